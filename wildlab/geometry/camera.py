@@ -1,0 +1,209 @@
+"""The camera: pinhole with skew and Brown distortion, both ways.
+
+A camera takes a point in c to a pixel: normalise (divide by z), distort, scale and shift (H 5.6, F 2.20).
+Distortion follows OpenCV's model and order ``k1, k2, p1, p2, k3``, which is F (2.16) with F's
+``k1, k2, k4, k3, k5``. Written in numpy rather than handed to ``cv2.projectPoints`` because OpenCV has no
+skew and takes one pose per call; OpenCV is the oracle in the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.geometry.frames import Array
+
+NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Intrinsic parameters, all in pixels but for the distortion, which has no unit.
+
+    ``distortion`` is ``(k1, k2, p1, p2, k3)``. Pixel (0, 0) is the centre of the upper left pixel or its
+    corner, as the calibration had it: the difference of half a pixel is inside ``cx`` and ``cy``.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    skew: float = 0.0
+    distortion: tuple[float, float, float, float, float] = NO_DISTORTION
+
+    @property
+    def matrix(self) -> Array:
+        """The intrinsic matrix ``A`` (3, 3), H (2.1), with the skew of F (2.15)."""
+        return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def distorts(self) -> bool:
+        """Whether any distortion coefficient differs from zero."""
+        return any(self.distortion)
+
+
+def camera_from_data_sheet(
+    width: int, height: int, focal_length: float, sensor_width: float, sensor_height: float
+) -> Camera:
+    """The theoretical camera of H (2.2): lengths in metres, principal point in the middle of the image."""
+    return Camera(
+        width,
+        height,
+        width / sensor_width * focal_length,
+        height / sensor_height * focal_length,
+        width / 2,
+        height / 2,
+    )
+
+
+def camera_from_matrix(
+    matrix: ArrayLike,
+    width: int,
+    height: int,
+    distortion: tuple[float, float, float, float, float] = NO_DISTORTION,
+) -> Camera:
+    """A camera from a calibrated intrinsic matrix (3, 3), for instance OpenCV's."""
+    A = np.asarray(matrix, float)
+    return Camera(width, height, A[0, 0], A[1, 1], A[0, 2], A[1, 2], A[0, 1], distortion)
+
+
+def distort(xy: ArrayLike, distortion: ArrayLike) -> Array:
+    """Distorted normalised coordinates of ideal ones, F (2.16). (N, 2) -> (N, 2)."""
+    k1, k2, p1, p2, k3 = np.asarray(distortion, float)
+    x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return np.stack(
+        [
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        ],
+        axis=-1,
+    )
+
+
+def distortion_jacobian(xy: ArrayLike, distortion: ArrayLike) -> Array:
+    """Derivative of :func:`distort` with respect to the ideal coordinates. (N, 2) -> (N, 2, 2)."""
+    k1, k2, p1, p2, k3 = np.asarray(distortion, float)
+    x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3))  # d radial / d r2, times two
+    J = np.empty((*x.shape, 2, 2))
+    J[..., 0, 0] = radial + slope * x * x + 2 * p1 * y + 6 * p2 * x
+    J[..., 0, 1] = J[..., 1, 0] = slope * x * y + 2 * p1 * x + 2 * p2 * y
+    J[..., 1, 1] = radial + slope * y * y + 6 * p1 * y + 2 * p2 * x
+    return J
+
+
+def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float = 1e-13) -> Array:
+    """Ideal normalised coordinates of distorted ones: the exact inverse of :func:`distort`, by Newton's method.
+
+    OpenCV's fixed-point iteration converges slowly or not at all where the distortion is strong; Newton's
+    needs three to five steps. A polynomial folds back on itself at some radius: a point that no ideal point
+    inside the fold maps to becomes NaN.
+
+    Parameters
+    ----------
+    xy_distorted
+        (N, 2), no unit.
+    distortion
+        ``(k1, k2, p1, p2, k3)``.
+    tolerance
+        Largest remaining difference in distorted coordinates.
+
+    Returns
+    -------
+    (N, 2).
+    """
+    target = np.asarray(xy_distorted, float)
+    xy = target.copy()
+    for _ in range(50):
+        miss = distort(xy, distortion) - target
+        if not np.any(np.abs(miss) > tolerance):
+            break
+        J = distortion_jacobian(xy, distortion)
+        determinant = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            step = np.stack(
+                [
+                    J[..., 1, 1] * miss[..., 0] - J[..., 0, 1] * miss[..., 1],
+                    J[..., 0, 0] * miss[..., 1] - J[..., 1, 0] * miss[..., 0],
+                ],
+                axis=-1,
+            )
+            step /= determinant[..., None]
+            # A long step would leap over the fold of the polynomial.
+            length = np.linalg.norm(step, axis=-1, keepdims=True)
+            xy = xy - step * np.minimum(1.0, 0.3 / length, where=length > 0, out=np.ones_like(length))
+    with np.errstate(invalid="ignore", over="ignore"):
+        J = distortion_jacobian(xy, distortion)
+        one_to_one = (J[..., 0, 0] * J[..., 1, 1] > J[..., 0, 1] * J[..., 1, 0]) & (J[..., 0, 0] > 0)
+        solved = np.abs(distort(xy, distortion) - target).max(axis=-1) <= np.maximum(tolerance, 1e-12)
+    xy[~(one_to_one & solved)] = np.nan
+    return xy
+
+
+def undistort_approximately(xy_distorted: ArrayLike, k1: float) -> Array:
+    """F's approximate inverse (2.19) of the one-parameter model (2.18). (N, 2) -> (N, 2).
+
+    Good for a narrow field of view only; :func:`undistort` with ``(k1, 0, 0, 0, 0)`` is the exact one.
+    """
+    xy = np.asarray(xy_distorted, float)
+    r2 = np.sum(xy * xy, axis=-1, keepdims=True)
+    return np.asarray(xy / (1 + k1 * r2 / (1 + k1 * r2)))
+
+
+def normalise(camera: Camera, uv: ArrayLike) -> Array:
+    """Ideal normalised coordinates ``x/z, y/z`` in c of pixels. (N, 2) pixels -> (N, 2); F (2.21), exact."""
+    u, v = np.moveaxis(np.asarray(uv, float), -1, 0)
+    y = (v - camera.cy) / camera.fy
+    x = (u - camera.cx - camera.skew * y) / camera.fx
+    xy = np.stack([x, y], axis=-1)
+    return undistort(xy, camera.distortion) if camera.distorts else xy
+
+
+def normalise_jacobian(camera: Camera, xy: ArrayLike) -> Array:
+    """Derivative of :func:`normalise` with respect to the pixel, at ideal coordinates ``xy`` (N, 2).
+
+    Returns (N, 2, 2), per pixel.
+    """
+    xy = np.asarray(xy, float)
+    scale = camera.matrix[:2, :2]
+    if not camera.distorts:
+        return np.broadcast_to(np.linalg.inv(scale), (*xy.shape, 2)).copy()
+    J = scale @ distortion_jacobian(xy, camera.distortion)
+    lost = ~np.isfinite(J).all(axis=(-1, -2))
+    J[lost] = np.eye(2)
+    inverse = np.linalg.inv(J)
+    inverse[lost] = np.nan
+    return np.asarray(inverse)
+
+
+def project(camera: Camera, p_c: ArrayLike) -> Array:
+    """Pixels of points in c. (N, 3) metres -> (N, 2) pixels; H (5.6), F (2.20).
+
+    Points in or behind the plane of the lens are NaN. Pixels may lie outside the image.
+    """
+    p = np.asarray(p_c, float)
+    z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
+    xy = p[..., :2] / z[..., None]
+    if camera.distorts:
+        xy = distort(xy, camera.distortion)
+    return np.stack(
+        [camera.fx * xy[..., 0] + camera.skew * xy[..., 1] + camera.cx, camera.fy * xy[..., 1] + camera.cy],
+        axis=-1,
+    )
+
+
+def in_image(camera: Camera, uv: ArrayLike, border: float = 0.0) -> np.ndarray:
+    """Which pixels lie inside the image, at least ``border`` pixels from its edge. (N, 2) -> (N,) bool."""
+    u, v = np.moveaxis(np.asarray(uv, float), -1, 0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            (u >= border) & (u <= camera.width - border) & (v >= border) & (v <= camera.height - border)
+        )

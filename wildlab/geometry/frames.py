@@ -1,0 +1,140 @@
+"""Earth frames and rotations.
+
+Positions on the Earth go through pymap3d (exact, ellipsoidal); rotations through scipy. The conventions are
+those of H 5.2: Euler angles in zyx order (H 5.10), quaternions scalar first, Hamilton, from b to n (H 7.13).
+
+The print of H (5.10) has two slips in its first row; it is the standard zyx matrix
+``R_z(yaw) R_y(pitch) R_x(roll)`` that is meant, and that is what stands here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pymap3d
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+Origin = tuple[float, float, float]
+
+#: Exchanges north-east-down and east-north-up; its own inverse (F 2.4).
+R_NED_ENU: Array = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+def euler_to_matrix(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """``R_nb`` of zyx Euler angles, H (5.10).
+
+    Parameters
+    ----------
+    roll, pitch, yaw
+        Radians, scalars or (N,), broadcast against each other.
+
+    Returns
+    -------
+    (N, 3, 3), or (3, 3) where all three are scalars.
+    """
+    angles = np.stack(np.broadcast_arrays(yaw, pitch, roll), axis=-1).astype(float)
+    return np.asarray(Rotation.from_euler("ZYX", angles).as_matrix())
+
+
+def matrix_to_euler(R_nb: ArrayLike) -> Array:
+    """Roll, pitch, yaw (radians) of rotation matrices, the inverse of :func:`euler_to_matrix`.
+
+    (N, 3, 3) -> (N, 3), or (3, 3) -> (3,). Written out rather than asked of scipy: at a pitch of +-90 deg,
+    where roll and yaw cannot be told apart, roll is set to zero without a warning.
+    """
+    R = np.asarray(R_nb, float)
+    pitch = np.arcsin(np.clip(-R[..., 2, 0], -1.0, 1.0))
+    vertical = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 1e-12
+    roll = np.where(vertical, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(vertical, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    return np.stack([roll, pitch, yaw], axis=-1)
+
+
+def quaternion_to_matrix(q_nb: ArrayLike) -> Array:
+    """``R_nb`` of unit quaternions (w, x, y, z), H (7.13). (N, 4) -> (N, 3, 3), or (4,) -> (3, 3).
+
+    The quaternions are normalised; a zero quaternion raises ``ValueError``. Rows with NaN give NaN.
+    """
+    q = np.asarray(q_nb, float)
+    rows = np.atleast_2d(q)
+    whole = np.isfinite(rows).all(axis=1)
+    R = np.full((len(rows), 3, 3), np.nan)
+    if whole.any():
+        R[whole] = Rotation.from_quat(rows[whole], scalar_first=True).as_matrix()
+    return R.reshape(*q.shape[:-1], 3, 3)
+
+
+def matrix_to_quaternion(R_nb: ArrayLike) -> Array:
+    """Unit quaternions (w, x, y, z) with ``w >= 0``. (N, 3, 3) -> (N, 4), or (3, 3) -> (4,)."""
+    return np.asarray(Rotation.from_matrix(R_nb).as_quat(canonical=True, scalar_first=True))
+
+
+def rotation_vector_to_matrix(rotation: ArrayLike) -> Array:
+    """The exponential map: rotation vectors (radians) -> matrices. (N, 3) -> (N, 3, 3)."""
+    return np.asarray(Rotation.from_rotvec(rotation).as_matrix())
+
+
+def matrix_to_rotation_vector(R: ArrayLike) -> Array:
+    """The logarithm: matrices -> rotation vectors (radians). (N, 3, 3) -> (N, 3)."""
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+
+
+def skew(vector: ArrayLike) -> Array:
+    """``S(a)`` with ``S(a) b = a x b``, H (5.1). (N, 3) -> (N, 3, 3), or (3,) -> (3, 3)."""
+    a = np.asarray(vector, float)
+    S = np.zeros((*a.shape, 3))
+    S[..., 0, 1], S[..., 0, 2] = -a[..., 2], a[..., 1]
+    S[..., 1, 0], S[..., 1, 2] = a[..., 2], -a[..., 0]
+    S[..., 2, 0], S[..., 2, 1] = -a[..., 1], a[..., 0]
+    return S
+
+
+def geodetic_to_ned(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike, origin: Origin) -> Array:
+    """Positions in n from WGS84 coordinates.
+
+    Parameters
+    ----------
+    latitude, longitude
+        Radians, (N,) or scalars.
+    height
+        Metres above the ellipsoid.
+    origin
+        Latitude, longitude (radians) and ellipsoidal height (metres) of the origin of n.
+
+    Returns
+    -------
+    (N, 3) or (3,): north, east, down in metres, exact (not a projection).
+    """
+    ned = pymap3d.geodetic2ned(
+        *(np.asarray(a, float) for a in (latitude, longitude, height)), *origin, deg=False
+    )
+    return np.stack(ned, axis=-1).astype(float)
+
+
+def ned_to_geodetic(p_n: ArrayLike, origin: Origin) -> Array:
+    """The inverse of :func:`geodetic_to_ned`: (N, 3) -> (N, 3) latitude, longitude (radians), height (m)."""
+    p = np.asarray(p_n, float)
+    llh = pymap3d.ned2geodetic(p[..., 0], p[..., 1], p[..., 2], *origin, deg=False)
+    return np.stack(llh, axis=-1).astype(float)
+
+
+def geodetic_to_ecef(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Array:
+    """ECEF positions (metres) of WGS84 coordinates in radians and metres. (N,) each -> (N, 3)."""
+    xyz = pymap3d.geodetic2ecef(*(np.asarray(a, float) for a in (latitude, longitude, height)), deg=False)
+    return np.stack(xyz, axis=-1).astype(float)
+
+
+def ecef_to_geodetic(p_e: ArrayLike) -> Array:
+    """The inverse of :func:`geodetic_to_ecef`: (N, 3) -> (N, 3) latitude, longitude (radians), height (m)."""
+    p = np.asarray(p_e, float)
+    llh = pymap3d.ecef2geodetic(p[..., 0], p[..., 1], p[..., 2], deg=False)
+    return np.stack(llh, axis=-1).astype(float)
+
+
+def ned_to_enu(p_n: ArrayLike) -> Array:
+    """North-east-down <-> east-north-up, F (2.4); the same exchange both ways. (N, 3) -> (N, 3)."""
+    return np.asarray(p_n, float) @ R_NED_ENU
+
+
+enu_to_ned = ned_to_enu

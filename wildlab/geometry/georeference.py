@@ -1,0 +1,68 @@
+"""Pixel -> ground plane and ground -> pixel, one pose per pixel (H 5.13, 5.7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.geometry.camera import Camera, normalise, project
+from wildlab.geometry.frames import Array
+
+
+def pixel_rays(camera: Camera, uv: ArrayLike, R_nc: ArrayLike) -> Array:
+    """Directions in n in which pixels look, not normalised: depth 1 along the lens.
+
+    (N, 2) pixels and (N, 3, 3) or (3, 3) -> (N, 3).
+    """
+    xy = normalise(camera, uv)
+    R = np.asarray(R_nc, float)
+    return np.asarray(R[..., :, 0] * xy[..., :1] + R[..., :, 1] * xy[..., 1:] + R[..., :, 2])
+
+
+def pixel_to_plane(
+    camera: Camera, uv: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike, plane_down: ArrayLike
+) -> Array:
+    """Where the rays of pixels meet a horizontal plane: direct georeferencing, H (5.13).
+
+    Cutting the ray with the plane is the same as inverting the homography ``G_NE`` of H (5.14), and does
+    not need a plane through the origin.
+
+    Parameters
+    ----------
+    uv
+        (N, 2) pixels.
+    p_nc, R_nc
+        Pose of the camera: (N, 3) metres and (N, 3, 3), or one pose for all.
+    plane_down
+        Down coordinate of the plane in n, metres, scalar or (N,).
+
+    Returns
+    -------
+    (N, 3) metres. Rows are NaN where the ray does not meet the plane in front of the camera: at or above
+    the horizon, or a camera below the plane.
+    """
+    return intersect_plane(pixel_rays(camera, uv, R_nc), p_nc, plane_down)
+
+
+def intersect_plane(rays: ArrayLike, p_nc: ArrayLike, plane_down: ArrayLike) -> Array:
+    """Where rays (N, 3) from ``p_nc`` (N, 3) meet the plane at ``plane_down``; misses are NaN."""
+    d, p = np.asarray(rays, float), np.asarray(p_nc, float)
+    drop = plane_down - p[..., 2]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        distance = np.where((d[..., 2] > 0) & (drop > 0), drop / d[..., 2], np.nan)
+        ground = p + distance[..., None] * d
+    ground[..., 2] = np.where(np.isnan(distance), np.nan, plane_down)
+    return np.asarray(ground)
+
+
+def ground_to_pixel(camera: Camera, p_nt: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike) -> Array:
+    """Pixels at which points in n appear, H (5.7). (N, 3) -> (N, 2); behind the camera NaN.
+
+    The pixel may lie outside the image: see :func:`wildlab.geometry.camera.in_image`.
+    """
+    offset = np.asarray(p_nt, float) - np.asarray(p_nc, float)
+    R = np.asarray(R_nc, float)
+    p_c = (
+        R[..., 0, :] * offset[..., 0:1] + R[..., 1, :] * offset[..., 1:2] + R[..., 2, :] * offset[..., 2:3]
+    )  # R transposed times the offset
+    return project(camera, p_c)
