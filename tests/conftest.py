@@ -12,18 +12,18 @@ from hypothesis import HealthCheck, settings
 #: Set by nearly every CI service; "false", "0" and "" count as not set.
 IN_CI = os.environ.get("CI", "").lower() not in ("", "0", "false")
 
-# No deadline anywhere: the first call of a compiled function takes seconds, and a busy machine is not a fault.
+# No deadline anywhere: the first call of a compiled function takes seconds, and a busy machine is no fault.
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", parent=settings.get_profile("here"), derandomize=True, print_blob=True)
 settings.load_profile("ci" if IN_CI else "here")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--run-slow", action="store_true", help="also run tests marked slow (CI=true does so too)")
+    parser.addoption("--run-slow", action="store_true", help="also run tests marked slow (so does CI=true)")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave slow tests out, unless CI, ``--run-slow``, a ``-m`` expression or a test named by ``::`` asks for them."""
+    """Leave slow tests out, unless CI, ``--run-slow``, ``-m`` or a test named by ``::`` asks for them."""
     named = any("::" in argument for argument in config.args)
     if IN_CI or named or config.getoption("--run-slow") or config.getoption("markexpr"):
         return
@@ -46,12 +46,13 @@ def find_shared_data(*parts: str) -> Path | None:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Callable[..., Path]:
-    """A function ``shared_data("georeferencing", "openathena")`` giving a path; the test is skipped without it."""
+    """``shared_data("georeferencing", "openathena")`` gives the path, or skips the test where it is absent."""
 
     def find(*parts: str) -> Path:
         path = find_shared_data(*parts)
         if path is None:
-            pytest.skip(f"needs the data set {'/'.join(parts)}: set WILDLAB_TEST_DATA to the folder that holds it")
+            name = "/".join(parts)
+            pytest.skip(f"needs the data set {name}: set WILDLAB_TEST_DATA to the folder that holds it")
         return path
 
     return find
