@@ -101,11 +101,11 @@ def distortion_jacobian(xy: ArrayLike, distortion: ArrayLike) -> Array:
 
 
 def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float = 1e-13) -> Array:
-    """Ideal normalised coordinates of distorted ones: the exact inverse of :func:`distort`, by Newton's method.
+    """Ideal normalised coordinates of distorted ones: the exact inverse of :func:`distort`.
 
-    OpenCV's fixed-point iteration converges slowly or not at all where the distortion is strong; Newton's
-    needs three to five steps. A polynomial folds back on itself at some radius: a point that no ideal point
-    inside the fold maps to becomes NaN.
+    By Newton's method. OpenCV's fixed-point iteration converges slowly or not at all where the distortion is
+    strong; Newton's needs three to five steps. A polynomial folds back on itself at some radius: a point that
+    no ideal point inside the fold maps to becomes NaN.
 
     Parameters
     ----------

@@ -36,8 +36,8 @@ def geodetic_to_enu_linear(latitude: ArrayLike, longitude: ArrayLike, origin: tu
 
     The print multiplies the row ``(k_phi k_lambda)`` with the column of differences and so adds metres east
     to metres north; what is meant is one factor per axis, east from longitude and north from latitude. The
-    last term of ``k_lambda`` is printed with a minus; the usual series has a plus there, a difference of 0.24 m
-    per degree at most.
+    last term of ``k_lambda`` is printed with a minus; the usual series has a plus there, a difference of
+    0.24 m per degree at most.
 
     Parameters
     ----------

@@ -67,17 +67,19 @@ def quaternion_to_matrix(q_nb: ArrayLike) -> Array:
 
 def matrix_to_quaternion(R_nb: ArrayLike) -> Array:
     """Unit quaternions (w, x, y, z) with ``w >= 0``. (N, 3, 3) -> (N, 4), or (3, 3) -> (4,)."""
-    return np.asarray(Rotation.from_matrix(R_nb).as_quat(canonical=True, scalar_first=True))
+    return np.asarray(
+        Rotation.from_matrix(np.asarray(R_nb, float)).as_quat(canonical=True, scalar_first=True)
+    )
 
 
 def rotation_vector_to_matrix(rotation: ArrayLike) -> Array:
     """The exponential map: rotation vectors (radians) -> matrices. (N, 3) -> (N, 3, 3)."""
-    return np.asarray(Rotation.from_rotvec(rotation).as_matrix())
+    return np.asarray(Rotation.from_rotvec(np.asarray(rotation, float)).as_matrix())
 
 
 def matrix_to_rotation_vector(R: ArrayLike) -> Array:
     """The logarithm: matrices -> rotation vectors (radians). (N, 3, 3) -> (N, 3)."""
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+    return np.asarray(Rotation.from_matrix(np.asarray(R, float)).as_rotvec())
 
 
 def skew(vector: ArrayLike) -> Array:
@@ -106,9 +108,8 @@ def geodetic_to_ned(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike
     -------
     (N, 3) or (3,): north, east, down in metres, exact (not a projection).
     """
-    ned = pymap3d.geodetic2ned(
-        *(np.asarray(a, float) for a in (latitude, longitude, height)), *origin, deg=False
-    )
+    lat, lon, h = (np.asarray(a, float) for a in (latitude, longitude, height))
+    ned = pymap3d.geodetic2ned(lat, lon, h, *origin, deg=False)
     return np.stack(ned, axis=-1).astype(float)
 
 
@@ -121,7 +122,8 @@ def ned_to_geodetic(p_n: ArrayLike, origin: Origin) -> Array:
 
 def geodetic_to_ecef(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Array:
     """ECEF positions (metres) of WGS84 coordinates in radians and metres. (N,) each -> (N, 3)."""
-    xyz = pymap3d.geodetic2ecef(*(np.asarray(a, float) for a in (latitude, longitude, height)), deg=False)
+    lat, lon, h = (np.asarray(a, float) for a in (latitude, longitude, height))
+    xyz = pymap3d.geodetic2ecef(lat, lon, h, deg=False)
     return np.stack(xyz, axis=-1).astype(float)
 
 

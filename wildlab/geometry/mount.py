@@ -47,8 +47,8 @@ class Mount:
 def helgesen_misalignment(roll: float, tilt: float, pan: float) -> tuple[float, float, float]:
     """The misalignment angles as H 5.6.1 prints them, in the right-handed sense of :class:`Mount`.
 
-    H does not print how the three angles are combined. Tables 5.1-5.3 decide: they come out (all 42 numbers
-    to better than 0.15 m) when roll and pan count positive the other way round, as in axes with y to the left.
+    H does not print how the three angles are combined. Tables 5.1-5.3 decide: all 42 numbers come out
+    to better than 0.15 m when roll and pan count positive the other way round, as in axes with y to the left.
     """
     return -roll, tilt, -pan
 

@@ -1,0 +1,90 @@
+"""How far a wrong pose moves a georeferenced point: the analysis of H 5.3.1."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
+
+#: The calibrated FLIR Tau 2 of H (2.3).
+TAU2 = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
+#: Mounting misalignment of H 5.6.1: roll, tilt, pan as printed, degrees.
+PRINTED_MISALIGNMENT_DEG = (-1.7, 3.9, 1.9)
+#: Where the object stands in the image: its middle (H 5.3.1), not the principal point.
+IMAGE_CENTRE = (320.0, 256.0)
+
+#: Roll, pitch, yaw (degrees) of the three cases, tables 5.1, 5.2, 5.3.
+ATTITUDES_DEG = {"level": (0.0, 0.0, 0.0), "turn": (25.0, 0.0, 0.0), "ascent": (0.0, 20.0, 0.0)}
+ALTITUDES_M = (100.0, 400.0)
+#: Roll, pitch, yaw (degrees) and north, east, down (metres) of the seven offsets.
+OFFSETS = {
+    "roll": (3.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "pitch": (0.0, 3.0, 0.0, 0.0, 0.0, 0.0),
+    "yaw": (0.0, 0.0, 3.0, 0.0, 0.0, 0.0),
+    "north": (0.0, 0.0, 0.0, 10.0, 0.0, 0.0),
+    "east": (0.0, 0.0, 0.0, 0.0, 10.0, 0.0),
+    "down": (0.0, 0.0, 0.0, 0.0, 0.0, 10.0),
+    "roll+pitch": (3.0, 3.0, 0.0, 0.0, 0.0, 0.0),
+}
+
+
+def helgesen_mount() -> Mount:
+    """The mount of H 5.6.1: camera straight down with the printed misalignment."""
+    return Mount(looks="down", misalignment=helgesen_misalignment(*np.radians(PRINTED_MISALIGNMENT_DEG)))
+
+
+def displacement(
+    camera: Camera,
+    mount: Mount,
+    uv: ArrayLike,
+    euler: ArrayLike,
+    p_nb: ArrayLike,
+    euler_offset: ArrayLike,
+    position_offset: ArrayLike,
+    plane_down: float = 0.0,
+) -> Array:
+    """Shift (N, 2), north-east in metres, of the ground point when the pose is wrong by the offsets.
+
+    Parameters
+    ----------
+    uv
+        (N, 2) or (2,) pixels.
+    euler, p_nb
+        True roll, pitch, yaw (radians) and position of the airframe: (N, 3) or (3,).
+    euler_offset, position_offset
+        What is added to them: (N, 3) or (3,).
+    """
+    uv, euler, p_nb = (np.atleast_2d(np.asarray(a, float)) for a in (uv, euler, p_nb))
+
+    def ground(angles: Array, position: Array) -> Array:
+        R_nb = euler_to_matrix(*np.atleast_2d(angles).T)
+        return pixel_to_plane(camera, uv, *camera_pose(mount, position, R_nb), plane_down)[:, :2]
+
+    wrong = ground(euler + np.asarray(euler_offset, float), p_nb + np.asarray(position_offset, float))
+    return np.asarray(wrong - ground(euler, p_nb))
+
+
+def helgesen_tables(
+    camera: Camera = TAU2, mount: Mount | None = None, uv: tuple[float, float] = IMAGE_CENTRE
+) -> dict[str, float]:
+    """The 42 numbers of H tables 5.1-5.3: horizontal error (metres) by ``attitude/offset/altitude``."""
+    mount = helgesen_mount() if mount is None else mount
+    table = {}
+    for attitude, euler_deg in ATTITUDES_DEG.items():
+        for altitude in ALTITUDES_M:
+            for name, offset in OFFSETS.items():
+                shift = displacement(
+                    camera,
+                    mount,
+                    uv,
+                    np.radians(euler_deg),
+                    (0.0, 0.0, -altitude),
+                    np.radians(offset[:3]),
+                    offset[3:],
+                )
+                table[f"{attitude}/{name}/{altitude:.0f}m"] = float(np.hypot(*shift[0]))
+    return table
