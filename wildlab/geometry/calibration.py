@@ -1,0 +1,247 @@
+"""Boresight, lens position and camera clock from known points in the flight's own images (H 5.3.2).
+
+H (5.15)-(5.17) finds three misalignment angles that bring georeferenced points onto known ones, by nonlinear
+least squares. Here the residuals may be weighted with each point's ground covariance, a robust loss keeps a
+wrong click from deciding, and the estimate comes with a covariance that knows that clicks of one image share
+the image's pose error. What the data cannot tell apart is named and left alone, not fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose
+
+#: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
+#: with the size an error of it would usually have (radians, seconds, metres). A parameter, or a combination,
+#: that the data determine no better than that is not worth fitting.
+PARAMETERS: dict[str, float] = {
+    "roll": np.radians(3.0),
+    "tilt": np.radians(3.0),
+    "pan": np.radians(3.0),
+    "clock": 0.5,
+    "down": 5.0,
+    "north": 5.0,
+    "east": 5.0,
+}
+BORESIGHT = ("roll", "tilt", "pan")
+
+#: Poses of the airframe at the images' times shifted by so many seconds: ``p_nb`` (N, 3), ``R_nb`` (N, 3, 3).
+PosesAt = Callable[[float], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An estimate of some of :data:`PARAMETERS`.
+
+    Attributes
+    ----------
+    names
+        The parameters estimated.
+    values
+        Corrections (P,), radians, seconds, metres: angles turn the camera's base on the airframe, ``clock``
+        is to be added to the camera's stamps, ``north``/``east``/``down`` to the logged position.
+    covariance
+        (P, P); clicks of one image count as one draw of the image's error.
+    undetermined
+        Asked for and not estimated, with the parameters each could not be told apart from (none: it has no
+        effect that shows).
+    n_points, n_images
+        What it rests on.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    undetermined: dict[str, tuple[str, ...]]
+    n_points: int
+    n_images: int
+
+    def value(self, name: str) -> float:
+        """The correction called ``name``, zero where it was not estimated."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def sd(self, name: str) -> float:
+        """Its standard deviation; NaN where it was not estimated."""
+        if name not in self.names:
+            return float("nan")
+        i = self.names.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+
+def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:
+    """The mount with the estimated angles on top of its own misalignment."""
+    angles = [calibration.value(name) for name in BORESIGHT]
+    turned = euler_to_matrix(*angles) @ euler_to_matrix(*mount.misalignment)
+    roll, tilt, pan = matrix_to_euler(turned)
+    return replace(mount, misalignment=(float(roll), float(tilt), float(pan)))
+
+
+def georeference_calibrated(
+    calibration: Calibration,
+    camera: Camera,
+    mount: Mount,
+    uv: ArrayLike,
+    poses_at: PosesAt,
+    plane_down: ArrayLike,
+) -> Array:
+    """Ground points (N, 3) with a calibration applied to mount, position and clock."""
+    p_nb, R_nb = poses_at(calibration.value("clock"))
+    shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
+    pose = camera_pose(apply_calibration(calibration, mount), p_nb + shift, R_nb)
+    return pixel_to_plane(camera, uv, *pose, plane_down)
+
+
+def calibrate(
+    camera: Camera,
+    mount: Mount,
+    uv: ArrayLike,
+    poses_at: PosesAt,
+    known_points: ArrayLike,
+    image: Sequence[object] | np.ndarray,
+    estimate: Sequence[str] = BORESIGHT,
+    covariance: ArrayLike | None = None,
+) -> Calibration:
+    """Estimate what is constantly wrong with the camera's pose from points whose position is known.
+
+    Parameters
+    ----------
+    uv
+        (N, 2) pixels of the points.
+    poses_at
+        Gives the airframe's poses at the times of the N pixels, shifted by an offset in seconds.
+    known_points
+        (N, 3) metres in n; their down coordinate is the plane each pixel is cut with.
+    image
+        (N,) which image each pixel belongs to.
+    estimate
+        Names from :data:`PARAMETERS`.
+    covariance
+        (N, 2, 2) ground covariances to weight with; without them all points count alike, as in H (5.17).
+
+    Returns
+    -------
+    The estimate. Parameters that cannot be told apart are in ``undetermined``.
+
+    Raises
+    ------
+    ValueError
+        Unknown parameter, or no usable point.
+    """
+    unknown = set(estimate) - PARAMETERS.keys()
+    if unknown:
+        raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
+    uv, known = np.asarray(uv, float), np.asarray(known_points, float)
+    groups = np.unique(np.asarray(image), return_inverse=True)[1]
+    whiten = _whitening(covariance, len(uv))
+
+    def residuals(names: tuple[str, ...], scaled: Array) -> Array:
+        trial = _unscaled(names, scaled)
+        ground = georeference_calibrated(trial, camera, mount, uv, poses_at, known[:, 2])
+        return np.asarray(np.einsum("nij,nj->ni", whiten, ground[:, :2] - known[:, :2]))
+
+    wanted = tuple(name for name in PARAMETERS if name in estimate)
+    usable = np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1)
+    if usable.sum() < 2:
+        raise ValueError("fewer than two points have a pose and meet the ground: nothing to calibrate with")
+    start = residuals(wanted, np.zeros(len(wanted)))[usable]
+    noise = max(1.4826 * float(np.median(np.abs(start))), 1e-6)  # robust SD of one residual
+
+    def fit(names: tuple[str, ...]) -> tuple[Array, Array, Array]:
+        def flat(scaled: Array) -> Array:
+            # A trial that tips a ray over the horizon is far off; a large residual turns it back.
+            return np.nan_to_num(residuals(names, scaled)[usable], nan=1e3 * noise).ravel()
+
+        if not names:
+            return np.zeros(0), np.zeros((usable.sum() * 2, 0)), flat(np.zeros(0))
+        solution = least_squares(flat, np.zeros(len(names)), jac="3-point", loss="soft_l1", f_scale=noise)
+        step = 1e-5
+        J = np.stack(
+            [
+                (flat(solution.x + step * axis) - flat(solution.x - step * axis)) / (2 * step)
+                for axis in np.eye(len(names))
+            ],
+            axis=-1,
+        )
+        return solution.x, J, flat(solution.x)
+
+    names, undetermined = wanted, dict[str, tuple[str, ...]]()
+    while True:
+        scaled, J, r = fit(names)
+        blurred = _undetermined(names, J, noise)
+        if blurred is None:
+            break
+        name, partners = blurred
+        undetermined[name] = partners
+        names = tuple(other for other in names if other != name)
+    scale = np.array([PARAMETERS[name] for name in names])
+    spread = _clustered_covariance(J, r, np.repeat(groups[usable], 2), noise)
+    return Calibration(
+        names=names,
+        values=scaled * scale,
+        covariance=spread * np.outer(scale, scale),
+        undetermined=undetermined,
+        n_points=int(usable.sum()),
+        n_images=len(np.unique(groups[usable])),
+    )
+
+
+def split_images(image: Sequence[object] | np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Halves for cross-validation: for each point (N,) whether its image fell into the first half.
+
+    Whole images move together, for their points share one pose error.
+    """
+    labels, index = np.unique(np.asarray(image), return_inverse=True)
+    first = np.zeros(len(labels), bool)
+    first[rng.permutation(len(labels))[: (len(labels) + 1) // 2]] = True
+    return np.asarray(first[index])
+
+
+def _unscaled(names: tuple[str, ...], scaled: Array) -> Calibration:
+    values = scaled * np.array([PARAMETERS[name] for name in names])
+    return Calibration(names, values, np.zeros((len(names), len(names))), {}, 0, 0)
+
+
+def _whitening(covariance: ArrayLike | None, n: int) -> Array:
+    """(N, 2, 2) factors that give a residual unit covariance; identity without covariances."""
+    if covariance is None:
+        return np.broadcast_to(np.eye(2), (n, 2, 2))
+    C = np.array(covariance, float)
+    lost = ~np.isfinite(C).all(axis=(1, 2))
+    C[lost] = np.eye(2)
+    W = np.linalg.inv(np.linalg.cholesky(C))
+    W[lost] = np.nan
+    return W
+
+
+def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, tuple[str, ...]] | None:
+    """The parameter to give up, if any, with those it cannot be told apart from.
+
+    ``J`` is per usual size of each parameter, so a singular value below ``noise`` marks a direction that the
+    data determine no better than one already knew. The last parameter in rank with a say in it is given up.
+    """
+    if not names:
+        return None
+    _, singular, directions = np.linalg.svd(J, full_matrices=False)
+    if singular[-1] > noise:
+        return None
+    involved = [i for i in range(len(names)) if abs(directions[-1, i]) > 0.3]
+    return names[involved[-1]], tuple(names[i] for i in involved[:-1])
+
+
+def _clustered_covariance(J: Array, r: Array, groups: Array, noise: float) -> Array:
+    """Covariance (P, P) of the scaled estimate when residuals of one image go together (the sandwich)."""
+    weight = 1 / np.sqrt(1 + (r / noise) ** 2)  # soft_l1's pull, relative to least squares
+    bread = np.linalg.pinv(J.T @ (weight[:, None] * J))
+    labels = np.unique(groups)
+    scores = np.stack([J[groups == g].T @ (weight * r)[groups == g] for g in labels])
+    small_sample = len(labels) / max(len(labels) - 1, 1)
+    return np.asarray(bread @ (scores.T @ scores) @ bread * small_sample)
