@@ -1,0 +1,61 @@
+# The way in. `make` alone lists what there is; README.md says more.
+#
+# Every path here is relative, so that a checkout may lie in a folder with blanks in its name.
+
+.DEFAULT_GOAL := help
+.PHONY: help environment reports test test-all style strip lab lock bench doctor clean
+
+# How many notebooks or test processes at once.
+JOBS ?= 2
+# More arguments for the tool behind a target: make test ARGS="tests/geometry -k frames"
+ARGS ?=
+
+BIN := .venv/bin
+
+# Set by other software (ROS does), these would slip foreign packages and kernels into the environment.
+unexport PYTHONPATH PYTHONHOME JUPYTER_PATH
+export PYTHONNOUSERSITE := 1
+export JUPYTER_PREFER_ENV_PATH := 1
+export PYTHON LOCK_UPGRADE
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+
+environment: ## create or update .venv from environment.lock (the targets below do so themselves)
+	@sh tools/environment.sh
+
+reports: environment ## run every study that needs no download; writes reports/index.html
+	@status=0; $(BIN)/wildlab run --all --jobs $(JOBS) $(ARGS) || status=$$?; \
+	if [ -f reports/index.html ]; then printf '\nOpen this in a browser: %s\n' "$$(pwd)/reports/index.html"; fi; \
+	exit $$status
+
+test: environment ## run the tests (where CI=true: the slow ones too)
+	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+
+test-all: environment ## run all tests, the slow ones too
+	@CI=true $(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+
+style: environment ## ruff, mypy and the notebooks' state, as the tests check them
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+	@$(BIN)/python -m pytest -q tests/test_notebooks_stripped.py
+
+strip: environment ## take outputs and execution counts out of the notebooks
+	@$(BIN)/nbstripout notebooks/*.ipynb
+
+lab: environment ## open JupyterLab on the notebooks; git then strips outputs on commit
+	@! git rev-parse --git-dir >/dev/null 2>&1 || git config filter.nbstripout.clean '$(BIN)/nbstripout'
+	@$(BIN)/jupyter lab --notebook-dir=notebooks $(ARGS)
+
+lock: ## rewrite environment.lock from pyproject.toml, keeping versions (LOCK_UPGRADE=1 takes newer ones)
+	@sh tools/environment.sh lock
+
+bench: environment ## compare speed with other packages, as ratios
+	@$(BIN)/python -m benchmarks $(ARGS)
+
+doctor: environment ## what is wrong with this installation, and the fix
+	@$(BIN)/wildlab doctor
+
+clean: ## remove the environment and caches; reports stay
+	@rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build wildlab.egg-info
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
