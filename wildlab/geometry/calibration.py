@@ -33,6 +33,8 @@ PARAMETERS: dict[str, float] = {
     "east": 5.0,
 }
 BORESIGHT = ("roll", "tilt", "pan")
+#: Smallest singular value of the normalised derivatives: 0.1 is two columns with a correlation of 0.99.
+PARALLEL = 0.1
 
 #: Poses of the airframe at the images' times shifted by so many seconds: ``p_nb`` (N, 3), ``R_nb`` (N, 3, 3).
 PosesAt = Callable[[float], tuple[Array, Array]]
@@ -152,30 +154,39 @@ def calibrate(
     usable = np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1)
     if usable.sum() < 2:
         raise ValueError("fewer than two points have a pose and meet the ground: nothing to calibrate with")
-    start = residuals(wanted, np.zeros(len(wanted)))[usable]
-    noise = max(1.4826 * float(np.median(np.abs(start))), 1e-6)  # robust SD of one residual
 
-    def fit(names: tuple[str, ...]) -> tuple[Array, Array, Array]:
+    def spread(r: Array) -> float:
+        """Robust standard deviation of one residual."""
+        return max(1.4826 * float(np.median(np.abs(r))), 1e-6)
+
+    def fit(names: tuple[str, ...]) -> tuple[Array, Array, float]:
+        """Scaled estimate (P,), residuals (2N,) at it, and the spread of those."""
+
         def flat(scaled: Array) -> Array:
             # A trial that tips a ray over the horizon is far off; a large residual turns it back.
-            return np.nan_to_num(residuals(names, scaled)[usable], nan=1e3 * noise).ravel()
+            return np.nan_to_num(residuals(names, scaled)[usable], nan=1e6).ravel()
 
-        if not names:
-            return np.zeros(0), np.zeros((usable.sum() * 2, 0)), flat(np.zeros(0))
-        solution = least_squares(flat, np.zeros(len(names)), jac="3-point", loss="soft_l1", f_scale=noise)
-        step = 1e-5
-        J = np.stack(
-            [
-                (flat(solution.x + step * axis) - flat(solution.x - step * axis)) / (2 * step)
-                for axis in np.eye(len(names))
-            ],
-            axis=-1,
-        )
-        return solution.x, J, flat(solution.x)
+        scaled, r = np.zeros(len(names)), flat(np.zeros(len(names)))
+        if names:
+            # What counts as far out is only known once the constant errors are taken off: hence three rounds.
+            for _ in range(3):
+                solution = least_squares(flat, scaled, jac="3-point", loss="soft_l1", f_scale=spread(r))
+                scaled, r = solution.x, flat(solution.x)
+        return scaled, r, spread(r)
+
+    def derivative(names: tuple[str, ...], scaled: Array, step: float = 1e-5) -> Array:
+        """Derivative (2N, P) of the residuals by central differences."""
+        columns = [
+            (residuals(names, scaled + step * axis) - residuals(names, scaled - step * axis))[usable].ravel()
+            / (2 * step)
+            for axis in np.eye(len(names))
+        ]
+        return np.stack(columns, axis=-1) if columns else np.zeros((2 * int(usable.sum()), 0))
 
     names, undetermined = wanted, dict[str, tuple[str, ...]]()
     while True:
-        scaled, J, r = fit(names)
+        scaled, r, noise = fit(names)
+        J = derivative(names, scaled)
         blurred = _undetermined(names, J, noise)
         if blurred is None:
             break
@@ -183,11 +194,11 @@ def calibrate(
         undetermined[name] = partners
         names = tuple(other for other in names if other != name)
     scale = np.array([PARAMETERS[name] for name in names])
-    spread = _clustered_covariance(J, r, np.repeat(groups[usable], 2), noise)
+    clustered = _clustered_covariance(J, r, np.repeat(groups[usable], 2), noise)
     return Calibration(
         names=names,
         values=scaled * scale,
-        covariance=spread * np.outer(scale, scale),
+        covariance=clustered * np.outer(scale, scale),
         undetermined=undetermined,
         n_points=int(usable.sum()),
         n_images=len(np.unique(groups[usable])),
@@ -225,23 +236,32 @@ def _whitening(covariance: ArrayLike | None, n: int) -> Array:
 def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, tuple[str, ...]] | None:
     """The parameter to give up, if any, with those it cannot be told apart from.
 
-    ``J`` is per usual size of each parameter, so a singular value below ``noise`` marks a direction that the
-    data determine no better than one already knew. The last parameter in rank with a say in it is given up.
+    ``J`` (2N, P) is per usual size of each parameter. A direction is lost when the data determine it no
+    better than one already knew, or when columns are so nearly parallel (correlation beyond 0.99) that only the
+    curvature of the projection keeps them apart. The last parameter in rank with a say in it is given up.
     """
     if not names:
         return None
+    length = np.linalg.norm(J, axis=0)
     _, singular, directions = np.linalg.svd(J, full_matrices=False)
     if singular[-1] > noise:
-        return None
+        _, parallel, directions = np.linalg.svd(J / length, full_matrices=False)
+        if parallel[-1] > PARALLEL:
+            return None
     involved = [i for i in range(len(names)) if abs(directions[-1, i]) > 0.3]
     return names[involved[-1]], tuple(names[i] for i in involved[:-1])
 
 
 def _clustered_covariance(J: Array, r: Array, groups: Array, noise: float) -> Array:
-    """Covariance (P, P) of the scaled estimate when residuals of one image go together (the sandwich)."""
-    weight = 1 / np.sqrt(1 + (r / noise) ** 2)  # soft_l1's pull, relative to least squares
-    bread = np.linalg.pinv(J.T @ (weight[:, None] * J))
+    """Covariance (P, P) of the scaled estimate when residuals of one image go together (the sandwich).
+
+    The loss is soft_l1: its slope at ``r`` is ``r / sqrt(1 + z)`` and its curvature ``(1 + z) ** -1.5`` with
+    ``z = (r / noise) ** 2``.
+    """
+    z = (r / noise) ** 2
+    slope, curvature = r / np.sqrt(1 + z), (1 + z) ** -1.5
+    bread = np.linalg.pinv(J.T @ (curvature[:, None] * J))
     labels = np.unique(groups)
-    scores = np.stack([J[groups == g].T @ (weight * r)[groups == g] for g in labels])
+    scores = np.stack([J[groups == g].T @ slope[groups == g] for g in labels])
     small_sample = len(labels) / max(len(labels) - 1, 1)
     return np.asarray(bread @ (scores.T @ scores) @ bread * small_sample)

@@ -44,8 +44,9 @@ def matrix_to_euler(R_nb: ArrayLike) -> Array:
     where roll and yaw cannot be told apart, roll is set to zero without a warning.
     """
     R = np.asarray(R_nb, float)
-    pitch = np.arcsin(np.clip(-R[..., 2, 0], -1.0, 1.0))
-    vertical = np.hypot(R[..., 0, 0], R[..., 1, 0]) < 1e-12
+    level = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    pitch = np.arctan2(-R[..., 2, 0], level)  # keeps its digits near the vertical, where arcsin loses half
+    vertical = level < 1e-12
     roll = np.where(vertical, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
     yaw = np.where(vertical, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
     return np.stack([roll, pitch, yaw], axis=-1)

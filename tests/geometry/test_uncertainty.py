@@ -1,0 +1,154 @@
+"""Ground covariances: derivatives against finite differences, coverage against Monte Carlo."""
+
+import numpy as np
+import pytest
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
+from wildlab.geometry.georeference import intersect_plane, pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose, camera_rotation, mount_rotation
+from wildlab.geometry.sensitivity import TAU2
+from wildlab.geometry.uncertainty import (
+    PoseErrors,
+    ellipse_axes,
+    ground_covariance,
+    ground_jacobians,
+    inside_ellipse,
+    ray_flatness,
+    sample_ground,
+)
+
+BENT = Camera(640, 512, 700.0, 705.0, 322.0, 250.0, 1.5, (-0.1, 0.05, 0.001, -0.002, 0.0))
+ZERO = np.zeros(3)
+TURNED = Mount("down", pan=0.3, tilt=-0.2, misalignment=(0.03, -0.05, 0.02), lever_arm=(0.4, -0.1, 0.2))
+
+
+def errors(attitude_deg: float, pixel=2.0, position=1.0, mount_deg=0.0, plane=1.0) -> PoseErrors:
+    s = np.radians(attitude_deg)
+    return PoseErrors(
+        pixel=np.eye(2) * pixel**2,
+        pose=np.diag([position**2] * 3 + [s * s] * 3),
+        mount=np.eye(3) * np.radians(mount_deg) ** 2,
+        plane=plane**2,
+    )
+
+
+def test_derivatives_against_finite_differences():
+    rng = np.random.default_rng(3)
+    n = 40
+    uv = rng.uniform([0, 0], [640, 512], (n, 2))
+    p = rng.uniform([-50, -50, -300], [50, 50, -60], (n, 3))
+    R = euler_to_matrix(*rng.uniform([-0.4, -0.4, -3], [0.4, 0.4, 3], (n, 3)).T)
+    plane = rng.uniform(-5, 5, n)
+
+    def ground(pixel=ZERO[:2], position=ZERO, attitude=ZERO, mount=ZERO, height=0.0):
+        turned = R @ rotation_vector_to_matrix(attitude)
+        R_bm = mount_rotation(TURNED)
+        R_mc = R_bm.T @ camera_rotation(TURNED)
+        R_nc = turned @ R_bm @ rotation_vector_to_matrix(mount) @ R_mc
+        foot = p + position + turned @ np.array(TURNED.lever_arm)
+        return pixel_to_plane(BENT, uv + pixel, foot, R_nc, plane + height)[:, :2]
+
+    def numeric(name: str, size: int, h: float):
+        if size == 1:
+            return (ground(**{name: h}) - ground(**{name: -h})) / (2 * h)
+        return np.stack(
+            [(ground(**{name: h * e}) - ground(**{name: -h * e})) / (2 * h) for e in np.eye(size)], -1
+        )
+
+    J = ground_jacobians(BENT, TURNED, uv, p, R, plane)
+    scale = np.abs(J.pose[..., 3:]).max()
+    assert np.allclose(J.pixel, numeric("pixel", 2, 1e-3), rtol=1e-5, atol=1e-5)
+    assert np.allclose(J.pose[..., :3], numeric("position", 3, 1e-3), rtol=1e-6, atol=1e-6)
+    assert np.allclose(J.pose[..., 3:], numeric("attitude", 3, 1e-6), rtol=1e-5, atol=1e-6 * scale)
+    assert np.allclose(J.mount, numeric("mount", 3, 1e-6), rtol=1e-5, atol=1e-6 * scale)
+    assert np.allclose(J.plane, numeric("height", 1, 1e-3), rtol=1e-6, atol=1e-6)
+
+
+def test_straight_down_has_a_closed_form():
+    """Height h, focal length f: position + h^2 attitude + (h/f)^2 pixel; the plane's height plays no part."""
+    h = 200.0
+    uv, p, rng = np.array([[TAU2.cx, TAU2.cy]]), np.array([[0, 0, -h]]), np.random.default_rng(0)
+    result = ground_covariance(TAU2, Mount("down"), uv, p, np.eye(3), 0.0, errors(1.0), rng)
+    angle = (h * np.radians(1.0)) ** 2
+    expected = np.diag([1 + angle + (2 * h / TAU2.fy) ** 2, 1 + angle + (2 * h / TAU2.fx) ** 2])
+    assert result.method.tolist() == ["linear"]
+    assert np.allclose(result.covariance[0], expected)
+
+
+def test_flatness_of_a_forward_ray_is_sd_times_cotangent():
+    pitch = np.radians(-20.0)
+    R = euler_to_matrix([0.0], [pitch], [0.3])
+    only_attitude = errors(2.0, pixel=0.0, position=0.0)
+    flatness = ray_flatness(TAU2, Mount("forward"), np.array([[TAU2.cx, TAU2.cy]]), R, only_attitude)
+    assert np.isclose(flatness[0], np.radians(2.0) / np.tan(np.radians(20.0)))
+
+
+@pytest.mark.parametrize("pitch_deg", [-90, -70, -50, -40, -30, -25, -20, -15])
+@pytest.mark.parametrize("attitude_deg", [0.2, 0.5, 1.0, 2.0])
+def test_ninety_per_cent_ellipses_hold_ninety_per_cent(pitch_deg, attitude_deg):
+    """Independent draws against each ellipse, the pixel anywhere in the middle of the image."""
+    rng = np.random.default_rng([abs(pitch_deg), int(10 * attitude_deg)])
+    mount, e = Mount("forward"), errors(attitude_deg, mount_deg=0.1)
+    p, R = np.array([3.0, -2.0, -120.0]), euler_to_matrix(0.05, np.radians(pitch_deg), rng.uniform(-3, 3))
+    for uv in (np.array([TAU2.cx, TAU2.cy]), np.array([200.0, 300.0])):
+        result = ground_covariance(TAU2, mount, uv, p, R, 0.0, e, rng)
+        centre = pixel_to_plane(TAU2, uv, *camera_pose(mount, p, R), 0.0)[:2]
+        draws = sample_ground(TAU2, mount, uv, p, R, 0.0, e, rng, 8000)
+        share = inside_ellipse(draws - centre, result.covariance[0]).mean()
+        assert 0.85 <= share <= 0.95, (result.method, share)
+
+
+def test_flat_rays_are_sampled_and_hopeless_ones_refused():
+    mount, e = Mount("forward"), errors(2.0)
+    pitches = np.radians([-60.0, -15.0, -3.0, 10.0])
+    R = euler_to_matrix(np.zeros(4), pitches, np.zeros(4))
+    uv = np.tile([TAU2.cx, TAU2.cy], (4, 1))
+    result = ground_covariance(TAU2, mount, uv, np.array([0, 0, -100.0]), R, 0.0, e, np.random.default_rng(0))
+    assert result.method.tolist() == ["linear", "sampled", "unbounded", "none"]
+    assert np.isfinite(result.covariance[:2]).all()
+    assert np.isnan(result.covariance[2:]).all()
+
+
+def test_the_linear_ellipse_would_be_wrong_where_it_is_not_used():
+    """What the switch is for: at -7 deg the linear ellipse holds far less than it says."""
+    mount, e = Mount("forward"), errors(2.0)
+    p, R = np.array([0, 0, -100.0]), euler_to_matrix(0.0, np.radians(-7.0), 0.0)
+    uv = np.array([TAU2.cx, TAU2.cy])
+    draws = sample_ground(TAU2, mount, uv, p, R, 0.0, e, np.random.default_rng(1), 20000)
+    centre = pixel_to_plane(TAU2, uv, *camera_pose(mount, p, R), 0.0)[:2]
+    J = ground_jacobians(TAU2, mount, uv[None], p[None], R[None], 0.0)
+    linear = (
+        J.pixel[0] @ e.pixel @ J.pixel[0].T + J.pose[0] @ e.pose @ J.pose[0].T + np.outer(J.plane, J.plane)
+    )
+    assert inside_ellipse(draws - centre, linear).mean() < 0.85
+    sampled = ground_covariance(TAU2, mount, uv, p, R, 0.0, e, np.random.default_rng(2))
+    assert sampled.method[0] == "sampled"
+    assert 0.88 < inside_ellipse(draws - centre, sampled.covariance[0]).mean() < 0.92
+
+
+def test_same_seed_same_bytes():
+    R = euler_to_matrix(0.0, np.radians(-12.0), 0.0)
+    one, two = (
+        ground_covariance(TAU2, Mount("forward"), np.array([[320.0, 256.0]]), np.array([0, 0, -90.0]), R, 0.0,
+                          errors(2.0), np.random.default_rng(5)).covariance
+        for _ in range(2)
+    )  # fmt: skip
+    assert one.tobytes() == two.tobytes()
+
+
+def test_ellipse_axes_against_eigenvalues():
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(50, 2, 2))
+    C = A @ np.swapaxes(A, 1, 2)
+    long_axis, short_axis, bearing = ellipse_axes(C)
+    values, vectors = np.linalg.eigh(C)
+    scale = -2 * np.log(0.1)  # chi-square with two degrees of freedom is an exponential
+    assert np.allclose(long_axis**2, scale * values[:, 1])
+    assert np.allclose(short_axis**2, scale * values[:, 0], atol=1e-9)
+    along = np.stack([np.cos(bearing), np.sin(bearing)], -1)
+    assert np.allclose(np.abs(np.einsum("ni,ni->n", along, vectors[:, :, 1])), 1)
+
+
+def test_a_ray_over_the_horizon_has_no_point():
+    assert np.isnan(intersect_plane([[1.0, 0, -0.1]], [[0.0, 0, -10]], 0.0)).all()
