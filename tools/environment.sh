@@ -98,7 +98,8 @@ explain() {
         wanted=$(sed -n 's/^ERROR: No matching distribution found for \([^ ]*\).*/\1/p' "$log" | head -n 1)
         fail "The package index has no $wanted for $(.venv/bin/python --version) on this machine: use another Python from 3.11 to 3.13 ('make PYTHON=python3.12 ...'), or check the index in 'pip config list' (details in $log)."
     fi
-    fail "Installing the packages failed ($(grep '^ERROR' "$log" | tail -n 1)): see $log, and run make again once that is mended."
+    reason=$(grep '^ERROR' "$log" | tail -n 1)
+    fail "Installing the packages failed (${reason:-pip stopped without saying why}): see $log, and run make again once that is mended."
 }
 
 # Two makes at once would pull the environment from under each other.
