@@ -237,8 +237,8 @@ def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, 
     """The parameter to give up, if any, with those it cannot be told apart from.
 
     ``J`` (2N, P) is per usual size of each parameter. A direction is lost when the data determine it no
-    better than one already knew, or when columns are so nearly parallel (correlation beyond 0.99) that only the
-    curvature of the projection keeps them apart. The last parameter in rank with a say in it is given up.
+    better than one already knew, or when columns are so nearly parallel (correlation beyond 0.99) that only
+    the curvature of the projection keeps them apart. The last parameter in rank with a say in it is given up.
     """
     if not names:
         return None

@@ -1,1 +1,1 @@
-"""tracking"""
+"""Tracking filters: stateless predict and update on arrays."""

@@ -1,0 +1,107 @@
+"""How noisy were the poses? Standard deviations estimated from the errors of known points.
+
+Every image has a pose error of its own: position (three axes), roll, pitch and yaw. It moves all points of
+the image together, each through its own derivative, and that is what tells it from the noise of single clicks.
+The standard deviations are those under which the observed errors are most likely, with a broad prior about
+the ones assumed, so that what the data cannot decide stays where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize
+
+Array = NDArray[np.float64]
+
+#: Which of the six pose errors (north, east, down, roll, pitch, yaw) share a standard deviation.
+KINDS = {"position_horizontal": (0, 1), "position_vertical": (2,), "roll_pitch": (3, 4), "yaw": (5,)}
+#: Standard deviation of the prior on the logarithm: a factor of three either way.
+PRIOR = np.log(3.0)
+
+
+class PoseNoise(NamedTuple):
+    """Estimated standard deviations by :data:`KINDS` (metres, radians) and how well each is decided.
+
+    ``factor`` is what one standard deviation of the estimate multiplies or divides by: near 3 the data said
+    nothing, near 1 they decided.
+    """
+
+    sd: dict[str, float]
+    factor: dict[str, float]
+
+
+def estimate_pose_noise(
+    errors: ArrayLike, derivatives: ArrayLike, noise: ArrayLike, image: ArrayLike, assumed: dict[str, float]
+) -> PoseNoise:
+    """Most likely standard deviations of the pose errors behind the errors of known points.
+
+    Parameters
+    ----------
+    errors
+        (N, 2) north-east, metres, computed minus known.
+    derivatives
+        (N, 2, 6) of each point with respect to north, east, down, roll, pitch, yaw.
+    noise
+        (N, 2, 2) covariance of what is each point's own: pixel, plane height.
+    image
+        (N,) which image each belongs to.
+    assumed
+        Standard deviations by :data:`KINDS` about which the prior lies.
+
+    Raises
+    ------
+    ValueError
+        Where fewer than three images have a usable point.
+    """
+    e, J, R = (np.asarray(a, float) for a in (errors, derivatives, noise))
+    keep = np.isfinite(e).all(axis=1) & np.isfinite(J).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2))
+    labels = np.asarray(image)[keep]
+    e, J, R = e[keep], J[keep], R[keep]
+    blocks = []
+    for label in np.unique(labels):
+        rows = labels == label
+        own = np.zeros((2 * rows.sum(),) * 2)
+        for i, r in enumerate(R[rows]):
+            own[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = r
+        blocks.append((e[rows].ravel(), J[rows].reshape(-1, 6), own))
+    if len(blocks) < 3:
+        raise ValueError("fewer than three images with known points: their noise cannot be estimated")
+    start = np.log([assumed[kind] for kind in KINDS])
+
+    def negative_log_posterior(log_sd: Array) -> float:
+        variance = np.empty(6)
+        for kind, value in zip(KINDS, log_sd, strict=True):
+            variance[list(KINDS[kind])] = np.exp(2 * value)
+        total = 0.5 * np.sum(((log_sd - start) / PRIOR) ** 2)
+        for residual, derivative, own in blocks:
+            L = np.linalg.cholesky(own + derivative * variance @ derivative.T)
+            z = np.linalg.solve(L, residual)
+            total += 0.5 * z @ z + np.log(np.diag(L)).sum()
+        return float(total)
+
+    found = minimize(negative_log_posterior, start, method="BFGS")
+    curvature = _second_derivatives(negative_log_posterior, found.x)
+    factor = np.exp(np.sqrt(np.clip(np.diag(np.linalg.inv(curvature)), 0, None)))
+    return PoseNoise(
+        sd=dict(zip(KINDS, map(float, np.exp(found.x)), strict=True)),
+        factor=dict(zip(KINDS, map(float, factor), strict=True)),
+    )
+
+
+def _second_derivatives(function: Callable[[Array], float], x: Array, h: float = 1e-3) -> Array:
+    """Hessian (n, n) by central differences."""
+    steps = h * np.eye(len(x))
+    return np.array(
+        [
+            [
+                (function(x + a + b) - function(x + a - b) - function(x - a + b) + function(x - a - b))
+                / (4 * h * h)
+                for b in steps
+            ]
+            for a in steps
+        ]
+    )

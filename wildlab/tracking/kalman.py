@@ -1,0 +1,75 @@
+"""The Kalman filter, H (3.5), as two functions without a state of their own."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class Update(NamedTuple):
+    """What a measurement did: new estimate, and what it was judged by."""
+
+    x: Array  # (n,)
+    P: Array  # (n, n)
+    innovation: Array  # (m,)
+    S: Array  # (m, m)
+    gain: Array  # (n, m)
+
+
+def predict(x: Array, P: Array, F: Array, Q: Array) -> tuple[Array, Array]:
+    """Prior estimate (n,) and covariance (n, n), H (3.5a)-(3.5b)."""
+    return F @ x, F @ P @ F.T + Q
+
+
+def update(x: Array, P: Array, z: Array, H: Array, R: Array) -> Update:
+    """Posterior after a measurement ``z`` (m,) = H x + noise with covariance ``R``.
+
+    H (3.5c)-(3.5h), Joseph form.
+    """
+    innovation = z - H @ x
+    S = H @ P @ H.T + R
+    gain = np.asarray(np.linalg.solve(S, H @ P).T, float)
+    kept = np.eye(len(x)) - gain @ H
+    posterior = kept @ P @ kept.T + gain @ R @ gain.T
+    return Update(x + gain @ innovation, (posterior + posterior.T) / 2, innovation, S, gain)
+
+
+class Filtered(NamedTuple):
+    """Estimates after each of T measurements; rows of measurements with NaN carry the estimate on."""
+
+    x: Array  # (T, n)
+    P: Array  # (T, n, n)
+    innovation: Array  # (T, m), NaN at the first and where there was no measurement
+    S: Array  # (T, m, m)
+
+
+def filter_at_rest(measurements: ArrayLike, R: ArrayLike) -> Filtered:
+    """Position of an object at rest: F = I, Q = 0 (H 5.6.1), started on the first measurement.
+
+    Parameters
+    ----------
+    measurements
+        (T, m) positions in order of time.
+    R
+        (T, m, m) their covariances.
+    """
+    z, R = np.asarray(measurements, float), np.asarray(R, float)
+    T, m = z.shape
+    usable = np.flatnonzero(np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2)))
+    x, P = np.full((T, m), np.nan), np.full((T, m, m), np.nan)
+    innovation, S = x.copy(), P.copy()
+    if not len(usable):
+        return Filtered(x, P, innovation, S)
+    state, spread, unmoved = z[usable[0]], R[usable[0]], np.eye(m)
+    known = set(usable[1:].tolist())
+    for t in range(usable[0], T):
+        if t in known:
+            state, spread = predict(state, spread, unmoved, np.zeros((m, m)))
+            step = update(state, spread, z[t], unmoved, R[t])
+            state, spread, innovation[t], S[t] = step.x, step.P, step.innovation, step.S
+        x[t], P[t] = state, spread
+    return Filtered(x, P, innovation, S)
