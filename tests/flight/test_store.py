@@ -1,0 +1,253 @@
+"""Flights on disk: they survive the trip, whole or not at all, and hostile folders stay outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import wildlab.flight.store as store
+from wildlab.errors import WildlabError
+from wildlab.flight.schema import NAV, TABLES, conform
+from wildlab.flight.store import Flight, load_flight, save_flight
+
+
+def _same(one: Flight, other: Flight) -> None:
+    assert one.manifest == other.manifest
+    assert sorted(one.nav) == sorted(other.nav)
+    assert sorted(one.tables) == sorted(other.tables)
+    for name in one.nav:
+        pd.testing.assert_frame_equal(one.nav[name], other.nav[name])
+    for name in one.tables:
+        pd.testing.assert_frame_equal(one.tables[name], other.tables[name])
+
+
+def test_round_trip(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    flight = make_flight()
+    saved = save_flight(flight, tmp_path / "deep" / "flight")
+    _same(load_flight(tmp_path / "deep" / "flight"), flight)
+    assert saved.folder == tmp_path / "deep" / "flight"
+    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["flight"]
+
+
+def test_same_flight_same_bytes(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    for name in "ab":
+        save_flight(make_flight(), tmp_path / name)
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert len(files) == 5
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+names = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
+
+
+@given(
+    st.lists(
+        st.tuples(names, names, st.floats(allow_infinity=True, allow_nan=True), st.integers(-5, 5)),
+        max_size=6,
+    )
+)
+def test_table_values_survive(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[str, str, float, int]]
+) -> None:
+    truth = pd.DataFrame(rows, columns=["target_id", "remark", "north_m", "east_m"]).assign(
+        down_m=0.0, time_s=np.nan
+    )
+    table = conform(TABLES["truth"], truth, "truth")
+    path = tmp_path_factory.mktemp("table") / "truth.parquet"
+    store._write(table, path)
+    back = store._read(path.parent, path.name, TABLES["truth"])
+    pd.testing.assert_frame_equal(back, table, check_exact=True)
+
+
+def test_whole_numbers_become_float_and_the_caller_keeps_his_table() -> None:
+    mine = pd.DataFrame({"frame_id": ["1"], "time_s": np.array([3], dtype=np.int32)}, index=[7])
+    table = conform(TABLES["frames"], mine, "frames")
+    assert table["time_s"].dtype == np.float64
+    assert list(table.index) == [0]
+    assert mine["time_s"].dtype == np.int32
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "field", "said"),
+    [
+        ("frames", lambda d: d.drop(columns="time_s"), "time_s", "is missing"),
+        ("frames", lambda d: d.assign(time_s="soon"), "time_s", "where numbers are expected"),
+        ("frames", lambda d: d.assign(time_s=[True, False, True]), "time_s", "bool"),
+        ("frames", lambda d: d.assign(time_s=1j), "time_s", "complex"),
+        ("frames", lambda d: d.assign(frame_id=[1, 2, 3]), "frame_id", "holds 1 where text is expected"),
+        ("frames", lambda d: d.assign(group=["a", None, "b"]), "group", "holds None where text is expected"),
+        ("frames", lambda d: d.assign(pan_rad=0.0), "tilt_rad", "'pan_rad' is there without it"),
+        ("detections", lambda d: d.drop(columns="u_px"), "u_px", "is missing"),
+        ("detections", lambda d: d.assign(kind="bearing"), "azimuth_rad", "is missing"),
+        ("detections", lambda d: d.assign(kind="guess"), "kind", "'guess' is not a kind of detection"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused_and_nothing_written(
+    make_flight: Callable[..., Flight],
+    tmp_path: Path,
+    table: str,
+    change: Callable[[pd.DataFrame], pd.DataFrame],
+    field: str,
+    said: str,
+) -> None:
+    flight = make_flight()
+    flight.tables[table] = change(flight.tables[table])
+    with pytest.raises(WildlabError) as caught:
+        save_flight(flight, tmp_path / "flight")
+    assert caught.value.field == field
+    assert said in str(caught.value)
+    assert table in (caught.value.file or "")
+    assert caught.value.fix
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("column", ["q_w", "north_m", "time_s"])
+def test_loading_names_the_file_and_the_missing_column(
+    make_flight: Callable[..., Flight], tmp_path: Path, column: str
+) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+    path = tmp_path / "flight" / "nav" / "autopilot.parquet"
+    pd.read_parquet(path).drop(columns=column).to_parquet(path)
+    with pytest.raises(WildlabError) as caught:
+        load_flight(tmp_path / "flight")
+    assert caught.value.file == str(path)
+    assert caught.value.field == column
+
+
+def test_partial_covariance_is_refused() -> None:
+    data = pd.DataFrame({name: [0.0] for name in NAV.column_names if name not in ("frame_id", "cov_35")})
+    with pytest.raises(WildlabError, match="cov_35"):
+        conform(NAV, data, "nav")
+
+
+def test_no_such_folder(tmp_path: Path) -> None:
+    with pytest.raises(WildlabError, match="there is no such folder"):
+        load_flight(tmp_path / "nothing")
+
+
+def test_folder_without_manifest(tmp_path: Path) -> None:
+    with pytest.raises(WildlabError, match=r"flight\.toml: there is no such file"):
+        load_flight(tmp_path)
+
+
+def test_broken_parquet(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+    (tmp_path / "flight" / "truth.parquet").write_bytes(b"PAR1 rubbish")
+    with pytest.raises(WildlabError, match=r"truth\.parquet: is not a readable Parquet file"):
+        load_flight(tmp_path / "flight")
+
+
+@pytest.mark.parametrize("name", ["truth.parquet", "nav/other.parquet", "terrain.tif", "flight.toml"])
+def test_a_link_out_of_the_folder_is_refused(
+    make_flight: Callable[..., Flight], tmp_path: Path, name: str
+) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+    outside = tmp_path / "outside"
+    outside.write_bytes((tmp_path / "flight" / "truth.parquet").read_bytes())
+    inside = tmp_path / "flight" / name
+    inside.unlink(missing_ok=True)
+    inside.symlink_to(outside)
+    with pytest.raises(WildlabError) as caught:
+        load_flight(tmp_path / "flight")
+    assert "leaves the folder" in str(caught.value)
+    assert caught.value.field == name
+
+
+def test_a_dangling_link_is_a_missing_file(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+    (tmp_path / "flight" / "gnss.parquet").symlink_to("nowhere.parquet")
+    with pytest.raises(WildlabError, match=r"gnss\.parquet: this file is missing"):
+        load_flight(tmp_path / "flight")
+
+
+@pytest.mark.parametrize("source", ["../x", "/x", "a/b", "", ".", "a\\b", "x" * 101])
+def test_a_nav_source_cannot_leave_the_folder(
+    make_flight: Callable[..., Flight], tmp_path: Path, source: str
+) -> None:
+    flight = make_flight()
+    flight.nav[source] = flight.nav["autopilot"]
+    with pytest.raises(WildlabError, match="cannot be the name of a nav source"):
+        save_flight(flight, tmp_path / "flight")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_overwriting_only_when_asked_and_only_flights(
+    make_flight: Callable[..., Flight], tmp_path: Path
+) -> None:
+    folder = tmp_path / "flight"
+    folder.mkdir()
+    save_flight(make_flight(), folder)  # an empty folder is as good as none
+    changed = make_flight(description="second")
+    with pytest.raises(WildlabError, match="there is a flight in this folder already"):
+        save_flight(changed, folder)
+    save_flight(changed, folder, overwrite=True)
+    assert load_flight(folder).manifest.description == "second"
+    assert [path.name for path in tmp_path.iterdir()] == ["flight"]
+
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(WildlabError, match=r"notes\.txt' is no part of a flight"):
+        save_flight(changed, folder, overwrite=True)
+    assert (folder / "notes.txt").read_text() == "mine"
+
+    other = tmp_path / "photos"
+    other.mkdir()
+    (other / "a.jpg").write_bytes(b"")
+    with pytest.raises(WildlabError, match="holds other things"):
+        save_flight(changed, other, overwrite=True)
+    with pytest.raises(WildlabError, match="is a file"):
+        save_flight(changed, other / "a.jpg", overwrite=True)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_an_interrupted_write_leaves_the_old_flight(
+    make_flight: Callable[..., Flight],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: type[BaseException],
+) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+
+    def fail(*_: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(store, "_write", fail)
+    with pytest.raises(error):
+        save_flight(make_flight(description="second"), tmp_path / "flight", overwrite=True)
+    with pytest.raises(error):
+        save_flight(make_flight(), tmp_path / "new")
+    assert [path.name for path in tmp_path.iterdir()] == ["flight"]
+    assert load_flight(tmp_path / "flight").manifest.description == ""
+
+
+def test_terrain_goes_along(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    first = save_flight(make_flight(), tmp_path / "one")
+    (tmp_path / "one" / "terrain.tif").write_bytes(b"II*")
+    second = save_flight(first, tmp_path / "two")
+    assert second.terrain is not None
+    assert second.terrain.read_bytes() == b"II*"
+
+
+def test_choice_of_pose_source(make_flight: Callable[..., Flight]) -> None:
+    flight = make_flight()
+    assert flight.pose_source()[0] == "autopilot"
+    flight.nav["observer"] = flight.nav["autopilot"]
+    assert flight.pose_source("observer")[0] == "observer"
+    with pytest.raises(WildlabError, match="Name one of those there are: autopilot, observer"):
+        flight.pose_source()
+    flight.nav["logged"] = flight.nav["autopilot"]
+    assert flight.pose_source()[0] == "logged"
+    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
+        flight.pose_source("mekf")
+
+
+def test_a_table_that_is_not_there(make_flight: Callable[..., Flight]) -> None:
+    with pytest.raises(WildlabError, match=r"no table 'imu'\. Add imu\.parquet: inertial"):
+        make_flight().table("imu")

@@ -1,0 +1,185 @@
+"""Files as hostile input: names that may not leave a folder, hashes, atomic writes, strict TOML models.
+
+Manifests, recipes and the catalog are TOML files checked by a pydantic model. `check_model` turns the first
+thing pydantic finds into the one sentence a user reads.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import os
+import re
+import tempfile
+import tomllib
+import typing
+from collections.abc import Iterable, Sequence
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from wildlab.errors import WildlabError
+
+#: What a flight, a nav source or a twin may be called: it becomes a file name on every system.
+SAFE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+
+
+class Strict(BaseModel):
+    """A part of a TOML file: unknown keys are errors, numbers are finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def is_safe_name(name: str) -> bool:
+    """Whether a name is letters, digits, ``-`` and ``_`` only, and so cannot leave a folder."""
+    return SAFE_NAME.fullmatch(name) is not None
+
+
+def leaves_folder(name: str) -> bool:
+    """Whether a relative file name is absolute or climbs out, read as POSIX and as Windows would read it."""
+    windows = PureWindowsPath(name)
+    return (
+        not name
+        or "\0" in name
+        or PurePosixPath(name).is_absolute()
+        or bool(windows.drive or windows.root)
+        or ".." in windows.parts
+    )
+
+
+def inside(folder: Path, name: str, *, file: Path, field: str) -> Path:
+    """Path of `name` below `folder`; `file` and `field` say who asked for it.
+
+    Raises
+    ------
+    WildlabError
+        Where the name is absolute, climbs out with ``..``, or is a symbolic link to somewhere else.
+    """
+    path = folder / name
+    if leaves_folder(name) or not path.resolve().is_relative_to(folder.resolve()):
+        raise WildlabError(
+            f"the path {name!r} leaves the folder it belongs to",
+            "give a name below that folder, and copy the file there if it lies elsewhere",
+            file=file,
+            field=field,
+        )
+    return path
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, as 64 hexadecimal digits."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def write_atomic(path: Path, data: bytes) -> None:
+    """Write a file whole or not at all: into a temporary sibling, then one rename."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".partial")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def did_you_mean(wrong: str, known: Iterable[str]) -> str:
+    """A clause that names the closest known word, or all of them."""
+    known = sorted(known)
+    close = difflib.get_close_matches(wrong, known, n=1)
+    every = ", ".join(known)
+    return f"did you mean {close[0]!r}? Known are {every}" if close else f"use one of {every}"
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Read a TOML file; `what` is what it is to the user ("the manifest of a flight").
+
+    Raises
+    ------
+    WildlabError
+        Where it is missing, not UTF-8 or not TOML.
+    """
+    try:
+        with path.open("rb") as stream:
+            return tomllib.load(stream)
+    except FileNotFoundError:
+        raise WildlabError(f"there is no such file, and it is {what}", "check the path", file=path) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise WildlabError(f"is not valid TOML ({error})", "mend that line", file=path) from None
+    except OSError as error:
+        fix = "check the path and its permissions"
+        raise WildlabError(f"cannot be read ({error.strerror})", fix, file=path) from None
+
+
+def check_model(model: type[Model], data: Any, path: Path | None) -> Model:
+    """Check parsed TOML against a model.
+
+    Raises
+    ------
+    WildlabError
+        With the file, the dotted name of the first wrong key, what was found and what to do.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        # An unknown key is often a misspelt one: naming it explains a "missing" key, so it comes first.
+        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+        fault = faults[0]
+        problem, fix = _explain(model, fault["type"], fault["loc"], fault["msg"], fault.get("input"))
+        raise WildlabError(problem, fix, file=path, field=dotted(fault["loc"]) or None) from None
+
+
+def dotted(location: Sequence[str | int]) -> str:
+    """``("sources", 0, "file")`` -> ``"sources[0].file"``."""
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _explain(
+    model: type[BaseModel], kind: str, location: tuple[str | int, ...], message: str, found: Any
+) -> tuple[str, str]:
+    if kind == "extra_forbidden":
+        known = _keys_at(model, location[:-1])
+        return "this key is not known", (
+            did_you_mean(str(location[-1]), known) if known else "take it out or check its spelling"
+        )
+    if kind == "missing":
+        return "this key is missing", "add it"
+    text = message.removeprefix("Value error, ").rstrip(".")
+    text = text[:1].lower() + text[1:]
+    if "; " in text:  # our own validators say problem and fix
+        problem, fix = text.split("; ", 1)
+        return problem, fix
+    shown = repr(found)
+    return f"{shown if len(shown) <= 80 else shown[:77] + '...'} does not fit ({text})", "mend that value"
+
+
+def _keys_at(model: type[BaseModel], location: Sequence[str | int]) -> list[str]:
+    """The keys a (nested) model knows at a place in it; empty where that cannot be told."""
+    here: Any = model
+    for part in location:
+        here = _model_in(here)
+        if here is None:
+            return []
+        if isinstance(part, str) and part in here.model_fields:
+            here = here.model_fields[part].annotation
+    here = _model_in(here)
+    return list(here.model_fields) if here is not None else []
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in typing.get_args(annotation):  # of X | None, tuple[X, ...], Annotated[X, ...]
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,277 @@
+"""`flight.toml`: what a flight is, apart from its tables.
+
+Degrees and metres stand in the file, and the names say so; the functions at the end give radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AwareDatetime, Field, field_validator, model_validator
+
+from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, read_toml
+from wildlab.flight.toml import dump_toml
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Origin
+from wildlab.geometry.mount import Mount
+
+FILE_NAME = "flight.toml"
+
+Angle = Annotated[float, Field(ge=-360, le=360)]
+Spread = Annotated[float, Field(gt=0, le=1e6)]
+Vector = tuple[float, float, float]
+
+
+class LocationsPart(Strict):
+    """How sensitive the places are: whoever shares a report decides by this. Denied unless stated."""
+
+    sensitivity: Literal["open", "generalised", "withheld"] = "withheld"
+
+
+class OriginPart(Strict):
+    """Origin of frame n: WGS84, height above the ellipsoid."""
+
+    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
+    longitude_deg: Annotated[float, Field(ge=-180, le=180)]
+    height_m: Annotated[float, Field(ge=-1e4, le=1e5)]
+
+
+class PlatformPart(Strict):
+    name: str
+
+
+class CameraPart(Strict):
+    """Intrinsic parameters in pixels; Brown distortion without unit."""
+
+    name: str
+    width_px: Annotated[int, Field(gt=0, le=1_000_000)]
+    height_px: Annotated[int, Field(gt=0, le=1_000_000)]
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    skew_px: float = 0.0
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+
+    @field_validator("fx_px", "fy_px")
+    @classmethod
+    def _focal_length(cls, value: float) -> float:
+        if value <= 0:
+            raise ValueError(
+                f"the focal length is {value:g} px; give the calibrated focal length in pixels, above 0 "
+                "(lens focal length times image width over sensor width)"
+            )
+        return value
+
+
+class MountPart(Strict):
+    """How the camera is fixed to the airframe: see `wildlab.geometry.mount.Mount`."""
+
+    looks: Literal["down", "forward"] = "down"
+    pan_deg: Angle = 0.0
+    tilt_deg: Angle = 0.0
+    lever_arm_m: Vector = (0.0, 0.0, 0.0)
+    misalignment_roll_deg: Angle = 0.0
+    misalignment_tilt_deg: Angle = 0.0
+    misalignment_pan_deg: Angle = 0.0
+
+
+class TimePart(Strict):
+    """`sequence`: the photos carry no time, `time_s` merely numbers them."""
+
+    kind: Literal["utc", "sequence"]
+    epoch: AwareDatetime | None = None
+
+    @field_validator("epoch", mode="before")
+    @classmethod
+    def _zone(cls, value: Any) -> Any:
+        if isinstance(value, datetime) and value.tzinfo is None:
+            raise ValueError("the time has no zone; write it in UTC with a Z at the end")
+        return value
+
+    @field_validator("epoch")
+    @classmethod
+    def _utc(cls, value: datetime | None) -> datetime | None:
+        return value.astimezone(UTC) if value is not None else None
+
+    @model_validator(mode="after")
+    def _needs_epoch(self) -> TimePart:
+        if self.kind == "utc" and self.epoch is None:
+            raise ValueError('kind = "utc" has no epoch; add epoch, the UTC time at which time_s is 0')
+        return self
+
+
+class ClocksPart(Strict):
+    """What to add to a stamp of each clock to get flight time. The raw stamps are never rewritten."""
+
+    camera_offset_s: float = 0.0
+    truth_offset_s: float = 0.0
+
+
+class VerticalPart(Strict):
+    """Heights are ellipsoidal inside; this says what they were, and what was taken off on import."""
+
+    reference: str = "ellipsoid"
+    correction_m: float = 0.0
+    note: str = ""
+
+
+class UncertaintyPart(Strict):
+    """Standard deviations to assume where the log has none. Absent = not assumed."""
+
+    pixel_px: Spread | None = None
+    position_horizontal_m: Spread | None = None
+    position_vertical_m: Spread | None = None
+    roll_deg: Spread | None = None
+    pitch_deg: Spread | None = None
+    yaw_deg: Spread | None = None
+    misalignment_deg: Spread | None = None
+    plane_height_m: Spread | None = None
+    note: str = ""
+
+
+class ScoringPart(Strict):
+    """Which truth a detection is scored against: the target it names, or the nearest one."""
+
+    rule: Literal["labelled", "nearest"] = "labelled"
+
+
+class TwinPart(Strict):
+    name: str
+    seed: Annotated[int, Field(ge=0)]
+
+
+class SourcePart(Strict):
+    """A raw file the flight was made from, by its name below the source folder."""
+
+    file: str
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    what: str = ""
+
+    @field_validator("file")
+    @classmethod
+    def _stays(cls, value: str) -> str:
+        if leaves_folder(value):
+            raise ValueError(
+                f"the path {value!r} leaves the folder it belongs to; give the name of a file below it"
+            )
+        return value
+
+
+class Manifest(Strict):
+    """The whole of `flight.toml`."""
+
+    name: str
+    kind: Literal["logged", "twin"]
+    description: str = ""
+    locations: LocationsPart = LocationsPart()
+    origin: OriginPart
+    platform: PlatformPart
+    camera: CameraPart
+    mount: MountPart = MountPart()
+    time: TimePart
+    clocks: ClocksPart = ClocksPart()
+    vertical: VerticalPart = VerticalPart()
+    uncertainty: UncertaintyPart = UncertaintyPart()
+    scoring: ScoringPart = ScoringPart()
+    twin: TwinPart | None = None
+    sources: tuple[SourcePart, ...] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _safe_name(cls, value: str) -> str:
+        if not is_safe_name(value):
+            raise ValueError(
+                f"{value!r} cannot be the name of a flight; use letters, digits, - and _ only, 100 at most, "
+                "the first a letter or digit"
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _twin_is_a_twin(self) -> Manifest:
+        if (self.kind == "twin") != (self.twin is not None):
+            raise ValueError(
+                f'kind = "{self.kind}" {"without" if self.twin is None else "with"} a [twin] part; '
+                "a twin names its parameters and seed in [twin], a logged flight has no [twin]"
+            )
+        return self
+
+    def geometry_camera(self) -> Camera:
+        """The camera, as geometry takes it."""
+        c = self.camera
+        distortion = (c.k1, c.k2, c.p1, c.p2, c.k3)
+        return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, distortion)
+
+    def geometry_mount(self) -> Mount:
+        """The mount, in radians and metres."""
+        m = self.mount
+        turn = math.radians
+        return Mount(
+            looks=m.looks,
+            pan=turn(m.pan_deg),
+            tilt=turn(m.tilt_deg),
+            misalignment=(
+                turn(m.misalignment_roll_deg),
+                turn(m.misalignment_tilt_deg),
+                turn(m.misalignment_pan_deg),
+            ),
+            lever_arm=m.lever_arm_m,
+        )
+
+    def origin_tuple(self) -> Origin:
+        """Latitude, longitude (radians) and ellipsoidal height (metres) of the origin of frame n."""
+        o = self.origin
+        return math.radians(o.latitude_deg), math.radians(o.longitude_deg), o.height_m
+
+
+def make_manifest(data: Mapping[str, Any], path: Path | None = None) -> Manifest:
+    """A manifest from nested mappings; `path` is only for messages.
+
+    Raises
+    ------
+    WildlabError
+        Naming the key that is unknown, missing or wrong.
+    """
+    return check_model(Manifest, dict(data), path)
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read `flight.toml`.
+
+    Raises
+    ------
+    WildlabError
+        Where it is missing, not TOML, or a key is unknown, missing or wrong.
+    """
+    return make_manifest(read_toml(path, "the manifest of a flight"), path)
+
+
+def manifest_toml(manifest: Manifest) -> str:
+    """The manifest as TOML text, every value written out, defaults too."""
+    data = manifest.model_dump(exclude_none=True)
+    return dump_toml({key: value for key, value in data.items() if value not in ((), {})})
+
+
+def replace_in_manifest(manifest: Manifest, changes: Mapping[str, Mapping[str, Any] | Any]) -> Manifest:
+    """A manifest with some values changed: ``replace_in_manifest(m, {"clocks": {"camera_offset_s": 0.2}})``.
+
+    Raises
+    ------
+    WildlabError
+        Where a changed key is unknown or its value is wrong.
+    """
+    data = manifest.model_dump(exclude_none=True)
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and isinstance(data.get(key), dict):
+            data[key] = {**data[key], **value}
+        else:
+            data[key] = value
+    return make_manifest(data)

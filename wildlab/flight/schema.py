@@ -1,0 +1,267 @@
+"""What the tables of a flight are: every column's name, type, unit and meaning, in one place.
+
+Tables are Parquet files. Extra columns are carried along untouched (`wildlab check` points them out, since an
+optional column that is misspelt is an extra one).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from wildlab.errors import WildlabError
+
+DType = Literal["float", "text"]
+
+#: Detection kinds and the columns each of them must fill.
+DETECTION_KINDS: dict[str, tuple[str, ...]] = {
+    "pixel": ("u_px", "v_px"),
+    "bearing": ("azimuth_rad", "elevation_rad"),
+    "range-bearing": ("azimuth_rad", "elevation_rad", "range_m"),
+    "position": ("north_m", "east_m", "down_m"),
+}
+
+#: Upper triangle of the 6x6 pose covariance, row by row: cov_00, cov_01, ..., cov_55.
+COVARIANCE_COLUMNS = tuple(f"cov_{i}{j}" for i in range(6) for j in range(i, 6))
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column. `may_be_nan`: a row without the value is fine."""
+
+    name: str
+    dtype: DType
+    unit: str
+    meaning: str
+    required: bool = True
+    may_be_nan: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table. `together`: groups of optional columns that only make sense all at once."""
+
+    name: str
+    meaning: str
+    columns: tuple[Column, ...]
+    together: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        return tuple(column.name for column in self.columns)
+
+
+def _position(of: str, *, required: bool = True, may_be_nan: bool = False) -> tuple[Column, ...]:
+    return tuple(
+        Column(f"{axis}_m", "float", "m", f"{axis} coordinate of {of} in frame n", required, may_be_nan)
+        for axis in ("north", "east", "down")
+    )
+
+
+def _velocity() -> tuple[Column, ...]:
+    return tuple(
+        Column(f"v_{axis}_m_s", "float", "m/s", f"velocity of b towards {axis}", False, True)
+        for axis in ("north", "east", "down")
+    )
+
+
+_TIME = Column("time_s", "float", "s", "flight time: seconds since the epoch")
+_GIMBAL = tuple(
+    Column(f"{axis}_rad", "float", "rad", f"gimbal {axis}", required=False, may_be_nan=True)
+    for axis in ("pan", "tilt")
+)
+
+NAV = Table(
+    "nav",
+    "pose of the platform from one source (one table per source, in nav/)",
+    (
+        _TIME,
+        *_position("b"),
+        *(
+            Column(f"q_{part}", "float", "1", f"{part} of the unit quaternion b -> n (Hamilton)")
+            for part in ("w", "x", "y", "z")
+        ),
+        *_velocity(),
+        *(
+            Column(
+                name,
+                "float",
+                "m, rad (products)",
+                "covariance of (north, east, down, rotation vector in b): R_true = R_logged Exp(delta)",
+                required=False,
+                may_be_nan=True,
+            )
+            for name in COVARIANCE_COLUMNS
+        ),
+        Column("frame_id", "text", "", "the one frame this pose belongs to (no interpolation)", False),
+    ),
+    together=(("v_north_m_s", "v_east_m_s", "v_down_m_s"), COVARIANCE_COLUMNS),
+)
+
+TABLES: dict[str, Table] = {
+    table.name: table
+    for table in (
+        Table(
+            "frames",
+            "one row per image",
+            (
+                Column("frame_id", "text", "", "name of the image"),
+                Column("time_s", "float", "s", "when it was taken, on the camera's own clock"),
+                Column("group", "text", "", "sub-flight it belongs to", required=False),
+                *_GIMBAL,
+            ),
+            together=(("pan_rad", "tilt_rad"),),
+        ),
+        Table(
+            "gimbal",
+            "gimbal angles over time",
+            (
+                _TIME,
+                Column("pan_rad", "float", "rad", "gimbal pan"),
+                Column("tilt_rad", "float", "rad", "gimbal tilt"),
+            ),
+        ),
+        Table(
+            "imu",
+            "inertial measurements in b",
+            (
+                _TIME,
+                *(Column(f"f_{a}_m_s2", "float", "m/s^2", f"specific force along {a}") for a in "xyz"),
+                *(Column(f"w_{a}_rad_s", "float", "rad/s", f"angular rate about {a}") for a in "xyz"),
+            ),
+        ),
+        Table(
+            "gnss",
+            "satellite positions",
+            (
+                _TIME,
+                *_position("the antenna"),
+                *_velocity(),
+                Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
+                Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
+                Column("sd_velocity_m_s", "float", "m/s", "SD of each axis of the velocity", False, True),
+            ),
+            together=(("v_north_m_s", "v_east_m_s", "v_down_m_s"),),
+        ),
+        Table(
+            "detections",
+            "what was seen in the frames, and other programs' answers to the same",
+            (
+                Column("detection_id", "text", "", "name of the detection; may occur once per source"),
+                Column("frame_id", "text", "", "frame it was seen in"),
+                Column("source", "text", "", "who says so"),
+                Column("kind", "text", "", " | ".join(DETECTION_KINDS)),
+                Column("u_px", "float", "px", "to the right, as the calibration counts", False, True),
+                Column("v_px", "float", "px", "downwards", False, True),
+                Column("azimuth_rad", "float", "rad", "from north towards east", False, True),
+                Column("elevation_rad", "float", "rad", "above the horizon", False, True),
+                Column("range_m", "float", "m", "slant range", False, True),
+                *_position("the detection", required=False, may_be_nan=True),
+                Column("target_id", "text", "", "target it is of, empty = not known", False),
+                Column("plane_down_m", "float", "m", "down coordinate of the ground there", False, True),
+            ),
+        ),
+        Table(
+            "truth",
+            "where the targets really were",
+            (
+                Column("target_id", "text", "", "name of the target"),
+                Column(
+                    "time_s", "float", "s", "when, on the truth's own clock; NaN = never moves", True, True
+                ),
+                *_position("the target"),
+                Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
+                Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
+            ),
+        ),
+    )
+}
+
+
+def extra_columns(table: Table, data: pd.DataFrame) -> list[str]:
+    """Columns of `data` that the schema does not name."""
+    return [str(name) for name in data.columns if name not in table.column_names]
+
+
+def conform(table: Table, data: pd.DataFrame, file: Path | str) -> pd.DataFrame:
+    """The table with every known column in its type (float64, or text as str), rows numbered from 0.
+
+    `file` is only for the message. Values are not judged here (see `check_flight`), only their shape.
+
+    Raises
+    ------
+    WildlabError
+        Where a required column is missing, only some of a group of columns are there, or a type is wrong.
+    """
+    result = data.reset_index(drop=True)
+    if not result.columns.is_unique or not all(isinstance(name, str) for name in result.columns):
+        problem = "two columns have the same name, or one has none"
+        raise WildlabError(problem, "give each its own name", file=file)
+    for column in table.columns:
+        if column.name in result.columns:
+            result[column.name] = _typed(column, result[column.name], file)
+        elif column.required:
+            raise _missing(column.name, table, file)
+    for group in table.together:
+        there = [name for name in group if name in result.columns]
+        if there and len(there) < len(group):
+            lacking = next(name for name in group if name not in there)
+            raise WildlabError(
+                f"{there[0]!r} is there without it",
+                f"add it, or leave out all of {', '.join(group)}",
+                file=file,
+                field=lacking,
+            )
+    if table.name == "detections":
+        for kind, needed in DETECTION_KINDS.items():
+            if (result["kind"] == kind).any():
+                for name in needed:
+                    if name not in result.columns:
+                        raise _missing(name, table, file)
+        unknown = sorted(set(result["kind"]) - set(DETECTION_KINDS))
+        if unknown:
+            raise WildlabError(
+                f"{unknown[0]!r} is not a kind of detection",
+                f"use one of {', '.join(DETECTION_KINDS)}",
+                file=file,
+                field="kind",
+            )
+    return result
+
+
+def _missing(name: str, table: Table, file: Path | str) -> WildlabError:
+    column = next(column for column in table.columns if column.name == name)
+    unit = f", {column.unit}" if column.unit not in ("", "1") else ""
+    return WildlabError(
+        f"this column of the table {table.name!r} is missing",
+        f"add it: {column.meaning}{unit}",
+        file=file,
+        field=name,
+    )
+
+
+def _typed(column: Column, values: pd.Series, file: Path | str) -> pd.Series:
+    if column.dtype == "float":
+        kinds = pd.api.types
+        plain = kinds.is_float_dtype(values) or kinds.is_integer_dtype(values)
+        if len(values) and not plain:  # a column without rows has no type of its own
+            raise WildlabError(
+                f"holds {values.dtype} where numbers are expected",
+                "write it as floating point",
+                file=file,
+                field=column.name,
+            )
+        return pd.Series(values.to_numpy(dtype=np.float64, na_value=np.nan), name=column.name)
+    wrong = next((value for value in values if not isinstance(value, str)), None)
+    if len(values) and not values.map(lambda value: isinstance(value, str)).all():
+        raise WildlabError(
+            f"holds {wrong!r} where text is expected",
+            "write every value as text, empty where there is none",
+            file=file,
+            field=column.name,
+        )
+    return pd.Series(values.astype(object).to_numpy(), name=column.name, dtype=object)

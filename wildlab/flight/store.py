@@ -1,0 +1,264 @@
+"""A flight on disk: one folder with `flight.toml` and Parquet tables."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow
+import pyarrow.parquet
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import inside, is_safe_name
+from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
+from wildlab.flight.schema import NAV, TABLES, Table, conform
+
+TERRAIN = "terrain.tif"
+
+# pyarrow carries no types.
+arrow: Any = pyarrow
+parquet: Any = pyarrow.parquet
+
+
+@dataclass
+class Flight:
+    """A flight in memory.
+
+    Attributes
+    ----------
+    manifest
+        What `flight.toml` says.
+    nav
+        Pose tables by source name.
+    tables
+        The other tables by name (see `wildlab.flight.schema.TABLES`), those that are there.
+    folder
+        Where it was loaded from or saved to; None while it only exists in memory.
+    """
+
+    manifest: Manifest
+    nav: dict[str, pd.DataFrame] = field(default_factory=dict)
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
+    folder: Path | None = None
+
+    @property
+    def name(self) -> str:
+        return self.manifest.name
+
+    @property
+    def frames(self) -> pd.DataFrame | None:
+        return self.tables.get("frames")
+
+    @property
+    def gimbal(self) -> pd.DataFrame | None:
+        return self.tables.get("gimbal")
+
+    @property
+    def imu(self) -> pd.DataFrame | None:
+        return self.tables.get("imu")
+
+    @property
+    def gnss(self) -> pd.DataFrame | None:
+        return self.tables.get("gnss")
+
+    @property
+    def detections(self) -> pd.DataFrame | None:
+        return self.tables.get("detections")
+
+    @property
+    def truth(self) -> pd.DataFrame | None:
+        return self.tables.get("truth")
+
+    @property
+    def terrain(self) -> Path | None:
+        """The elevation model, where the flight has one."""
+        path = self.folder / TERRAIN if self.folder is not None else None
+        return path if path is not None and path.is_file() else None
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table that must be there.
+
+        Raises
+        ------
+        WildlabError
+            Where the flight has no such table.
+        """
+        if name not in self.tables:
+            known = f"use one of {', '.join(TABLES)}"
+            fix = f"add {name}.parquet: {TABLES[name].meaning}" if name in TABLES else known
+            raise WildlabError(f"this flight has no table {name!r}", fix, file=self.folder)
+        return self.tables[name]
+
+    def pose_source(self, name: str | None = None) -> tuple[str, pd.DataFrame]:
+        """Name and table of a nav source; without a name, the only one (or ``logged``, where there are more).
+
+        Raises
+        ------
+        WildlabError
+            Where there is none of that name, or the choice is not clear.
+        """
+        if name is None and len(self.nav) == 1:
+            return next(iter(self.nav.items()))
+        wanted = "logged" if name is None else name
+        if wanted in self.nav:
+            return wanted, self.nav[wanted]
+        known = ", ".join(sorted(self.nav)) or "none"
+        raise WildlabError(
+            f"there is no nav source {wanted!r}" if name else "it is not clear which nav source to use",
+            f"name one of those there are: {known}" if self.nav else "add the poses as nav/<source>.parquet",
+            file=self.folder,
+            field="nav",
+        )
+
+
+def load_flight(folder: Path | str) -> Flight:
+    """Read a flight folder and check its structure (not its values: that is `check_flight`).
+
+    Raises
+    ------
+    WildlabError
+        Where the folder, the manifest, a table or a column is missing, a type is wrong, or a file lies
+        outside of the folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise WildlabError("there is no such folder", "check the path of the flight", file=folder)
+    manifest = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME))
+    nav = {}
+    nav_folder = folder / "nav"
+    if nav_folder.exists():
+        inside(folder, "nav", file=folder, field="nav")
+        for path in sorted(nav_folder.glob("*.parquet")):
+            if not is_safe_name(path.stem):
+                raise WildlabError(
+                    f"{path.stem!r} cannot be the name of a nav source",
+                    "rename it: letters, digits, - and _ only",
+                    file=path,
+                )
+            nav[path.stem] = _read(folder, f"nav/{path.name}", NAV)
+    tables = {
+        name: _read(folder, f"{name}.parquet", table)
+        for name, table in TABLES.items()
+        if os.path.lexists(folder / f"{name}.parquet")
+    }
+    if os.path.lexists(folder / TERRAIN):
+        inside(folder, TERRAIN, file=folder, field=TERRAIN)
+    return Flight(manifest, nav, tables, folder)
+
+
+def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
+    path = inside(folder, name, file=folder, field=name)
+    try:
+        # ParquetFile, not read_table: the latter would read columns out of folder names such as "a=b".
+        with parquet.ParquetFile(path) as stored:
+            data = stored.read().to_pandas(ignore_metadata=True)
+    except FileNotFoundError:
+        fix = "restore it, or import the flight again"
+        raise WildlabError("this file is missing", fix, file=path) from None
+    except (arrow.ArrowException, OSError, ValueError) as error:
+        first = (str(error).strip() or type(error).__name__).splitlines()[0]
+        problem = f"is not a readable Parquet file ({first})"
+        raise WildlabError(problem, "write the table again", file=path) from None
+    return conform(table, data, path)
+
+
+def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) -> Flight:
+    """Write a flight folder, whole or not at all. Returns the flight as it now stands there.
+
+    Raises
+    ------
+    WildlabError
+        Where a table does not fit the schema, the folder holds something else, or it holds a flight and
+        `overwrite` is false.
+    """
+    target = Path(folder)
+    _refuse(target, overwrite)
+    nav = {}
+    for source, table in flight.nav.items():
+        if not is_safe_name(source):
+            raise WildlabError(
+                f"{source!r} cannot be the name of a nav source, since it becomes a file name",
+                "use letters, digits, - and _ only",
+                file=target,
+                field="nav",
+            )
+        nav[source] = conform(NAV, table, f"nav/{source}")
+    tables = {}
+    for name, table in flight.tables.items():
+        if name not in TABLES:
+            known = ", ".join(TABLES)
+            raise WildlabError(f"{name!r} is not a table of a flight", f"use one of {known}", file=target)
+        tables[name] = conform(TABLES[name], table, name)
+    with _replacing(target, overwrite) as folder_now:
+        (folder_now / FILE_NAME).write_text(manifest_toml(flight.manifest), encoding="utf-8")
+        if nav:
+            (folder_now / "nav").mkdir()
+        for source, table in nav.items():
+            _write(table, folder_now / "nav" / f"{source}.parquet")
+        for name, table in tables.items():
+            _write(table, folder_now / f"{name}.parquet")
+        if flight.terrain is not None:
+            shutil.copyfile(flight.terrain, folder_now / TERRAIN)
+    return Flight(flight.manifest, nav, tables, target)
+
+
+def _write(table: pd.DataFrame, path: Path) -> None:
+    # Without pandas' own metadata, which names its version: the same flight gives the same bytes.
+    plain = arrow.Table.from_pandas(table, preserve_index=False).replace_schema_metadata(None)
+    parquet.write_table(plain, path)
+
+
+def _refuse(target: Path, overwrite: bool) -> None:
+    if not os.path.lexists(target):
+        return
+    if not target.is_dir():
+        raise WildlabError("is a file, and a flight is a folder", "choose another name", file=target)
+    there = sorted(path.relative_to(target).as_posix() for path in target.rglob("*") if not path.is_dir())
+    if there and FILE_NAME not in there:
+        raise WildlabError(
+            f"this folder holds other things ({there[0]}) and no flight",
+            "choose an empty or a new folder",
+            file=target,
+        )
+    if there and not overwrite:
+        fix = "choose another folder, or ask to overwrite it"
+        raise WildlabError("there is a flight in this folder already", fix, file=target)
+    known = {FILE_NAME, TERRAIN, *(f"{name}.parquet" for name in TABLES)}
+    for name in there:
+        if name not in known and not re.fullmatch(r"nav/[^/]+\.parquet", name):
+            problem = f"{name!r} is no part of a flight, and overwriting would lose it"
+            raise WildlabError(problem, "move it elsewhere first", file=target)
+
+
+@contextlib.contextmanager
+def _replacing(target: Path, overwrite: bool) -> Iterator[Path]:
+    """A temporary sibling that takes the place of `target` when the block ends well."""
+    target = target.resolve()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    new = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.", suffix=".partial"))
+    old = None
+    try:
+        new.chmod(0o755)
+        yield new
+        if target.exists() and any(target.iterdir()):
+            _refuse(target, overwrite)
+            old = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.", suffix=".old"))
+            target.rename(old)
+        try:
+            new.rename(target)
+        except BaseException:
+            if old is not None:
+                old.rename(target)
+            raise
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+        if old is not None and old.exists() and target.exists():
+            shutil.rmtree(old, ignore_errors=True)

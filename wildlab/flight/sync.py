@@ -1,0 +1,237 @@
+"""Bring clocks together: poses, gimbal angles and truth at the times of the frames.
+
+A clock's offset is what to add to its stamps to get flight time (`[clocks]` of the manifest).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from wildlab.errors import WildlabError
+from wildlab.flight.schema import COVARIANCE_COLUMNS
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import quaternion_to_matrix
+
+Array = NDArray[np.float64]
+
+#: Longest stretch without a pose that is bridged by interpolation, unless the caller says otherwise.
+MAX_GAP_S = 1.0
+
+#: (row, column) of each of COVARIANCE_COLUMNS.
+_UPPER = np.triu_indices(6)
+
+
+def frame_times(flight: Flight) -> Array:
+    """Flight time of each frame in seconds, the camera's clock offset applied. (N,)
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames.
+    """
+    stamps = flight.table("frames")["time_s"].to_numpy(float)
+    return np.asarray(stamps + flight.manifest.clocks.camera_offset_s)
+
+
+def poses_at(
+    nav: pd.DataFrame,
+    times: ArrayLike | None = None,
+    frame_ids: Sequence[str] | pd.Series | None = None,
+    max_gap_s: float = MAX_GAP_S,
+) -> tuple[Array, Array, Array | None]:
+    """Poses of the platform at given times, or of given frames.
+
+    Where `nav` has a column `frame_id` and `frame_ids` are given, each frame has the pose that belongs to it,
+    and `times` are not looked at. Otherwise: positions linear in time, attitudes along the shortest turn
+    (slerp), covariances linear.
+
+    Parameters
+    ----------
+    nav
+        One nav table.
+    times
+        (N,) flight times in seconds.
+    frame_ids
+        (N,) names of frames.
+    max_gap_s
+        No pose where the two nearest stamps in the log are further apart than this (but at a stamp itself).
+
+    Returns
+    -------
+    p_nb
+        (N, 3) metres; NaN outside of the log, in a gap, beside a NaN, or for a frame without a pose.
+    R_nb
+        (N, 3, 3), likewise.
+    covariance
+        (N, 6, 6) in the order of `schema.COVARIANCE_COLUMNS`, or None where the log has none.
+
+    Raises
+    ------
+    WildlabError
+        Where the log's stamps do not increase, or neither times nor frame names fit the log.
+    """
+    position = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
+    attitude = nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
+    covariance = covariances(nav)
+    if len(nav) == 0:
+        raise WildlabError("the table is empty", "give it rows", file="nav")
+    if frame_ids is not None and "frame_id" in nav:
+        first = ~nav["frame_id"].duplicated()
+        rows = pd.Index(nav.loc[first, "frame_id"]).get_indexer(pd.Index(frame_ids))
+        missing = rows < 0
+        rows = np.flatnonzero(first)[rows]
+        p = np.where(missing[:, None], np.nan, position[rows])
+        R = quaternion_to_matrix(np.where(missing[:, None], np.nan, attitude[rows]))
+        P = None if covariance is None else np.where(missing[:, None, None], np.nan, covariance[rows])
+        return p, R, P
+    if times is None:
+        raise WildlabError(
+            "these poses belong to no frames, and no times are given",
+            "give times, or a nav table with a frame_id",
+            field="nav",
+        )
+    before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, max_gap_s, "nav")
+    p = _between(position, before, after, share)
+    turn = _between_attitudes(attitude, before, after, share)
+    if covariance is None:
+        return p, turn, None
+    return p, turn, _between(covariance.reshape(-1, 36), before, after, share).reshape(-1, 6, 6)
+
+
+def frame_poses(
+    flight: Flight, source: str | None = None, max_gap_s: float = MAX_GAP_S
+) -> tuple[Array, Array, Array | None]:
+    """Poses of the platform for every frame of a flight, row by row: see `poses_at`.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames or no such nav source.
+    """
+    _, nav = flight.pose_source(source)
+    return poses_at(nav, frame_times(flight), flight.table("frames")["frame_id"], max_gap_s)
+
+
+def covariances(nav: pd.DataFrame) -> Array | None:
+    """Pose covariances of a nav table, (N, 6, 6) in m and rad, or None where it has none."""
+    if not set(COVARIANCE_COLUMNS) <= set(nav.columns):
+        return None
+    P = np.empty((len(nav), 6, 6))
+    upper = nav[list(COVARIANCE_COLUMNS)].to_numpy(float)
+    P[:, _UPPER[0], _UPPER[1]] = upper
+    P[:, _UPPER[1], _UPPER[0]] = upper
+    return P
+
+
+def covariance_columns(covariance: ArrayLike) -> pd.DataFrame:
+    """The 21 columns `cov_ij` of covariances (N, 6, 6): the inverse of `covariances`."""
+    P = np.asarray(covariance, float)
+    return pd.DataFrame(P[:, _UPPER[0], _UPPER[1]], columns=list(COVARIANCE_COLUMNS))
+
+
+def gimbal_angles(flight: Flight, max_gap_s: float = MAX_GAP_S) -> tuple[Array, Array]:
+    """Pan and tilt of the gimbal for every frame, radians, (N,) each.
+
+    From the columns of the frames where they have them, else from the gimbal table (linear in time), else the
+    fixed angles of the manifest. They take the place of the manifest's, they are not added to them.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames, or the stamps of the gimbal do not increase.
+    """
+    frames = flight.table("frames")
+    mount = flight.manifest.geometry_mount()
+    if "pan_rad" in frames:
+        return frames["pan_rad"].to_numpy(float), frames["tilt_rad"].to_numpy(float)
+    if flight.gimbal is None:
+        return np.full(len(frames), mount.pan), np.full(len(frames), mount.tilt)
+    angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
+    stamps = flight.gimbal["time_s"].to_numpy(float)
+    neighbours = _neighbours(stamps, frame_times(flight), max_gap_s, "gimbal")
+    pan, tilt = _between(angles, *neighbours).T
+    return pan, tilt
+
+
+def truth_at(
+    truth: pd.DataFrame, times: ArrayLike, max_gap_s: float = MAX_GAP_S, offset_s: float = 0.0
+) -> tuple[list[str], Array]:
+    """Where every target truly was at given times.
+
+    Parameters
+    ----------
+    truth
+        The table; rows with a NaN time are points that never move.
+    times
+        (T,) flight times in seconds.
+    max_gap_s
+        As in `poses_at`.
+    offset_s
+        What to add to the stamps of the truth (`clocks.truth_offset_s`).
+
+    Returns
+    -------
+    Names of the M targets in order of appearance, and positions (M, T, 3) in n, NaN where not known.
+
+    Raises
+    ------
+    WildlabError
+        Where a target's stamps do not increase.
+    """
+    at = np.atleast_1d(np.asarray(times, float))
+    names: list[str] = []
+    where = []
+    for name, rows in truth.groupby("target_id", sort=False):
+        position = rows[["north_m", "east_m", "down_m"]].to_numpy(float)
+        stamps = rows["time_s"].to_numpy(float) + offset_s
+        names.append(str(name))
+        if np.isnan(stamps).all():
+            where.append(np.broadcast_to(position[0], (len(at), 3)))
+        else:
+            where.append(_between(position, *_neighbours(stamps, at, max_gap_s, f"truth of {name!r}")))
+    return names, np.stack(where) if where else np.empty((0, len(at), 3))
+
+
+def _neighbours(
+    stamps: Array, times: ArrayLike, max_gap_s: float, what: str
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
+    at = np.atleast_1d(np.asarray(times, float))
+    if not (np.diff(stamps) > 0).all():
+        raise WildlabError(
+            "the timestamps do not increase",
+            "sort the rows by time and remove repeated stamps",
+            file=what,
+            field="time_s",
+        )
+    if len(stamps) == 0:
+        raise WildlabError("the table is empty", "give it rows", file=what)
+    after = np.clip(np.searchsorted(stamps, at, side="left"), 0, len(stamps) - 1)
+    exact = stamps[after] == at
+    before = np.where(exact, after, np.maximum(after - 1, 0))
+    span = stamps[after] - stamps[before]
+    inside = (at >= stamps[0]) & (at <= stamps[-1])
+    share = np.divide(at - stamps[before], span, out=np.zeros(len(at)), where=span > 0)
+    return before, after, np.where(exact | (inside & (span <= max_gap_s)), share, np.nan)
+
+
+def _between(values: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
+    # A time that falls on a stamp takes that row alone, whatever stands in the next.
+    return np.asarray(values[before] + share[:, None] * (values[after] - values[before]))
+
+
+def _between_attitudes(q: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
+    R = np.full((len(share), 3, 3), np.nan)
+    good = np.isfinite(q).all(axis=1) & (np.linalg.norm(q, axis=1) > 0)
+    rows = np.flatnonzero(np.isfinite(share) & good[before] & good[after])
+    if len(rows):
+        start = Rotation.from_quat(q[before[rows]], scalar_first=True)
+        end = Rotation.from_quat(q[after[rows]], scalar_first=True)
+        turn = (start.inv() * end).as_rotvec()
+        R[rows] = (start * Rotation.from_rotvec(share[rows, None] * turn)).as_matrix()
+    return R

@@ -1,0 +1,81 @@
+"""Write the TOML that `tomllib` reads back: tables, arrays of tables, and the plain values of a manifest."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from datetime import date, datetime, time
+from typing import Any
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def dump_toml(data: Mapping[str, Any]) -> str:
+    """TOML text of nested mappings.
+
+    Values are strings, booleans, integers, finite floats, dates, times, and lists of these; a list of
+    mappings is written as an array of tables. Keys whose value is None are left out: TOML has no null.
+
+    Raises
+    ------
+    ValueError
+        For a float that is not finite.
+    TypeError
+        For any other kind of value.
+    """
+    lines: list[str] = []
+    _table(data, (), lines)
+    return "\n".join(lines).strip("\n") + "\n"
+
+
+def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
+    below = []
+    for key, value in data.items():
+        if value is None:
+            continue
+        if isinstance(value, Mapping) or (
+            isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value)
+        ):
+            below.append((key, value))
+        else:
+            lines.append(f"{_key(key)} = {_value(value)}")
+    for key, value in below:
+        name = ".".join(_key(part) for part in (*path, key))
+        for item, header in (
+            [(value, f"[{name}]")]
+            if isinstance(value, Mapping)
+            else [(item, f"[[{name}]]") for item in value]
+        ):
+            lines += ["", header]
+            _table(item, (*path, key), lines)
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else _string(key)
+
+
+def _string(text: str) -> str:
+    # JSON's escapes are a subset of TOML's; JSON alone lets DEL through.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        return _string(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not a finite number")
+        return repr(value)
+    if isinstance(value, datetime):
+        return value.isoformat().replace("+00:00", "Z")
+    if isinstance(value, date | time):
+        return value.isoformat()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_value(item) for item in value)}]"
+    raise TypeError(f"TOML has no place for a {type(value).__name__}")
