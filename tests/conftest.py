@@ -46,7 +46,7 @@ def find_shared_data(*parts: str) -> Path | None:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Callable[..., Path]:
-    """``shared_data("georeferencing", "openathena")`` gives the path, or skips the test where it is absent."""
+    """``shared_data("georeferencing", "openathena")`` gives the path, or skips the test without it."""
 
     def find(*parts: str) -> Path:
         path = find_shared_data(*parts)

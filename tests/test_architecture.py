@@ -1,0 +1,300 @@
+"""Who may import whom, what is never imported, and how long a file may grow.
+
+The rules are checked on the source text (nothing is imported), and the last tests show on a made-up tree that
+each rule can fail.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from wildlab import doctor, paths
+
+BELOW_PIPELINE = {
+    "geometry", "navigation", "detection", "tracking", "planning", "flight", "simulation", "evaluation",
+}  # fmt: skip
+
+#: Which rooms of wildlab each room may import. Data goes down the house once, and so do imports.
+MAY_IMPORT: dict[str, set[str]] = {
+    "geometry": set(),
+    "navigation": {"geometry"},
+    "detection": {"geometry"},
+    "tracking": {"geometry"},
+    "planning": {"geometry"},
+    "flight": {"geometry"},
+    "simulation": {"geometry", "flight"},
+    "evaluation": {"geometry", "tracking"},
+    "pipeline": BELOW_PIPELINE,
+    "reporting": BELOW_PIPELINE | {"pipeline"},
+    "cli": BELOW_PIPELINE | {"pipeline", "reporting", "doctor"},
+    "__main__": {"cli"},
+    "doctor": set(),
+    "errors": set(),
+    "paths": set(),
+    "__init__": set(),
+}
+#: These know nothing about flights and may be used by all.
+FOR_ALL = {"errors", "paths", "__version__"}
+
+NOTEBOOK_PACKAGES = {
+    "papermill", "nbconvert", "nbclient", "nbformat", "IPython", "ipykernel", "jupyter_client",
+}  # fmt: skip
+KNOW_NOTEBOOKS = {"reporting", "cli"}
+#: The doctor asks which kernel Jupyter would start, no more.
+ALSO = {("doctor", "jupyter_client")}
+
+#: They check our numbers in tests and benchmarks, so our numbers must not come from them.
+ORACLES = {"stonesoup", "pyins", "cameratransform", "osgeo", "gdal"}
+#: Under the GPL or AGPL, which would bind whoever uses wildlab.
+COPYLEFT = {"orthority", "opendm", "evo", "ultralytics", "yolov5", "PyQt5", "PyQt6"}
+#: Reading such a file runs whatever code its author put into it.
+UNSAFE_PACKAGES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal", "joblib"}
+UNSAFE_CALLS = {
+    "eval", "exec", "__import__", "os.system", "os.popen", "yaml.load", "yaml.unsafe_load",
+}  # fmt: skip
+UNSAFE_METHODS = {"read_pickle", "to_pickle"}
+UNSAFE_KEYWORDS = {"shell", "allow_pickle"}
+
+LONGEST_FILE = 450  # a file that grows past about 400 lines is two rooms
+
+
+def imported_names(tree: ast.AST, package: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of everything imported, also inside functions and by `import_module`.
+
+    ``package`` is where the file lies, as in ``("wildlab", "geometry")``, for relative imports.
+    """
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            start = ".".join((*base, *(node.module or "").split("."))).strip(".")
+            # "from wildlab import geometry" names a room only in what is imported.
+            yield from ((node.lineno, f"{start}.{alias.name}") for alias in node.names)
+        elif isinstance(node, ast.Call) and called_name(node).endswith("import_module"):
+            for argument in node.args[:1]:
+                if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
+                    yield node.lineno, argument.value
+
+
+def called_name(call: ast.Call) -> str:
+    """``"os.system"`` for ``os.system(...)``, ``"eval"`` for ``eval(...)``, ``""`` for what has no name."""
+    parts: list[str] = []
+    node = call.func
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    return ".".join([node.id, *reversed(parts)]) if isinstance(node, ast.Name) else ".".join(reversed(parts))
+
+
+def check_imports(room: str, line: int, name: str) -> Iterator[str]:
+    parts = name.split(".")
+    package = parts[0]
+    if package == "wildlab":
+        target = parts[1] if len(parts) > 1 else ""
+        if target and target != room and target not in FOR_ALL | MAY_IMPORT.get(room, set()):
+            yield f"{line}: {room} may not import {target}"
+    if package in NOTEBOOK_PACKAGES and room not in KNOW_NOTEBOOKS and (room, package) not in ALSO:
+        yield f"{line}: only reporting and cli know about notebooks, {room} imports {package}"
+    if package in ORACLES:
+        yield f"{line}: {package} is an oracle for tests and benchmarks"
+    if package in COPYLEFT:
+        yield f"{line}: {package} is under a copyleft licence"
+    if package in UNSAFE_PACKAGES:
+        yield f"{line}: {package} can run code that is in a file"
+
+
+def check_calls(tree: ast.AST) -> Iterator[str]:
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        name = called_name(call)
+        if name in UNSAFE_CALLS or name.rpartition(".")[2] in UNSAFE_METHODS:
+            yield f"{call.lineno}: {name}() can run what is in a file"
+        for keyword in call.keywords:
+            constant_false = isinstance(keyword.value, ast.Constant) and not keyword.value.value
+            if keyword.arg in UNSAFE_KEYWORDS and not constant_false:
+                yield f"{call.lineno}: {keyword.arg}=True in {name}()"
+
+
+def violations(root: Path) -> list[str]:
+    """Every breach of the rules in ``root/wildlab``, as ``file:line: what``."""
+    found: list[str] = []
+    for path in sorted((root / "wildlab").rglob("*.py")):
+        place = path.relative_to(root)
+        room = place.parts[1].removesuffix(".py")
+        if room not in MAY_IMPORT:
+            found.append(f"{place}:1: the room {room} is not in MAY_IMPORT: decide what it may import")
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+        for line, name in imported_names(tree, place.parts[:-1]):
+            found += [f"{place}:{problem}" for problem in check_imports(room, line, name)]
+        found += [f"{place}:{problem}" for problem in check_calls(tree)]
+    return found
+
+
+def undeclared(root: Path) -> list[str]:
+    """Packages imported by ``root/wildlab`` that are here only because another package brought them."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
+    providers = metadata.packages_distributions()
+    found = set()
+    for path in (root / "wildlab").rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for line, name in imported_names(tree, path.relative_to(root).parts[:-1]):
+            package = name.partition(".")[0]
+            if package == "wildlab" or package in sys.stdlib_module_names:
+                continue
+            if not {canonicalize_name(provider) for provider in providers.get(package, [package])} & declared:
+                found.add(f"{path.relative_to(root)}:{line}: {package}")
+    return sorted(found)
+
+
+def source_files(root: Path) -> list[Path]:
+    folders = ("wildlab", "tests", "benchmarks", "tools", "notebooks", "data")
+    kinds = {".py", ".sh", ".ipynb", ".toml", ".md"}
+    inside = [path for folder in folders for path in (root / folder).rglob("*") if path.suffix in kinds]
+    top = [root / "Makefile", root / "README.md", root / "pyproject.toml"]
+    hidden = {".ipynb_checkpoints", "fetched"}
+    return sorted(path for path in inside + top if path.is_file() and not hidden & set(path.parts))
+
+
+def too_long(root: Path) -> list[str]:
+    python = [path for path in source_files(root) if path.suffix == ".py"]
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in python}
+    return [f"{path.relative_to(root)}: {n} lines" for path, n in lengths.items() if n > LONGEST_FILE]
+
+
+def left_undone(root: Path) -> list[str]:
+    word = re.compile(r"\b(?:TO" + r"DO|FIX" + r"ME)\b")
+    return [
+        f"{path.relative_to(root)}:{number}"
+        for path in source_files(root)
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if word.search(line)
+    ]
+
+
+def test_rooms_import_only_what_lies_below() -> None:
+    assert violations(paths.ROOT) == []
+
+
+def test_what_is_imported_is_asked_for() -> None:
+    assert undeclared(paths.ROOT) == []
+
+
+def test_the_rules_cover_what_is_there() -> None:
+    entries = (paths.ROOT / "wildlab").iterdir()
+    there = {path.stem for path in entries if path.is_dir() or path.suffix == ".py"} - {"__pycache__"}
+    assert {"geometry", "flight", "reporting"} <= there <= set(MAY_IMPORT)
+
+
+def test_files_stay_short() -> None:
+    assert too_long(paths.ROOT) == []
+
+
+def test_nothing_is_put_off() -> None:
+    assert left_undone(paths.ROOT) == []
+
+
+def test_no_copyleft_in_the_lock() -> None:
+    names = {pin.name.lower() for pin in doctor.read_lock(paths.LOCK)}
+    assert names
+    assert not names & {name.lower() for name in COPYLEFT}
+    for name in sorted(names):
+        try:
+            about = metadata.metadata(name).json
+        except metadata.PackageNotFoundError:
+            continue  # the doctor's tests say so where it should be here
+        fields = [about.get("license_expression", ""), about.get("license", "")[:60]]
+        fields += about.get("classifier", [])
+        licence = " ".join(str(field) for field in fields if "Python ::" not in str(field))
+        # The lesser GPL (LGPL) does not reach what merely imports a package.
+        assert not re.search(r"\bA?GPL|GNU (Affero )?General", licence), f"{name}: {licence}"
+
+
+@pytest.mark.parametrize(
+    ("file", "source", "problem"),
+    [
+        ("geometry/a.py", "from wildlab.flight.store import load_flight", "geometry may not import flight"),
+        ("geometry/a.py", "from wildlab import flight", "geometry may not import flight"),
+        ("geometry/a.py", "from ..flight import store", "geometry may not import flight"),
+        ("geometry/a.py", "from .. import flight", "geometry may not import flight"),
+        ("geometry/a.py", "import wildlab.flight.store as s", "geometry may not import flight"),
+        ("geometry/a.py", "def f():\n    import wildlab.flight", "a.py:2: geometry may not import flight"),
+        ("geometry/deep/a.py", "from ...flight import store", "geometry may not import flight"),
+        (
+            "geometry/a.py",
+            "import importlib\nimportlib.import_module('wildlab.flight')",
+            "geometry may not import flight",
+        ),
+        ("tracking/a.py", "import wildlab.evaluation", "tracking may not import evaluation"),
+        ("tracking/a.py", "import wildlab.flight", "tracking may not import flight"),
+        ("flight/a.py", "import wildlab.pipeline", "flight may not import pipeline"),
+        ("simulation/a.py", "import wildlab.pipeline", "simulation may not import pipeline"),
+        ("pipeline/a.py", "from wildlab.reporting import run", "pipeline may not import reporting"),
+        ("reporting/a.py", "from wildlab.cli import main", "reporting may not import cli"),
+        ("attic/a.py", "x = 1", "the room attic is not in MAY_IMPORT"),
+        ("pipeline/a.py", "import papermill", "only reporting and cli know about notebooks"),
+        ("flight/a.py", "from IPython.display import display", "only reporting and cli know about notebooks"),
+        ("pipeline/a.py", "import cameratransform", "is an oracle"),
+        ("pipeline/a.py", "from osgeo import gdal", "is an oracle"),
+        ("detection/a.py", "from ultralytics import YOLO", "copyleft"),
+        ("flight/a.py", "import pickle", "can run code"),
+        ("flight/a.py", "eval('1')", "eval()"),
+        ("flight/a.py", "import pandas as pd\npd.read_pickle('x')", "read_pickle()"),
+        ("flight/a.py", "import os\nos.system('ls')", "os.system()"),
+        ("flight/a.py", "import yaml\nyaml.load('x')", "yaml.load()"),
+        ("flight/a.py", "import subprocess\nsubprocess.run('ls', shell=True)", "shell=True"),
+        ("flight/a.py", "import numpy\nnumpy.load('x', allow_pickle=1)", "allow_pickle=True"),
+    ],
+)
+def test_a_breach_is_found(tmp_path: Path, file: str, source: str, problem: str) -> None:
+    path = tmp_path / "wildlab" / file
+    path.parent.mkdir(parents=True)
+    path.write_text(source, encoding="utf-8")
+    found = violations(tmp_path)
+    assert len(found) == 1, found
+    assert problem in found[0]
+
+
+def test_an_undeclared_package_is_found(tmp_path: Path) -> None:
+    (tmp_path / "wildlab").mkdir()
+    (tmp_path / "pyproject.toml").write_text(
+        "[project]\ndependencies = ['numpy>=2', 'opencv-python-headless']\n", encoding="utf-8"
+    )
+    (tmp_path / "wildlab" / "a.py").write_text("import os, numpy, cv2\nimport click\n", encoding="utf-8")
+    assert undeclared(tmp_path) == ["wildlab/a.py:2: click"]
+
+
+def test_what_is_allowed_passes(tmp_path: Path) -> None:
+    sources = {
+        "geometry/a.py": "from wildlab.errors import WildlabError\nfrom .frames import x\nimport numpy\n",
+        "tracking/a.py": "from wildlab.geometry.frames import x\nfrom wildlab import __version__, paths\n",
+        "flight/a.py": "import subprocess\nsubprocess.run(['git'], shell=False)\nframe.eval('x')\n",
+        "reporting/a.py": "import papermill\nfrom wildlab.pipeline import judge\n",
+        "cli.py": "from wildlab import doctor\nfrom wildlab.reporting.run import run_study\n",
+        "doctor.py": "import jupyter_client\n",
+    }
+    for name, source in sources.items():
+        path = tmp_path / "wildlab" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(source, encoding="utf-8")
+    assert violations(tmp_path) == []
+
+
+def test_long_files_and_things_put_off_are_found(tmp_path: Path) -> None:
+    (tmp_path / "wildlab").mkdir()
+    (tmp_path / "wildlab" / "long.py").write_text("x = 1\n" * (LONGEST_FILE + 1), encoding="utf-8")
+    (tmp_path / "wildlab" / "just.py").write_text("x = 1\n" * LONGEST_FILE, encoding="utf-8")
+    (tmp_path / "Makefile").write_text("all:\n\t# TO" + "DO: all\n", encoding="utf-8")
+    assert too_long(tmp_path) == [f"wildlab/long.py: {LONGEST_FILE + 1} lines"]
+    assert left_undone(tmp_path) == ["Makefile:2"]
