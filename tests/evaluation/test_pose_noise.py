@@ -1,0 +1,69 @@
+"""Pose noise comes back from simulated errors, and stays where it was when the data are silent."""
+
+import numpy as np
+import pytest
+
+from wildlab.evaluation.pose_noise import estimate_pose_noise
+from wildlab.geometry.frames import euler_errors_to_body, euler_to_matrix, matrix_to_rotation_vector
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.sensitivity import TAU2
+from wildlab.geometry.uncertainty import ground_jacobians
+
+ASSUMED = {
+    "position_horizontal": 2.0,
+    "position_vertical": 3.0,
+    "roll_pitch": np.radians(0.7),
+    "yaw": np.radians(3.0),
+}
+
+
+def simulate(seed, sd, n_images, points):
+    rng = np.random.default_rng(seed)
+    image = np.repeat(np.arange(n_images), points)
+    euler = np.column_stack(
+        [rng.uniform(-0.3, 0.3, n_images), rng.uniform(-1.2, -0.6, n_images), rng.uniform(-3, 3, n_images)]
+    )
+    height = rng.uniform(30, 300, n_images)
+    p = np.column_stack([np.zeros((n_images, 2)), -height])
+    wrong_p = p + rng.normal(0, [sd[0], sd[0], sd[1]], (n_images, 3))
+    wrong = euler + rng.normal(0, [sd[2], sd[2], sd[3]], (n_images, 3))
+    uv = rng.uniform([0, 0], [640, 512], (len(image), 2))
+    mount = Mount("forward")
+    true = pixel_to_plane(TAU2, uv, *camera_pose(mount, p[image], euler_to_matrix(*euler[image].T)), 0.0)
+    clicked = uv + rng.normal(0, 2.0, uv.shape)
+    ours = pixel_to_plane(
+        TAU2, clicked, *camera_pose(mount, wrong_p[image], euler_to_matrix(*wrong[image].T)), 0.0
+    )
+    J = ground_jacobians(TAU2, mount, uv, p[image], euler_to_matrix(*euler[image].T), 0.0)
+    derivatives = J.pose.copy()
+    derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(*euler[image, :2].T)
+    return (ours - true)[:, :2], derivatives, 4 * J.pixel @ np.swapaxes(J.pixel, 1, 2), image
+
+
+def test_deviations_come_back():
+    true = (1.0, 2.0, np.radians(1.5), np.radians(2.0))
+    found = estimate_pose_noise(*simulate(1, true, 250, 5), ASSUMED)
+    for (kind, value), put_in in zip(found.sd.items(), true, strict=True):
+        assert value == pytest.approx(put_in, rel=0.25), kind
+        assert found.factor[kind] < 1.35
+
+
+def test_with_three_images_the_assumption_stands_and_the_doubt_is_stated():
+    found = estimate_pose_noise(*simulate(2, (2.0, 3.0, np.radians(0.7), np.radians(3.0)), 3, 2), ASSUMED)
+    assert max(found.factor.values()) > 1.8
+    with pytest.raises(ValueError, match="fewer than three images"):
+        estimate_pose_noise(*simulate(3, (1, 1, 0.01, 0.01), 2, 2), ASSUMED)
+
+
+def test_euler_errors_as_rotation_vectors_against_finite_differences():
+    roll, pitch, yaw, h = 0.4, -0.7, 2.0, 1e-6
+    R = euler_to_matrix(roll, pitch, yaw)
+    numeric = np.stack(
+        [
+            matrix_to_rotation_vector(R.T @ euler_to_matrix(*(np.array([roll, pitch, yaw]) + h * step))) / h
+            for step in np.eye(3)
+        ],
+        axis=-1,
+    )
+    assert np.allclose(euler_errors_to_body(roll, pitch), numeric, atol=1e-5)

@@ -1,0 +1,140 @@
+"""A flight's boresight from its own known points, judged on images it has not seen."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate, split_images
+from wildlab.pipeline.georeference import (
+    Observations,
+    calibrated,
+    covariances_of,
+    georeference,
+    observe,
+    pose_errors,
+)
+from wildlab.pipeline.judge import judge, known_points
+
+Array = NDArray[np.float64]
+
+
+class Calibrated(NamedTuple):
+    """A calibration from all images, and the errors on images that a calibration has not seen.
+
+    Attributes
+    ----------
+    calibration
+        From all images: what to write into the manifest.
+    judged
+        Every point placed by a calibration from the other half of the images (the first split).
+    mean_errors
+        Mean error of each split, metres.
+    """
+
+    calibration: Calibration
+    judged: pd.DataFrame
+    mean_errors: Array
+
+
+def fit_flight(
+    flight: Flight,
+    judged: pd.DataFrame,
+    source: str | None = None,
+    estimate: tuple[str, ...] = BORESIGHT,
+) -> Calibration:
+    """Calibrate on the points of a judged table, weighted with their ground covariances."""
+    observations, known = known_points(flight, observe(flight, source), judged)
+    ids = observations.table["detection_id"]
+
+    def poses_at(shift: float) -> tuple[Array, Array]:
+        if shift == 0.0:
+            return observations.p_nb, observations.R_nb
+        moved = observe(flight, source, clock_shift=shift)
+        moved = moved.take(moved.table["detection_id"].isin(ids).to_numpy())
+        return moved.p_nb, moved.R_nb
+
+    weights = covariances_of(judged.set_index("detection_id").loc[ids].reset_index())
+    return calibrate(
+        flight.manifest.geometry_camera(),
+        observations.mount,
+        observations.uv,
+        poses_at,
+        known,
+        observations.table["frame_id"].to_numpy(),
+        estimate,
+        weights,
+    )
+
+
+def calibrate_flight(
+    flight: Flight,
+    rng: np.random.Generator,
+    source: str | None = None,
+    estimate: tuple[str, ...] = BORESIGHT,
+    splits: int = 20,
+) -> Calibrated:
+    """Calibrate on a flight's known points, and judge each half of its images by the other half.
+
+    Images are halved at random, ``splits`` times over; a calibration from one half places the points of the
+    other. A clock offset is asked for only where the flight has times.
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than four images show a known point.
+    """
+    if flight.manifest.time.kind == "sequence":
+        estimate = tuple(name for name in estimate if name != "clock")
+    observations = observe(flight, source)
+    plain = judge(flight, georeference(flight, observations, rng))
+    plain = plain[np.isfinite(plain["error_m"]) & np.isfinite(plain["cov_nn"])]
+    if plain["frame_id"].nunique() < 4:
+        raise WildlabError(
+            "fewer than four images show a known point, too few to calibrate on half of them",
+            "label more detections, or add truth",
+            file=flight.folder,
+            field="detections",
+        )
+    images = plain["frame_id"].to_numpy()
+    rounds = []
+    for _ in range(splits):
+        half = split_images(images, rng)
+        parts = [
+            _judge_unseen(
+                flight,
+                observations,
+                fit_flight(flight, plain[seen], source, estimate),
+                plain[~seen],
+                source,
+                rng,
+            )
+            for seen in (half, ~half)
+        ]
+        rounds.append(pd.concat(parts, ignore_index=True))
+    return Calibrated(
+        fit_flight(flight, plain, source, estimate),
+        rounds[0],
+        np.array([r["error_m"].mean() for r in rounds]),
+    )
+
+
+def _judge_unseen(
+    flight: Flight,
+    observations: Observations,
+    calibration: Calibration,
+    unseen: pd.DataFrame,
+    source: str | None,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Errors of the unseen points with a calibration applied."""
+    clock = calibration.value("clock")
+    placed = observe(flight, source, clock_shift=clock) if clock else observations
+    placed = placed.take(placed.table["detection_id"].isin(unseen["detection_id"]).to_numpy())
+    placed = calibrated(placed, calibration)
+    return judge(flight, georeference(flight, placed, rng, pose_errors(flight, placed)))

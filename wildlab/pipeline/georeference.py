@@ -1,0 +1,256 @@
+"""A flight's detections as points on the ground, each with its covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.flight.sync import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.geometry.calibration import Calibration, apply_calibration
+from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
+
+Array = NDArray[np.float64]
+
+#: Standard deviations assumed where neither the log nor the manifest states one.
+USUAL = {
+    "pixel_px": 2.0,
+    "position_horizontal_m": 2.0,
+    "position_vertical_m": 3.0,
+    "roll_deg": 1.0,
+    "pitch_deg": 1.0,
+    "yaw_deg": 2.0,
+    "misalignment_deg": 0.0,
+    "plane_height_m": 1.0,
+}
+
+
+@dataclass(frozen=True)
+class Observations:
+    """The pixel detections of a flight with everything needed to put them on the ground. One row each.
+
+    Attributes
+    ----------
+    table
+        ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time).
+    uv
+        (N, 2) pixels.
+    p_nb, R_nb
+        Pose of the airframe, (N, 3) and (N, 3, 3); NaN where the log has none.
+    pan, tilt
+        Gimbal angles, (N,) radians.
+    plane_down
+        Down coordinate of the ground at each detection, (N,); NaN where it is not known.
+    pose_covariance
+        (N, 6, 6) where the log states one.
+    mount
+        The mount, calibrated or not.
+    """
+
+    table: pd.DataFrame
+    uv: Array
+    p_nb: Array
+    R_nb: Array
+    pan: Array
+    tilt: Array
+    plane_down: Array
+    pose_covariance: Array | None
+    mount: Mount
+
+    def take(self, rows: NDArray[np.bool_]) -> Observations:
+        """The observations of some rows."""
+        return Observations(
+            self.table[rows].reset_index(drop=True),
+            self.uv[rows],
+            self.p_nb[rows],
+            self.R_nb[rows],
+            self.pan[rows],
+            self.tilt[rows],
+            self.plane_down[rows],
+            None if self.pose_covariance is None else self.pose_covariance[rows],
+            self.mount,
+        )
+
+
+def observe(
+    flight: Flight, source: str | None = None, stamps: str = "time_s", clock_shift: float = 0.0
+) -> Observations:
+    """Collect the pixel detections of a flight with the poses of one navigation source.
+
+    The ground of a detection is the height of the target it names, else the detection's own
+    ``plane_down_m``.
+
+    Parameters
+    ----------
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+    stamps
+        Column of the frames that holds the camera's stamps.
+    clock_shift
+        Seconds added to the stamps on top of the manifest's offset.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames, detections or poses, no such column, or two sources to choose from.
+    """
+    detections = flight.table("detections")
+    frames = flight.table("frames")
+    if stamps not in frames:
+        known = ", ".join(name for name in map(str, frames) if name.startswith("time"))
+        raise WildlabError(
+            f"the frames have no stamps {stamps!r}",
+            f"use one of: {known}",
+            file=flight.folder,
+            field="frames",
+        )
+    pixels = detections[detections["kind"] == "pixel"].reset_index(drop=True)
+    if pixels.empty:
+        raise WildlabError(
+            "there is no detection of the kind 'pixel'",
+            "add detections with u_px and v_px",
+            file=flight.folder,
+            field="detections",
+        )
+    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
+    own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
+    times = (frame_times(flight) + own_clock + clock_shift)[at]
+    _, nav = flight.pose_source(source)
+    p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
+    pan, tilt = (angle[at] for angle in gimbal_angles(flight))
+    lost = at < 0
+    p_nb[lost], R_nb[lost] = np.nan, np.nan
+    table = pd.DataFrame(
+        {
+            "detection_id": pixels["detection_id"],
+            "frame_id": pixels["frame_id"],
+            "group": frames["group"].to_numpy()[at] if "group" in frames else "",
+            "target_id": pixels["target_id"].fillna("") if "target_id" in pixels else "",
+            "time_s": np.where(lost, np.nan, times),
+        }
+    )
+    return Observations(
+        table,
+        pixels[["u_px", "v_px"]].to_numpy(float),
+        p_nb,
+        R_nb,
+        pan,
+        tilt,
+        _ground_heights(flight, table, pixels),
+        covariance,
+        flight.manifest.geometry_mount(),
+    )
+
+
+def calibrated(observations: Observations, calibration: Calibration) -> Observations:
+    """The observations with estimated mount angles and position offset applied.
+
+    A clock offset moves the poses themselves: pass it to :func:`observe` as ``clock_shift``.
+    """
+    shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
+    mount = apply_calibration(calibration, observations.mount)
+    return replace(observations, p_nb=observations.p_nb + shift, mount=mount)
+
+
+def pose_errors(
+    flight: Flight, observations: Observations, assumed: dict[str, float] | None = None
+) -> PoseErrors:
+    """Covariances of what the ground points are computed from.
+
+    The pose's covariance is the log's where it has one; all else comes from ``assumed``, then the manifest's
+    ``[uncertainty]``, then :data:`USUAL`, in that order. ``assumed`` overrides the log too.
+    """
+    sd = assumed_deviations(flight) | (assumed or {})
+    n = len(observations.uv)
+    pose = observations.pose_covariance
+    if pose is None or assumed is not None:
+        roll, pitch, _ = matrix_to_euler(observations.R_nb).T
+        E = euler_errors_to_body(roll, pitch)
+        attitude = (
+            E * np.radians([sd["roll_deg"], sd["pitch_deg"], sd["yaw_deg"]]) ** 2 @ np.swapaxes(E, 1, 2)
+        )
+        pose = np.zeros((n, 6, 6))
+        pose[:, :3, :3] = np.diag([sd["position_horizontal_m"]] * 2 + [sd["position_vertical_m"]]) ** 2
+        pose[:, 3:, 3:] = attitude
+    return PoseErrors(
+        pixel=np.eye(2) * sd["pixel_px"] ** 2,
+        pose=pose,
+        mount=np.eye(3) * np.radians(sd["misalignment_deg"]) ** 2,
+        plane=sd["plane_height_m"] ** 2,
+    )
+
+
+def assumed_deviations(flight: Flight) -> dict[str, float]:
+    """Standard deviations by the names of :data:`USUAL`: the manifest's, else the usual ones."""
+    stated = flight.manifest.uncertainty
+    return {
+        name: usual if getattr(stated, name) is None else float(getattr(stated, name))
+        for name, usual in USUAL.items()
+    }
+
+
+def georeference(
+    flight: Flight,
+    observations: Observations,
+    rng: np.random.Generator,
+    errors: PoseErrors | None = None,
+) -> pd.DataFrame:
+    """Ground points of a flight's pixel detections, one row each, NaN where the ray misses the ground.
+
+    Returns
+    -------
+    DataFrame
+        The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
+        ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found).
+    """
+    camera = flight.manifest.geometry_camera()
+    o = observations
+    pose = camera_pose(o.mount, o.p_nb, o.R_nb, o.pan, o.tilt)
+    ground = pixel_to_plane(camera, o.uv, *pose, o.plane_down)
+    if errors is None:
+        errors = pose_errors(flight, o)
+    covariance, method = ground_covariance(
+        camera, o.mount, o.uv, o.p_nb, o.R_nb, o.plane_down, errors, rng, o.pan, o.tilt
+    )
+    return o.table.assign(
+        north_m=ground[:, 0],
+        east_m=ground[:, 1],
+        down_m=ground[:, 2],
+        cov_nn=covariance[:, 0, 0],
+        cov_ne=covariance[:, 0, 1],
+        cov_ee=covariance[:, 1, 1],
+        ellipse=method,
+    )
+
+
+def covariances_of(points: pd.DataFrame) -> Array:
+    """The covariances (N, 2, 2) of a table of ground points."""
+    c = points[["cov_nn", "cov_ne", "cov_ne", "cov_ee"]].to_numpy(float)
+    return c.reshape(-1, 2, 2)
+
+
+def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
+    """True positions (N, 3) in n of the targets that detections name; NaN where none is named or known."""
+    where = np.full((len(table), 3), np.nan)
+    if flight.truth is None:
+        return where
+    for target, rows in table.groupby("target_id").indices.items():
+        known = flight.truth[flight.truth["target_id"] == target]
+        if target and len(known):
+            times = table["time_s"].to_numpy(float)[rows]
+            where[rows] = truth_at(known, times, offset_s=flight.manifest.clocks.truth_offset_s)[1][0]
+    return where
+
+
+def _ground_heights(flight: Flight, table: pd.DataFrame, pixels: pd.DataFrame) -> Array:
+    of_target = truth_of(flight, table)[:, 2]
+    if "plane_down_m" not in pixels:
+        return of_target
+    return np.asarray(np.where(np.isnan(of_target), pixels["plane_down_m"].to_numpy(float), of_target))
