@@ -1,0 +1,189 @@
+"""Is a filter honest about its own uncertainty? NEES, NIS, whiteness and the limits they keep (H 3.5)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from filterpy.common import Q_discrete_white_noise
+from filterpy.kalman import KalmanFilter
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2, norm
+
+from wildlab.errors import WildlabError
+
+Array = NDArray[np.float64]
+
+
+def chi_square_interval(dof: int, probability: float = 0.95, runs: int = 1) -> tuple[float, float]:
+    """Two-sided interval in which NEES or NIS lies with ``probability`` if the filter is consistent (H
+    example 3.1).
+
+    Parameters
+    ----------
+    dof
+        Number of states (NEES) or of elements of a measurement (NIS).
+    runs
+        Of how many independent runs the value is the mean; their sum has ``runs * dof`` degrees of freedom.
+
+    Returns
+    -------
+    (low, high)
+
+    Raises
+    ------
+    WildlabError
+        If ``dof`` or ``runs`` is below 1, or ``probability`` not between 0 and 1.
+    """
+    if dof < 1 or runs < 1 or not 0 < probability < 1:
+        raise WildlabError(
+            f"no interval for {dof} degrees of freedom, {runs} runs and probability {probability}",
+            "give at least one of each, and a probability between 0 and 1",
+        )
+    tail = (1 - probability) / 2
+    return float(chi2.ppf(tail, dof * runs) / runs), float(chi2.ppf(1 - tail, dof * runs) / runs)
+
+
+def nees(errors: ArrayLike, covariances: ArrayLike) -> Array:
+    """Normalised estimation error squared, H (3.11): ``e' P^-1 e``.
+
+    Parameters
+    ----------
+    errors
+        (N, n), truth minus estimate. A row with NaN (no truth at that time) gives NaN.
+    covariances
+        (N, n, n) of the estimates, or (n, n) for all.
+
+    Returns
+    -------
+    (N,)
+
+    Raises
+    ------
+    WildlabError
+        If the shapes do not fit, or a covariance is not positive definite.
+    """
+    e = np.asarray(errors, dtype=float)
+    P = np.asarray(covariances, dtype=float)
+    if e.ndim != 2 or P.shape not in ((e.shape[1],) * 2, (*e.shape, e.shape[1])):
+        raise WildlabError(
+            f"errors of shape {e.shape} do not go with covariances of shape {P.shape}",
+            "give (N, n) and (N, n, n)",
+        )
+    P = np.broadcast_to(P, (*e.shape, e.shape[1]))
+    known = np.isfinite(e).all(axis=1) & np.isfinite(P).all(axis=(1, 2))
+    values = np.full(len(e), np.nan)
+    try:
+        L = np.linalg.cholesky(P[known])
+    except np.linalg.LinAlgError:
+        smallest = np.linalg.eigvalsh(P[known])[:, 0]
+        row = int(np.flatnonzero(known)[np.argmin(smallest)])
+        raise WildlabError(
+            f"the covariance in row {row} is not positive definite", "look at the filter that made it"
+        ) from None
+    whitened = np.linalg.solve(L, e[known][..., None])[..., 0]
+    values[known] = np.sum(whitened**2, axis=1)
+    return values
+
+
+def nis(innovations: ArrayLike, covariances: ArrayLike) -> Array:
+    """Normalised innovation squared, H (3.12); shapes as in `nees`."""
+    return nees(innovations, covariances)
+
+
+def share_inside(values: ArrayLike, interval: tuple[float, float]) -> float:
+    """Share of the known values inside an interval; NaN where none is known."""
+    array = np.asarray(values, dtype=float)
+    known = array[np.isfinite(array)]
+    return float(np.mean((known >= interval[0]) & (known <= interval[1]))) if len(known) else float("nan")
+
+
+def autocorrelation(innovations: ArrayLike, lags: int, probability: float = 0.95) -> tuple[Array, float]:
+    """Normalised autocorrelation of an innovation sequence, and the bound a white one keeps (criterion 3 of
+    H 3.5).
+
+    Parameters
+    ----------
+    innovations
+        (N,) or (N, m), in order of time, equally spaced; rows with NaN leave their products out.
+
+    Returns
+    -------
+    (lags + 1,), float
+        Correlation at lags 0..``lags`` (the first is 1), and the half width of the band about zero in which
+        each lag lies with ``probability`` if the sequence is white.
+
+    Raises
+    ------
+    WildlabError
+        If there are not more rows than lags.
+    """
+    v = np.asarray(innovations, dtype=float)
+    v = v[:, None] if v.ndim == 1 else v
+    if not 0 <= lags < len(v):
+        raise WildlabError(f"{len(v)} innovations do not allow {lags} lags", "ask for fewer lags")
+    correlation = np.empty(lags + 1)
+    for lag in range(lags + 1):
+        a, b = v[: len(v) - lag], v[lag:]
+        both = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
+        a, b = a[both], b[both]
+        size = np.sqrt(np.sum(a * a) * np.sum(b * b))
+        correlation[lag] = np.sum(a * b) / size if size > 0 else np.nan
+    known = int(np.isfinite(v).all(axis=1).sum()) * v.shape[1]
+    return correlation, float(norm.ppf(0.5 + probability / 2) / np.sqrt(max(known, 1)))
+
+
+class FilterRuns(NamedTuple):
+    """NEES and NIS of simulated filter runs, each (runs, steps), and the time of each step in seconds."""
+
+    time_s: Array
+    nees: Array
+    nis: Array
+
+
+def simulate_filter_runs(
+    rng: np.random.Generator,
+    *,
+    runs: int,
+    steps: int,
+    claimed_noise: float = 1.0,
+    interval_s: float = 1.0,
+    acceleration_m_s2: float = 0.3,
+    measurement_m: float = 2.0,
+) -> FilterRuns:
+    """Runs of a linear Kalman filter on targets that move and are measured exactly as it assumes (H example
+    3.1).
+
+    North and east position and velocity are estimated from measured north and east positions.
+
+    Parameters
+    ----------
+    claimed_noise
+        Factor on the measurement noise that the filter believes in: 1 is the truth, 0.5 an overconfident
+        filter.
+    acceleration_m_s2, measurement_m
+        Standard deviations of the process noise (constant over a step) and of each measured coordinate.
+    """
+    F = np.kron(np.array([[1.0, interval_s], [0.0, 1.0]]), np.eye(2))
+    # The order of the state is north, east, velocity north, velocity east.
+    Q = np.kron(Q_discrete_white_noise(2, dt=interval_s, var=acceleration_m_s2**2), np.eye(2))
+    H = np.eye(2, 4)
+    R = np.eye(2) * measurement_m**2
+    P0 = np.diag([10.0, 10.0, 3.0, 3.0]) ** 2
+    # Q has rank 2: one acceleration per axis, which moves position and velocity together.
+    push = np.kron(np.array([[interval_s**2 / 2], [interval_s]]), np.eye(2)) * acceleration_m_s2
+    values = np.empty((2, runs, steps))
+    for run in range(runs):
+        truth = rng.standard_normal(4) * np.sqrt(np.diag(P0))
+        errors, innovations = np.empty((steps, 4)), np.empty((steps, 2))
+        P, S = np.empty((steps, 4, 4)), np.empty((steps, 2, 2))
+        kf = KalmanFilter(dim_x=4, dim_z=2)
+        kf.F, kf.H, kf.Q, kf.R, kf.P = F, H, Q, R * claimed_noise**2, P0.copy()
+        for step in range(steps):
+            truth = F @ truth + push @ rng.standard_normal(2)
+            kf.predict()
+            kf.update(H @ truth + measurement_m * rng.standard_normal(2))
+            errors[step], P[step] = truth - kf.x.ravel(), kf.P
+            innovations[step], S[step] = kf.y.ravel(), kf.S
+        values[0, run], values[1, run] = nees(errors, P), nis(innovations, S)
+    return FilterRuns(np.arange(1, steps + 1, dtype=np.float64) * interval_s, values[0], values[1])

@@ -1,0 +1,261 @@
+"""House style for figures: one look, one colour per subject through the whole ledger, maps that can be
+measured.
+
+A figure carries one message, and its title says the message. It must stay legible on a phone: keep single
+panels at the default 5.6 inches or below, and show two panels as two figures in a row (`Report.figures`),
+which stack.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+DPI = 144
+#: Okabe and Ito's colours, which colour-blind readers can tell apart; their yellow is too faint for lines
+#: on white.
+ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
+VERMILLION, PURPLE, GREY, INK = "#D55E00", "#CC79A7", "#6B7480", "#18222D"
+
+#: Seven colours and more subjects: sources of a pose, tracking filters and judged poses are three families,
+#: and within a family, which is what shares a figure, no colour comes twice.
+COLOURS = {
+    "truth": "#000000",
+    "measurement": GREY,
+    "recorded": GREY,
+    # sources of a pose
+    "autopilot": ORANGE,
+    "observer": GREEN,
+    "mekf": SKY,
+    # tracking filters
+    "kf": BLUE,
+    "ekf": VERMILLION,
+    "schmidt": GREEN,
+    "coloured": PURPLE,
+    "ukf": SKY,
+    "imm": ORANGE,
+    # poses a position was computed from
+    "logged-pose": BLUE,
+    "calibrated-pose": VERMILLION,
+}
+
+_STYLE: dict[str, Any] = {
+    "figure.facecolor": "white",
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "font.family": "sans-serif",
+    # matplotlib brings this font along, so a figure looks the same on every machine.
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 10.0,
+    "axes.titlesize": 11.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 9.0,
+    "axes.labelsize": 10.0,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.prop_cycle": cycler(color=[BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, GREY]),
+    "grid.color": "#E3E7EB",
+    "grid.linewidth": 0.8,
+    "xtick.labelsize": 9.5,
+    "ytick.labelsize": 9.5,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "lines.linewidth": 1.7,
+    "lines.markersize": 4.5,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 9.5,
+    "pdf.fonttype": 42,
+    "pdf.compression": 9,
+}
+
+
+def colour(subject: str) -> str:
+    """The fixed colour of a subject; grey for one that has none."""
+    return COLOURS.get(subject, GREY)
+
+
+def house_style() -> None:
+    """Set matplotlib's defaults to ours, whatever the reader's own settings file says."""
+    mpl.rcdefaults()
+    mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+
+
+def new_figure(
+    width: float = 5.6, height: float = 3.6, *, rows: int = 1, columns: int = 1, **subplots: Any
+) -> tuple[Figure, Any]:
+    """A figure in house style and its axes (one `Axes`, or an array of them), apart from pyplot's global
+    state.
+
+    Parameters
+    ----------
+    width, height
+        Inches. Above 6 inches a phone shows the figure in a box that scrolls sideways.
+    **subplots
+        Passed to `Figure.subplots` (``sharex``, ``width_ratios``, ...).
+    """
+    house_style()
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, **subplots)
+
+
+def map_axes(ax: Axes, *, scale_bar: bool = True, east: str = "east (m)", north: str = "north (m)") -> None:
+    """Make ``ax`` a map in local metres: equal aspect, north arrow, scale bar. Call it after plotting."""
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_xlabel(east)
+    ax.set_ylabel(north)
+    left, right = sorted(ax.get_xlim())
+    if scale_bar and right > left:
+        from mpl_toolkits.axes_grid1.anchored_artists import (
+            AnchoredSizeBar,
+        )
+
+        length = nice_length((right - left) / 4)
+        bar = AnchoredSizeBar(
+            ax.transData,
+            length,
+            f"{length:g} m",
+            "lower right",
+            frameon=False,
+            pad=0.3,
+            sep=3,
+            size_vertical=0,
+        )
+        ax.add_artist(bar)
+    ax.annotate(
+        "N",
+        xy=(0.965, 0.99),
+        xytext=(0.965, 0.87),
+        xycoords="axes fraction",
+        ha="center",
+        va="center",
+        fontsize=9.5,
+        arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.0},
+    )
+
+
+def nice_length(about: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above ``about``."""
+    power = 10.0 ** math.floor(math.log10(about))
+    return max(step * power for step in (1, 2, 5) if step * power <= about * (1 + 1e-9))
+
+
+def ellipse(
+    ax: Axes,
+    mean_en: ArrayLike,
+    covariance: ArrayLike,
+    probability: float = 0.9,
+    *,
+    color: str = BLUE,
+    fill: bool = False,
+    **patch: Any,
+) -> Ellipse | None:
+    """Draw the ellipse that holds ``probability`` of a two-dimensional normal distribution.
+
+    Parameters
+    ----------
+    mean_en
+        Centre (east, north), metres.
+    covariance
+        2x2, of (east, north), square metres. With NaN in either, nothing is drawn and None comes back.
+    """
+    centre = np.asarray(mean_en, dtype=float)
+    matrix = np.asarray(covariance, dtype=float)
+    if not (np.isfinite(centre).all() and np.isfinite(matrix).all()):
+        return None
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    half_axes = np.sqrt(np.clip(values, 0, None) * chi2.ppf(probability, 2))
+    angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
+    patch = {"lw": 1.6, "edgecolor": color, "facecolor": color if fill else "none"} | patch
+    if fill:
+        patch.setdefault("alpha", 0.18)
+    shape = Ellipse((centre[0], centre[1]), 2 * half_axes[1], 2 * half_axes[0], angle=angle, **patch)
+    ax.add_patch(shape)
+    # Patches do not widen the view by themselves when the axes are shared with scatter points.
+    reach = np.hypot(*half_axes)
+    ax.update_datalim([centre - reach, centre + reach])
+    ax.autoscale_view()
+    return shape
+
+
+def log_band(ax: Axes, low: float, high: float, label: str = "95 % band", *, color: str = GREEN) -> None:
+    """Logarithmic y-axis with the band a consistent filter stays in, for NEES and NIS."""
+    ax.set_yscale("log")
+    ax.axhspan(low, high, color=color, alpha=0.13, lw=0, zorder=0)
+    for edge in (low, high):
+        ax.axhline(edge, color=color, lw=0.8, alpha=0.7, zorder=0.5)
+    # Below the band: what is consistent hardly ever goes there, so the words cover nothing.
+    ax.annotate(
+        label,
+        xy=(0.0, low),
+        xycoords=("axes fraction", "data"),
+        xytext=(4, -3),
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        fontsize=9,
+        color="#00664B",
+    )
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def mark_gaps(ax: Axes, times: ArrayLike, longest_s: float) -> int:
+    """Shade the periods without measurements longer than ``longest_s``; returns how many there are."""
+    stamps: NDArray[np.float64] = np.sort(np.asarray(times, dtype=float))
+    gaps = np.flatnonzero(np.diff(stamps) > longest_s)
+    for index in gaps:
+        ax.axvspan(stamps[index], stamps[index + 1], color=GREY, alpha=0.13, lw=0, zorder=0)
+    return len(gaps)
+
+
+def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: Any) -> None:
+    """Write a line's name at its end, in its colour: easier to read than a legend."""
+    settings: dict[str, Any] = {"va": "center", "fontsize": 9.5, "annotation_clip": False} | annotate
+    ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """The figure as PNG at 144 dpi, without a date or the name of a program."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
+    """Write ``name.pdf`` and ``name.png`` into ``folder``; the same figure gives the same bytes.
+
+    Returns
+    -------
+    bytes
+        The PNG.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    png = png_bytes(figure)
+    (folder / f"{name}.png").write_bytes(png)
+    figure.savefig(
+        folder / f"{name}.pdf", metadata={"CreationDate": None, "Producer": None, "Creator": "wildlab"}
+    )
+    return png

@@ -1,0 +1,235 @@
+"""An executed notebook as one HTML file that opens anywhere: no script, no network, maths as MathML.
+
+nbconvert's template ``basic`` turns the outputs into HTML; everything around them is ours (`page`), and the
+result is examined before it is written: what could ask the network for something, run something, or shut
+out a reader who does not see the figures, stops the build with a sentence.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from bs4 import BeautifulSoup, Tag
+from nbconvert import HTMLExporter
+from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
+from traitlets.config import Config
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.page import page
+from wildlab.reporting.text import escape, maths
+
+MAX_BYTES = 5_000_000
+#: Cells that belong to the machinery, not to the report.
+REMOVED_TAGS = ("parameters", "injected-parameters", "remove_cell")
+#: Elements that could run something, ask for something, or send something.
+FORBIDDEN = (
+    *(
+        "script",
+        "iframe",
+        "frame",
+        "object",
+        "embed",
+        "applet",
+        "link",
+        "base",
+        "meta",
+        "form",
+        "input",
+        "button",
+    ),
+    *("select", "textarea", "audio", "video", "source", "track", "portal", "template", "noscript"),
+)
+#: The classes of nbconvert's own wrappers.
+_WRAPPERS = {
+    *("cell", "inner_cell", "output_wrapper", "output", "output_area", "output_subarea", "text_cell_render"),
+    *("prompt", "input"),
+}
+_FETCHING = ("src", "srcset", "poster", "background", "data", "xlink:href", "action", "formaction", "ping")
+_CSS_REQUEST = re.compile(r"@import|url\s*\(\s*['\"]?(?!data:)", re.I)
+
+
+class _Renderer(IPythonRenderer):
+    """Markdown cells with their maths translated here, since no script will do it in the browser."""
+
+    def block_math(self, body: str) -> str:
+        return maths(body, block=True)
+
+    def inline_math(self, body: str) -> str:
+        return maths(body)
+
+    def multiline_math(self, text: str) -> str:
+        return maths(text.strip("$"), block=True)
+
+    def latex_environment(self, name: str, body: str) -> str:
+        return maths(f"\\begin{{{name}}}{body}\\end{{{name}}}", block=True)
+
+
+def _markdown(source: str) -> str:
+    return str(MarkdownWithMath(renderer=_Renderer(escape=True, exclude_anchor_links=True)).render(source))
+
+
+def notebook_body(notebook: nbformat.NotebookNode) -> str:
+    """What an executed notebook shows, as HTML without nbconvert's wrappers; no code, prints, warnings."""
+    exporter = HTMLExporter(
+        config=Config(
+            {
+                "TagRemovePreprocessor": {"enabled": True, "remove_cell_tags": list(REMOVED_TAGS)},
+                "HTMLExporter": {
+                    "template_name": "basic",
+                    "exclude_input": True,
+                    "exclude_input_prompt": True,
+                    "exclude_output_prompt": True,
+                    "exclude_output_stdin": True,
+                    "exclude_anchor_links": True,
+                    "embed_images": True,
+                    "require_js_url": "",
+                    "mathjax_url": "",
+                    "jquery_url": "",
+                    "mermaid_js_url": "",
+                    "widget_renderer_url": "",
+                    "preprocessors": ["nbconvert.preprocessors.TagRemovePreprocessor"],
+                },
+            }
+        )
+    )
+    exporter.register_filter("markdown2html", _no_context(_markdown))
+    shown = nbformat.from_dict(notebook)
+    for cell in shown.cells:
+        if cell.cell_type == "code":
+            # Prints, warnings and the bare value of a last line are for whoever writes the notebook.
+            cell.outputs = [output for output in cell.outputs if set(output.get("data", {})) - {"text/plain"}]
+    body, _ = exporter.from_notebook_node(shown)
+    soup = BeautifulSoup(body, "html.parser")
+    for block in soup.find_all("div", class_=_is_wrapper):
+        block.unwrap()
+    return re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+
+
+def _no_context(function: Any) -> Any:
+    def render(source: str, *_: Any, **__: Any) -> str:
+        return str(function(source))
+
+    return render
+
+
+def _is_wrapper(name: str | None) -> bool:
+    return name in _WRAPPERS
+
+
+def report_page(
+    notebook: nbformat.NotebookNode, *, study: str, footer: str = "", ledger: str = "../index.html"
+) -> str:
+    """The whole page of a report, examined.
+
+    Parameters
+    ----------
+    footer
+        HTML of the provenance line (`wildlab.reporting.provenance.footer`).
+    ledger
+        Where the page of all studies lies, seen from the report; "" leaves the link out.
+
+    Raises
+    ------
+    WildlabError
+        If the page would break one of the promises in `examine`.
+    """
+    body = notebook_body(notebook)
+    heading = BeautifulSoup(body, "html.parser").h1
+    title = heading.get_text(" ", strip=True) if heading else study
+    way = f'<a href="{escape(ledger)}">wildlab ledger</a> › {escape(study)}' if ledger else escape(study)
+    whole = page(title=title, body=body, kicker=way, footer=footer)
+    examine(whole, study)
+    return whole
+
+
+def examine(whole: str, name: str) -> None:
+    """Refuse a page that breaks a promise.
+
+    Raises
+    ------
+    WildlabError
+        If the page is above 5 MB, has something that runs, asks the network or sends, an image without alt
+        text, or headings that are out of order.
+    """
+    file = f"{name}/report.html"
+    size = len(whole.encode("utf-8"))
+    if size > MAX_BYTES:
+        raise WildlabError(
+            f"the report has {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:.0f} MB",
+            "show fewer points, or fewer and smaller figures",
+            file=file,
+        )
+    soup = BeautifulSoup(whole, "html.parser")
+    for tag in soup.find_all(list(FORBIDDEN)):
+        if tag.name == "meta" and tag.parent is not None and tag.parent.name == "head":
+            continue
+        raise WildlabError(
+            f"the report has a <{tag.name}>", "show text, tables and pictures only, through Report", file=file
+        )
+    for tag in soup.find_all(True):
+        _examine_attributes(tag, file)
+    for style in soup.find_all("style"):
+        if _CSS_REQUEST.search(style.get_text()):
+            raise WildlabError("a style asks the network for something", "take the url() out", file=file)
+    for image in soup.find_all("img"):
+        if not str(image.get("alt") or "").strip():
+            raise WildlabError(
+                "a picture has no alt text",
+                "show it with Report.figure(alt=...), saying what it shows",
+                file=file,
+            )
+    _examine_headings([int(tag.name[1]) for tag in soup.find_all(re.compile("^h[1-6]$"))], file)
+
+
+def _examine_attributes(tag: Tag, file: str) -> None:
+    for name, value in tag.attrs.items():
+        text = " ".join(value) if isinstance(value, list) else str(value)
+        if name.lower().startswith("on"):
+            raise WildlabError(f"a <{tag.name}> has the script attribute {name!r}", "take it out", file=file)
+        if name.lower() in _FETCHING and not text.startswith("data:image/"):
+            raise WildlabError(
+                f"a <{tag.name}> asks for {text[:60]!r}", "put the picture into the page itself", file=file
+            )
+        if name.lower() == "href" and re.match(r"\s*(javascript|data|vbscript):", text, re.I):
+            raise WildlabError(f"a link runs {text[:60]!r}", "link to a page", file=file)
+        if name.lower() == "style" and _CSS_REQUEST.search(text):
+            raise WildlabError("a style asks the network for something", "take the url() out", file=file)
+
+
+def _examine_headings(levels: list[int], file: str) -> None:
+    if levels[:1] != [1] or levels.count(1) != 1:
+        raise WildlabError(
+            f"the report has {levels.count(1)} main headings"
+            if levels.count(1) != 1
+            else "a heading precedes <h1>",
+            "begin the notebook with one report.head(...)",
+            file=file,
+        )
+    for before, after in pairwise(levels):
+        if after > before + 1:
+            raise WildlabError(
+                f"a heading of level {after} follows one of level {before}",
+                "use the level between",
+                file=file,
+            )
+
+
+def read_notebook(path: Path) -> nbformat.NotebookNode:
+    """Read a notebook.
+
+    Raises
+    ------
+    WildlabError
+        If it is not one.
+    """
+    try:
+        notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)
+        return notebook
+    except Exception as error:  # nbformat raises its own, json's and jsonschema's errors
+        raise WildlabError(
+            f"this is not a notebook ({type(error).__name__})", "restore the file", file=path.name
+        ) from error

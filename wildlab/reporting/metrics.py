@@ -1,0 +1,181 @@
+"""``metrics.json``: the numbers a run leaves behind, for tools, tests and the ledger.
+
+::
+
+    {"study", "flight", "kind": "logged"|"twin"|"computed", "seed", "seeds",
+     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high"}],
+     "claims":  [{"id", "text", "verdict", "fraction", "seeds"}]}
+
+A value that could not be computed is ``null``. ``low`` and ``high`` bound the middle 90 % over seeds (or
+flights) where there were several.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.files import write_json
+
+KINDS = ("logged", "twin", "computed")
+VERDICTS = ("holds", "does not hold", "cannot be decided")
+NUMBERS = ("value", "published", "low", "high", "fraction")
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_SUBJECT = re.compile(r"\S+")
+
+
+def plain_number(value: Any, what: str) -> float | int | None:
+    """``value`` as a plain number; None and NaN become None.
+
+    Raises
+    ------
+    WildlabError
+        If it is infinite or not a number at all.
+    """
+    if value is None:
+        return None
+    if isinstance(value, (bool, str)):
+        raise WildlabError(f"{what} is {value!r}", "give a number, or None where there is none")
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise WildlabError(
+            f"{what} is of type {type(value).__name__}", "give a number, or None where there is none"
+        ) from error
+    if math.isnan(number):
+        return None
+    if math.isinf(number):
+        raise WildlabError(f"{what} is infinite", "look for a division by zero, or give None")
+    return int(number) if isinstance(value, int) else number
+
+
+def metric(
+    name: str,
+    subject: str,
+    value: Any,
+    unit: str,
+    *,
+    n: Any = None,
+    published: Any = None,
+    source: str | None = None,
+    low: Any = None,
+    high: Any = None,
+) -> dict[str, Any]:
+    """One entry of ``metrics``, checked."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise WildlabError(
+            f"the metric name {name!r} is not made of a-z, 0-9 and _",
+            "rename it: tools read it",
+            field="metrics",
+        )
+    if not isinstance(subject, str) or not _SUBJECT.fullmatch(subject):
+        raise WildlabError(
+            f"the subject {subject!r} of metric {name!r} is empty or has a blank",
+            "join its parts with / or -",
+            field="metrics",
+        )
+    what = f"{name} of {subject}"
+    entry: dict[str, Any] = {
+        "name": name,
+        "subject": subject,
+        "value": plain_number(value, f"the value of {what}"),
+        "unit": str(unit),
+        "n": None if n is None else int(n),
+        "published": plain_number(published, f"the published value of {what}"),
+        "source": None if source is None else str(source),
+        "low": plain_number(low, f"the low bound of {what}"),
+        "high": plain_number(high, f"the high bound of {what}"),
+    }
+    if entry["low"] is not None and entry["high"] is not None and entry["low"] > entry["high"]:
+        raise WildlabError(f"the low bound of {what} is above the high one", "swap them", field="metrics")
+    return entry
+
+
+def claim(id: str, text: str, verdict: str, *, fraction: Any = None, seeds: Any = None) -> dict[str, Any]:
+    """One entry of ``claims``, checked. ``fraction`` is the share of ``seeds`` flights on which it holds."""
+    if not isinstance(id, str) or not _SUBJECT.fullmatch(id):
+        raise WildlabError(f"the claim id {id!r} is empty or has a blank", "use letters, digits, - and _")
+    if verdict not in VERDICTS:
+        raise WildlabError(
+            f"the verdict {verdict!r} of claim {id!r} is unknown", f"use one of: {', '.join(VERDICTS)}"
+        )
+    share = plain_number(fraction, f"the fraction of claim {id}")
+    if share is not None and not 0 <= share <= 1:
+        raise WildlabError(f"the fraction of claim {id!r} is {share}", "give a share from 0 to 1")
+    return {
+        "id": id,
+        "text": str(text),
+        "verdict": verdict,
+        "fraction": share,
+        "seeds": None if seeds is None else int(seeds),
+    }
+
+
+def document(
+    *,
+    study: str,
+    flight: str,
+    kind: str,
+    seed: int | None,
+    seeds: int | None,
+    metrics: Iterable[dict[str, Any]],
+    claims: Iterable[dict[str, Any]],
+) -> dict[str, Any]:
+    """The whole content of ``metrics.json``; a name and subject, or a claim, that comes twice is an error."""
+    if kind not in KINDS:
+        raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(KINDS)}", field="kind")
+    metrics, claims = list(metrics), list(claims)
+    seen: set[tuple[str, ...]] = set()
+    for key in [(m["name"], m["subject"]) for m in metrics] + [(c["id"],) for c in claims]:
+        if key in seen:
+            raise WildlabError(f"{' of '.join(key)} is given twice", "give each number and claim once")
+        seen.add(key)
+    return {
+        "study": study,
+        "flight": flight,
+        "kind": kind,
+        "seed": seed,
+        "seeds": seeds,
+        "metrics": metrics,
+        "claims": claims,
+    }
+
+
+def write_metrics(path: Path, content: dict[str, Any]) -> None:
+    """Write a `document` atomically."""
+    write_json(path, content)
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Read and check a ``metrics.json``.
+
+    Raises
+    ------
+    WildlabError
+        If it cannot be read or is not what `document` makes.
+    """
+    try:
+        raw = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
+        return document(
+            study=str(raw["study"]),
+            flight=str(raw["flight"]),
+            kind=raw["kind"],
+            seed=raw["seed"],
+            seeds=raw["seeds"],
+            metrics=[metric(**entry) for entry in raw["metrics"]],
+            claims=[claim(**entry) for entry in raw["claims"]],
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise WildlabError(
+            f"this is not a metrics file ({type(error).__name__}: {error})", "run the study again", file=path
+        ) from error
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is not JSON")

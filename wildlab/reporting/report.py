@@ -1,0 +1,357 @@
+"""`Report`: what a notebook writes its report with.
+
+Each method shows one part of the page as HTML and collects the numbers for ``metrics.json``. All text is
+escaped; ``**bold**`` and a code span in backquotes are the only marks (`wildlab.reporting.text`)::
+
+    report = open_report(study=study, flight=flight, kind="twin", seed=seed, out=out,
+    expected_prefix=expected_prefix) report.head("How far off is a position read from one photo?", "29
+    photos from 55 m") report.summary(["Typically 2 metres.", "Over many photos the errors cancel.", "The
+    pose is the limit."]) report.tiles([("2.9 m", "mean error")]) report.section("What most limits it")
+    report.figure(fig, name="fig-5-04a", alt="Scatter of 103 errors ...", caption="Error of every click.")
+    report.metric("horizontal_error_mean", "logged-pose", 2.92, "m", n=103) report.save()
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wildlab.errors import WildlabError
+from wildlab.reporting import metrics as schema
+from wildlab.reporting.figures import png_bytes, save_figure
+from wildlab.reporting.published import load_published
+from wildlab.reporting.text import NOTHING, escape, inline, maths, number, prose, slug
+
+LEVELS = ("good", "warn", "bad", "neutral")
+TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed": "computed, no flight"}
+
+#: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
+_FULL_SIZE, _LEAST_SIZE = 116, 58
+_FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
+
+
+def open_report(
+    *,
+    study: str,
+    kind: str,
+    flight: str = "",
+    seed: int | None = None,
+    seeds: int | None = None,
+    out: str = "",
+    expected_prefix: str = "",
+) -> Report:
+    """Begin a report.
+
+    Parameters
+    ----------
+    flight
+        The flight's name, or its folder, of which only the last part is shown.
+    seeds
+        How many simulated flights the numbers come from, where it is more than one.
+    out
+        Folder for ``metrics.json`` and ``figures/``; "" (a notebook opened by hand) writes nothing.
+    expected_prefix
+        ``sys.prefix`` of whoever runs the notebook; "" does not look.
+
+    Raises
+    ------
+    WildlabError
+        If this kernel runs in another environment than the caller's.
+    """
+    here = Path(sys.prefix).resolve()
+    if expected_prefix and here != Path(expected_prefix).resolve():
+        raise WildlabError(
+            f"the notebook's kernel runs in another Python environment ({here.name}) than wildlab",
+            "run `make reports`, or register the kernel again: python -m ipykernel install --sys-prefix",
+        )
+    if kind not in TAGS:
+        raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(TAGS)}", field="kind")
+    return Report(
+        study=study,
+        flight=Path(flight).name if flight else "",
+        kind=kind,
+        seed=seed,
+        seeds=seeds,
+        out=Path(out) if out else None,
+    )
+
+
+class Report:
+    """A report in the making; see the module. Make one with `open_report`."""
+
+    def __init__(
+        self, *, study: str, flight: str, kind: str, seed: int | None, seeds: int | None, out: Path | None
+    ) -> None:
+        self.study, self.flight, self.kind, self.seed, self.seeds, self.out = (
+            study,
+            flight,
+            kind,
+            seed,
+            seeds,
+            out,
+        )
+        #: The HTML of every part shown so far, in order.
+        self.parts: list[str] = []
+        self._metrics: list[dict[str, Any]] = []
+        self._claims: list[dict[str, Any]] = []
+        self._figures: set[str] = set()
+        self._tables = 0
+        published = load_published(study)
+        self._published = {(row["name"], row["subject"]): row for row in published.to_dict(orient="records")}
+
+    # -- the parts of a page
+    # ------------------------------------------------------------------------------------
+
+    def head(self, title: str, subtitle: str = "") -> None:
+        """``<h1>``, and below it what is shown: flight, logged or simulated, ``subtitle``."""
+        about = f"Flight <b>{escape(self.flight)}</b> " if self.flight else ""
+        tag = f'<span class="tag {self.kind}">{TAGS[self.kind]}</span>'
+        self._show(
+            f"<header><h1>{inline(title)}</h1>", f'<p class="sub">{about}{tag}{inline(subtitle)}</p></header>'
+        )
+
+    def summary(self, sentences: Sequence[str], level: str = "neutral") -> None:
+        """The plain-language summary, three sentences at best; the first is set bold."""
+        if level not in LEVELS:
+            raise WildlabError(f"the level {level!r} is unknown", f"use one of: {', '.join(LEVELS)}")
+        if not sentences:
+            raise WildlabError("the summary is empty", "give it a sentence")
+        first, *others = [inline(sentence) for sentence in sentences]
+        text = " ".join([f"<b>{first.replace('<b>', '').replace('</b>', '')}</b>", *others])
+        self._show(f'<section class="summary {level}" aria-label="Summary"><p>{text}</p></section>')
+
+    def tiles(self, tiles: Sequence[tuple[str, str]]) -> None:
+        """The few numbers to remember: ``[("2.9 m", "mean error"), ...]``."""
+        items = [f"<li><b>{inline(value)}</b><span>{inline(label)}</span></li>" for value, label in tiles]
+        self._show(f'<ul class="tiles">{"".join(items)}</ul>')
+
+    def section(self, title: str, intro: str = "") -> None:
+        """``<h2>`` and, if given, a paragraph."""
+        self._show(f'<h2 id="{slug(title)}">{inline(title)}</h2>', f"<p>{inline(intro)}</p>" if intro else "")
+
+    def subsection(self, title: str, intro: str = "") -> None:
+        """``<h3>`` and, if given, a paragraph."""
+        self._show(f"<h3>{inline(title)}</h3>", f"<p>{inline(intro)}</p>" if intro else "")
+
+    def text(self, paragraphs: str) -> None:
+        """Paragraphs, split at blank lines, with ``$latex$`` set as maths. Not for text out of data."""
+        self._show(prose(paragraphs))
+
+    def points(self, points: Iterable[str], *, ordered: bool = False) -> None:
+        """A list."""
+        tag = "ol" if ordered else "ul"
+        self._show(f"<{tag}>{''.join(f'<li>{inline(point)}</li>' for point in points)}</{tag}>")
+
+    def figure(self, fig: Figure, *, name: str, alt: str, caption: str = "") -> None:
+        """Show a figure, and write it as ``figures/<name>.pdf`` and ``.png``.
+
+        Parameters
+        ----------
+        name
+            The thesis figure it answers to (``fig-5-04a``), or what it shows.
+        alt
+            What a reader who cannot see it should know; never empty.
+        """
+        self._show(self._figure(fig, name, alt, caption))
+
+    def figures(self, row: Sequence[tuple[Figure, str, str, str]]) -> None:
+        """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone."""
+        self._show(f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>')
+
+    def table(
+        self,
+        frame: pd.DataFrame,
+        *,
+        caption: str = "",
+        columns: Mapping[str, str] | None = None,
+        digits: Mapping[str, int] | int | None = None,
+        fold: str = "",
+    ) -> None:
+        """A table without its index: numbers to the right, text to the left.
+
+        Parameters
+        ----------
+        columns
+            Headings by column name; where given, only these columns are shown, in this order.
+        digits
+            Decimals by column name, or for all; three figures otherwise.
+        fold
+            For long tables: the one-line summary behind which the table is folded away.
+        """
+        if columns is not None:
+            missing = [name for name in columns if name not in frame]
+            if missing:
+                raise WildlabError(
+                    f"the table has no column {missing[0]!r}", f"it has: {', '.join(map(str, frame))}"
+                )
+            frame = frame[list(columns)]
+        self._tables += 1
+        label = f"<b>Table {self._tables}.</b> {inline(caption)}" if caption else ""
+        body = _table(frame, columns or {}, digits)
+        described = f' aria-label="{escape(caption or fold or f"Table {self._tables}")}"'
+        html = f'<figure class="table"><div class="scroll" role="region" tabindex="0"{described}>{body}</div>'
+        html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
+        self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
+
+    def math(self, latex: str) -> None:
+        """A formula on a line of its own."""
+        self._show(maths(latex, block=True))
+
+    def limits(self, points: Iterable[str]) -> None:
+        """What this report does not tell."""
+        self.section("What this does not tell you")
+        self.points(points)
+
+    def method(self, paragraphs: str) -> None:
+        """How it was computed, folded away at the end; ``$latex$`` is set as maths."""
+        self._show(f"<details><summary>How it was computed</summary>{prose(paragraphs)}</details>")
+
+    # -- the numbers
+    # --------------------------------------------------------------------------------------------
+
+    def metric(
+        self,
+        name: str,
+        subject: str,
+        value: Any,
+        unit: str,
+        *,
+        n: int | None = None,
+        published: float | None = None,
+        source: str | None = None,
+        low: float | None = None,
+        high: float | None = None,
+    ) -> None:
+        """Record a number. ``published`` and ``source`` are looked up in ``data/published`` where not given.
+
+        Raises
+        ------
+        WildlabError
+            If the name or subject is not allowed, or the unit is not the published one.
+        """
+        known = self._published.get((name, subject))
+        if known is not None:
+            if known["unit"] != unit:
+                raise WildlabError(
+                    f"{name} of {subject} is in {unit!r} here and published in {known['unit']!r}",
+                    "convert it",
+                )
+            published = known["value"] if published is None else published
+            source = known["source"] if source is None else source
+        self._metrics.append(
+            schema.metric(
+                name, subject, value, unit, n=n, published=published, source=source, low=low, high=high
+            )
+        )
+
+    def claim(
+        self, id: str, text: str, verdict: str, fraction: float | None = None, seeds: int | None = None
+    ) -> None:
+        """Record a claim of a thesis and whether it holds (on ``fraction`` of ``seeds`` flights)."""
+        self._claims.append(schema.claim(id, text, verdict, fraction=fraction, seeds=seeds))
+
+    def save(self) -> None:
+        """Write ``metrics.json`` into the report's folder; where there is none, only check the numbers."""
+        content = schema.document(
+            study=self.study,
+            flight=self.flight,
+            kind=self.kind,
+            seed=self.seed,
+            seeds=self.seeds,
+            metrics=self._metrics,
+            claims=self._claims,
+        )
+        if self.out is not None:
+            schema.write_metrics(self.out / "metrics.json", content)
+
+    # -- inside
+    # -------------------------------------------------------------------------------------------------
+
+    def _figure(self, fig: Figure, name: str, alt: str, caption: str = "") -> str:
+        if not _FILE_NAME.fullmatch(name):
+            raise WildlabError(f"the figure name {name!r} is not made of a-z, 0-9 and -", "rename it")
+        if name in self._figures:
+            raise WildlabError(f"the figure {name!r} is shown twice", "give each figure its own name")
+        if not alt.strip():
+            raise WildlabError(f"the figure {name!r} has no alt text", "say in words what it shows")
+        self._figures.add(name)
+        png = save_figure(fig, self.out / "figures", name) if self.out is not None else png_bytes(fig)
+        width_in, height_in = fig.get_size_inches()
+        _close(fig)
+        data = base64.b64encode(png).decode("ascii")
+        # The size in pixels lets a browser keep the place before it has decoded the picture.
+        width, height = round(width_in * _FULL_SIZE), round(height_in * _FULL_SIZE)
+        image = (
+            f'<img alt="{escape(alt)}" width="{width}" height="{height}" '
+            f'style="max-width:{width}px;min-width:{round(width_in * _LEAST_SIZE)}px" '
+            f'src="data:image/png;base64,{data}">'
+        )
+        if width_in > 6:
+            image = (
+                f'<div class="scroll" role="region" tabindex="0" aria-label="{escape(name)}">{image}</div>'
+            )
+        label = (
+            f"<figcaption><b>Figure {len(self._figures)}.</b> {inline(caption)}</figcaption>"
+            if caption
+            else ""
+        )
+        return f"<figure>{image}{label}</figure>"
+
+    def _show(self, *html: str) -> None:
+        content = "\n".join(part for part in html if part)
+        self.parts.append(content)
+        if "IPython" in sys.modules:
+            from IPython.core.getipython import get_ipython
+            from IPython.display import display
+
+            if get_ipython() is not None:
+                plain = re.sub(r"<[^>]+>", " ", content)[:200]
+                display({"text/html": content, "text/plain": plain}, raw=True)
+
+
+def _table(frame: pd.DataFrame, headings: Mapping[str, str], digits: Mapping[str, int] | int | None) -> str:
+    cells: list[list[str]] = []
+    classes: list[str] = []
+    for name in frame:
+        column = frame[name]
+        numeric = pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_bool_dtype(column)
+        decimals = digits if isinstance(digits, int) else (digits or {}).get(str(name))
+        if decimals is None and pd.api.types.is_integer_dtype(column):
+            decimals = 0
+        classes.append("" if numeric else ' class="text"')
+        cells.append([number(value, decimals) if numeric else _words(value) for value in column])
+    head = "".join(
+        f'<th scope="col"{style}>{inline(headings.get(str(name), str(name)))}</th>'
+        for name, style in zip(frame, classes, strict=True)
+    )
+    rows = "".join(
+        "<tr>"
+        + "".join(
+            f'<th scope="row"{style}>{cell}</th>' if index == 0 else f"<td{style}>{cell}</td>"
+            for index, (cell, style) in enumerate(zip(row, classes, strict=True))
+        )
+        + "</tr>"
+        for row in zip(*cells, strict=True)
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _words(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
+        return NOTHING
+    return inline(value)
+
+
+def _close(fig: Figure) -> None:
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None:
+        pyplot.close(fig)

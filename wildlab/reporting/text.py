@@ -1,0 +1,104 @@
+"""Text that is safe to put into a page: everything escaped, three marks allowed.
+
+Names of flights, targets and columns come out of other people's logs. They reach a page through the functions
+below and no other way, so that ``<script>`` in a target's name is a strange name and nothing more.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from typing import Any
+
+from latex2mathml.converter import convert as latex_to_mathml
+
+from wildlab.errors import WildlabError
+
+_BOLD = re.compile(r"\*\*(.+?)\*\*", re.S)
+_CODE = re.compile(r"`([^`\n]+)`")
+_MATHS = re.compile(r"(?<!\\)\$\$(.+?)\$\$|(?<!\\)\$([^$\n]+?)\$", re.S)
+#: Control characters that HTML forbids; a log may hold any of them.
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
+
+#: What a number that could not be computed looks like.
+NOTHING = "–"
+
+
+def escape(text: object) -> str:
+    """``text`` with everything HTML gives a meaning to made harmless, quotes included."""
+    return html.escape(_CONTROL.sub("\N{REPLACEMENT CHARACTER}", str(text)), quote=True)
+
+
+def inline(text: object) -> str:
+    """Escaped ``text`` in which ``**bold**`` and a `````code````` span keep their meaning."""
+    return _CODE.sub(r"<code>\1</code>", _BOLD.sub(r"<b>\1</b>", escape(text)))
+
+
+def maths(latex: str, *, block: bool = False) -> str:
+    """One LaTeX formula as MathML.
+
+    Raises
+    ------
+    WildlabError
+        If the formula is not understood: a page must not show half-translated LaTeX.
+    """
+    try:
+        mathml = latex_to_mathml(latex.strip(), display="block" if block else "inline")
+    except Exception as error:  # latex2mathml has a dozen exceptions of its own and raises IndexError too
+        raise WildlabError(
+            f"the formula {latex.strip()!r} cannot be translated ({type(error).__name__})",
+            "use simpler LaTeX; check braces and \\left/\\right pairs",
+        ) from error
+    unknown = re.search(r"<m[a-z]+>\\[A-Za-z]+", mathml)
+    if unknown:
+        raise WildlabError(
+            f"{unknown.group(0).split('>')[1]} in the formula {latex.strip()!r} has no translation",
+            "write it another way",
+        )
+    return f'<div class="scroll formula">{mathml}</div>' if block else mathml
+
+
+def prose(text: str) -> str:
+    """Paragraphs, split at blank lines, with the marks of `inline` and ``$maths$`` or ``$$maths$$``."""
+    paragraphs = [part for part in re.split(r"\n\s*\n", text.strip()) if part.strip()]
+    return "".join(_paragraph(part) for part in paragraphs)
+
+
+def _paragraph(text: str) -> str:
+    pieces: list[str] = []
+    at = 0
+    for match in _MATHS.finditer(text):
+        pieces.append(inline(text[at : match.start()].replace("\\$", "$")))
+        block, within = match.groups()
+        # A formula on its own line may not stand inside <p>: close it and open it again.
+        pieces.append(f"</p>{maths(block, block=True)}<p>" if block else maths(within))
+        at = match.end()
+    pieces.append(inline(text[at:].replace("\\$", "$")))
+    return re.sub(r"<p>\s*</p>", "", f"<p>{''.join(pieces)}</p>")
+
+
+def number(value: Any, digits: int | None = None) -> str:
+    """A number as a reader wants it: a true minus sign, ``digits`` decimals, three figures if not told."""
+    try:
+        value = float(value)
+    except (TypeError, ValueError):
+        return NOTHING
+    if math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if digits is None:
+        magnitude = abs(value)
+        if magnitude != 0 and not 1e-4 <= magnitude < 1e7:
+            return f"{value:.2e}".replace("-", "−")
+        digits = 0 if magnitude >= 100 else max(0, 2 - math.floor(math.log10(magnitude))) if magnitude else 0
+    shown = f"{value:.{max(0, digits)}f}"
+    if float(shown) == 0:
+        shown = shown.lstrip("-")
+    return shown.replace("-", "−")
+
+
+def slug(text: str) -> str:
+    """Letters, digits and hyphens only: for the names of files and the ids of headings."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
