@@ -1,4 +1,4 @@
-"""Is a filter honest about its own uncertainty? NEES, NIS, whiteness and the limits they keep (H 3.5)."""
+"""Is a filter honest about its own uncertainty? NEES, NIS and the limits they keep (H 3.5)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from filterpy.common import Q_discrete_white_noise
 from filterpy.kalman import KalmanFilter
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 
@@ -96,41 +96,6 @@ def share_inside(values: ArrayLike, interval: tuple[float, float]) -> float:
     array = np.asarray(values, dtype=float)
     known = array[np.isfinite(array)]
     return float(np.mean((known >= interval[0]) & (known <= interval[1]))) if len(known) else float("nan")
-
-
-def autocorrelation(innovations: ArrayLike, lags: int, probability: float = 0.95) -> tuple[Array, float]:
-    """Normalised autocorrelation of an innovation sequence, and the bound a white one keeps (criterion 3 of
-    H 3.5).
-
-    Parameters
-    ----------
-    innovations
-        (N,) or (N, m), in order of time, equally spaced; rows with NaN leave their products out.
-
-    Returns
-    -------
-    (lags + 1,), float
-        Correlation at lags 0..``lags`` (the first is 1), and the half width of the band about zero in which
-        each lag lies with ``probability`` if the sequence is white.
-
-    Raises
-    ------
-    WildlabError
-        If there are not more rows than lags.
-    """
-    v = np.asarray(innovations, dtype=float)
-    v = v[:, None] if v.ndim == 1 else v
-    if not 0 <= lags < len(v):
-        raise WildlabError(f"{len(v)} innovations do not allow {lags} lags", "ask for fewer lags")
-    correlation = np.empty(lags + 1)
-    for lag in range(lags + 1):
-        a, b = v[: len(v) - lag], v[lag:]
-        both = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
-        a, b = a[both], b[both]
-        size = np.sqrt(np.sum(a * a) * np.sum(b * b))
-        correlation[lag] = np.sum(a * b) / size if size > 0 else np.nan
-    known = int(np.isfinite(v).all(axis=1).sum()) * v.shape[1]
-    return correlation, float(norm.ppf(0.5 + probability / 2) / np.sqrt(max(known, 1)))
 
 
 class FilterRuns(NamedTuple):

@@ -10,65 +10,106 @@ from wildlab.reporting.text import escape
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 
-# System fonts only: a font file would be a request, or a megabyte. Colours: the status colours hold 4.5:1
-# on white.
-STYLE = """ :root{--ink:#18222d;--dim:#55626f;--line:#dce1e6;--soft:#f4f6f8;--blue:#0072b2;--link:#00598c;
---good:#0b7a4b;--warn:#a85b00;--bad:#b3261e;--gap:1.6rem} *{box-sizing:border-box}
-html{-webkit-text-size-adjust:100%;text-size-adjust:100%} body{margin:0 auto;max-width:58rem;padding:1.75rem
-1.25rem 3.5rem;color:var(--ink);background:#fff; font:16px/1.55 system-ui,-apple-system,"Segoe
-UI",Roboto,"Noto Sans","DejaVu Sans",sans-serif; overflow-wrap:break-word}
-h1{font-size:1.9rem;line-height:1.18;letter-spacing:-.012em;margin:.15rem 0 .45rem;text-wrap:balance}
-h2{font-size:1.22rem;line-height:1.3;margin:2.5rem 0 .6rem} h3{font-size:1.02rem;margin:1.7rem 0 .4rem}
-p,ul,ol{margin:.55rem 0;max-width:46rem} li{margin:.3rem 0}ul,ol{padding-left:1.4rem} a{color:var(--link)}
-code{font:.88em ui-monospace,Menlo,Consolas,"DejaVu Sans Mono",monospace;overflow-wrap:anywhere}
-pre{font:.8rem/1.45 ui-monospace,Menlo,Consolas,"DejaVu Sans Mono",monospace;background:var(--soft);
-padding:.8rem 1rem;margin:.6rem 0;overflow-x:auto} .kicker{margin:0;color:var(--dim);font-size:.86rem}
-.sub{color:var(--dim);margin:.2rem 0 0} .tag{display:inline-block;border:1px solid
-currentColor;border-radius:1rem;padding:0 .6rem;margin-right:.45rem;
-font-size:.8rem;font-weight:400;line-height:1.5;color:var(--dim);white-space:nowrap}
-.tag.logged{color:var(--good)}.tag.twin{color:var(--link)} .summary{border-left:6px solid
-var(--dim);background:var(--soft);padding:.85rem 1.1rem;margin:1.4rem 0}
-.summary.good{border-color:var(--good)}.summary.warn{border-color:var(--warn)}.summary.bad{border-color:var(--bad)}
-.summary p{margin:0;font-size:1.08rem;max-width:none}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(9.5rem,1fr));gap:.75rem;margin:1.3rem
-0;padding:0; list-style:none;max-width:none} .tiles li{border:1px solid
-var(--line);border-radius:.4rem;padding:.65rem .85rem;margin:0} .tiles
-b{display:block;font-size:1.5rem;line-height:1.25;font-variant-numeric:tabular-nums} .tiles
-span{display:block;color:var(--dim);font-size:.86rem;line-height:1.35} figure{margin:var(--gap) 0}
-.table{margin:.8rem 0 var(--gap)} .row{display:flex;flex-wrap:wrap;gap:0 1.5rem}.row figure{flex:1 1
-20rem;min-width:0;margin:.8rem 0} figure img{display:block;width:100%;height:auto}
-figcaption,.note,caption{color:var(--dim);font-size:.88rem;line-height:1.45;margin-top:.45rem;max-width:46rem}
-.scroll{overflow-x:auto;max-width:100%}
-.scroll:focus-visible,a:focus-visible,summary:focus-visible{outline:2px solid
-var(--blue);outline-offset:2px} table{border-collapse:collapse;width:100%;margin:.4rem
-0;font-size:.93rem;font-variant-numeric:tabular-nums} caption{caption-side:bottom;text-align:left}
-th,td{padding:.38rem .7rem;border-bottom:1px solid
-var(--line);text-align:right;vertical-align:top;white-space:nowrap}
-th:first-child,td:first-child{padding-left:0}th:last-child,td:last-child{padding-right:0} thead
-th{color:var(--dim);font-weight:600;font-size:.82rem;vertical-align:bottom;white-space:normal} tbody
-th{font-weight:400} th.text,td.text{text-align:left;white-space:normal;min-width:8rem;max-width:26rem}
-td.text.wide{min-width:14rem} td svg{display:block;margin-left:auto} .formula{margin:.7rem 0;padding:.1rem
-0;overflow-y:hidden}math[display=block]{width:max-content;margin:0 auto} details{border-top:1px solid
-var(--line);margin-top:1.8rem;padding-top:.7rem} details.plain{border:0;margin-top:.6rem;padding:0}
-summary{cursor:pointer;color:var(--dim)} details[open]>summary{margin-bottom:.5rem}
-footer{margin-top:2.6rem;border-top:1px solid
-var(--line);padding-top:.6rem;color:var(--dim);font-size:.82rem} footer p{margin:.25rem 0;max-width:none}
-.pill{display:inline-block;border-radius:1rem;padding:.02rem
-.6rem;font-size:.82rem;color:#fff;background:var(--dim); white-space:nowrap}
-.pill.yes{background:var(--good)}.pill.part{background:var(--warn)}.pill.no{background:var(--bad)} .key
-i{display:inline-block;vertical-align:-1px;margin:0 .25rem 0 .6rem}
-.hollow,.full{width:9px;height:9px;border-radius:50%}.hollow{border:1.6px solid
-#18222d}.full{background:var(--blue)} .band{width:18px;height:6px;border-radius:3px;background:#9cc7e0}
-.dim{color:var(--dim)} @media screen and (max-width:36rem){body{padding:1.1rem .9rem
-2.5rem;font-size:15.5px}h1{font-size:1.5rem} .summary{padding:.75rem .9rem}.tiles b{font-size:1.3rem}}
-@page{size:A4;margin:16mm 15mm} @media
-print{body{max-width:none;padding:0;font-size:10.2pt;line-height:1.42}
-h1{font-size:17pt}h2{font-size:12.5pt;margin-top:1.5rem}h1,h2,h3,caption{break-after:avoid}
-figure,tr,.summary,.tiles,.formula{break-inside:avoid}figure img{max-height:120mm;width:auto;max-width:100%}
-.summary,.tag,.pill,.band,.full{print-color-adjust:exact;-webkit-print-color-adjust:exact}
-.scroll{overflow:visible}table{font-size:8.4pt}th,td{padding:.22rem .45rem;white-space:normal}
-a{color:inherit;text-decoration:none}details::details-content{content-visibility:visible;display:block;height:auto}}
-""".strip()
+# System fonts only: a font file would be a request, or a megabyte. The status colours hold 4.5:1 on white.
+STYLE = """:root { --ink: #18222d; --dim: #55626f; --line: #dce1e6; --soft: #f4f6f8; --blue: #0072b2;
+  --link: #00598c; --good: #0b7a4b; --warn: #a85b00; --bad: #b3261e; --gap: 1.6rem;
+  --mono: ui-monospace, Menlo, Consolas, "DejaVu Sans Mono", monospace }
+* { box-sizing: border-box }
+html { -webkit-text-size-adjust: 100%; text-size-adjust: 100% }
+body { margin: 0 auto; max-width: 58rem; padding: 1.75rem 1.25rem 3.5rem; color: var(--ink); background: #fff;
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif;
+  overflow-wrap: break-word }
+h1 { font-size: 1.9rem; line-height: 1.18; letter-spacing: -.012em; margin: .15rem 0 .45rem;
+  text-wrap: balance }
+h2 { font-size: 1.22rem; line-height: 1.3; margin: 2.5rem 0 .6rem }
+h3 { font-size: 1.02rem; margin: 1.7rem 0 .4rem }
+p, ul, ol { margin: .55rem 0; max-width: 46rem }
+ul, ol { padding-left: 1.4rem }
+li { margin: .3rem 0 }
+a { color: var(--link) }
+code { font: .88em var(--mono); overflow-wrap: anywhere }
+pre { font: .8rem/1.45 var(--mono); background: var(--soft); padding: .8rem 1rem; margin: .6rem 0;
+  overflow-x: auto }
+.kicker { margin: 0; color: var(--dim); font-size: .86rem }
+.sub { color: var(--dim); margin: .2rem 0 0 }
+.dim { color: var(--dim) }
+.tag { display: inline-block; border: 1px solid currentColor; border-radius: 1rem; padding: 0 .6rem;
+  margin-right: .45rem; font-size: .8rem; font-weight: 400; line-height: 1.5; color: var(--dim);
+  white-space: nowrap }
+.tag.logged { color: var(--good) }
+.tag.twin { color: var(--link) }
+.summary { border-left: 6px solid var(--dim); background: var(--soft); padding: .85rem 1.1rem;
+  margin: 1.4rem 0 }
+.summary.good { border-color: var(--good) }
+.summary.warn { border-color: var(--warn) }
+.summary.bad { border-color: var(--bad) }
+.summary p { margin: 0; font-size: 1.08rem; max-width: none }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: .75rem;
+  margin: 1.3rem 0; padding: 0; list-style: none; max-width: none }
+.tiles li { border: 1px solid var(--line); border-radius: .4rem; padding: .65rem .85rem; margin: 0 }
+.tiles b { display: block; font-size: 1.5rem; line-height: 1.25; font-variant-numeric: tabular-nums }
+.tiles span { display: block; color: var(--dim); font-size: .86rem; line-height: 1.35 }
+figure { margin: var(--gap) 0 }
+figure.table { margin: .8rem 0 var(--gap) }
+.row { display: flex; flex-wrap: wrap; gap: 0 1.5rem }
+.row figure { flex: 1 1 20rem; min-width: 0; margin: .8rem 0 }
+figure img { display: block; width: 100%; height: auto }
+figcaption, .note { color: var(--dim); font-size: .88rem; line-height: 1.45; margin-top: .45rem;
+  max-width: 46rem }
+.scroll { overflow-x: auto; max-width: 100% }
+.scroll:focus-visible, a:focus-visible, summary:focus-visible { outline: 2px solid var(--blue);
+  outline-offset: 2px }
+table { border-collapse: collapse; width: 100%; margin: .4rem 0; font-size: .93rem;
+  font-variant-numeric: tabular-nums }
+th, td { padding: .38rem .7rem; border-bottom: 1px solid var(--line); text-align: right; vertical-align: top;
+  white-space: nowrap }
+th:first-child, td:first-child { padding-left: 0 }
+th:last-child, td:last-child { padding-right: 0 }
+thead th { color: var(--dim); font-weight: 600; font-size: .82rem; vertical-align: bottom;
+  white-space: normal }
+tbody th { font-weight: 400 }
+th.text, td.text { text-align: left; white-space: normal; min-width: 6.5rem; max-width: 28rem }
+td svg { display: block; margin-left: auto }
+.formula { margin: .7rem 0; padding: .1rem 0; overflow-y: hidden }
+math[display=block] { width: max-content; margin: 0 auto }
+details { border-top: 1px solid var(--line); margin-top: 1.8rem; padding-top: .7rem }
+details.plain { border: 0; margin-top: .6rem; padding: 0 }
+summary { cursor: pointer; color: var(--dim) }
+details[open] > summary { margin-bottom: .5rem }
+footer { margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: .6rem; color: var(--dim);
+  font-size: .82rem }
+footer p { margin: .25rem 0; max-width: none }
+.pill { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .82rem; color: #fff;
+  background: var(--dim); white-space: nowrap }
+.pill.yes { background: var(--good) }
+.pill.part { background: var(--warn) }
+.pill.no { background: var(--bad) }
+.key { white-space: nowrap; font-weight: 400 }
+.key i { display: inline-block; vertical-align: -1px; margin: 0 .25rem 0 .6rem }
+.hollow, .full { width: 9px; height: 9px; border-radius: 50% }
+.hollow { border: 1.6px solid #18222d }
+.full { background: var(--blue) }
+.band { width: 18px; height: 6px; border-radius: 3px; background: #9cc7e0 }
+@media screen and (max-width: 36rem) {
+  body { padding: 1.1rem .9rem 2.5rem; font-size: 15.5px }
+  h1 { font-size: 1.5rem }
+  .summary { padding: .75rem .9rem }
+  .tiles b { font-size: 1.3rem }
+}
+@page { size: A4; margin: 16mm 15mm }
+@media print {
+  body { max-width: none; padding: 0; font-size: 10.2pt; line-height: 1.42 }
+  h1 { font-size: 17pt }
+  h2 { font-size: 12.5pt; margin-top: 1.5rem }
+  h1, h2, h3 { break-after: avoid }
+  figure:not(.table), tr, .summary, .tiles, .formula { break-inside: avoid }
+  figure img { max-height: 120mm; width: auto; max-width: 100% !important; min-width: 0 !important }
+  .summary, .tag, .pill, .band, .full { print-color-adjust: exact; -webkit-print-color-adjust: exact }
+  .scroll { overflow: visible }
+  table { font-size: 8.4pt }
+  th, td { padding: .22rem .45rem; white-space: normal }
+  a { color: inherit; text-decoration: none }
+}"""
 
 
 def page(*, title: str, body: str, kicker: str = "", footer: str = "") -> str:

@@ -3,12 +3,14 @@
 Each method shows one part of the page as HTML and collects the numbers for ``metrics.json``. All text is
 escaped; ``**bold**`` and a code span in backquotes are the only marks (`wildlab.reporting.text`)::
 
-    report = open_report(study=study, flight=flight, kind="twin", seed=seed, out=out,
-    expected_prefix=expected_prefix) report.head("How far off is a position read from one photo?", "29
-    photos from 55 m") report.summary(["Typically 2 metres.", "Over many photos the errors cancel.", "The
-    pose is the limit."]) report.tiles([("2.9 m", "mean error")]) report.section("What most limits it")
+    report = open_report(study=study, kind="twin", flight=flight, seed=seed, out=out)
+    report.head("How far off is a position read from one photo?", "29 photos from 55 m")
+    report.summary(["Typically 2 metres.", "Over many photos the errors cancel.", "The pose is the limit."])
+    report.tiles([("2.9 m", "mean error")])
+    report.section("What most limits it")
     report.figure(fig, name="fig-5-04a", alt="Scatter of 103 errors ...", caption="Error of every click.")
-    report.metric("horizontal_error_mean", "logged-pose", 2.92, "m", n=103) report.save()
+    report.metric("horizontal_error_mean", "logged-pose", 2.92, "m", n=103)
+    report.save()
 """
 
 from __future__ import annotations
@@ -282,6 +284,7 @@ class Report:
         if not alt.strip():
             raise WildlabError(f"the figure {name!r} has no alt text", "say in words what it shows")
         self._figures.add(name)
+        ordinal = len(self._figures)
         png = save_figure(fig, self.out / "figures", name) if self.out is not None else png_bytes(fig)
         width_in, height_in = fig.get_size_inches()
         _close(fig)
@@ -293,15 +296,8 @@ class Report:
             f'style="max-width:{width}px;min-width:{round(width_in * _LEAST_SIZE)}px" '
             f'src="data:image/png;base64,{data}">'
         )
-        if width_in > 6:
-            image = (
-                f'<div class="scroll" role="region" tabindex="0" aria-label="{escape(name)}">{image}</div>'
-            )
-        label = (
-            f"<figcaption><b>Figure {len(self._figures)}.</b> {inline(caption)}</figcaption>"
-            if caption
-            else ""
-        )
+        image = f'<div class="scroll" role="region" tabindex="0" aria-label="Figure {ordinal}">{image}</div>'
+        label = f"<figcaption><b>Figure {ordinal}.</b> {inline(caption)}</figcaption>" if caption else ""
         return f"<figure>{image}{label}</figure>"
 
     def _show(self, *html: str) -> None:

@@ -1,0 +1,88 @@
+"""NEES, NIS and their limits, against the print, scipy and the definition."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, kstest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import (
+    chi_square_interval,
+    nees,
+    nis,
+    share_inside,
+    simulate_filter_runs,
+)
+
+
+@pytest.mark.parametrize(
+    ("dof", "runs", "printed", "digits"),
+    [(4, 1, (0.48, 11.14), 2), (2, 1, (0.051, 7.38), 2), (2, 50, (1.5, 2.6), 1)],
+)
+def test_limits_as_printed_in_example_3_1(
+    dof: int, runs: int, printed: tuple[float, float], digits: int
+) -> None:
+    low, high = chi_square_interval(dof, runs=runs)
+    assert (round(low, digits + (printed[0] == 0.051)), round(high, digits)) == printed
+
+
+def test_limits_of_a_mean_enclose_the_mean_of_draws() -> None:
+    rng = np.random.default_rng(0)
+    means = rng.chisquare(3, (20_000, 7)).mean(axis=1)
+    assert share_inside(means, chi_square_interval(3, 0.8, runs=7)) == pytest.approx(0.8, abs=0.012)
+
+
+@pytest.mark.parametrize("arguments", [(0,), (2, 1.0), (2, 0.0), (2, 0.95, 0)])
+def test_limits_that_do_not_exist_are_refused(arguments: tuple[float, ...]) -> None:
+    with pytest.raises(WildlabError, match="give at least one of each"):
+        chi_square_interval(*arguments)  # type: ignore[arg-type]
+
+
+def test_nees_is_its_definition() -> None:
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((50, 4, 4))
+    P = root @ root.transpose(0, 2, 1) + np.eye(4) * 0.1
+    e = rng.standard_normal((50, 4))
+    expected = [row @ np.linalg.inv(matrix) @ row for row, matrix in zip(e, P, strict=True)]
+    np.testing.assert_allclose(nees(e, P), expected, rtol=1e-9)
+    np.testing.assert_allclose(nis(e, P[0]), [row @ np.linalg.inv(P[0]) @ row for row in e], rtol=1e-9)
+
+
+def test_nees_does_not_depend_on_units() -> None:
+    rng = np.random.default_rng(2)
+    e, P, scale = rng.standard_normal((9, 2)), np.array([[2.0, 0.3], [0.3, 1.0]]), np.diag([1000.0, 0.01])
+    np.testing.assert_allclose(nees(e @ scale, scale @ P @ scale), nees(e, P), rtol=1e-9)
+
+
+def test_moments_without_truth_stay_in_their_row() -> None:
+    e = np.array([[1.0, 0.0], [np.nan, 0.0], [0.0, 2.0]])
+    np.testing.assert_array_equal(nees(e, np.eye(2)), [1.0, np.nan, 4.0])
+    assert share_inside([1.0, np.nan, 4.0], (0.5, 2.0)) == 0.5
+    assert np.isnan(share_inside([np.nan], (0.0, 1.0)))
+
+
+def test_a_covariance_that_is_none_is_named_by_its_row() -> None:
+    P = np.array([np.eye(2), np.diag([1.0, -1.0])])
+    with pytest.raises(WildlabError, match="covariance in row 1 is not positive definite"):
+        nees(np.ones((2, 2)), P)
+    with pytest.raises(WildlabError, match=r"errors of shape \(2, 2\) do not go"):
+        nees(np.ones((2, 2)), np.eye(3))
+
+
+def test_limits_hold_for_a_real_filter_and_expose_an_overconfident_one() -> None:
+    honest = simulate_filter_runs(np.random.default_rng(3), runs=400, steps=25)
+    # Runs are independent: the last step of each is a fair sample of the whole distribution.
+    assert kstest(honest.nees[:, -1], chi2(4).cdf).pvalue > 0.01
+    assert kstest(honest.nis[:, -1], chi2(2).cdf).pvalue > 0.01
+    assert share_inside(honest.nees, chi_square_interval(4)) == pytest.approx(0.95, abs=0.015)
+    assert share_inside(honest.nis, chi_square_interval(2)) == pytest.approx(0.95, abs=0.01)
+    means = honest.nis.reshape(8, 50, 25).mean(axis=1)
+    assert share_inside(means, chi_square_interval(2, runs=50)) == pytest.approx(0.95, abs=0.05)
+    wrong = simulate_filter_runs(np.random.default_rng(3), runs=100, steps=25, claimed_noise=0.5)
+    assert share_inside(wrong.nees, chi_square_interval(4)) < 0.8
+
+
+def test_the_same_seed_gives_the_same_runs() -> None:
+    one, two = (simulate_filter_runs(np.random.default_rng(5), runs=3, steps=4) for _ in range(2))
+    np.testing.assert_array_equal(one.nees, two.nees)
