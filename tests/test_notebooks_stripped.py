@@ -1,0 +1,119 @@
+"""Notebooks are kept without outputs, take parameters and stay short: checked here, not only by a filter."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wildlab import paths
+
+MOST_CODE_LINES = 250
+#: A path that exists on one machine only: /home/..., /Users/..., /tmp/..., C:...
+ABSOLUTE = re.compile(
+    r"""(?:^|[\s"'=(\[,])(?:/(?:home|Users|root|tmp|mnt|media|work|opt|data|srv)/|[A-Za-z]:[\\/]{1,2}\w)"""
+)
+
+
+def tracked_notebooks(root: Path) -> list[Path]:
+    """Those git knows; without git, those on disk."""
+    if shutil.which("git") and (root / ".git").exists():
+        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", "*.ipynb"]
+        done = subprocess.run(command, cwd=root, capture_output=True, check=True, timeout=60)
+        names = [name for name in done.stdout.decode().split("\0") if name]
+        return sorted(root / name for name in names if (root / name).exists())
+    found = (root / "notebooks").rglob("*.ipynb")
+    return sorted(path for path in found if ".ipynb_checkpoints" not in path.parts)
+
+
+def text_of(cell: dict[str, Any]) -> str:
+    source = cell.get("source", "")
+    return source if isinstance(source, str) else "".join(source)
+
+
+def problems(notebook: dict[str, Any]) -> list[str]:
+    """What keeps this notebook from being committed, one sentence each."""
+    found = []
+    cells = notebook.get("cells", [])
+    code = [cell for cell in cells if cell.get("cell_type") == "code"]
+    for number, cell in enumerate(cells, start=1):
+        if cell.get("outputs"):
+            found.append(f"cell {number} has outputs: run 'make strip'")
+        if cell.get("execution_count") is not None:
+            found.append(f"cell {number} has an execution count: run 'make strip'")
+        if ABSOLUTE.search(text_of(cell)):
+            found.append(f"cell {number} names an absolute path")
+    parameters = [cell for cell in code if "parameters" in cell.get("metadata", {}).get("tags", [])]
+    if len(parameters) != 1:
+        found.append(f"{len(parameters)} cells are tagged 'parameters' and there must be one")
+    lines = sum(len([line for line in text_of(cell).splitlines() if line.strip()]) for cell in code)
+    if lines > MOST_CODE_LINES:
+        found.append(f"{lines} lines of code: move some into wildlab ({MOST_CODE_LINES} at most)")
+    if notebook.get("metadata", {}).get("kernelspec", {}).get("name", "python3") != "python3":
+        found.append("its kernel is not python3")
+    if "widgets" in notebook.get("metadata", {}):
+        found.append("it keeps the state of widgets: run 'make strip'")
+    for number, cell in enumerate(cells, start=1):
+        try:
+            if cell.get("cell_type") == "code":
+                ast.parse(text_of(cell))
+        except SyntaxError as error:
+            found.append(f"cell {number} is not plain Python: {error.msg}")
+    return found
+
+
+def test_tracked_notebooks() -> None:
+    notebooks = tracked_notebooks(paths.ROOT)
+    assert notebooks, "no notebook found"
+    found = {
+        str(path.relative_to(paths.ROOT)): faults
+        for path in notebooks
+        if (faults := problems(json.loads(path.read_text(encoding="utf-8"))))
+    }
+    assert not found
+
+
+def cell(source: str, **more: Any) -> dict[str, Any]:
+    bare = {"cell_type": "code", "source": source, "metadata": {}, "outputs": [], "execution_count": None}
+    return bare | more
+
+
+PARAMETERS = cell("seed = 1", metadata={"tags": ["parameters"]})
+
+
+def test_a_stripped_notebook_passes() -> None:
+    text = {"cell_type": "markdown", "source": ["# Title\n", "metres/second, https://example.org/tmp/x"]}
+    code = cell("x = out + '/figures'\nratio = 1/2")
+    assert problems({"cells": [text, PARAMETERS, code], "metadata": {}}) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ([cell("1", outputs=[{"output_type": "stream", "text": "1"}])], "has outputs"),
+        ([cell("1", execution_count=3)], "has an execution count"),
+        ([PARAMETERS], "2 cells are tagged"),
+        ([cell("x = 1\n" * 250)], "251 lines of code"),
+        ([cell("read('/home/someone/flight')")], "names an absolute path"),
+        ([cell("path = '/tmp/x'")], "names an absolute path"),
+        ([cell("path = 'C:\\\\Users'")], "names an absolute path"),
+        ([{"cell_type": "markdown", "source": "see /Users/x/y"}], "names an absolute path"),
+        ([cell("%matplotlib inline")], "is not plain Python"),
+    ],
+)
+def test_what_must_not_be_committed_is_found(more: list[dict[str, Any]], problem: str) -> None:
+    found = problems({"cells": [PARAMETERS, *more], "metadata": {}})
+    assert len(found) == 1, found
+    assert problem in found[0]
+
+
+def test_notebook_as_a_whole() -> None:
+    assert problems({"cells": []}) == ["0 cells are tagged 'parameters' and there must be one"]
+    wrong = {"cells": [PARAMETERS], "metadata": {"kernelspec": {"name": "conda-base"}, "widgets": {}}}
+    assert len(problems(wrong)) == 2
