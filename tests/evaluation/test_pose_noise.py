@@ -15,6 +15,7 @@ ASSUMED = {
     "position_vertical": 3.0,
     "roll_pitch": np.radians(0.7),
     "yaw": np.radians(3.0),
+    "pixel": 3.0,
 }
 
 
@@ -31,18 +32,18 @@ def simulate(seed, sd, n_images, points):
     uv = rng.uniform([0, 0], [640, 512], (len(image), 2))
     mount = Mount("forward")
     true = pixel_to_plane(TAU2, uv, *camera_pose(mount, p[image], euler_to_matrix(*euler[image].T)), 0.0)
-    clicked = uv + rng.normal(0, 2.0, uv.shape)
+    clicked = uv + rng.normal(0, sd[4], uv.shape)
     ours = pixel_to_plane(
         TAU2, clicked, *camera_pose(mount, wrong_p[image], euler_to_matrix(*wrong[image].T)), 0.0
     )
     J = ground_jacobians(TAU2, mount, uv, p[image], euler_to_matrix(*euler[image].T), 0.0)
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(*euler[image, :2].T)
-    return (ours - true)[:, :2], derivatives, 4 * J.pixel @ np.swapaxes(J.pixel, 1, 2), image
+    return (ours - true)[:, :2], derivatives, J.pixel, np.zeros((len(uv), 2, 2)), image
 
 
 def test_deviations_come_back():
-    true = (1.0, 2.0, np.radians(1.5), np.radians(2.0))
+    true = (1.0, 2.0, np.radians(1.5), np.radians(2.0), 5.0)
     found = estimate_pose_noise(*simulate(1, true, 250, 5), ASSUMED)
     for (kind, value), put_in in zip(found.sd.items(), true, strict=True):
         assert value == pytest.approx(put_in, rel=0.25), kind
@@ -50,10 +51,12 @@ def test_deviations_come_back():
 
 
 def test_with_three_images_the_assumption_stands_and_the_doubt_is_stated():
-    found = estimate_pose_noise(*simulate(2, (2.0, 3.0, np.radians(0.7), np.radians(3.0)), 3, 2), ASSUMED)
+    found = estimate_pose_noise(
+        *simulate(2, (2.0, 3.0, np.radians(0.7), np.radians(3.0), 3.0), 3, 2), ASSUMED
+    )
     assert max(found.factor.values()) > 1.8
     with pytest.raises(ValueError, match="fewer than three images"):
-        estimate_pose_noise(*simulate(3, (1, 1, 0.01, 0.01), 2, 2), ASSUMED)
+        estimate_pose_noise(*simulate(3, (1, 1, 0.01, 0.01, 1), 2, 2), ASSUMED)
 
 
 def test_euler_errors_as_rotation_vectors_against_finite_differences():

@@ -1,9 +1,9 @@
-"""How noisy were the poses? Standard deviations estimated from the errors of known points.
+"""How noisy were poses and pixels? Standard deviations estimated from the errors of known points.
 
 Every image has a pose error of its own: position (three axes), roll, pitch and yaw. It moves all points of
-the image together, each through its own derivative, and that is what tells it from the noise of single clicks.
-The standard deviations are those under which the observed errors are most likely, with a broad prior about
-the ones assumed, so that what the data cannot decide stays where it was.
+the image together, each through its own derivative, and that tells it from the error of single pixels, where
+clicking and an imperfect lens model end up. The standard deviations are those under which the observed errors
+are most likely, with a broad prior about the ones assumed, so that what the data cannot decide stays put.
 """
 
 from __future__ import annotations
@@ -13,18 +13,26 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
 
-#: Which of the six pose errors (north, east, down, roll, pitch, yaw) share a standard deviation.
-KINDS = {"position_horizontal": (0, 1), "position_vertical": (2,), "roll_pitch": (3, 4), "yaw": (5,)}
+#: Which of the six pose errors (north, east, down, roll, pitch, yaw) share a standard deviation. The pixel's
+#: (both axes) stands last and is each point's own.
+KINDS: dict[str, tuple[int, ...]] = {
+    "position_horizontal": (0, 1),
+    "position_vertical": (2,),
+    "roll_pitch": (3, 4),
+    "yaw": (5,),
+    "pixel": (),
+}
 #: Standard deviation of the prior on the logarithm: a factor of three either way.
 PRIOR = np.log(3.0)
 
 
 class PoseNoise(NamedTuple):
-    """Estimated standard deviations by :data:`KINDS` (metres, radians) and how well each is decided.
+    """Estimated standard deviations by :data:`KINDS` (metres, radians, pixels) and how well each is decided.
 
     ``factor`` is what one standard deviation of the estimate multiplies or divides by: near 3 the data said
     nothing, near 1 they decided.
@@ -35,9 +43,14 @@ class PoseNoise(NamedTuple):
 
 
 def estimate_pose_noise(
-    errors: ArrayLike, derivatives: ArrayLike, noise: ArrayLike, image: ArrayLike, assumed: dict[str, float]
+    errors: ArrayLike,
+    derivatives: ArrayLike,
+    pixel_derivatives: ArrayLike,
+    noise: ArrayLike,
+    image: ArrayLike,
+    assumed: dict[str, float],
 ) -> PoseNoise:
-    """Most likely standard deviations of the pose errors behind the errors of known points.
+    """Most likely standard deviations of the pose and pixel errors behind the errors of known points.
 
     Parameters
     ----------
@@ -45,8 +58,10 @@ def estimate_pose_noise(
         (N, 2) north-east, metres, computed minus known.
     derivatives
         (N, 2, 6) of each point with respect to north, east, down, roll, pitch, yaw.
+    pixel_derivatives
+        (N, 2, 2) of each point with respect to its pixel.
     noise
-        (N, 2, 2) covariance of what is each point's own: pixel, plane height.
+        (N, 2, 2) covariance of what else is each point's own and known: plane height, survey.
     image
         (N,) which image each belongs to.
     assumed
@@ -57,17 +72,16 @@ def estimate_pose_noise(
     ValueError
         Where fewer than three images have a usable point.
     """
-    e, J, R = (np.asarray(a, float) for a in (errors, derivatives, noise))
+    e, J, Ju, R = (np.asarray(a, float) for a in (errors, derivatives, pixel_derivatives, noise))
     keep = np.isfinite(e).all(axis=1) & np.isfinite(J).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2))
     labels = np.asarray(image)[keep]
-    e, J, R = e[keep], J[keep], R[keep]
+    e, J, R, own_pixel = e[keep], J[keep], R[keep], (Ju @ np.swapaxes(Ju, 1, 2))[keep]
     blocks = []
     for label in np.unique(labels):
         rows = labels == label
-        own = np.zeros((2 * rows.sum(),) * 2)
-        for i, r in enumerate(R[rows]):
-            own[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = r
-        blocks.append((e[rows].ravel(), J[rows].reshape(-1, 6), own))
+        blocks.append(
+            (e[rows].ravel(), J[rows].reshape(-1, 6), block_diag(*R[rows]), block_diag(*own_pixel[rows]))
+        )
     if len(blocks) < 3:
         raise ValueError("fewer than three images with known points: their noise cannot be estimated")
     start = np.log([assumed[kind] for kind in KINDS])
@@ -76,14 +90,17 @@ def estimate_pose_noise(
         variance = np.empty(6)
         for kind, value in zip(KINDS, log_sd, strict=True):
             variance[list(KINDS[kind])] = np.exp(2 * value)
+        pixel = np.exp(2 * log_sd[-1])
         total = 0.5 * np.sum(((log_sd - start) / PRIOR) ** 2)
-        for residual, derivative, own in blocks:
-            L = np.linalg.cholesky(own + derivative * variance @ derivative.T)
+        for residual, derivative, own, of_pixel in blocks:
+            L = np.linalg.cholesky(own + pixel * of_pixel + derivative * variance @ derivative.T)
             z = np.linalg.solve(L, residual)
             total += 0.5 * z @ z + np.log(np.diag(L)).sum()
         return float(total)
 
-    found = minimize(negative_log_posterior, start, method="BFGS")
+    # Bounded, for the first step along a steep slope would otherwise leap to where no prior brings it back.
+    bounds = [(s - 4 * PRIOR, s + 4 * PRIOR) for s in start]
+    found = minimize(negative_log_posterior, start, method="L-BFGS-B", bounds=bounds)
     curvature = _second_derivatives(negative_log_posterior, found.x)
     factor = np.exp(np.sqrt(np.clip(np.diag(np.linalg.inv(curvature)), 0, None)))
     return PoseNoise(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
 
@@ -88,3 +91,31 @@ def helgesen_tables(
                 )
                 table[f"{attitude}/{name}/{altitude:.0f}m"] = float(np.hypot(*shift[0]))
     return table
+
+
+class Convention(NamedTuple):
+    """One way to combine the printed misalignment angles: ``R_bm`` is their product in this order."""
+
+    order: str  # of "roll", "tilt" and "pan", by first letters, left to right
+    signs: tuple[int, int, int]  # of roll, tilt, pan against the print
+    errors: dict[str, float]  # as from helgesen_tables
+
+
+def misalignment_conventions() -> list[Convention]:
+    """The 42 numbers under all 48 orders and signs of the printed mounting angles.
+
+    H prints the angles and not how they combine; this is how the convention of
+    :func:`~wildlab.geometry.mount.helgesen_misalignment` was found.
+    """
+    axes = {"r": (1, 0, 0), "t": (0, 1, 0), "p": (0, 0, 1)}
+    conventions = []
+    for order in permutations("rtp"):
+        for signs in product((1, -1), repeat=3):
+            angles = dict(zip("rtp", np.radians(PRINTED_MISALIGNMENT_DEG) * signs, strict=True))
+            R_bm = np.eye(3)
+            for letter in order:
+                R_bm = R_bm @ euler_to_matrix(*(angles[letter] * np.array(axes[letter])))
+            roll, tilt, pan = (float(angle) for angle in matrix_to_euler(R_bm))
+            table = helgesen_tables(mount=Mount("down", misalignment=(roll, tilt, pan)))
+            conventions.append(Convention("".join(order), signs, table))
+    return conventions

@@ -24,17 +24,16 @@ def estimate_noise(flight: Flight, observations: Observations, judged: pd.DataFr
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(roll, pitch)
     sd = assumed_deviations(flight)
-    noise = (
-        sd["pixel_px"] ** 2 * J.pixel @ np.swapaxes(J.pixel, 1, 2)
-        + sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
-    )
+    plane = sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
     assumed = {
         "position_horizontal": sd["position_horizontal_m"],
         "position_vertical": sd["position_vertical_m"],
         "roll_pitch": float(np.radians((sd["roll_deg"] + sd["pitch_deg"]) / 2)),
         "yaw": float(np.radians(sd["yaw_deg"])),
+        "pixel": sd["pixel_px"],
     }
-    return estimate_pose_noise(errors, derivatives, noise, o.table["frame_id"].to_numpy(), assumed)
+    images = o.table["frame_id"].to_numpy()
+    return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed)
 
 
 def as_deviations(noise: PoseNoise) -> dict[str, float]:
@@ -46,6 +45,7 @@ def as_deviations(noise: PoseNoise) -> dict[str, float]:
         "roll_deg": roll_pitch,
         "pitch_deg": roll_pitch,
         "yaw_deg": float(np.degrees(noise.sd["yaw"])),
+        "pixel_px": noise.sd["pixel"],
     }
 
 
