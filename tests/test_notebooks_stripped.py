@@ -80,7 +80,7 @@ def test_tracked_notebooks() -> None:
 
 
 def cell(source: str, **more: Any) -> dict[str, Any]:
-    bare = {"cell_type": "code", "source": source, "metadata": {}, "outputs": [], "execution_count": None}
+    bare: dict[str, Any] = {"cell_type": "code", "source": source, "metadata": {}, "outputs": [], "execution_count": None}
     return bare | more
 
 
