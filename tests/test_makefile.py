@@ -1,8 +1,8 @@
 """The way in: what ``make`` promises, tried with a made-up Python so that nothing is downloaded.
 
 The stand-in answers the few questions that ``tools/environment.sh`` puts to a Python, notes every
-installation in ``calls``, and fails in the way that ``FAULT`` names. That the real packages install is shown by
-these tests running.
+installation in ``calls``, and fails in the way that ``FAULT`` names. That the real ones install is shown by
+the other tests running.
 """
 
 from __future__ import annotations
