@@ -1,0 +1,24 @@
+"""The filter on errors is the filter on positions, moved to the truth."""
+
+import numpy as np
+import pandas as pd
+
+from wildlab.pipeline.at_rest import filter_errors
+from wildlab.tracking.kalman import filter_at_rest
+
+
+def test_filtering_errors_is_filtering_positions():
+    rng = np.random.default_rng(0)
+    truth, n = np.array([400.0, -70.0]), 25
+    A = rng.normal(size=(n, 2, 2))
+    C = A @ np.swapaxes(A, 1, 2) + 0.1 * np.eye(2)
+    errors = rng.normal(size=(n, 2))
+    judged = pd.DataFrame(
+        {"time_s": np.arange(n) * 1.0, "error_north_m": errors[:, 0], "error_east_m": errors[:, 1],
+         "cov_nn": C[:, 0, 0], "cov_ne": C[:, 0, 1], "cov_ee": C[:, 1, 1]}
+    ).sample(frac=1.0, random_state=1)  # fmt: skip
+    direct = filter_at_rest(errors + truth, C)
+    ours = filter_errors(judged)
+    assert np.allclose(ours.x, direct.x - truth)
+    assert np.allclose(ours.P, direct.P)
+    assert np.allclose(ours.innovation[1:], direct.innovation[1:])
