@@ -41,10 +41,10 @@ style: environment ## ruff, mypy and the notebooks' state, as the tests check th
 	@$(BIN)/python -m pytest -q tests/test_notebooks_stripped.py
 
 strip: environment ## take outputs and execution counts out of the notebooks
-	@$(BIN)/nbstripout notebooks/*.ipynb
+	@$(BIN)/nbstripout --keep-id notebooks/*.ipynb
 
 lab: environment ## open JupyterLab on the notebooks; git then strips outputs on commit
-	@! git rev-parse --git-dir >/dev/null 2>&1 || git config filter.nbstripout.clean '$(BIN)/nbstripout'
+	@! git rev-parse --git-dir >/dev/null 2>&1 || git config filter.nbstripout.clean '$(BIN)/nbstripout --keep-id'
 	@$(BIN)/jupyter lab --notebook-dir=notebooks $(ARGS)
 
 lock: ## rewrite environment.lock from pyproject.toml, keeping versions (LOCK_UPGRADE=1 takes newer ones)

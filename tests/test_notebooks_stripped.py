@@ -24,7 +24,7 @@ ABSOLUTE = re.compile(
 def tracked_notebooks(root: Path) -> list[Path]:
     """Those git knows; without git, those on disk."""
     if shutil.which("git") and (root / ".git").exists():
-        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", "*.ipynb"]
+        command = ["git", "ls-files", "-z", "--", "*.ipynb"]
         done = subprocess.run(command, cwd=root, capture_output=True, check=True, timeout=60)
         names = [name for name in done.stdout.decode().split("\0") if name]
         return sorted(root / name for name in names if (root / name).exists())
