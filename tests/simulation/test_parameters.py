@@ -1,0 +1,159 @@
+"""A twin's file: every number accounted for, every promised sentence said."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.simulation.parameters import TWINS, each_parameter, load_twin, parameters_table, twin_names
+
+
+@pytest.fixture
+def altered(tmp_path):
+    """Load the shipped twin with some text of its file replaced."""
+
+    def load(old: str, new: str):
+        text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{old!r} is there {text.count(old)} times"
+        path = tmp_path / "twin.toml"
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        return load_twin(path)
+
+    return load
+
+
+def test_every_parameter_of_every_twin_is_accounted_for():
+    assert "static-antenna" in twin_names()
+    for name in twin_names():
+        for group, key, parameter in each_parameter(load_twin(name)):
+            where = f"{name}: {group}.{key}"
+            if parameter.status == "published":
+                assert re.search(r"\bH (\d|table|fig|\()", parameter.source), where
+            else:
+                assert len(parameter.reason) > 8, where
+
+
+def test_published_numbers_are_those_of_the_thesis():
+    """Typed a second time, from H 2.5.1, 5.6.1, 7.5.3, 7.5.4 and table A.1."""
+    published = {
+        f"{group}.{key}": p.value
+        for group, key, p in each_parameter(load_twin("static-antenna"))
+        if p.status == "published" and not isinstance(p.value, str)
+    }
+    assert published == {
+        "flight.duration": 25 * 60,
+        "flight.altitude": 350,
+        "target.height": 2,
+        "target.sd": 0.01,
+        "target.observations": 552,
+        "camera.width": 640,
+        "camera.height": 512,
+        "camera.fx": 1159.2,
+        "camera.fy": 1167.8,
+        "camera.cx": 313,
+        "camera.cy": 265,
+        "camera.frame_rate": 7.5,
+        "mount.misalignment_roll": -1.7,
+        "mount.misalignment_tilt": 3.9,
+        "mount.misalignment_pan": 1.9,
+        "autopilot.rate": 10,
+        "autopilot.imu_roll": 1.1,
+        "autopilot.imu_pitch": -5.7,
+        "autopilot.imu_yaw": 0.25,
+        "assumed.plane_height": 0.01,
+        "assumed.roll": round((1.35 + 1.22 + 1.73) / 3, 1),
+        "assumed.pitch": round((1.30 + 1.24 + 1.78) / 3, 1),
+        "assumed.yaw": round((2.65 + 2.63 + 2.48) / 3, 1),
+    }
+
+
+def test_units_are_converted_once():
+    twin = load_twin("static-antenna")
+    assert twin.autopilot.imu_pitch.si == pytest.approx(-0.0994838)
+    assert twin.onboard_clock.drift.si == pytest.approx(5e-5)
+    assert twin.camera.latency.si == pytest.approx(0.005)
+
+
+def test_the_table_names_value_unit_and_reason():
+    table = parameters_table("static-antenna").set_index("parameter")
+    assert table.loc["camera: fx"].tolist() == ["1159.2", "px", "published", "H (2.3)"]
+    assert table.loc["flight: airspeed", "status"] == "chosen"
+    assert "H 7.5.4" in table.loc["flight: airspeed", "because"]
+    assert table.index.is_unique
+    assert len(table) == len(list(each_parameter(load_twin("static-antenna"))))
+
+
+RATE = '[camera.frame_rate]\nvalue = 7.5\nunit = "Hz"'
+RADIUS = '[flight.loiter_radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "found", "fix"),
+    [
+        (RATE, RATE.replace("Hz", "kHz"), "camera.frame_rate", "unit is 'kHz'", "'Hz'"),
+        (RATE, RATE.replace("7.5", "0.0"), "camera.frame_rate", "0 is out of range", "above 0 to 500"),
+        (RATE, RATE.replace("7.5", "1e9"), "camera.frame_rate", "1e.09 is out of range", "above 0 to 500"),
+        (
+            RATE,
+            RATE.replace("7.5", "nan"),
+            "camera.frame_rate.value",
+            "nan is not a finite number",
+            "Give one",
+        ),
+        (RATE, RATE.replace("7.5", "true"), "camera.frame_rate.value", "[Tt]rue is neither", "Give one"),
+        (RATE, RATE.replace("7.5", '"fast"'), "camera.frame_rate", "'fast' is not a number", "in Hz"),
+        (RATE, RATE.replace("frame_rate", "frame_rat"), "camera.frame_rat", "not known", "'frame_rate'"),
+        (RADIUS, RADIUS.replace("chosen", "guessed"), "flight.loiter_radius.status", "guessed", "Mend"),
+        (RADIUS, RADIUS.replace("chosen", "published"), "flight.loiter_radius", "names no source", "Add"),
+        ("value = 552\n", "value = 552.5\n", "target.observations", "not a whole number", "Give one"),
+        ("value = 7990\n", "value = 9990\n", None, "after the flight's end", "camera.images"),
+        ('value = "clockwise"', 'value = "left"', "flight.turn", "'left' is not known", "clockwise"),
+        ('value = "2018-06-01T10:00:00Z"', 'value = "2018-06-01"', "place.epoch", "not a time", "10:00:00Z"),
+        ('name = "static-antenna"', 'name = "../up"', "name", "'../up' cannot be the name", "letters"),
+        (
+            "[flight.wind_speed]\nvalue = 4.5",
+            "[flight.wind_speed]\nvalue = 18.0",
+            "flight",
+            "0.8 of",
+            "Lower wind_speed",
+        ),
+        (
+            "[flight.sway_longest_period]\nvalue = 9.0",
+            "[flight.sway_longest_period]\nvalue = 1.0",
+            "flight",
+            "sway_shortest_period is longer",
+            "Exchange",
+        ),
+    ],
+)
+def test_bad_parameters_are_named(altered, old, new, field, found, fix):
+    with pytest.raises(WildlabError) as caught:
+        altered(old, new)
+    assert caught.value.field == field
+    assert caught.value.file is not None
+    assert caught.value.file.endswith("twin.toml")
+    assert re.search(found, str(caught.value)), str(caught.value)
+    assert re.search(fix, str(caught.value)), str(caught.value)
+
+
+def test_a_choice_without_a_reason_is_refused(altered):
+    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
+    with pytest.raises(
+        WildlabError, match=r"target\.identifier: the value is called chosen but gives no reason"
+    ):
+        altered(old, old.replace("only a name", " "))
+
+
+def test_a_missing_parameter_is_named(altered):
+    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
+    with pytest.raises(WildlabError, match=r"target\.identifier: this key is missing"):
+        altered(old, "")
+
+
+def test_an_unknown_twin_is_answered_with_those_there_are():
+    with pytest.raises(WildlabError, match=r"no twin 'static-antena'.*Did you mean 'static-antenna'"):
+        load_twin("static-antena")
+    with pytest.raises(WildlabError, match=r"nowhere\.toml: there is no such file"):
+        load_twin("/nowhere.toml")

@@ -1,0 +1,149 @@
+"""A motion must not contradict itself: stated derivatives against differences and dead reckoning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wildlab.geometry.frames import matrix_to_euler
+from wildlab.simulation.trajectory import (
+    angular_rates,
+    attitude_of,
+    coordinated_attitude,
+    loiter,
+    move,
+    random_wander,
+    specific_forces,
+)
+
+WIND = np.array([4.0, -3.0, 0.0])
+
+
+def restless_loiter(turn="clockwise"):
+    """A loiter with wind, wander and sway, all on: (path, attitude)."""
+    rng = np.random.default_rng(7)
+    path = loiter(
+        (30.0, -50.0),
+        160.0,
+        350.0,
+        19.5,
+        wind=WIND[:2],
+        turn=turn,
+        start_angle=0.3,
+        radius_wander=random_wander(3.0, 20.0, 120.0, rng),
+        altitude_wander=random_wander(2.0, 20.0, 120.0, rng),
+    )
+    sway = tuple(random_wander(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
+    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), sway=sway)
+
+
+@pytest.mark.parametrize(("turn", "sense"), [("clockwise", 1), ("counter-clockwise", -1)])
+def test_still_air_circle_is_a_coordinated_turn(turn, sense):
+    speed, radius, gravity = 20.0, 150.0, 9.82
+    path = loiter((0.0, 0.0), radius, 300.0, speed, turn=turn)
+    t = np.linspace(0, 100, 500)
+    p, v, _ = path(t)
+    roll, pitch, yaw = matrix_to_euler(attitude_of(path, gravity=gravity)(t)).T
+    assert np.tan(roll) == pytest.approx(sense * speed**2 / (gravity * radius), abs=1e-12)
+    assert pitch == pytest.approx(0.0, abs=1e-12)
+    course = np.arctan2(v[:, 1], v[:, 0])
+    assert np.sin(yaw - course) == pytest.approx(0.0, abs=1e-12)
+    assert np.hypot(p[:, 0], p[:, 1]) == pytest.approx(radius, abs=1e-9)
+    # Clockwise seen from above is from north to east.
+    bearing = np.unwrap(np.arctan2(p[:, 1], p[:, 0]))
+    assert np.diff(bearing) == pytest.approx(sense * speed / radius * np.diff(t), abs=1e-12)
+
+
+def test_in_wind_the_airspeed_is_steady_and_the_ground_track_a_circle():
+    path = loiter((10.0, 20.0), 160.0, 350.0, 19.5, wind=WIND[:2])
+    p, v, a = path(np.linspace(0, 1500, 4000))
+    assert np.hypot(p[:, 0] - 10, p[:, 1] - 20) == pytest.approx(160.0, abs=1e-9)
+    assert np.linalg.norm(v - WIND, axis=1) == pytest.approx(19.5, abs=1e-10)
+    ground_speed = np.linalg.norm(v, axis=1)
+    assert ground_speed.min() == pytest.approx(14.5, abs=1e-3)
+    assert ground_speed.max() == pytest.approx(24.5, abs=1e-3)
+    # A steady airspeed leaves no acceleration along the way through the air.
+    assert np.einsum("ij,ij->i", v - WIND, a) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_coordinated_flight_has_no_sideslip_and_no_lateral_force():
+    path, _ = restless_loiter()
+    t = np.linspace(0, 200, 1000)
+    _, v, a = path(t)
+    R = coordinated_attitude(v, a, wind=WIND, trim_pitch=0.05)
+    through_air = np.einsum("nij,ni->nj", R, v - WIND)
+    assert through_air[:, 1] == pytest.approx(0.0, abs=1e-10)
+    assert np.arctan2(through_air[:, 2], through_air[:, 0]) == pytest.approx(0.05, abs=1e-10)
+    motion = move(path, attitude_of(path, wind=WIND, trim_pitch=0.05), t)
+    assert specific_forces(motion)[:, 1] == pytest.approx(0.0, abs=1e-10)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("turn", ["clockwise", "counter-clockwise"])
+def test_velocity_and_acceleration_are_the_derivatives_of_position(turn):
+    path, _ = restless_loiter(turn)
+    t, h = np.linspace(5, 1400, 2000), 1e-3
+    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
+    _, v, a = path(t)
+    # Truncation is h^2/6 times the third derivative, below 2 m/s^3 (and its own, below 2 m/s^4): 4e-7.
+    # Rounding is 1e-13 m in 2e-3 s times a few, 1e-9.
+    assert np.abs((p1 - p0) / (2 * h) - v).max() < 4e-7
+    assert np.abs((v1 - v0) / (2 * h) - a).max() < 4e-7
+
+
+def test_angular_rate_is_the_derivative_of_attitude():
+    _, attitude = restless_loiter()
+    t, h = np.linspace(5, 1400, 2000), 1e-3
+    turn = np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)
+    rate = Rotation.from_matrix(turn).as_rotvec() / h
+    # A turn from t to t+h has the mean rate at t+h/2, but for h^2/24 times the rate's second derivative
+    # (below 3 rad/s^3) and products of it.
+    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 1e-6
+    assert np.abs(rate - angular_rates(attitude, t)).max() > 1e-5  # the bound could fail
+
+
+def test_dead_reckoning_with_ideal_inertial_sensors_returns_the_motion():
+    """Strapdown at 200 Hz for two minutes, from the first pose alone."""
+    path, attitude = restless_loiter()
+    h, n = 0.005, 24_000
+    t = np.arange(n + 1) * h
+    middle = move(path, attitude, t[:-1] + h / 2)
+    turns = Rotation.from_rotvec(angular_rates(attitude, middle.times) * h)
+    force = specific_forces(middle)
+    start, end = move(path, attitude, t[:1]), move(path, attitude, t[-1:])
+    R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
+    gravity = np.array([0.0, 0.0, 9.81])
+    half = Rotation.from_rotvec(angular_rates(attitude, middle.times) * h / 2)
+    for i in range(n):
+        a = (R * half[i]).apply(force[i]) + gravity
+        p += h * v + h**2 / 2 * a
+        v += h * a
+        R = R * turns[i]
+    # The midpoint rule errs by h^2/24 times second derivatives of a few rad/s^3: 1e-6 rad/s at worst, and it
+    # oscillates rather than adds up. A tenth of a metre in two minutes is a tilt of 1e-6 rad.
+    assert np.degrees((R.inv() * Rotation.from_matrix(end.R_nb[0])).magnitude()) < 1e-3
+    assert np.linalg.norm(v - end.velocity[0]) < 5e-3
+    assert np.linalg.norm(p - end.position[0]) < 0.1
+
+
+def test_wander_has_its_spread_its_band_and_its_derivatives():
+    rng = np.random.default_rng(3)
+    t = np.arange(0, 200_000, 0.7)
+    for _ in range(5):
+        w = random_wander(2.5, 4.0, 40.0, rng)
+        # Over 5000 of the longest periods a mean square of sines is theirs to a few parts in a thousand.
+        assert np.sqrt(np.mean(w(t) ** 2)) == pytest.approx(2.5, rel=0.01)
+        periods = 2 * np.pi / w.frequencies
+        assert periods.min() >= 4.0
+        assert periods.max() <= 40.0
+        s, h = t[:1000], 1e-4
+        assert np.abs((w(s + h) - w(s - h)) / (2 * h) - w(s, 1)).max() < 1e-6
+        assert np.abs((w(s + h, 1) - w(s - h, 1)) / (2 * h) - w(s, 2)).max() < 1e-6
+
+
+def test_a_circle_that_cannot_be_flown_is_refused():
+    with pytest.raises(ValueError, match="exceed the wind"):
+        loiter((0.0, 0.0), 100.0, 300.0, 10.0, wind=(8.0, 8.0))
+    with pytest.raises(ValueError, match="radius"):
+        loiter((0.0, 0.0), 0.0, 300.0, 10.0)

@@ -1,0 +1,237 @@
+"""The twin of H 5.6.1 as a flight. No test here asks for the thesis's results: those are for the report."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.flight.sync import frame_times, poses_at
+from wildlab.geometry.frames import (
+    euler_to_matrix,
+    matrix_to_euler,
+    matrix_to_rotation_vector,
+    quaternion_to_matrix,
+)
+from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
+from wildlab.geometry.mount import camera_pose
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.trajectory import move
+from wildlab.simulation.twins import loiter_centre, simulate, simulate_twin, trajectory
+
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+
+
+def with_values(twin, **changes):
+    """The twin with some parameters changed: ``camera__latency=0``."""
+    for name, value in changes.items():
+        group, key = name.split("__")
+        part = getattr(twin, group)
+        part = part.model_copy(update={key: getattr(part, key).model_copy(update={"value": value})})
+        twin = twin.model_copy(update={group: part})
+    return twin
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return load_twin("static-antenna")
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate_twin("static-antenna", 3)
+
+
+def every_table(flight):
+    return {**{f"nav/{name}": table for name, table in flight.nav.items()}, **flight.tables}
+
+
+def test_same_seed_same_bytes(flight, tmp_path):
+    again = simulate_twin("static-antenna", 3)
+    for name, table in every_table(flight).items():
+        pd.testing.assert_frame_equal(table, every_table(again)[name], check_exact=True)
+    save_flight(flight, tmp_path / "a")
+    save_flight(again, tmp_path / "b")
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert len(files) == 7
+    for name in files:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_another_seed_is_another_flight(flight):
+    other = simulate_twin("static-antenna", 4)
+    for name in ("autopilot", "truth"):
+        assert not np.allclose(flight.nav[name]["north_m"], other.nav[name]["north_m"], atol=0.5)
+    assert not np.allclose(flight.detections["u_px"], other.detections["u_px"], atol=0.5)
+    assert list(flight.nav) == list(other.nav)
+
+
+def test_one_sensors_errors_do_not_touch_anothers(twin, flight):
+    other = simulate(with_values(twin, camera__marking_sd=9.0, onboard_clock__latency=0.0), 3)
+    for name, table in flight.nav.items():
+        pd.testing.assert_frame_equal(table, other.nav[name], check_exact=True)
+    assert flight.detections["frame_id"].equals(other.detections["frame_id"])
+    assert not flight.detections["u_px"].equals(other.detections["u_px"])
+    assert flight.frames["time_s"].equals(other.frames["time_s"])
+    assert not flight.frames["time_onboard_s"].equals(other.frames["time_onboard_s"])
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_every_seed_has_552_observations_inside_the_image_in_batches(seed):
+    flight = simulate_twin("static-antenna", seed)
+    d, frames = flight.detections, flight.frames
+    assert len(d) == 552
+    assert d["frame_id"].is_unique
+    assert d["u_px"].between(0, 640).all()
+    assert d["v_px"].between(0, 512).all()
+    assert (d["kind"] == "pixel").all()
+    assert (d["target_id"] == "antenna").all()
+    assert len(frames) == 7990
+    assert np.diff(frames["time_s"]) == pytest.approx(1 / 7.5)
+    # Seen in a fixed part of each loop, and never in between.
+    times = frames.set_index("frame_id").loc[d["frame_id"], "time_s"].to_numpy()
+    gaps = np.diff(times)
+    batches = (gaps > 20).sum() + 1
+    assert 8 <= batches <= 25
+    assert ((gaps < 3) | (gaps > 20)).all()
+
+
+def test_the_first_images_that_show_the_target_are_the_ones_marked(twin):
+    fewer = simulate(with_values(twin, target__observations=100), 3)
+    all_of_them = simulate(twin, 3)
+    assert fewer.detections["frame_id"].tolist() == all_of_them.detections["frame_id"].tolist()[:100]
+
+
+def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
+    flight = simulate(with_values(twin, camera__marking_sd=0.0, camera__latency=0.0), 5)
+    m = flight.manifest
+    at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
+    pose = camera_pose(m.geometry_mount(), p_nb, R_nb)
+    uv = flight.detections[["u_px", "v_px"]].to_numpy()
+    ground = pixel_to_plane(m.geometry_camera(), uv, *pose, -2.0)
+    assert np.abs(ground - [0.0, 0.0, -2.0]).max() < 1e-6
+    assert np.abs(ground_to_pixel(m.geometry_camera(), [0.0, 0.0, -2.0], *pose) - uv).max() < 1e-6
+    # and a mount without the misalignment does not
+    wrong = pixel_to_plane(
+        m.geometry_camera(), uv, *camera_pose(type(m.geometry_mount())(), p_nb, R_nb), -2.0
+    )
+    assert np.linalg.norm(wrong[:, :2], axis=1).min() > 5.0
+
+
+def test_marks_scatter_about_the_true_pixels_as_stated(twin):
+    exact, marked = (simulate(with_values(twin, camera__marking_sd=sd), 6).detections for sd in (0.0, 2.0))
+    off = (marked[["u_px", "v_px"]] - exact[["u_px", "v_px"]]).to_numpy()
+    assert off.mean(axis=0) == pytest.approx([0, 0], abs=5 * 2 / np.sqrt(552))
+    assert off.std(axis=0) == pytest.approx([2, 2], rel=5 / np.sqrt(2 * 552))
+
+
+def test_the_pair_of_autopilot_logs_differs_by_exactly_the_imus_misalignment(flight):
+    with_it, without = flight.nav["autopilot-uncalibrated"], flight.nav["autopilot"]
+    same = [name for name in without if name not in QUATERNION]
+    pd.testing.assert_frame_equal(with_it[same], without[same], check_exact=True)
+    R, R_left_in = (quaternion_to_matrix(table[QUATERNION].to_numpy()) for table in (without, with_it))
+    difference = np.swapaxes(R, 1, 2) @ R_left_in
+    expected = euler_to_matrix(*np.radians([1.1, -5.7, 0.25]))
+    assert np.abs(difference - expected).max() < 1e-14
+    # Of a level airframe the IMU reads what H prints.
+    assert np.degrees(matrix_to_euler(np.eye(3) @ difference[0])) == pytest.approx([1.1, -5.7, 0.25])
+
+
+@pytest.mark.slow
+def test_autopilot_errors_have_the_stated_size_and_wander():
+    """Over 12 flights: 25 min hold 50 correlation times of attitude, and 5 of position."""
+    turns, shifts = [], []
+    for seed in range(12):
+        flight = simulate_twin("static-antenna", 100 + seed)
+        auto, truth = flight.nav["autopilot"], flight.nav["truth"]
+        p, R, _ = poses_at(truth, auto["time_s"].to_numpy())
+        logged = quaternion_to_matrix(auto[QUATERNION].to_numpy())
+        turns.append(np.degrees(matrix_to_rotation_vector(np.swapaxes(logged, 1, 2) @ R)))
+        shifts.append(auto[["north_m", "east_m", "down_m"]].to_numpy() - p)
+    turn, shift = np.array(turns), np.array(shifts)
+    # Over M correlation times the mean square of such a process is known to sqrt(2/M), its root to half that.
+    spread = np.sqrt((turn**2).mean(axis=(0, 1)))
+    assert spread == pytest.approx([1.0, 1.0, 2.0], rel=4 * np.sqrt(0.5 / (12 * 50)))
+    spread = np.sqrt((shift**2).mean(axis=(0, 1)))
+    assert spread == pytest.approx([1.5, 1.5, 2.5], rel=4 * np.sqrt(0.5 / (12 * 5)))
+    kept = [(turn[:, :-300, i] * turn[:, 300:, i]).mean() / (turn[:, :, i] ** 2).mean() for i in range(3)]
+    assert kept == pytest.approx([np.exp(-1)] * 3, abs=4 / np.sqrt(12 * 50))
+
+
+def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for(twin):
+    calm = with_values(twin, flight__radius_sd=0.0, flight__altitude_sd=0.0)
+    calm = with_values(calm, flight__roll_sd=0.0, flight__pitch_sd=0.0, flight__yaw_sd=0.0)
+    for changes in ({}, {"flight__turn": "counter-clockwise"}, {"flight__course_at_target": 120.0}):
+        changed = with_values(calm, **changes)
+        path, attitude = trajectory(changed, np.random.default_rng(0))
+        motion = move(path, attitude, np.arange(0, 120, 0.01))
+        flight = simulate(with_values(changed, target__observations=1), 0)
+        pose = camera_pose(flight.manifest.geometry_mount(), motion.position, motion.R_nb)
+        uv = ground_to_pixel(flight.manifest.geometry_camera(), [0.0, 0.0, -2.0], *pose)
+        off = np.linalg.norm(uv - [320, 256], axis=1)
+        at = np.nanargmin(off)
+        assert off[at] < 2.0  # within a hundredth of a second of flight
+        course = np.degrees(np.arctan2(motion.velocity[at, 1], motion.velocity[at, 0]))
+        assert course == pytest.approx(changed.flight.course_at_target.number, abs=0.2)
+    # The camera looks out of the turn, so the target lies outside of the circle.
+    assert np.linalg.norm(loiter_centre(twin)) > twin.flight.loiter_radius.number
+
+
+def test_onboard_stamps_are_early_late_and_drifting_but_in_order(flight, twin):
+    frames = flight.frames
+    stamps = frames["time_onboard_s"].to_numpy()
+    assert (np.diff(stamps) > 0).all()
+    prompt = simulate(with_values(twin, onboard_clock__latency=0.0), 3).frames
+    error = (prompt["time_onboard_s"] - prompt["time_s"]).to_numpy()
+    assert error[0] == pytest.approx(-0.3)
+    assert error[-1] - error[0] == pytest.approx(5e-5 * 7989 / 7.5)
+    assert (stamps - prompt["time_onboard_s"].to_numpy()).min() >= -1e-9
+
+
+def test_a_saved_twin_is_a_flight_like_any_other(flight, tmp_path):
+    save_flight(flight, tmp_path / "twin")
+    loaded = load_flight(tmp_path / "twin")
+    for name, table in every_table(flight).items():
+        pd.testing.assert_frame_equal(every_table(loaded)[name], table, check_exact=True)
+    assert loaded.manifest == flight.manifest
+    assert loaded.manifest.twin is not None
+    assert loaded.manifest.twin.seed == 3
+    assert loaded.manifest.kind == "twin"
+
+
+def test_check_finds_nothing_wrong(flight, tmp_path):
+    check = pytest.importorskip("wildlab.flight.check")
+    save_flight(flight, tmp_path / "twin")
+    findings = check.check_flight(load_flight(tmp_path / "twin"))
+    assert [finding.sentence for finding in findings if finding.level == "problem"] == []
+
+
+def test_the_manifest_does_not_give_the_simulated_errors_away(twin, flight):
+    stated, real = flight.manifest.uncertainty, twin.autopilot
+    assert stated.roll_deg != real.roll_sd.number
+    assert stated.yaw_deg != real.yaw_sd.number
+    assert stated.position_horizontal_m != real.horizontal_sd.number
+    assert stated.pixel_px != twin.camera.marking_sd.number
+    other = simulate(with_values(twin, autopilot__roll_sd=3.0, autopilot__horizontal_sd=7.0), 3)
+    assert other.manifest == flight.manifest
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 1.5, True, "1"])
+def test_a_seed_is_a_whole_number_from_zero(seed):
+    with pytest.raises(WildlabError, match=r"is not a seed\. Give a whole number from 0"):
+        simulate_twin("static-antenna", seed)
+
+
+def test_a_target_that_is_not_seen_often_enough_is_said(twin):
+    with pytest.raises(
+        WildlabError, match=r"target\.observations: .* in view in \d+ images only, not in 5000"
+    ):
+        simulate(with_values(twin, target__observations=5000), 1)
+
+
+def test_a_camera_that_does_not_look_at_the_target_is_said(twin):
+    with pytest.raises(WildlabError, match=r"flight\.altitude: the camera does not look down"):
+        simulate(with_values(twin, mount__tilt=120.0), 1)
