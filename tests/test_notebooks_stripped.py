@@ -80,8 +80,8 @@ def test_tracked_notebooks() -> None:
 
 
 def cell(source: str, **more: Any) -> dict[str, Any]:
-    bare: dict[str, Any] = {"cell_type": "code", "source": source, "metadata": {}, "outputs": [], "execution_count": None}
-    return bare | more
+    bare: dict[str, Any] = {"cell_type": "code", "source": source, "metadata": {}}
+    return bare | {"outputs": [], "execution_count": None} | more
 
 
 PARAMETERS = cell("seed = 1", metadata={"tags": ["parameters"]})
