@@ -1,0 +1,190 @@
+"""Fetching: the right bytes or none, from a mirror or from a (local, made-up) network."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight import catalog
+from wildlab.flight.catalog import DataFile, dataset_folder, fetch, is_fetched, read_catalog
+
+GOOD = {"a.csv": b"one\n", "b.csv": b"two\n"}
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Iterator[tuple[str, Path]]:
+    """Address and folder of a small web server."""
+    folder = tmp_path / "web"
+    folder.mkdir()
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Quiet, directory=str(folder)))
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}", folder
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.fixture
+def dataset(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """``dataset("http://...")`` makes a catalog with one data set of two files at that address."""
+    monkeypatch.delenv("WILDLAB_DATA_MIRROR", raising=False)
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+
+    def make(address: str) -> None:
+        files = tuple(
+            DataFile.model_construct(
+                path=name,
+                url=f"{address}/{name}",
+                sha256=hashlib.sha256(data).hexdigest(),
+                mirror=f"deep/{name}",
+            )
+            for name, data in GOOD.items()
+        )
+        made = catalog.DataSet(title="", source="", commit="", licence="MIT", files=files)
+        monkeypatch.setattr(catalog, "read_catalog", lambda: {"small": made})
+
+    return make
+
+
+def _put(folder: Path, **changed: bytes) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in GOOD.items():
+        (folder / name).write_bytes(changed.get(name.removesuffix(".csv"), data))
+
+
+def test_download_and_not_again(
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path
+) -> None:
+    dataset(web[0])
+    _put(web[1])
+    told: list[tuple[str, int, int]] = []
+    assert not is_fetched("small", tmp_path / "here")
+    paths = fetch("small", tmp_path / "here", lambda *progress: told.append(progress))
+    assert [path.read_bytes() for path in paths] == list(GOOD.values())
+    assert told == [("a.csv", 0, 2), ("b.csv", 1, 2)]
+    assert is_fetched("small", tmp_path / "here")
+
+    (web[1] / "a.csv").unlink()
+    assert fetch("small", tmp_path / "here", lambda *progress: told.append(progress)) == paths
+    assert len(told) == 2
+    paths[1].write_bytes(b"changed")
+    assert not is_fetched("small", tmp_path / "here")
+    fetch("small", tmp_path / "here", lambda *progress: told.append(progress))
+    assert told[2:] == [("b.csv", 0, 1)]
+    assert paths[1].read_bytes() == b"two\n"
+
+
+@pytest.mark.parametrize("bad", ["a", "b"])
+def test_a_download_with_the_wrong_hash_leaves_nothing(
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path, bad: str
+) -> None:
+    dataset(web[0])
+    _put(web[1], **{bad: b"evil"})
+    with pytest.raises(WildlabError) as caught:
+        fetch("small", tmp_path / "here")
+    assert hashlib.sha256(b"evil").hexdigest() in str(caught.value)
+    assert hashlib.sha256(GOOD[f"{bad}.csv"]).hexdigest() in str(caught.value)
+    assert f"{bad}.csv" in str(caught.value)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]
+
+
+def test_no_network_and_no_mirror_is_one_sentence(dataset: Callable[[str], None], tmp_path: Path) -> None:
+    dataset("http://127.0.0.1:1")
+    with pytest.raises(WildlabError) as caught:
+        fetch("small", tmp_path / "here")
+    assert caught.value.__cause__ is None
+    assert caught.value.__suppress_context__
+    assert "a.csv: the file cannot be downloaded from http://127.0.0.1:1/a.csv" in str(caught.value)
+    assert "set WILDLAB_DATA_MIRROR to a folder" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_that_is_gone(web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path) -> None:
+    dataset(web[0])
+    with pytest.raises(WildlabError, match="404"):
+        fetch("small", tmp_path / "here")
+    assert not (tmp_path / "here").exists()
+
+
+@pytest.mark.parametrize("layout", ["", "deep"])
+def test_mirror_instead_of_network(
+    dataset: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, layout: str
+) -> None:
+    dataset("http://127.0.0.1:1")
+    monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(tmp_path / "mirror"))
+    _put(tmp_path / "mirror" / layout)
+    paths = fetch("small", tmp_path / "here")
+    assert [path.read_bytes() for path in paths] == list(GOOD.values())
+    assert sorted(path.name for path in (tmp_path / "here" / "small").iterdir()) == ["a.csv", "b.csv"]
+
+
+def test_a_wrong_hash_in_the_mirror_leaves_nothing(
+    dataset: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset("http://127.0.0.1:1")
+    monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(tmp_path / "mirror"))
+    _put(tmp_path / "mirror", b=b"evil")
+    with pytest.raises(WildlabError) as caught:
+        fetch("small", tmp_path / "here")
+    assert hashlib.sha256(b"evil").hexdigest() in str(caught.value)
+    assert hashlib.sha256(b"two\n").hexdigest() in str(caught.value)
+    assert caught.value.file == str(tmp_path / "mirror" / "b.csv")
+    assert not (tmp_path / "here").exists()
+    assert (tmp_path / "mirror" / "b.csv").read_bytes() == b"evil"
+
+
+def test_a_mirror_without_the_file(
+    dataset: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset("http://127.0.0.1:1")
+    monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(tmp_path / "mirror"))
+    with pytest.raises(WildlabError, match=r"has no deep/a\.csv and no a\.csv\. Copy the file there"):
+        fetch("small", tmp_path / "here")
+    assert not (tmp_path / "here").exists()
+
+
+def test_an_unknown_data_set_lists_the_known() -> None:
+    with pytest.raises(WildlabError, match=r"no data set 'openatena'.*Did you mean 'openathena'"):
+        fetch("openatena")
+    with pytest.raises(WildlabError, match="Use one of openathena"):
+        dataset_folder("../..")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("https://raw", "file:///etc"), "url"),
+        (('mirror = "georeferencing', 'mirror = "../georeferencing'), "leaves its folder"),
+        (("[openathena]", '["../x"]\nfiles = []\n[openathena]'), "this key is missing"),
+        (("4785d352", "4785D352"), "sha256"),
+    ],
+)
+def test_the_catalog_is_checked(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    text = (catalog.DATA / "catalog.toml").read_text()
+    assert change[0] in text
+    (tmp_path / "catalog.toml").write_text(text.replace(*change))
+    with pytest.raises(WildlabError, match=said):
+        read_catalog(tmp_path / "catalog.toml")
+
+
+def test_openathena_from_the_mirror(
+    shared_data: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shared_data("georeferencing", "openathena")
+    monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(folder.parents[1]))
+    paths = fetch("openathena", tmp_path)
+    assert [path.suffix for path in paths] == [".csv", ".csv"]
+    assert is_fetched("openathena", tmp_path)
+    assert read_catalog()["openathena"].licence == "MIT"

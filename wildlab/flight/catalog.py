@@ -1,0 +1,216 @@
+"""Public data sets, fetched file by file and checked by SHA-256.
+
+`data/catalog.toml` names them. The environment variable ``WILDLAB_DATA_MIRROR`` points at a folder that stands
+in for the network.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import pooch
+from pydantic import Field, RootModel, field_validator
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import (
+    Strict,
+    check_model,
+    did_you_mean,
+    is_safe_name,
+    leaves_folder,
+    read_toml,
+    sha256_of,
+)
+from wildlab.paths import DATA
+
+MIRROR_VARIABLE = "WILDLAB_DATA_MIRROR"
+
+#: Seconds without an answer after which a download is given up.
+TIMEOUT_S = 30
+
+#: Told before each file is fetched: its name, how many are done, how many there are.
+Progress = Callable[[str, int, int], None]
+
+
+class DataFile(Strict):
+    path: str
+    url: Annotated[str, Field(pattern=r"^https://")]
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    mirror: str
+
+    @field_validator("path", "mirror")
+    @classmethod
+    def _stays(cls, value: str) -> str:
+        if leaves_folder(value):
+            raise ValueError(f"the path {value!r} leaves its folder; name a file below it")
+        return value
+
+
+class DataSet(Strict):
+    title: str
+    source: str
+    commit: str
+    licence: str
+    files: tuple[DataFile, ...]
+
+
+class _Catalog(RootModel[dict[str, DataSet]]):
+    @field_validator("root")
+    @classmethod
+    def _safe_names(cls, value: dict[str, DataSet]) -> dict[str, DataSet]:
+        for name in value:
+            if not is_safe_name(name):
+                raise ValueError(
+                    f"{name!r} cannot be the name of a data set; use letters, digits, - and _ only"
+                )
+        return value
+
+
+def read_catalog(path: Path | None = None) -> dict[str, DataSet]:
+    """The data sets by name.
+
+    Raises
+    ------
+    WildlabError
+        Where the catalog is missing or wrong.
+    """
+    path = DATA / "catalog.toml" if path is None else path
+    return check_model(_Catalog, read_toml(path, "the catalog of data sets"), path).root
+
+
+def find_dataset(name: str) -> DataSet:
+    """One data set of the catalog.
+
+    Raises
+    ------
+    WildlabError
+        Where there is none of that name.
+    """
+    catalog = read_catalog()
+    if name not in catalog:
+        raise WildlabError(f"there is no data set {name!r} in the catalog", did_you_mean(name, catalog))
+    return catalog[name]
+
+
+def dataset_folder(name: str, into: Path | None = None) -> Path:
+    """Folder of a data set below `into` (default ``data/fetched``), whether it has been fetched or not.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no data set of that name.
+    """
+    find_dataset(name)
+    return (DATA / "fetched" if into is None else into) / name
+
+
+def is_fetched(name: str, into: Path | None = None) -> bool:
+    """Whether every file of a data set is there and has the right checksum.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no data set of that name.
+    """
+    folder = dataset_folder(name, into)
+    return all(_is_right(folder / file.path, file) for file in find_dataset(name).files)
+
+
+def fetch(name: str, into: Path | None = None, progress: Progress | None = None) -> list[Path]:
+    """Get the files of a data set; those that are there and right are not fetched again.
+
+    All of them or none: a failure leaves the folder as it was.
+
+    Parameters
+    ----------
+    name
+        Of the catalog.
+    into
+        Folder to put the folder of the data set in, by default ``data/fetched``.
+    progress
+        Called before each file that has to be fetched.
+
+    Returns
+    -------
+    The files, in the order of the catalog.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such data set, no network and no mirror, or a checksum is wrong.
+    """
+    dataset = find_dataset(name)
+    folder = dataset_folder(name, into)
+    missing = [file for file in dataset.files if not _is_right(folder / file.path, file)]
+    if missing:
+        mirror = os.environ.get(MIRROR_VARIABLE)
+        existing = next(parent for parent in (folder, *folder.parents) if parent.is_dir())
+        with tempfile.TemporaryDirectory(dir=existing, prefix=".fetch.") as temporary:
+            for number, file in enumerate(missing):
+                if progress is not None:
+                    progress(file.path, number, len(missing))
+                target = Path(temporary) / str(number)
+                if mirror:
+                    _copy(Path(mirror), file, target)
+                else:
+                    _download(file, target)
+            for number, file in enumerate(missing):
+                (folder / file.path).parent.mkdir(parents=True, exist_ok=True)
+                (Path(temporary) / str(number)).replace(folder / file.path)
+    return [folder / file.path for file in dataset.files]
+
+
+def _is_right(path: Path, file: DataFile) -> bool:
+    return path.is_file() and sha256_of(path) == file.sha256
+
+
+def _copy(mirror: Path, file: DataFile, target: Path) -> None:
+    places = [mirror / file.mirror, mirror / file.path, mirror / Path(file.path).name]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        raise WildlabError(
+            f"the folder that {MIRROR_VARIABLE} names has no {file.mirror} and no {file.path}",
+            f"copy the file there, or unset {MIRROR_VARIABLE} to download it",
+            file=mirror,
+        )
+    try:
+        shutil.copyfile(found, target)
+    except OSError as error:
+        raise WildlabError(
+            f"cannot be read ({error.strerror})", "check its permissions", file=found
+        ) from None
+    _verify(target, file, found, "replace it by the published file")
+
+
+def _download(file: DataFile, target: Path) -> None:
+    pooch.get_logger().setLevel(logging.WARNING)
+    downloader = pooch.HTTPDownloader(timeout=TIMEOUT_S)
+    try:
+        # Checked below: pooch would not name the hash it found.
+        pooch.retrieve(file.url, None, target.name, target.parent, downloader=downloader)
+    except OSError as error:  # what requests raises is an OSError too
+        first = str(error).strip().splitlines()[:1] or [type(error).__name__]
+        raise WildlabError(
+            f"the file cannot be downloaded from {file.url} ({_short(first[0])})",
+            f"check the network, or set {MIRROR_VARIABLE} to a folder that has the file",
+            file=file.path,
+        ) from None
+    _verify(target, file, file.url, "try again; if it stays so, do not trust the source")
+
+
+def _verify(path: Path, file: DataFile, whence: Path | str, fix: str) -> None:
+    found = sha256_of(path)
+    if found != file.sha256:
+        raise WildlabError(
+            f"has the SHA-256 {found}, and the catalog says {file.sha256} for {file.path}", fix, file=whence
+        )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 120 else text[:117] + "..."
