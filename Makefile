@@ -24,10 +24,8 @@ help: ## this list
 environment: ## create or update .venv from environment.lock (the targets below do so themselves)
 	@sh tools/environment.sh
 
-reports: environment ## run every study that needs no download; writes reports/index.html
-	@status=0; $(BIN)/wildlab run --all --jobs $(JOBS) $(ARGS) || status=$$?; \
-	if [ -f reports/index.html ]; then printf '\nOpen this in a browser: %s\n' "$$(pwd)/reports/index.html"; fi; \
-	exit $$status
+reports: environment ## run every study that needs no download, and say where the reports are
+	@$(BIN)/wildlab run --all --jobs $(JOBS) $(ARGS)
 
 test: environment ## run the tests (where CI=true: the slow ones too)
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)

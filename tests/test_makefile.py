@@ -270,3 +270,18 @@ def test_readme_names_only_targets_that_exist() -> None:
     assert {"reports", "test"} <= named
     for target in named:
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+def test_readme_names_only_commands_that_exist() -> None:
+    from wildlab.cli import wildlab
+
+    named = set(re.findall(r"(?:^|`|\s{4})wildlab ([a-z]+)", commands_in_readme(), re.MULTILINE))
+    assert {"import", "check", "evaluate"} <= named
+    assert named <= set(wildlab.commands)
+
+
+def test_readme_table_lists_every_command() -> None:
+    from wildlab.cli import wildlab
+
+    text = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| `wildlab ([a-z]+)", text, re.MULTILINE)) == set(wildlab.commands)
