@@ -160,10 +160,10 @@ def undistort_approximately(xy_distorted: ArrayLike, k1: float) -> Array:
 
 def normalise(camera: Camera, uv: ArrayLike) -> Array:
     """Ideal normalised coordinates ``x/z, y/z`` in c of pixels. (N, 2) pixels -> (N, 2); F (2.21), exact."""
-    u, v = np.moveaxis(np.asarray(uv, float), -1, 0)
-    y = (v - camera.cy) / camera.fy
-    x = (u - camera.cx - camera.skew * y) / camera.fx
-    xy = np.stack([x, y], axis=-1)
+    xy = np.asarray(uv, float) - (camera.cx, camera.cy)
+    xy /= (camera.fx, camera.fy)
+    if camera.skew:
+        xy[..., 0] -= camera.skew / camera.fx * xy[..., 1]
     return undistort(xy, camera.distortion) if camera.distorts else xy
 
 

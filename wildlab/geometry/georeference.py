@@ -16,6 +16,8 @@ def pixel_rays(camera: Camera, uv: ArrayLike, R_nc: ArrayLike) -> Array:
     """
     xy = normalise(camera, uv)
     R = np.asarray(R_nc, float)
+    if R.ndim == 2:
+        return np.asarray(xy @ R[:, :2].T + R[:, 2])
     return np.asarray(R[..., :, 0] * xy[..., :1] + R[..., :, 1] * xy[..., 1:] + R[..., :, 2])
 
 
@@ -47,12 +49,15 @@ def pixel_to_plane(
 def intersect_plane(rays: ArrayLike, p_nc: ArrayLike, plane_down: ArrayLike) -> Array:
     """Where rays (N, 3) from ``p_nc`` (N, 3) meet the plane at ``plane_down``; misses are NaN."""
     d, p = np.asarray(rays, float), np.asarray(p_nc, float)
-    drop = plane_down - p[..., 2]
+    plane = np.asarray(plane_down, float)
+    drop = plane - p[..., 2]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        distance = np.where((d[..., 2] > 0) & (drop > 0), drop / d[..., 2], np.nan)
-        ground = p + distance[..., None] * d
-    ground[..., 2] = np.where(np.isnan(distance), np.nan, plane_down)
-    return np.asarray(ground)
+        distance = np.asarray(drop / d[..., 2])
+        distance[~((d[..., 2] > 0) & (drop > 0))] = np.nan
+        ground = np.asarray(distance[..., None] * d)
+        ground += p
+        ground[..., 2] = plane + 0.0 * distance  # exactly the plane, and NaN where there is no point
+    return ground
 
 
 def ground_to_pixel(camera: Camera, p_nt: ArrayLike, p_nc: ArrayLike, R_nc: ArrayLike) -> Array:

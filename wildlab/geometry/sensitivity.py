@@ -97,7 +97,7 @@ class Convention(NamedTuple):
     """One way to combine the printed misalignment angles: ``R_bm`` is their product in this order."""
 
     order: str  # of "roll", "tilt" and "pan", by first letters, left to right
-    signs: tuple[int, int, int]  # of roll, tilt, pan against the print
+    signs: tuple[int, ...]  # of roll, tilt, pan against the print
     errors: dict[str, float]  # as from helgesen_tables
 
 
