@@ -18,6 +18,7 @@ from wildlab.pipeline.georeference import (
     georeference,
     observe,
     pose_errors,
+    shifted_poses,
 )
 from wildlab.pipeline.judge import judge, known_points
 
@@ -44,27 +45,20 @@ class Calibrated(NamedTuple):
 
 def fit_flight(
     flight: Flight,
+    observations: Observations,
     judged: pd.DataFrame,
     source: str | None = None,
     estimate: tuple[str, ...] = BORESIGHT,
 ) -> Calibration:
     """Calibrate on the points of a judged table, weighted with their ground covariances."""
-    observations, known = known_points(flight, observe(flight, source), judged)
+    observations, known = known_points(flight, observations, judged)
     ids = observations.table["detection_id"]
-
-    def poses_at(shift: float) -> tuple[Array, Array]:
-        if shift == 0.0:
-            return observations.p_nb, observations.R_nb
-        moved = observe(flight, source, clock_shift=shift)
-        moved = moved.take(moved.table["detection_id"].isin(ids).to_numpy())
-        return moved.p_nb, moved.R_nb
-
     weights = covariances_of(judged.set_index("detection_id").loc[ids].reset_index())
     return calibrate(
         flight.manifest.geometry_camera(),
         observations.mount,
         observations.uv,
-        poses_at,
+        lambda shift: shifted_poses(flight, source, observations, shift),
         known,
         observations.table["frame_id"].to_numpy(),
         estimate,
@@ -109,7 +103,7 @@ def calibrate_flight(
             _judge_unseen(
                 flight,
                 observations,
-                fit_flight(flight, plain[seen], source, estimate),
+                fit_flight(flight, observations, plain[seen], source, estimate),
                 plain[~seen],
                 source,
                 rng,
@@ -118,7 +112,7 @@ def calibrate_flight(
         ]
         rounds.append(pd.concat(parts, ignore_index=True))
     return Calibrated(
-        fit_flight(flight, plain, source, estimate),
+        fit_flight(flight, observations, plain, source, estimate),
         rounds[0],
         np.array([r["error_m"].mean() for r in rounds]),
     )
@@ -133,8 +127,6 @@ def _judge_unseen(
     rng: np.random.Generator,
 ) -> pd.DataFrame:
     """Errors of the unseen points with a calibration applied."""
-    clock = calibration.value("clock")
-    placed = observe(flight, source, clock_shift=clock) if clock else observations
-    placed = placed.take(placed.table["detection_id"].isin(unseen["detection_id"]).to_numpy())
-    placed = calibrated(placed, calibration)
+    rows = observations.table["detection_id"].isin(unseen["detection_id"]).to_numpy()
+    placed = calibrated(flight, source, observations.take(rows), calibration)
     return judge(flight, georeference(flight, placed, rng, pose_errors(flight, placed)))

@@ -122,8 +122,7 @@ def observe(
     at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
     own_clock = frames[stamps].to_numpy(float) - frames["time_s"].to_numpy(float)
     times = (frame_times(flight) + own_clock + clock_shift)[at]
-    _, nav = flight.pose_source(source)
-    p_nb, R_nb, covariance = poses_at(nav, times, pixels["frame_id"])
+    p_nb, R_nb, covariance = poses_at(flight.pose_source(source)[1], times, pixels["frame_id"])
     pan, tilt = (angle[at] for angle in gimbal_angles(flight))
     lost = at < 0
     p_nb[lost], R_nb[lost] = np.nan, np.nan
@@ -149,14 +148,26 @@ def observe(
     )
 
 
-def calibrated(observations: Observations, calibration: Calibration) -> Observations:
-    """The observations with estimated mount angles and position offset applied.
+def shifted_poses(
+    flight: Flight, source: str | None, observations: Observations, shift: float
+) -> tuple[Array, Array]:
+    """The poses ``p_nb``, ``R_nb`` of observations whose camera stamps are ``shift`` seconds later.
 
-    A clock offset moves the poses themselves: pass it to :func:`observe` as ``clock_shift``.
+    A moving gimbal keeps the angles it had at the unshifted stamps.
     """
-    shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
+    times = observations.table["time_s"].to_numpy(float) + shift
+    p_nb, R_nb, _ = poses_at(flight.pose_source(source)[1], times, observations.table["frame_id"])
+    return p_nb, R_nb
+
+
+def calibrated(
+    flight: Flight, source: str | None, observations: Observations, calibration: Calibration
+) -> Observations:
+    """The observations with estimated mount angles, position and clock offset applied."""
+    p_nb, R_nb = shifted_poses(flight, source, observations, calibration.value("clock"))
+    offset = np.array([calibration.value(name) for name in ("north", "east", "down")])
     mount = apply_calibration(calibration, observations.mount)
-    return replace(observations, p_nb=observations.p_nb + shift, mount=mount)
+    return replace(observations, p_nb=p_nb + offset, R_nb=R_nb, mount=mount)
 
 
 def pose_errors(
@@ -241,11 +252,17 @@ def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
     where = np.full((len(table), 3), np.nan)
     if flight.truth is None:
         return where
-    for target, rows in table.groupby("target_id").indices.items():
-        known = flight.truth[flight.truth["target_id"] == target]
-        if target and len(known):
-            times = table["time_s"].to_numpy(float)[rows]
-            where[rows] = truth_at(known, times, offset_s=flight.manifest.clocks.truth_offset_s)[1][0]
+    names = table["target_id"].to_numpy(object)
+    times = table["time_s"].to_numpy(float)
+    still = flight.truth[flight.truth["time_s"].isna()].drop_duplicates("target_id")
+    at = pd.Index(still["target_id"]).get_indexer(pd.Index(names))
+    where[at >= 0] = still[["north_m", "east_m", "down_m"]].to_numpy(float)[at[at >= 0]]
+    moving = flight.truth[flight.truth["time_s"].notna()]
+    tracks = dict(tuple(moving.groupby("target_id", sort=False)))
+    offset = flight.manifest.clocks.truth_offset_s
+    for target in set(names) & tracks.keys():
+        rows = names == target
+        where[rows] = truth_at(tracks[target], times[rows], offset_s=offset)[1][0]
     return where
 
 

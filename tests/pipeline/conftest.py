@@ -1,0 +1,107 @@
+"""A small flight whose every error is known: images of surveyed markers, from slightly wrong poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.manifest import Manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.sensitivity import TAU2
+
+SPEED = 15.0
+
+
+def build(
+    *,
+    seed: int = 0,
+    n_images: int = 40,
+    rule: str = "labelled",
+    misalignment_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    attitude_deg: float = 0.0,
+    position_m: float = 0.0,
+    pixel_px: float = 0.0,
+    clock_s: float = 0.0,
+    moving: bool = False,
+) -> Flight:
+    """Images at one a second, four markers in each; the manifest knows nothing of the misalignment."""
+    rng = np.random.default_rng(seed)
+    true_mount = Mount("down", misalignment=tuple(np.radians(misalignment_deg)))
+    t = np.arange(-20, n_images * 10 + 20) / 10.0
+    heading = 0.4 * t
+    euler = np.column_stack([0.15 * np.sin(0.5 * t), 0.1 * np.cos(0.9 * t), heading])
+    p = np.column_stack(
+        [SPEED / 0.4 * np.sin(heading), -SPEED / 0.4 * np.cos(heading), -90 - 25 * np.sin(0.21 * t)]
+    )
+    q = matrix_to_quaternion(euler_to_matrix(*euler.T))
+    nav = pd.DataFrame({"time_s": t, "north_m": p[:, 0], "east_m": p[:, 1], "down_m": p[:, 2]})
+    for i, name in enumerate(("q_w", "q_x", "q_y", "q_z")):
+        nav[name] = q[:, i]
+
+    at = np.arange(n_images) * 1.0  # flight time of the images; the camera's own stamps are off by the clock
+    index = np.searchsorted(t, at - 1e-6)
+    shared = rng.normal(0, np.radians(attitude_deg), (n_images, 3))
+    seen = euler_to_matrix(*(euler[index] + shared).T)
+    where = p[index] + rng.normal(0, position_m, (n_images, 3))
+    image = np.repeat(np.arange(n_images), 4)
+    markers = np.column_stack(
+        [where[image, :2] + rng.uniform(-15, 15, (len(image), 2)), rng.normal(0, 1.0, len(image))]
+    )
+    uv = ground_to_pixel(TAU2, markers, *camera_pose(true_mount, where[image], seen[image]))
+    uv += rng.normal(0, pixel_px, uv.shape)
+    names = [f"M{i:03d}" for i in range(len(image))]
+    frames = pd.DataFrame({"frame_id": [f"I{i:03d}" for i in range(n_images)], "time_s": at - clock_s})
+    detections = pd.DataFrame(
+        {
+            "detection_id": [f"D{i:03d}" for i in range(len(image))],
+            "frame_id": frames["frame_id"].to_numpy()[image],
+            "source": "click",
+            "kind": "pixel",
+            "u_px": uv[:, 0],
+            "v_px": uv[:, 1],
+            "target_id": names if rule == "labelled" else "",
+            "plane_down_m": markers[:, 2],
+        }
+    )
+    truth = pd.DataFrame(
+        {
+            "target_id": names,
+            "time_s": np.nan,
+            "north_m": markers[:, 0],
+            "east_m": markers[:, 1],
+            "down_m": markers[:, 2],
+        }
+    )
+    if moving:  # each marker on a track of its own that passes its place when it is seen
+        rows = []
+        for name, marker, k in zip(names, markers, image, strict=True):
+            for dt in (-0.5, 0.5):
+                rows.append([name, at[k] + dt, marker[0] + 2.0 * dt, marker[1] - 1.0 * dt, marker[2]])
+        truth = pd.DataFrame(rows, columns=truth.columns)
+    manifest = Manifest.model_validate(
+        {
+            "name": "synthetic",
+            "kind": "logged",
+            "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
+            "platform": {"name": "made up"},
+            "camera": {"name": "Tau 2", "width_px": 640, "height_px": 512, "fx_px": TAU2.fx, "fy_px": TAU2.fy,
+                       "cx_px": TAU2.cx, "cy_px": TAU2.cy},
+            "mount": {"looks": "down"},
+            "time": {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"},
+            "uncertainty": {"pixel_px": 2.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
+                            "roll_deg": 1.0, "pitch_deg": 1.0, "yaw_deg": 1.0, "plane_height_m": 0.1},
+            "scoring": {"rule": rule},
+        }
+    )  # fmt: skip
+    return Flight(manifest, {"logged": nav}, {"frames": frames, "detections": detections, "truth": truth})
+
+
+@pytest.fixture
+def make_flight() -> Callable[..., Flight]:
+    return build
