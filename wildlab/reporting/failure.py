@@ -66,7 +66,7 @@ def failure_page(status: dict[str, Any], *, title: str, step: str, details: str,
         '<p class="sub"><span class="pill no">did not finish</span></p></header>\n'
         '<section class="summary bad" aria-label="Summary"><p>'
         "<b>This study failed, so there are no results to show.</b> "
-        f"{escape(status['reason'])}</p></section>\n<p>{after}</p>\n"
+        f"{inline(status['reason'])}</p></section>\n<p>{after}</p>\n"
         f"<h2>What to do</h2>\n<ol>{''.join(f'<li>{inline(step)}</li>' for step in steps)}</ol>\n"
     )
     if details.strip():

@@ -21,9 +21,8 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
 
-#: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS; names below the
-#: folder take 55.
-_LONGEST_SOCKET_FOLDER = 45
+#: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
+_LONGEST_SOCKET_FOLDER = 95
 
 #: The cells begun in this process, in order.
 _STARTED: list[int] = []
@@ -191,7 +190,11 @@ def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any]
     config = Config()
     if len(job.runtime) <= _LONGEST_SOCKET_FOLDER and sys.platform != "win32":
         # Sockets in a folder of our own instead of ports that another kernel may take at the same moment.
+        # They are named here: left to itself, Jupyter puts them into the working directory, under the same
+        # names for every kernel.
         config.KernelManager.transport = "ipc"
+        config.KernelManager.ip = str(Path(job.runtime) / "k")
+    config.KernelManager.connection_file = str(Path(job.runtime) / "kernel.json")
     notebook = read_notebook(Path(job.notebook))
     # Whatever kernel the notebook was last saved with: this one is meant.
     notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
@@ -240,7 +243,7 @@ def _explain(error: BaseException, folder: Path) -> Failure:
     elif kind == "DeadKernelError":
         reason = (
             "The process that ran the notebook crashed or was ended from outside; the usual cause is too "
-            "little memory. Close other programs, or run with --jobs 1."
+            "little memory. Close other programs, or run with `--jobs 1`."
         )
     elif kind == "NoSuchKernel":
         reason = (

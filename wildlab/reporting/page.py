@@ -28,6 +28,7 @@ ul, ol { padding-left: 1.4rem }
 li { margin: .3rem 0 }
 a { color: var(--link) }
 code { font: .88em var(--mono); overflow-wrap: anywhere }
+code.short, .source { white-space: nowrap }
 pre { font: .8rem/1.45 var(--mono); background: var(--soft); padding: .8rem 1rem; margin: .6rem 0;
   overflow-x: auto }
 .kicker { margin: 0; color: var(--dim); font-size: .86rem }
@@ -69,6 +70,7 @@ thead th { color: var(--dim); font-weight: 600; font-size: .82rem; vertical-alig
   white-space: normal }
 tbody th { font-weight: 400 }
 th.text, td.text { text-align: left; white-space: normal; min-width: 6.5rem; max-width: 28rem }
+th.wide { min-width: 12rem }
 td svg { display: block; margin-left: auto }
 .formula { margin: .7rem 0; padding: .1rem 0; overflow-y: hidden }
 math[display=block] { width: max-content; margin: 0 auto }

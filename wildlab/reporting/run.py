@@ -8,17 +8,12 @@ as it was.
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import multiprocessing
 import os
-import re
-import shutil
-import signal
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from multiprocessing import connection
@@ -26,21 +21,19 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.reporting.failure import failure_page, step_of
-from wildlab.reporting.files import write_atomic, write_json
-from wildlab.reporting.html import read_notebook
+from wildlab.reporting.checks import check_notebook, plain_parameters
 from wildlab.reporting.job import Failure, Job, end_tree, work
-from wildlab.reporting.privacy import clean_notebook, clean_text
-from wildlab.reporting.studies import STANDARD_PARAMETERS, Study
+from wildlab.reporting.ledger import build_ledger
+from wildlab.reporting.outputs import clear, install, leave_failure, log_of, sweep
+from wildlab.reporting.progress import outcome_line, shown
+from wildlab.reporting.studies import STANDARD_PARAMETERS, Study, find_study, load_studies
 
-#: What a run may leave in a report's folder, besides ``figures/``. Anything else there is not ours, and
-#: stays.
-FILES = ("report.html", "metrics.json", "provenance.json", "notebook.ipynb", "replay.rrd")
-_PART = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d+)\.part")
+#: The notebook that judges any flight.
+EVALUATION = "georeferencing.ipynb"
 
 
 @dataclass(frozen=True)
@@ -56,68 +49,6 @@ class Outcome:
 
 #: Called with (name, "start" | "stage" | "cell" | "end", what).
 Listener = Callable[[str, str, Any], None]
-
-
-def plain_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters as papermill can hand them on: str, int, float, bool, None, and lists of these.
-
-    Raises
-    ------
-    WildlabError
-        If one is something else.
-    """
-    return {name: _plain(value, name) for name, value in parameters.items()}
-
-
-def _plain(value: Any, name: str) -> Any:
-    if value is None or isinstance(value, (str, bool)):
-        return value
-    if isinstance(value, (os.PathLike,)):
-        return os.fspath(value)
-    if isinstance(value, np.generic):
-        return _plain(value.item(), name)
-    if isinstance(value, (int, float)):
-        return value
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist(), name)
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry, name) for entry in value]
-    raise WildlabError(
-        f"the parameter {name!r} is of type {type(value).__name__}",
-        "give text, numbers, true/false or a list of these",
-    )
-
-
-def check_notebook(notebook: Path, parameters: Sequence[str]) -> None:
-    """Refuse a notebook that would not do as it is told.
-
-    Raises
-    ------
-    WildlabError
-        If the notebook is absent or not one, has no or several cells tagged ``parameters``, or does not
-        know one of the parameters. papermill lets all of these pass.
-    """
-    import papermill
-
-    if not notebook.is_file():
-        raise WildlabError(
-            "there is no such notebook", "restore it, or name another in studies.toml", file=notebook.name
-        )
-    node = read_notebook(notebook)
-    tagged = sum("parameters" in cell.metadata.get("tags", []) for cell in node.cells)
-    if tagged != 1:
-        raise WildlabError(
-            f"the notebook has {tagged} cells tagged `parameters`", "tag exactly one", file=notebook.name
-        )
-    node.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
-    known = papermill.inspect_notebook(node)
-    for name in parameters:
-        if name not in known:
-            raise WildlabError(
-                f"the notebook has no parameter {name!r}",
-                f"it has: {', '.join(known)}; add it to its parameters cell, or take it out of studies.toml",
-                file=notebook.name,
-            )
 
 
 def make_job(
@@ -167,6 +98,135 @@ def make_job(
     )
 
 
+def run_studies(
+    names: Sequence[str] = (),
+    *,
+    everything: bool = False,
+    seed: int | None = None,
+    flight: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    parallel: int = 1,
+    timeout_s: float | None = None,
+    console: Console | None = None,
+) -> list[Outcome]:
+    """Run studies by name, or all, and rebuild the ledger.
+
+    Parameters
+    ----------
+    everything
+        Run all studies. One whose public data are not here is skipped, and says so; asked for by name, it
+        is an error.
+    flight
+        A flight folder for the one study named, in place of its own; its report is then named
+        ``<study>-<flight>``.
+    console
+        Where progress is shown; nowhere if not given.
+
+    Returns
+    -------
+    list of Outcome
+        One per study, also of those that failed: a study that fails does not stop the others.
+
+    Raises
+    ------
+    WildlabError
+        Before anything runs, if a study is not known or cannot be run as it is written.
+    """
+    studies = load_studies(notebooks / "studies.toml")
+    chosen = (
+        list(studies.values()) if everything else [find_study(name, studies) for name in dict.fromkeys(names)]
+    )
+    if not chosen:
+        raise WildlabError("no study was named", "name one (see: wildlab list), or say --all")
+    report = None
+    if flight is not None:
+        if len(chosen) != 1:
+            raise WildlabError("a flight goes with one study", "name one study", field="--flight")
+        report = f"{chosen[0].name}-{_flight_name(flight)}"
+    jobs, skipped = [], []
+    for study in chosen:
+        absent = _absent_data(study) if flight is None else None
+        if absent is not None and everything:
+            skipped.append(Outcome(study.name, "skipped", 0.0, str(absent)))
+            continue
+        if absent is not None:
+            raise absent
+        job = make_job(
+            study,
+            seed=seed,
+            flight=flight,
+            reports=reports,
+            notebooks=notebooks,
+            timeout_s=timeout_s,
+            name=report,
+        )
+        jobs.append(job)
+    return _run(jobs, skipped, studies, reports, parallel, console)
+
+
+def evaluate_flight(
+    folder: Path,
+    *,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    timeout_s: float | None = None,
+    console: Console | None = None,
+) -> Outcome:
+    """Judge the georeferencing of a flight folder; the report goes to ``<reports>/<name of the flight>/``.
+
+    Raises
+    ------
+    WildlabError
+        If the folder is not a usable flight, or its name is that of a study.
+    """
+    name = _flight_name(folder)
+    studies = load_studies(notebooks / "studies.toml")
+    if name in studies:
+        raise WildlabError(
+            f"the flight is named {name!r} like a study, whose report it would replace",
+            "give the flight another name in flight.toml, or the report another folder with --out",
+        )
+    study = Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION)
+    job = make_job(study, flight=folder, reports=reports, notebooks=notebooks, timeout_s=timeout_s, name=name)
+    return _run([job], [], studies, reports, 1, console)[0]
+
+
+def _run(
+    jobs: list[Job],
+    skipped: list[Outcome],
+    studies: dict[str, Study],
+    reports: Path,
+    parallel: int,
+    console: Console | None,
+) -> list[Outcome]:
+    if console is not None:
+        for outcome in skipped:
+            console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
+    with shown(console) if console is not None else nullcontext() as listen:
+        outcomes = run_jobs(jobs, parallel=parallel, listen=listen)
+    build_ledger(reports, studies)
+    return [*outcomes, *skipped]
+
+
+def _flight_name(folder: Path) -> str:
+    from wildlab.flight.store import load_flight
+
+    return str(load_flight(folder).name)
+
+
+def _absent_data(study: Study) -> WildlabError | None:
+    from wildlab.reporting.flights import dataset_source
+
+    if study.dataset is None:
+        return None
+    try:
+        dataset_source(study.dataset)
+    except WildlabError as error:
+        return error
+    return None
+
+
 def run_jobs(jobs: Sequence[Job], *, parallel: int = 1, listen: Listener | None = None) -> list[Outcome]:
     """Run jobs, ``parallel`` at a time; one that fails does not stop the others.
 
@@ -186,7 +246,7 @@ def run_jobs(jobs: Sequence[Job], *, parallel: int = 1, listen: Listener | None 
     outcomes: dict[str, Outcome] = {}
     for folder in {Path(job.reports) for job in jobs}:
         folder.mkdir(parents=True, exist_ok=True)
-        _sweep(folder)
+        sweep(folder)
     try:
         while waiting or running:
             while waiting and len(running) < max(1, parallel):
@@ -201,7 +261,7 @@ def run_jobs(jobs: Sequence[Job], *, parallel: int = 1, listen: Listener | None 
     finally:
         for one in running:
             one.end()
-            _clear(one.job)
+            clear(one.job)
     return [outcomes[job.name] for job in jobs]
 
 
@@ -240,7 +300,7 @@ class _Running:
             elif time.monotonic() - self.started > self.job.timeout_s:
                 self.failure = self._failure(
                     f"It was stopped at its time limit of {_duration(self.job.timeout_s)}. "
-                    "If it only needs longer, give it more: --timeout MINUTES"
+                    "If it only needs longer, give it more: `--timeout MINUTES`"
                 )
         if self.done or self.failure:
             self.end()
@@ -248,7 +308,7 @@ class _Running:
         return False
 
     def _failure(self, reason: str) -> Failure:
-        return Failure(f"{reason}.", "", _log(self.job))
+        return Failure(f"{reason}.", "", log_of(self.job))
 
     def end(self) -> None:
         """End the process and all below it. Harmless where it has ended."""
@@ -261,7 +321,7 @@ class _Running:
 
 
 def _start(job: Job) -> _Running:
-    _clear(job)
+    clear(job)
     Path(job.work).mkdir(parents=True)
     Path(job.runtime).mkdir(parents=True, mode=0o700)
     context = multiprocessing.get_context("spawn")
@@ -286,127 +346,11 @@ def _finish(one: _Running) -> Outcome:
     }
     try:
         if one.failure is not None:
-            _leave_failure(job, one.failure, one.cell, status, folder)
+            leave_failure(job, one.failure, one.cell, status, folder)
         install(folder, target, status)
     finally:
-        _clear(job)
+        clear(job)
     return Outcome(job.name, str(status["state"]), seconds, str(status["reason"]), target)
-
-
-def _leave_failure(
-    job: Job, failure: Failure, cell: int | None, status: dict[str, Any], folder: Path
-) -> None:
-    """Turn a work folder into that of a failed run: the page, the notebook as far as it came, no numbers."""
-    step, executed = failure.step, folder / "notebook.ipynb"
-    if executed.is_file():
-        try:
-            notebook = read_notebook(executed)
-            # A process that was ended could not clean its notebook itself.
-            shown = {**job.parameters, "study": job.name, "seed": job.seed}
-            shown |= {"flight": Path(job.flight).name, "out": ".", "expected_prefix": ""}
-            write_notebook(executed, clean_notebook(notebook, shown, {str(folder): "."}))
-            step = step or step_of(notebook, cell)
-        except WildlabError:
-            executed.unlink()
-    for name in ("metrics.json", "replay.rrd"):
-        (folder / name).unlink(missing_ok=True)
-    shutil.rmtree(folder / "figures", ignore_errors=True)
-    beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]
-    ended = str(status["finished"]).replace("T", " ").replace("+00:00", " UTC")
-    links = [f'<a href="{name}">{name}</a>' for name in beside]
-    footer = f"<p>{' · '.join([f'ended {ended}', *links])}</p>"
-    details = failure.details or _log(job)
-    write_atomic(
-        folder / "report.html",
-        failure_page(status, title=job.title, step=step, details=details, footer=footer),
-    )
-
-
-def write_notebook(path: Path, notebook: Any) -> None:
-    """Write a notebook atomically."""
-    import nbformat
-
-    write_atomic(path, nbformat.writes(notebook) + "\n")
-
-
-def install(folder: Path, target: Path, status: dict[str, Any]) -> None:
-    """Move the files of a finished run into the report's folder, ``status.json`` last.
-
-    Ctrl-C is held back meanwhile. If the machine dies in the middle, no ``status.json`` is there, and the
-    ledger says that the study has to be run again.
-    """
-    with _undisturbed(), _locked(target.parent):
-        if target.is_symlink() or (target.exists() and not target.is_dir()):
-            raise WildlabError("a file is in the place of the report's folder", "move it away", file=target)
-        target.mkdir(exist_ok=True)
-        (target / "status.json").unlink(missing_ok=True)
-        figures = folder / "figures"
-        if (target / "figures").is_dir():
-            shutil.rmtree(target / "figures")
-        if figures.is_dir():
-            figures.replace(target / "figures")
-        for name in FILES:
-            if (folder / name).is_file():
-                (folder / name).replace(target / name)
-            else:
-                (target / name).unlink(missing_ok=True)
-        write_json(target / "status.json", status)
-
-
-@contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Hold Ctrl-C back for the few milliseconds of a move. Only the main thread is ever interrupted."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if held:
-        raise KeyboardInterrupt
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Two runners that finish the same study at once take turns."""
-    with (folder / ".lock").open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
-def _sweep(folder: Path) -> None:
-    """Remove what runners that were killed have left behind."""
-    for path in folder.glob(".*.part"):
-        match = _PART.fullmatch(path.name)
-        if match and not _alive(int(match["pid"])):
-            shutil.rmtree(path, ignore_errors=True)
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
-    return True
-
-
-def _clear(job: Job) -> None:
-    for folder in (job.work, job.runtime):
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _log(job: Job) -> str:
-    """The end of what the process printed: the only witness where it died."""
-    try:
-        text = (Path(job.work) / ".log").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-    return clean_text(text[-4000:], {job.work: "."})
 
 
 def _socket_folder() -> Path:

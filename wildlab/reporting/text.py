@@ -32,7 +32,13 @@ def escape(text: object) -> str:
 
 def inline(text: object) -> str:
     """Escaped ``text`` in which ``**bold**`` and a `````code````` span keep their meaning."""
-    return _CODE.sub(r"<code>\1</code>", _BOLD.sub(r"<b>\1</b>", escape(text)))
+    return _CODE.sub(_code, _BOLD.sub(r"<b>\1</b>", escape(text)))
+
+
+def _code(match: re.Match[str]) -> str:
+    # A command broken at its hyphens reads wrong; a long one has to break somewhere on a phone.
+    short = ' class="short"' if len(match[1]) <= 32 else ""
+    return f"<code{short}>{match[1]}</code>"
 
 
 def maths(latex: str, *, block: bool = False) -> str:

@@ -1,0 +1,398 @@
+"""The command line. Each command is a call of one function in a room; rooms are imported when they are
+needed.
+
+Exit codes: 0 done, 1 the run failed, 2 wrong use or unusable input, 130 broken off with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from wildlab import __version__
+from wildlab.errors import WildlabError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+FOLDER = click.Path(path_type=Path, file_okay=False)
+FILE = click.Path(path_type=Path, dir_okay=False)
+
+
+class Commands(click.Group):
+    """Commands in the order in which they are needed, and a hint where a name is misspelt."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        from difflib import get_close_matches
+
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            near = get_close_matches(args[0], self.commands, n=1)
+            if not near or "did you mean" in error.message.lower():
+                raise
+            raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from error
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="wildlab")
+def wildlab() -> None:
+    """Analyse UAV surveillance flights, and regenerate the figures of the two theses.
+
+    \b
+    Examples:
+      wildlab run --all             every study whose data are here
+      wildlab evaluate FLIGHT       how accurate is a flight of your own
+    """
+
+
+@wildlab.command("list")
+@click.option("--out", type=FOLDER, help="Where the reports are.  [default: reports]")
+@click.option("--json", "as_json", is_flag=True, help="As JSON, with every published number and ours.")
+def list_(out: Path | None, as_json: bool) -> None:
+    """The studies, and where each stands: published numbers, and how many came out again.
+
+    \b
+    Example:
+      wildlab list
+    """
+    from wildlab.reporting.standing import REPRODUCED, standing
+    from wildlab.reporting.studies import load_studies
+
+    standings = [standing(study, _reports(out)) for study in load_studies().values()]
+    if as_json:
+        _print_json(
+            [
+                {
+                    "study": one.study.name,
+                    "title": one.study.title,
+                    "section": one.study.section,
+                    "kind": one.study.kind,
+                    "state": one.state,
+                    "reason": one.reason,
+                    "seconds": one.seconds,
+                    "finished": one.finished or None,
+                    "published": [
+                        {
+                            "name": number.name,
+                            "subject": number.subject,
+                            "unit": number.unit,
+                            "published": number.published,
+                            "here": number.here,
+                            "verdict": number.verdict,
+                            "source": number.source,
+                        }
+                        for number in one.numbers
+                    ],
+                    "claims": [{"id": c.id, "verdict": c.verdict, "text": c.text} for c in one.claims],
+                }
+                for one in standings
+            ]
+        )
+        return
+    rows = []
+    for one in standings:
+        numbers = f"{one.count(REPRODUCED)} of {len(one.numbers)}" if one.numbers else "-"
+        holding = sum(claim.verdict == "holds" for claim in one.claims)
+        claims = f"{holding} of {len(one.claims)}" if one.claims else "-"
+        rows.append([one.study.name, one.study.kind, one.state, numbers, claims, one.study.title])
+    _print_table(["study", "kind", "state", "reproduced", "claims hold", "question"], rows)
+
+
+@wildlab.command()
+@click.argument("studies", nargs=-1, metavar="STUDY...")
+@click.option(
+    "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
+)
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
+@click.option("--flight", type=FOLDER, help="A flight folder in place of the study's own (one study only).")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="How many at a time.")
+@click.option(
+    "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes a study may take.  [default: 30]"
+)
+@click.option("--out", type=FOLDER, help="Where reports go.  [default: reports]")
+def run(
+    studies: tuple[str, ...],
+    everything: bool,
+    seed: int | None,
+    flight: Path | None,
+    jobs: int,
+    timeout: float | None,
+    out: Path | None,
+) -> None:
+    """Run studies; each leaves a report, and the ledger shows them all.
+
+    \b
+    Examples:
+      wildlab run sensitivity consistency-bounds
+      wildlab run --all --jobs 4
+    """
+    from wildlab.reporting.run import run_studies
+
+    if everything and studies:
+        raise click.UsageError("Name studies or say --all, not both.")
+    outcomes = run_studies(
+        studies,
+        everything=everything,
+        seed=seed,
+        flight=flight,
+        reports=_reports(out),
+        parallel=jobs,
+        timeout_s=None if timeout is None else timeout * 60,
+        console=_console(),
+    )
+    click.echo(_shown(_reports(out) / "index.html"))
+    failed = [outcome.name for outcome in outcomes if outcome.state == "failed"]
+    if failed:
+        click.echo(f"{len(failed)} of {len(outcomes)} failed: {', '.join(failed)}.", err=True)
+        sys.exit(1)
+
+
+@wildlab.command()
+@click.argument("flight", type=FOLDER)
+@click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
+@click.option(
+    "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes it may take.  [default: 30]"
+)
+def evaluate(flight: Path, out: Path | None, timeout: float | None) -> None:
+    """How accurate is the georeferencing of a flight? FLIGHT is a folder made by `wildlab import`.
+
+    \b
+    Example:
+      wildlab evaluate flights/tuesday
+    """
+    from wildlab.reporting.run import evaluate_flight
+
+    outcome = evaluate_flight(
+        flight,
+        reports=_reports(out),
+        timeout_s=None if timeout is None else timeout * 60,
+        console=_console(),
+    )
+    if outcome.folder is not None:
+        click.echo(_shown(outcome.folder / "report.html"))
+    if outcome.state == "failed":
+        sys.exit(1)
+
+
+@wildlab.command()
+@click.argument("flight", type=FOLDER)
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+def check(flight: Path, as_json: bool) -> None:
+    """Is a flight usable, and for what? Exits with 2 where there is a problem.
+
+    \b
+    Example:
+      wildlab check flights/tuesday
+    """
+    from wildlab.flight.check import check_flight
+    from wildlab.flight.store import load_flight
+
+    findings = check_flight(load_flight(flight))
+    problems = sum(finding.level == "problem" for finding in findings)
+    if as_json:
+        names = ("level", "table", "field", "sentence", "fix")
+        _print_json([{name: getattr(finding, name) for name in names} for finding in findings])
+    else:
+        for finding in findings:
+            fix = f" {finding.fix}" if finding.fix else ""
+            click.echo(f"{finding.level}: {finding.sentence}{fix}")
+        warnings = sum(finding.level == "warning" for finding in findings)
+        click.echo(f"{_count(problems, 'problem')}, {_count(warnings, 'warning')}.")
+    if problems:
+        sys.exit(2)
+
+
+@wildlab.command("import")
+@click.argument("recipe", type=FILE)
+@click.option("--source", type=FOLDER, help="Folder of the raw files.  [default: the recipe's]")
+@click.option("--into", type=FOLDER, required=True, help="Folder of the flight to make.")
+@click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
+def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> None:
+    """Make a flight folder from raw logs, as RECIPE says. The raw files are not changed.
+
+    \b
+    Example:
+      wildlab import data/recipes/openathena-f1.toml --source raw --into flights/f1
+    """
+    from wildlab.flight.recipe import import_flight
+
+    import_flight(recipe, source, into, overwrite=overwrite)
+    click.echo(_shown(into))
+
+
+@wildlab.command()
+@click.argument("dataset", required=False)
+@click.option("--json", "as_json", is_flag=True, help="Without DATASET: the list as JSON.")
+def fetch(dataset: str | None, as_json: bool) -> None:
+    """Get a public data set, checked by its SHA-256; without DATASET, list what there is.
+
+    WILDLAB_DATA_MIRROR=FOLDER takes the files from a folder in place of the network.
+
+    \b
+    Example:
+      wildlab fetch openathena
+    """
+    from wildlab.flight import catalog
+
+    if dataset is not None:
+        for path in catalog.fetch(dataset):
+            click.echo(_shown(path))
+        return
+    rows = _datasets(catalog)
+    if as_json:
+        _print_json(rows)
+    else:
+        _print_table(
+            ["dataset", "here", "what"],
+            [[str(r["dataset"]), "yes" if r["fetched"] else "no", str(r["what"])] for r in rows],
+        )
+
+
+@wildlab.command()
+@click.argument("twin")
+@click.option("--into", type=FOLDER, required=True, help="Folder of the flight to make.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
+@click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
+def simulate(twin: str, into: Path, seed: int, overwrite: bool) -> None:
+    """Simulate a twin as a flight folder. TWIN is a name in data/twins, or a parameter file.
+
+    \b
+    Example:
+      wildlab simulate static-antenna --into flights/antenna --seed 7
+    """
+    from wildlab.flight.store import save_flight
+    from wildlab.simulation.twins import simulate_twin
+
+    save_flight(simulate_twin(twin, seed), into, overwrite=overwrite)
+    click.echo(_shown(into))
+
+
+@wildlab.command()
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+def doctor(as_json: bool) -> None:
+    """What is wrong with this installation, and the fix. Exits with 2 where something is.
+
+    \b
+    Example:
+      wildlab doctor
+    """
+    from wildlab.doctor import examine
+
+    findings = examine()
+    if as_json:
+        _print_json([{"ok": f.ok, "name": f.name, "found": f.found, "fix": f.fix} for f in findings])
+    else:
+        for finding in findings:
+            mark = "ok   " if finding.ok else "WRONG"
+            fix = f"\n       {finding.fix}" if finding.fix else ""
+            click.echo(f"{mark}  {finding.name}: {finding.found}{fix}")
+    if not all(finding.ok for finding in findings):
+        sys.exit(2)
+
+
+# -- what the commands share
+# ------------------------------------------------------------------------------------
+
+
+def _datasets(catalog: Any) -> list[dict[str, Any]]:
+    return [
+        {"dataset": name, "fetched": bool(catalog.is_fetched(name)), "what": entry.description}
+        for name, entry in catalog.load_catalog().items()
+    ]
+
+
+def _reports(out: Path | None) -> Path:
+    from wildlab.paths import REPORTS
+
+    return REPORTS if out is None else out
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    # Progress goes to standard error: standard output is the path of the result.
+    return Console(stderr=True)
+
+
+def _shown(path: Path) -> str:
+    """Relative where that is shorter."""
+    path = path.resolve()
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
+
+
+def _print_json(content: Any) -> None:
+    click.echo(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def _print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Columns for a terminal; for a pipe, full width and nothing drawn."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(width=None if sys.stdout.isatty() else 10_000)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for index, heading in enumerate(headings):
+        table.add_column(heading, no_wrap=index + 1 < len(headings))
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console.print(table)
+
+
+def _terminate(number: int, frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Entry point of ``wildlab``: turns every error into a sentence and an exit code."""
+    # Being asked to end is the same as Ctrl-C: children are ended, nothing half-written stays.
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        result = wildlab.main(args=arguments, prog_name="wildlab", standalone_mode=False)
+        sys.exit(result if isinstance(result, int) else 0)
+    except click.exceptions.Exit as error:
+        sys.exit(error.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("Stopped. What was finished is kept; what was under way is as it was before.", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        # Whoever read our output has seen enough; Python would complain again when it flushes.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except WildlabError as error:
+        click.echo(f"wildlab: {error}", err=True)
+        sys.exit(error.exit_code)
+    except Exception as error:
+        if os.environ.get("WILDLAB_DEBUG") == "1":
+            raise
+        click.echo(
+            f"wildlab: Something unexpected happened ({type(error).__name__}: {error}). "
+            "Run it again with WILDLAB_DEBUG=1 to see where, and report that.",
+            err=True,
+        )
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

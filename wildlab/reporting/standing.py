@@ -1,0 +1,184 @@
+"""Where each study stands: its last run, and every published number and claim beside what came out here.
+
+A published number counts as *reproduced* when our value lies within the tolerance that `data/published`
+states for it, or when the published value lies in the middle 90 % of our simulated flights. Where there is
+neither, the difference is shown and nothing is claimed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.metrics import read_metrics
+from wildlab.reporting.published import FOLDER, load_claims, load_published
+from wildlab.reporting.studies import Study
+
+REPRODUCED, DIFFERS, NOT_JUDGED, MISSING = "reproduced", "differs", "not judged", "not reproduced yet"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A published number and ours. ``difference`` is ours minus theirs; None where we have none."""
+
+    name: str
+    subject: str
+    unit: str
+    source: str
+    published: float
+    digits: int
+    here: float | None
+    low: float | None
+    high: float | None
+    within: float | None
+    verdict: str
+    reason: str = ""
+
+    @property
+    def difference(self) -> float | None:
+        return None if self.here is None else self.here - self.published
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim and what became of it; verdict "not tested yet" where no run has decided."""
+
+    id: str
+    text: str
+    source: str
+    verdict: str
+    fraction: float | None = None
+    seeds: int | None = None
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One study: ``state`` is "done", "failed", "not run" or "broken off"; ``reason`` says why it failed."""
+
+    study: Study
+    state: str
+    reason: str = ""
+    seconds: float | None = None
+    finished: str = ""
+    flight: str = ""
+    seeds: int | None = None
+    has_report: bool = False
+    numbers: list[Number] = field(default_factory=list)
+    claims: list[Claim] = field(default_factory=list)
+
+    def count(self, verdict: str) -> int:
+        """How many of the numbers have that verdict."""
+        return sum(number.verdict == verdict for number in self.numbers)
+
+
+def standing(study: Study, reports: Path, published: Path = FOLDER) -> Standing:
+    """Where one study stands, from ``reports/<study>/`` and the published numbers.
+
+    A report folder that cannot be read counts as one to be run again; it never raises.
+    """
+    folder = reports / study.name
+    status = _status(folder)
+    state = str(status["state"])
+    metrics: dict[str, Any] | None = None
+    reason = str(status.get("reason", ""))
+    if state == "done":
+        try:
+            metrics = read_metrics(folder / "metrics.json")
+        except WildlabError:
+            state, reason = "broken off", ""
+    return Standing(
+        study=study,
+        state=state,
+        reason=reason,
+        seconds=status.get("seconds"),
+        finished=str(status.get("finished", "")),
+        flight=metrics["flight"] if metrics else "",
+        seeds=metrics["seeds"] if metrics else None,
+        has_report=state in ("done", "failed") and (folder / "report.html").is_file(),
+        numbers=_numbers(study, metrics, state, published),
+        claims=_claims(study, metrics, published),
+    )
+
+
+def _status(folder: Path) -> dict[str, Any]:
+    path = folder / "status.json"
+    if not path.is_file():
+        # A report without a status was being replaced when the machine stopped.
+        return {"state": "broken off" if (folder / "report.html").exists() else "not run"}
+    try:
+        status = json.loads(path.read_text(encoding="utf-8"))
+        seconds = status.get("seconds")
+        if status["state"] not in ("done", "failed") or not isinstance(seconds, (int, float)):
+            raise ValueError
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {"state": "broken off"}
+    return dict(status)
+
+
+def _numbers(study: Study, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Number]:
+    ours = {(entry["name"], entry["subject"]): entry for entry in metrics["metrics"]} if metrics else {}
+    numbers = []
+    for row in load_published(study.name, published).to_dict(orient="records"):
+        found = ours.get((row["name"], row["subject"]), {})
+        within = None if math.isnan(row["within"]) else float(row["within"])
+        number = {
+            "name": row["name"],
+            "subject": row["subject"],
+            "unit": row["unit"],
+            "source": row["source"],
+            "published": float(row["value"]),
+            "digits": int(row["digits"]),
+            "here": found.get("value"),
+            "low": found.get("low"),
+            "high": found.get("high"),
+            "within": within,
+        }
+        verdict = _verdict(number)
+        reason = _reason(study, row["name"], row["subject"], state) if verdict == MISSING else ""
+        numbers.append(Number(**number, verdict=verdict, reason=reason))
+    return numbers
+
+
+def _verdict(number: dict[str, Any]) -> str:
+    here, low, high, within = (number[key] for key in ("here", "low", "high", "within"))
+    if here is None:
+        return MISSING
+    # A hair of slack: 5.45 - 5.3 is 0.1500000000000004.
+    if within is not None and abs(here - number["published"]) <= within + 1e-9:
+        return REPRODUCED
+    if low is not None and high is not None and low - 1e-9 <= number["published"] <= high + 1e-9:
+        return REPRODUCED
+    return NOT_JUDGED if within is None and (low is None or high is None) else DIFFERS
+
+
+def _reason(study: Study, name: str, subject: str, state: str) -> str:
+    for pattern, reason in study.missing.items():
+        if any(
+            fnmatchcase(text, pattern) for text in (subject, name, f"{name}/{subject}", *subject.split("/"))
+        ):
+            return reason
+    return "" if state != "done" else "the study does not give it yet"
+
+
+def _claims(study: Study, metrics: dict[str, Any] | None, published: Path) -> list[Claim]:
+    typed = {entry["id"]: entry for entry in load_claims(study.name, published)}
+    decided = {entry["id"]: entry for entry in metrics["claims"]} if metrics else {}
+    claims = []
+    for key in [*typed, *(key for key in decided if key not in typed)]:
+        ours, theirs = decided.get(key, {}), typed.get(key, {})
+        claims.append(
+            Claim(
+                id=key,
+                text=theirs.get("text") or ours["text"],
+                source=theirs.get("source", ""),
+                verdict=ours.get("verdict", "not tested yet"),
+                fraction=ours.get("fraction"),
+                seeds=ours.get("seeds"),
+            )
+        )
+    return claims
