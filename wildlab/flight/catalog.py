@@ -1,7 +1,7 @@
 """Public data sets, fetched file by file and checked by SHA-256.
 
-`data/catalog.toml` names them. The environment variable ``WILDLAB_DATA_MIRROR`` points at a folder that stands
-in for the network.
+`data/catalog.toml` names them. The environment variable ``WILDLAB_DATA_MIRROR`` points at a folder that
+stands in for the network.
 """
 
 from __future__ import annotations

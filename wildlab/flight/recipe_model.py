@@ -1,0 +1,345 @@
+"""What may stand in a recipe: the models that a `recipe.toml` is checked by.
+
+A recipe says where in plain tables the parts of a flight are. It is data, not a program: columns, units,
+signs, constants, and the few operations named here. `data/recipes/README.md` explains it to its writers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import AwareDatetime, Field, field_validator, model_validator
+
+from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
+from wildlab.flight.manifest import (
+    CameraPart,
+    ClocksPart,
+    LocationsPart,
+    MountPart,
+    OriginPart,
+    PlatformPart,
+    ScoringPart,
+    UncertaintyPart,
+)
+from wildlab.flight.recipe_parts import (
+    Angle,
+    Attitude,
+    Length,
+    Pixel,
+    Position,
+    Spreads,
+    Stamp,
+    Velocity,
+    Zone,
+)
+
+Separator = Annotated[str, Field(min_length=1, max_length=1)]
+
+
+class Block(Strict):
+    """What every part that reads a file has: its name below the source folder, and its separator."""
+
+    file: str
+    separator: Separator = ","
+
+
+class Poses(Block):
+    """A nav source: by time, or one pose per frame (by the column `frame`, or of this very file)."""
+
+    time: Stamp | None = None
+    frame: str | None = None
+    position: Position
+    attitude: Attitude
+    velocity: Velocity | None = None
+    spreads: Spreads | None = None
+
+
+class Group(Strict):
+    """Label of the sub-flight: straight from a column, or by where a number lies between edges.
+
+    `clear`: no number may come closer to an edge than this; else the groups are not as separate as thought.
+    """
+
+    column: str
+    edges: tuple[float, ...] = ()
+    labels: tuple[str, ...] = ()
+    clear: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _edges_and_labels(self) -> Self:
+        edges, labels = len(self.edges), len(self.labels)
+        if (edges or labels) and labels != edges + 1:
+            raise ValueError(
+                f"{edges} edges make {edges + 1} groups, and there are {labels} labels; "
+                "give one label more than edges, or neither"
+            )
+        if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
+            raise ValueError("the edges do not increase; put them in order")
+        return self
+
+
+class Frames(Block):
+    """The images: one per row with its `id`, or one per `unique` combination of columns."""
+
+    id: str | None = None
+    unique: tuple[str, ...] = ()
+    prefix: str = ""
+    time: Stamp | None = None
+    group: Group | None = None
+    pan: Angle | None = None
+    tilt: Angle | None = None
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if (self.id is None) == (not self.unique):
+            raise ValueError("frames are named by either id or unique; give one of both")
+        if self.prefix and not self.unique:
+            raise ValueError("a prefix is for frames made by unique; leave it out")
+        if (self.pan is None) != (self.tilt is None):
+            raise ValueError("a gimbal has both pan and tilt; give both, one as a value if it is fixed")
+        return self
+
+
+class PixelPart(Strict):
+    """To the right and downwards."""
+
+    u: Pixel
+    v: Pixel
+
+
+class Ground(Strict):
+    """How high the ground is at a detection: as down in frame n, or as a height above the ellipsoid, at a
+    place (without one: under the camera)."""
+
+    down: Length | None = None
+    height: Length | None = None
+    latitude: Angle | None = None
+    longitude: Angle | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.down is None) == (self.height is None):
+            raise ValueError("the ground has either down or height; give one of both")
+        place = self.latitude is not None
+        if place != (self.longitude is not None) or (place and self.down is not None):
+            raise ValueError("a place is a latitude and a longitude beside a height; give both, or neither")
+        return self
+
+
+class Detections(Block):
+    """Detections of one source. One of pixel, position, or azimuth and elevation says what was measured."""
+
+    source: str
+    id: str | None = None
+    prefix: str = ""
+    frame: str | None = None
+    target: str | None = None
+    pixel: PixelPart | None = None
+    position: Position | None = None
+    azimuth: Angle | None = None
+    elevation: Angle | None = None
+    range: Length | None = None
+    ground: Ground | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        bearing = self.azimuth is not None and self.elevation is not None
+        partly = any(part is not None for part in (self.azimuth, self.elevation, self.range))
+        if (self.pixel is not None) + (self.position is not None) + partly != 1 or partly != bearing:
+            raise ValueError(
+                "a detection is a pixel, a position, or azimuth and elevation (with or without range); "
+                "give one of these"
+            )
+        if self.prefix and self.id is not None:
+            raise ValueError("a prefix is for detections without an id; leave it out")
+        return self
+
+    @property
+    def kind(self) -> str:
+        if self.pixel is not None:
+            return "pixel"
+        if self.position is not None:
+            return "position"
+        return "bearing" if self.range is None else "range-bearing"
+
+
+class Truth(Block):
+    """Where targets really were: `id` names the column, or `target` the one target of the whole file. Without
+    a time they are points that never move."""
+
+    id: str | None = None
+    target: str | None = None
+    time: Stamp | None = None
+    position: Position
+    sd_horizontal: Length | None = None
+    sd_vertical: Length | None = None
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if (self.id is None) == (self.target is None):
+            raise ValueError("truth is named by either id (a column) or target (one name); give one of both")
+        return self
+
+
+Number = float | str
+
+
+class RecipeCamera(Strict):
+    """As in the manifest; a text instead of a number names a column of `file` that holds one constant."""
+
+    name: str
+    file: str | None = None
+    separator: Separator = ","
+    width_px: Number
+    height_px: Number
+    fx_px: Number
+    fy_px: Number
+    cx_px: Number
+    cy_px: Number
+    skew_px: Number = 0.0
+    k1: Number = 0.0
+    k2: Number = 0.0
+    p1: Number = 0.0
+    p2: Number = 0.0
+    k3: Number = 0.0
+
+    @model_validator(mode="after")
+    def _file(self) -> Self:
+        if self.columns and self.file is None:
+            column = next(iter(self.columns))
+            raise ValueError(f"{column} names a column, and there is no file; add the file, or give a number")
+        return self
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Those of the numbers that stand in a column: name of the number -> name of the column."""
+        numbers = [name for name in CameraPart.model_fields if name != "name"]
+        return {name: value for name in numbers if isinstance(value := getattr(self, name), str)}
+
+
+class RecipeTime(Strict):
+    """As in the manifest; without an epoch, it is the first whole second. `zone` is of stamps without one."""
+
+    kind: Literal["utc", "sequence"]
+    epoch: AwareDatetime | None = None
+    zone: Zone | None = None
+
+
+class RecipeVertical(Strict):
+    """What the heights are, and a constant to take off where a source is wrong.
+
+    `taken_off` names which heights: ``poses``, ``ground`` (of detections), ``positions`` (detections that are
+    positions), ``truth``.
+    """
+
+    reference: str = "ellipsoid"
+    correction_m: float = 0.0
+    taken_off: tuple[Literal["poses", "ground", "positions", "truth"], ...] = ()
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _says_why(self) -> Self:
+        if self.correction_m and not self.taken_off:
+            raise ValueError(
+                "there is a correction, and taken_off does not say which heights to take it off; "
+                "name some of poses, ground, positions, truth"
+            )
+        if self.correction_m and not self.note:
+            raise ValueError("there is a correction, and no note says why; add the note")
+        return self
+
+
+class Recipe(Strict):
+    """The whole of a recipe."""
+
+    name: str
+    description: str = ""
+    locations: LocationsPart = LocationsPart()
+    origin: OriginPart | None = None
+    platform: PlatformPart
+    camera: RecipeCamera
+    mount: MountPart = MountPart()
+    time: RecipeTime
+    clocks: ClocksPart = ClocksPart()
+    vertical: RecipeVertical = RecipeVertical()
+    uncertainty: UncertaintyPart = UncertaintyPart()
+    scoring: ScoringPart = ScoringPart()
+    files: dict[str, str] = Field(default_factory=dict)
+    frames: Frames
+    poses: dict[str, Poses]
+    detections: tuple[Detections, ...] = ()
+    truth: tuple[Truth, ...] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _safe_name(cls, value: str) -> str:
+        if not is_safe_name(value):
+            raise ValueError(f"{value!r} cannot be the name of a flight; use letters, digits, - and _ only")
+        return value
+
+    @field_validator("poses")
+    @classmethod
+    def _safe_sources(cls, value: dict[str, Poses]) -> dict[str, Poses]:
+        for name in value:
+            if not is_safe_name(name):
+                raise ValueError(f"{name!r} cannot name a nav source; use letters, digits, - and _ only")
+        if not value:
+            raise ValueError("there are no poses; add a part such as [poses.autopilot]")
+        return value
+
+    @model_validator(mode="after")
+    def _times(self) -> Self:
+        times = {"frames": self.frames.time}
+        times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
+        times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
+        if self.time.kind == "utc" and self.frames.time is None:
+            raise ValueError('time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"')
+        for name, time in times.items():
+            if self.time.kind == "sequence" and time is not None:
+                raise ValueError(f'time.kind is "sequence" and [{name}] has a time; set kind = "utc"')
+            if time is not None and time.format == "elapsed" and self.time.epoch is None:
+                raise ValueError(
+                    f"[{name}] counts the time elapsed since an epoch, and [time] has no epoch; add the epoch"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _poses_belong(self) -> Self:
+        for name, poses in self.poses.items():
+            if poses.time is not None and poses.frame is not None:
+                raise ValueError(f"[poses.{name}] has a time and a frame; take one out")
+            if poses.time is None and poses.frame is None and poses.file != self.frames.file:
+                raise ValueError(
+                    f"[poses.{name}] has neither a time nor a frame; "
+                    "add the time, or name the column of the frame"
+                )
+            bearing = poses.attitude.yaw_from_bearing is not None
+            if bearing and (poses.time is not None or poses.position.form != "wgs84"):
+                raise ValueError(
+                    f"[poses.{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
+                    "longitude; give a yaw instead"
+                )
+        positions = {f"poses.{name}": one.position for name, one in self.poses.items()}
+        positions |= {f"truth[{i}]": one.position for i, one in enumerate(self.truth)}
+        positions |= {
+            f"detections[{i}]": one.position for i, one in enumerate(self.detections) if one.position
+        }
+        for name, position in positions.items():
+            if position.form != "wgs84" and self.origin is None:
+                raise ValueError(
+                    f"[{name}] has local positions, and there is no origin; "
+                    "add [origin] with latitude_deg, longitude_deg and height_m"
+                )
+        return self
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read a recipe.
+
+    Raises
+    ------
+    WildlabError
+        Where it is missing, not TOML, or a key is unknown, missing or wrong.
+    """
+    return check_model(Recipe, read_toml(path, "a recipe"), path)

@@ -1,0 +1,41 @@
+"""Units a recipe may name, and what takes a value in them to radians, metres, seconds or pixels."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+Dimension = Literal["angle", "length", "speed", "pixel", "time"]
+
+UNITS: dict[Dimension, dict[str, float]] = {
+    "angle": {"deg": math.radians(1), "rad": 1.0, "deg-e7": math.radians(1e-7)},
+    "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048},
+    "speed": {"m/s": 1.0, "cm/s": 0.01, "km/h": 1 / 3.6, "ft/s": 0.3048, "kn": 1852 / 3600},
+    # A proportion counts from 0 at the left or upper edge to 1 at the other.
+    "pixel": {"px": 1.0, "proportion-of-width": math.nan, "proportion-of-height": math.nan},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+}
+
+
+def factor(unit: str, dimension: Dimension, width_px: float = math.nan, height_px: float = math.nan) -> float:
+    """What to multiply by; the size of the image is only needed for proportions of it.
+
+    Raises
+    ------
+    ValueError
+        ``"problem; fix"`` where the unit is not one, or not one of this dimension.
+    """
+    if unit not in UNITS[dimension]:
+        known = ", ".join(UNITS[dimension])
+        elsewhere = [name for name, units in UNITS.items() if unit in units]
+        what = (
+            f"{unit!r} is a unit of {elsewhere[0]}, not of {dimension}"
+            if elsewhere
+            else f"{unit!r} is not a unit"
+        )
+        raise ValueError(f"{what}; use one of {known}")
+    if unit == "proportion-of-width":
+        return width_px
+    if unit == "proportion-of-height":
+        return height_px
+    return UNITS[dimension][unit]
