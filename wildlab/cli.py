@@ -249,7 +249,7 @@ def fetch(dataset: str | None, as_json: bool) -> None:
     from wildlab.flight import catalog
 
     if dataset is not None:
-        for path in catalog.fetch(dataset):
+        for path in catalog.fetch(dataset, progress=_tell_download):
             click.echo(_shown(path))
         return
     rows = _datasets(catalog)
@@ -257,8 +257,8 @@ def fetch(dataset: str | None, as_json: bool) -> None:
         _print_json(rows)
     else:
         _print_table(
-            ["dataset", "here", "what"],
-            [[str(r["dataset"]), "yes" if r["fetched"] else "no", str(r["what"])] for r in rows],
+            ["dataset", "here", "licence", "what"],
+            [[r["dataset"], "yes" if r["fetched"] else "no", r["licence"], r["title"]] for r in rows],
         )
 
 
@@ -310,9 +310,19 @@ def doctor(as_json: bool) -> None:
 
 def _datasets(catalog: Any) -> list[dict[str, Any]]:
     return [
-        {"dataset": name, "fetched": bool(catalog.is_fetched(name)), "what": entry.description}
-        for name, entry in catalog.load_catalog().items()
+        {
+            "dataset": name,
+            "fetched": bool(catalog.is_fetched(name)),
+            "title": entry.title,
+            "licence": entry.licence,
+            "source": entry.source,
+        }
+        for name, entry in catalog.read_catalog().items()
     ]
+
+
+def _tell_download(file: str, done: int, count: int) -> None:
+    click.echo(f"getting {file} ({done + 1} of {count})", err=True)
 
 
 def _reports(out: Path | None) -> Path:

@@ -122,6 +122,8 @@ def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> Non
                 f"{key!r} is {value!r}", "give text, or a number without quotes", file=file, field=where
             )
     if kind == "number":
+        if not math.isfinite(entry["value"]) or not math.isfinite(entry.get("within", 0)):
+            raise WildlabError("a number is not finite", "give the printed value", file=file, field=where)
         metric(entry["name"], entry["subject"], float(entry["value"]), entry["unit"])
 
 

@@ -18,6 +18,7 @@ from wildlab.errors import WildlabError
 _BOLD = re.compile(r"\*\*(.+?)\*\*", re.S)
 _CODE = re.compile(r"`([^`\n]+)`")
 _MATHS = re.compile(r"(?<!\\)\$\$(.+?)\$\$|(?<!\\)\$([^$\n]+?)\$", re.S)
+_MATHML_TAG = re.compile(r"</?m[a-z]+(?: [a-zA-Z:]+=\"[^\"<>]*\")*\s*/?>")
 #: Control characters that HTML forbids; a log may hold any of them.
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]")
 
@@ -56,12 +57,14 @@ def maths(latex: str, *, block: bool = False) -> str:
             f"the formula {latex.strip()!r} cannot be translated ({type(error).__name__})",
             "use simpler LaTeX; check braces and \\left/\\right pairs",
         ) from error
-    unknown = re.search(r"<m[a-z]+>\\[A-Za-z]+", mathml)
+    unknown = re.search(r"<m[a-z]+>(\\[A-Za-z]+)", mathml)
     if unknown:
         raise WildlabError(
-            f"{unknown.group(0).split('>')[1]} in the formula {latex.strip()!r} has no translation",
-            "write it another way",
+            f"{unknown[1]} in the formula {latex.strip()!r} has no translation", "write it another way"
         )
+    # The converter does not escape what stands in \\text{}.
+    if re.search("[<>]", _MATHML_TAG.sub("", mathml)):
+        raise WildlabError(f"the formula {latex.strip()!r} has a bare < or > in text", "use \\lt or \\gt")
     return f'<div class="scroll formula">{mathml}</div>' if block else mathml
 
 

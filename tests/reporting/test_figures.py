@@ -1,0 +1,79 @@
+"""Figures: the ellipse is the right one, the same figure gives the same bytes, a map can be measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from wildlab.reporting import figures
+
+
+def test_ellipse_holds_its_share_of_samples() -> None:
+    rng = np.random.default_rng(0)
+    covariance = np.array([[9.0, 4.0], [4.0, 3.0]])
+    points = rng.multivariate_normal([10.0, -5.0], covariance, 40_000)
+    _, ax = figures.new_figure()
+    shape = figures.ellipse(ax, [10.0, -5.0], covariance, probability=0.9)
+    assert shape is not None
+    # In the ellipse's own frame, independent of how the half axes were found.
+    turned = np.exp(-1j * np.radians(shape.angle)) * ((points - [10.0, -5.0]) @ [1, 1j])
+    inside = (turned.real / (shape.width / 2)) ** 2 + (turned.imag / (shape.height / 2)) ** 2 <= 1
+    assert inside.mean() == pytest.approx(0.9, abs=0.005)
+    # The view was widened to show it.
+    assert ax.get_xlim()[0] < 10 - shape.width / 4
+
+
+def test_nothing_is_drawn_where_nothing_is_known() -> None:
+    _, ax = figures.new_figure()
+    assert figures.ellipse(ax, [np.nan, 0.0], np.eye(2)) is None
+    assert figures.ellipse(ax, [0.0, 0.0], np.full((2, 2), np.nan)) is None
+    assert not ax.patches
+
+
+@pytest.mark.parametrize(("about", "length"), [(7.3, 5), (10, 10), (0.024, 0.02), (1999, 1000)])
+def test_nice_length(about: float, length: float) -> None:
+    assert figures.nice_length(about) == pytest.approx(length)
+
+
+def test_map_is_a_map() -> None:
+    _, ax = figures.new_figure()
+    ax.plot([0, 100], [0, 10])
+    figures.map_axes(ax)
+    assert ax.get_aspect() == 1.0
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("east (m)", "north (m)")
+    assert any(getattr(artist, "txt_label", None) for artist in ax.artists)
+
+
+def test_log_band_and_gaps() -> None:
+    _, ax = figures.new_figure()
+    figures.log_band(ax, 0.48, 11.14)
+    assert ax.get_yscale() == "log"
+    assert figures.mark_gaps(ax, [0.0, 1.0, 2.0, 9.0, 10.0, 30.0], longest_s=3.0) == 2
+
+
+def test_same_figure_same_bytes_and_no_trace_of_when(tmp_path: Path) -> None:
+    def draw(folder: Path) -> tuple[bytes, bytes]:
+        fig, ax = figures.new_figure(4, 3)
+        ax.plot([1, 2, 3], label="ü")
+        png = figures.save_figure(fig, folder, "a")
+        assert png == (folder / "a.png").read_bytes()
+        return png, (folder / "a.pdf").read_bytes()
+
+    one, two = draw(tmp_path / "1"), draw(tmp_path / "2")
+    assert one == two
+    assert b"Date" not in one[1] and b"matplotlib" not in one[0].lower()
+
+
+def test_a_readers_own_settings_do_not_show() -> None:
+    mpl.rcParams["lines.linewidth"] = 9
+    _, ax = figures.new_figure()
+    assert ax.plot([0, 1])[0].get_linewidth() == 1.7
+
+
+def test_subjects_that_share_a_figure_have_different_colours() -> None:
+    for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
+        assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
+    assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")

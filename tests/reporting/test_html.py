@@ -1,0 +1,119 @@
+"""The page of a report: what it promises is examined, and what comes out of a log stays text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import nbformat
+import pandas as pd
+import pytest
+
+from tests.reporting.conftest import notebook, shown
+from wildlab.errors import WildlabError
+from wildlab.reporting import html
+from wildlab.reporting.failure import failure_page
+from wildlab.reporting.figures import new_figure
+from wildlab.reporting.page import page
+from wildlab.reporting.report import Report, open_report
+
+HOSTILE = "<script>alert(1)</script>\"'\n<img src=x onerror=alert(2)>"
+
+
+def hostile_report() -> Report:
+    """Everything a report can show, with a name that tries to break out of every part of it."""
+    report = open_report(study="test", kind="logged", flight=HOSTILE, seed=1)
+    report.head(f"Title {HOSTILE}", HOSTILE)
+    report.summary([HOSTILE, HOSTILE], level="warn")
+    report.tiles([(HOSTILE, HOSTILE)] * 4)
+    report.section(HOSTILE, HOSTILE)
+    report.subsection(HOSTILE)
+    report.points([HOSTILE, "w" * 300], ordered=True)
+    for width in (5.0, 9.0):
+        fig, ax = new_figure(width, 3)
+        ax.plot([0, 1], [0, 1])
+        report.figure(fig, name=f"figure-{width:.0f}", alt=HOSTILE, caption=HOSTILE)
+    wide = pd.DataFrame({HOSTILE: [HOSTILE, None], **{f"column {i}": [i, i / 3] for i in range(12)}})
+    report.table(wide, caption=HOSTILE, fold=HOSTILE)
+    report.math(r"\epsilon_k = \tilde{x}_k^\top P_k^{-1} \tilde{x}_k " + "+ a_{k} b_{k} " * 30)
+    report.limits([HOSTILE])
+    report.method(f"{HOSTILE}\n\nwith $R_{{nb}}$")
+    return report
+
+
+def test_hostile_names_stay_text(tmp_path: Path, faults: Callable[[Path], list[str]]) -> None:
+    whole = html.report_page(shown(hostile_report()), study=HOSTILE)
+    assert "<script" not in whole and "<img src=x" not in whole
+    path = tmp_path / "report.html"
+    path.write_text(whole, encoding="utf-8")
+    assert faults(path) == []
+
+
+def test_failure_page_opens_offline_and_stays_text(
+    tmp_path: Path, faults: Callable[[Path], list[str]]
+) -> None:
+    status = {"study": HOSTILE, "reason": HOSTILE, "seconds": 3.0}
+    path = tmp_path / "report.html"
+    path.write_text(failure_page(status, title=HOSTILE, step=HOSTILE, details=HOSTILE * 50), encoding="utf-8")
+    assert "<script" not in path.read_text(encoding="utf-8")
+    assert faults(path) == []
+
+
+def test_code_prints_warnings_and_parameters_are_left_out() -> None:
+    node = notebook("secret = 1")
+    outputs = [
+        nbformat.v4.new_output("stream", name="stderr", text="a warning"),
+        nbformat.v4.new_output("stream", name="stdout", text="a print"),
+        nbformat.v4.new_output("execute_result", {"text/plain": "a value"}),
+        nbformat.v4.new_output("display_data", {"text/html": "<h1>Shown</h1>", "text/plain": "x"}),
+    ]
+    node.cells[1].outputs = outputs
+    node.cells[0].outputs = [nbformat.v4.new_output("display_data", {"text/html": "<p>parameters</p>"})]
+    body = html.notebook_body(node)
+    assert body == "<h1>Shown</h1>"
+
+
+def test_markdown_cells_have_their_maths_translated_and_their_html_escaped() -> None:
+    body = html.notebook_body(notebook("# Title with $x_1 < 2$\n\n$$y$$\n\n<script>alert(1)</script>"))
+    assert body.count("<math") == 2 and "$" not in body and "<script" not in body and "¶" not in body
+
+
+def test_page_says_what_browsers_may_do() -> None:
+    whole = page(title="a <b>", body="<h1>a</h1>")
+    assert "default-src 'none'; img-src data:; style-src 'unsafe-inline'" in whole
+    assert (
+        '<html lang="en">' in whole and "<title>a &lt;b&gt;</title>" in whole and 'name="viewport"' in whole
+    )
+    html.examine(whole, "study")
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("<h1>a</h1><script>1</script>", "has a <script>"),
+        ("<h1>a</h1><iframe></iframe>", "has a <iframe>"),
+        ('<h1>a</h1><meta http-equiv="refresh" content="0">', "has a <meta>"),
+        ('<h1>a</h1><p onclick="x()">b</p>', "script attribute 'onclick'"),
+        ('<h1>a</h1><img alt="b" src="https://example.org/a.png">', "asks for 'https://example.org"),
+        ('<h1>a</h1><img alt="b" src="figures/a.png">', "asks for 'figures/a.png'"),
+        ('<h1>a</h1><a href=" JavaScript:x()">b</a>', "a link runs"),
+        ('<h1>a</h1><p style="background:url(//example.org)">b</p>', "a style asks the network"),
+        ("<h1>a</h1><style>@import 'x'</style>", "a style asks the network"),
+        ('<h1>a</h1><img src="data:image/png;base64,AA==">', "no alt text"),
+        ('<h1>a</h1><img alt="  " src="data:image/png;base64,AA==">', "no alt text"),
+        ("<h2>a</h2><h1>b</h1>", "a heading precedes <h1>"),
+        ("<p>a</p>", "has 0 main headings"),
+        ("<h1>a</h1><h1>b</h1>", "has 2 main headings"),
+        ("<h1>a</h1><h3>b</h3>", "heading of level 3 follows one of level 1"),
+        ("<h1>a</h1>" + "x" * 5_000_000, r"5\.0 MB, more than 5 MB"),
+    ],
+)
+def test_a_page_that_breaks_a_promise_is_refused(body: str, sentence: str) -> None:
+    with pytest.raises(WildlabError, match=f"report.html: .*{sentence}"):
+        html.examine(page(title="a", body=body), "study")
+
+
+def test_a_file_that_is_no_notebook_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.ipynb").write_text("{}")
+    with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
+        html.read_notebook(tmp_path / "a.ipynb")

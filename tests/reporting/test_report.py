@@ -1,0 +1,107 @@
+"""Report: order, files, numbers, and the mistakes it does not let through."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from bs4 import BeautifulSoup
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.figures import new_figure
+from wildlab.reporting.report import Report, open_report
+
+
+def report(out: Path | None = None, study: str = "consistency-bounds") -> Report:
+    return open_report(study=study, kind="computed", seed=1, out=str(out or ""))
+
+
+def test_another_environment_is_refused() -> None:
+    with pytest.raises(WildlabError, match="another Python environment"):
+        open_report(study="s", kind="twin", expected_prefix="/somewhere/else")
+    open_report(study="s", kind="twin", expected_prefix=sys.prefix)
+
+
+def test_only_the_name_of_a_flight_folder_is_shown() -> None:
+    one = open_report(study="s", kind="logged", flight="/home/someone/flights/tuesday")
+    one.head("Title", "sub")
+    assert "<b>tuesday</b>" in one.parts[0] and "someone" not in one.parts[0]
+    assert "logged flight" in one.parts[0]
+
+
+def test_figure_is_shown_with_alt_and_written_as_pdf_and_png(tmp_path: Path) -> None:
+    one = report(tmp_path)
+    fig, ax = new_figure(5, 3)
+    ax.plot([0, 1])
+    one.figure(fig, name="fig-5-04a", alt="A line.", caption="It **rises**.")
+    soup = BeautifulSoup(one.parts[0], "html.parser")
+    assert soup.img is not None and soup.img["alt"] == "A line."
+    assert str(soup.img["src"]).startswith("data:image/png;base64,")
+    assert soup.figcaption is not None and soup.figcaption.text == "Figure 1. It rises."
+    assert (tmp_path / "figures" / "fig-5-04a.pdf").read_bytes().startswith(b"%PDF")
+    assert (tmp_path / "figures" / "fig-5-04a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("name", "alt", "sentence"),
+    [("../escape", "a", "not made of"), ("Fig 1", "a", "not made of"), ("fig", "  ", "no alt text")],
+)
+def test_figures_that_are_refused(tmp_path: Path, name: str, alt: str, sentence: str) -> None:
+    with pytest.raises(WildlabError, match=sentence):
+        report(tmp_path).figure(new_figure()[0], name=name, alt=alt)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_figure_name_is_used_once() -> None:
+    one = report()
+    one.figure(new_figure()[0], name="fig", alt="a")
+    with pytest.raises(WildlabError, match="shown twice"):
+        one.figure(new_figure()[0], name="fig", alt="a")
+
+
+def test_table_aligns_numbers_and_says_what_is_not_known() -> None:
+    one = report()
+    frame = pd.DataFrame({"who": ["a", None], "error": [1.234, np.nan], "n": [3, 4], "good": [True, False]})
+    one.table(
+        frame,
+        columns={"n": "count", "who": "name", "error": "error (m)", "good": "good"},
+        digits={"error": 1},
+    )
+    soup = BeautifulSoup(one.parts[0], "html.parser")
+    assert [cell.text for cell in soup.select("thead th")] == ["count", "name", "error (m)", "good"]
+    rows = [[cell.text for cell in row.find_all(["th", "td"])] for row in soup.select("tbody tr")]
+    assert rows == [["3", "a", "1.2", "yes"], ["4", "–", "–", "no"]]
+    assert [cell.get("class") for cell in soup.select("thead th")] == [None, ["text"], None, ["text"]]
+    with pytest.raises(WildlabError, match="no column 'nope'"):
+        one.table(frame, columns={"nope": "x"})
+
+
+def test_published_values_are_looked_up(tmp_path: Path) -> None:
+    one = report(tmp_path)
+    one.metric("interval_low", "nees-1-run", 0.4844, "")
+    one.metric("interval_low", "something-else", 0.1, "m")
+    one.claim("c", "It holds.", "holds", fraction=0.9, seeds=10)
+    one.save()
+    content = json.loads((tmp_path / "metrics.json").read_text())
+    assert content["metrics"][0]["published"] == 0.48
+    assert content["metrics"][0]["source"] == "H example 3.1"
+    assert content["metrics"][1]["published"] is None
+    assert content["study"] == "consistency-bounds" and content["kind"] == "computed"
+
+
+def test_a_number_in_another_unit_than_the_published_one_is_refused() -> None:
+    with pytest.raises(WildlabError, match="published in ''"):
+        report().metric("interval_low", "nees-1-run", 0.4844, "m")
+
+
+def test_mistakes_are_sentences() -> None:
+    with pytest.raises(WildlabError, match="level 'great'"):
+        report().summary(["a"], level="great")
+    with pytest.raises(WildlabError, match="summary is empty"):
+        report().summary([])
+    with pytest.raises(WildlabError, match="kind 'dream'"):
+        open_report(study="s", kind="dream")
