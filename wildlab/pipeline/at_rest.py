@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.evaluation.errors import summarise
+from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.store import Flight
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.judge import errors_of, judge
@@ -16,6 +18,11 @@ COLUMNS = {
     "without-time-synchronization": ("autopilot", "time_onboard_s"),
     "without-misalignment-calibration": ("autopilot-uncalibrated", "time_s"),
 }
+
+#: The quantities of the tables; ``mae`` is the mean distance from the truth.
+TABLE_NAMES = ("mean_north", "mean_east", "sd_north", "sd_east", "mae")
+#: A pause in the observations longer than this (seconds) ends a batch.
+BATCH_GAP_S = 10.0
 
 
 def judge_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
@@ -36,3 +43,33 @@ def filter_errors(judged: pd.DataFrame) -> Filtered:
     """
     ordered = judged.sort_values("time_s", kind="stable")
     return filter_at_rest(errors_of(ordered), covariances_of(ordered))
+
+
+def summarise_at_rest(judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
+    """Everything that is compared over many flights, by (subject, name).
+
+    The names of the tables for each column: ``mean_north``, ``mean_east``, ``sd_north``, ``sd_east``,
+    ``mae``.
+    For the subject ``filter``, on the autopilot's column: ``after_first_batch`` and ``at_end`` (distance of
+    the
+    estimate from the truth, metres), ``nees_at_end``, ``lag1_north`` and ``lag1_east`` (autocorrelation of
+    the
+    innovations), ``coverage`` (share of the single points' 90 % ellipses that hold the truth).
+    """
+    result: dict[tuple[str, str], float] = {}
+    for column, table in judged.items():
+        s = summarise(errors_of(table))
+        values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
+        result |= {(column, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
+    table = judged["pixhawk-autopilot"].sort_values("time_s", kind="stable")
+    followed = filter_errors(table)
+    distance = np.hypot(*followed.x.T)
+    pauses = np.flatnonzero(np.diff(table["time_s"]) > BATCH_GAP_S)
+    return result | {
+        ("filter", "after_first_batch"): float(distance[pauses[0] if len(pauses) else -1]),
+        ("filter", "at_end"): float(distance[-1]),
+        ("filter", "nees_at_end"): float(followed.x[-1] @ np.linalg.solve(followed.P[-1], followed.x[-1])),
+        ("filter", "lag1_north"): float(autocorrelation(followed.innovation[1:, 0], 1)[1]),
+        ("filter", "lag1_east"): float(autocorrelation(followed.innovation[1:, 1], 1)[1]),
+        ("filter", "coverage"): float(table["inside_90"].mean()),
+    }

@@ -160,6 +160,20 @@ def shifted_poses(
     return p_nb, R_nb
 
 
+def heights_left_in(flight: Flight, observations: Observations) -> Observations:
+    """The observations as they would be had the vertical correction not been taken off on import.
+
+    The ground of a labelled target comes from its survey and stays; any other came from the same source as
+    the heights of the aircraft, and rises with them.
+    """
+    raised = flight.manifest.vertical.correction_m
+    p_nb = observations.p_nb - np.array([0.0, 0.0, raised])
+    surveyed = np.isfinite(truth_of(flight, observations.table)[:, 2])
+    return replace(
+        observations, p_nb=p_nb, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)
+    )
+
+
 def calibrated(
     flight: Flight, source: str | None, observations: Observations, calibration: Calibration
 ) -> Observations:

@@ -9,7 +9,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.reporting.figures import BLUE, GREY, INK, VERMILLION, ellipse, end_label, map_axes, new_figure
+from wildlab.reporting.figures import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    ellipse,
+    end_label,
+    map_axes,
+    new_figure,
+)
 
 Array = NDArray[np.float64]
 
@@ -79,4 +89,61 @@ def errors_by_image(judged: pd.DataFrame, title: str, color: str = BLUE) -> Figu
 
 def _finite(errors: ArrayLike) -> Array:
     e = np.asarray(errors, float).reshape(-1, 2)
-    return e[np.isfinite(e).all(axis=1)]
+    return np.asarray(e[np.isfinite(e).all(axis=1)])
+
+
+def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str = "target") -> Figure:
+    """The path of a nav table in local metres, the places at ``times`` marked, the target at the origin."""
+    at = np.clip(np.searchsorted(nav["time_s"], np.asarray(times, float)), 0, len(nav) - 1)
+    fig, ax = new_figure(5.2, 4.6)
+    ax.plot(nav["east_m"], nav["north_m"], color=GREY, lw=0.7)
+    ax.plot(nav["east_m"].to_numpy()[at], nav["north_m"].to_numpy()[at], ".", color=ORANGE, ms=4)
+    ax.plot(0, 0, "k+", ms=13, mew=2)
+    ax.annotate(target, (0, 0), (10, -4), textcoords="offset points", fontsize=9.5)
+    ax.set_title(title)
+    map_axes(ax)
+    return fig
+
+
+def strips(times: ArrayLike, series: Mapping[str, ArrayLike], title: str, color: str) -> Figure:
+    """Series over time (seconds), one strip each, named with its unit; jumps of angles are not joined."""
+    fig, axes = new_figure(5.9, 1.5 * len(series) + 0.1, rows=len(series), sharex=True)
+    for ax, (label, values) in zip(axes, series.items(), strict=True):
+        y = np.array(values, float)
+        y[1:][np.abs(np.diff(y)) > 180] = np.nan
+        ax.plot(times, y, lw=1.0, color=color)
+        ax.set_ylabel(label)
+    axes[0].set_title(title)
+    axes[-1].set_xlabel("time (s)")
+    return fig
+
+
+def filter_chart(raw: ArrayLike, estimate: ArrayLike, stated: ArrayLike, title: str) -> Figure:
+    """Distances from the truth (T,) of measurements and of the estimate, with what the filter states."""
+    index = np.arange(len(np.asarray(raw)))
+    fig, ax = new_figure(5.9, 3.6)
+    ax.plot(index, raw, ".", color=GREY, ms=3, alpha=0.6)
+    ax.plot(index, estimate, color=BLUE)
+    ax.fill_between(index, 0, np.asarray(stated), color=BLUE, alpha=0.15, lw=0)
+    end_label(ax, index[-1], float(np.asarray(estimate)[-1]), "filtered", BLUE)
+    end_label(ax, index[-1], float(np.median(np.asarray(raw))), "single\nimages", GREY)
+    ax.set_ylim(0, 1.05 * float(np.max(np.asarray(raw))))
+    ax.set_xlabel("observation")
+    ax.set_ylabel("distance from the truth (m)")
+    ax.set_title(title)
+    return fig
+
+
+def autocorrelation_chart(series: Mapping[str, ArrayLike], bound: float, title: str) -> Figure:
+    """Autocorrelations by lag, one line for each series, with the band that white noise stays in."""
+    fig, ax = new_figure(5.9, 3.4)
+    ax.axhspan(-bound, bound, color=GREY, alpha=0.18, lw=0)
+    ends = sorted(((float(np.asarray(r)[-1]), name) for name, r in series.items()), reverse=True)
+    for (name, values), color in zip(series.items(), (BLUE, VERMILLION), strict=True):
+        r = np.asarray(values, float)
+        ax.plot(np.arange(len(r)), r, color=color)
+        end_label(ax, len(r) - 1, r[-1] + (0.06 if name == ends[0][1] else -0.06), name, color)
+    ax.set_xlabel("lag (observations)")
+    ax.set_ylabel("autocorrelation")
+    ax.set_title(title)
+    return fig

@@ -1,0 +1,71 @@
+"""Parts of a report on many simulated flights: published beside reproduced, and the verdicts on claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from wildlab.reporting.published import load_claims
+from wildlab.reporting.report import Report
+
+#: Share of the flights on which a claim must be true to hold, and below which it does not.
+HOLDS, FAILS = 0.9, 0.5
+
+
+def beside_published(
+    published: Mapping[tuple[str, str], float],
+    spread: pd.DataFrame,
+    subjects: Mapping[str, str],
+    names: Sequence[str],
+) -> pd.DataFrame:
+    """Published numbers beside the median over flights, the middle 90 % of them, and the first flight.
+
+    Parameters
+    ----------
+    published
+        Values by (subject, name).
+    spread
+        One row for each flight, the drawn one first; columns are (subject, name).
+    subjects
+        Words for each subject.
+    names
+        Which quantities, in order.
+    """
+    rows = []
+    for subject, words in subjects.items():
+        for name in names:
+            values, printed = spread[subject, name], published[subject, name]
+            low, high = values.quantile(0.05), values.quantile(0.95)
+            rows.append(
+                {
+                    "subject": words,
+                    "quantity": {"mae": "mean error"}.get(name, name.replace("_", " ").replace("sd", "SD")),
+                    "published": printed,
+                    "here": values.median(),
+                    "difference": values.median() - printed,
+                    "range": f"{low:.1f} to {high:.1f}".replace("-", "−"),
+                    "inside": "yes" if low <= printed <= high else "no",
+                    "drawn": values.iloc[0],
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def decide_claims(report: Report, study: str, checks: Mapping[str, ArrayLike]) -> pd.DataFrame:
+    """Record the verdict on each published claim of a study, and return them as a table.
+
+    ``checks`` says for each claim's id on which flights it is true, (seeds,) bool. A claim holds where it is
+    true on 90 % of the flights, and does not below half of them; in between it cannot be decided.
+    """
+    rows = []
+    for claim in load_claims(study):
+        true = pd.Series(checks[claim["id"]])
+        share = float(true.mean())
+        verdict = "holds" if share >= HOLDS else "does not hold" if share < FAILS else "cannot be decided"
+        report.claim(claim["id"], claim["text"], verdict, fraction=share, seeds=len(true))
+        rows.append(
+            {"claim": claim["text"], "source": claim["source"], "verdict": verdict, "share": 100 * share}
+        )
+    return pd.DataFrame(rows)
