@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
@@ -12,6 +13,20 @@ from wildlab.reporting.report import Report
 
 #: Share of the flights on which a claim must be true to hold, and below which it does not.
 HOLDS, FAILS = 0.9, 0.5
+
+#: Headings and decimals of the tables that `beside_published` and `decide_claims` give.
+PUBLISHED_COLUMNS = {
+    "subject": "pose",
+    "quantity": "quantity (m)",
+    "published": "published",
+    "here": "here, median",
+    "difference": "difference",
+    "range": "90 % of flights",
+    "inside": "published inside",
+    "drawn": "flight drawn",
+}
+PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "difference", "drawn"), 2)
+CLAIM_COLUMNS = {"claim": "claim", "source": "where", "verdict": "verdict", "share": "flights (%)"}
 
 
 def beside_published(
@@ -61,7 +76,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, ArrayLike]) -
     """
     rows = []
     for claim in load_claims(study):
-        true = pd.Series(checks[claim["id"]])
+        true = np.asarray(checks[claim["id"]], bool)
         share = float(true.mean())
         verdict = "holds" if share >= HOLDS else "does not hold" if share < FAILS else "cannot be decided"
         report.claim(claim["id"], claim["text"], verdict, fraction=share, seeds=len(true))
