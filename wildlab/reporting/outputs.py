@@ -41,7 +41,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             executed.unlink()
     for name in ("metrics.json", "replay.rrd"):
         (folder / name).unlink(missing_ok=True)
-    shutil.rmtree(folder / "figures", ignore_errors=True)
+    clear_folder(folder / "figures")
     beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]
     ended = str(status["finished"]).replace("T", " ").replace("+00:00", " UTC")
     links = [f'<a href="{name}">{name}</a>' for name in beside]
@@ -113,7 +113,7 @@ def sweep(folder: Path) -> None:
     for path in folder.glob(".*.part"):
         match = _PART.fullmatch(path.name)
         if match and not _alive(int(match["pid"])):
-            shutil.rmtree(path, ignore_errors=True)
+            clear_folder(path)
 
 
 def _alive(pid: int) -> bool:
@@ -127,8 +127,14 @@ def _alive(pid: int) -> bool:
 
 
 def clear(job: Job) -> None:
+    """Remove the folders a run works in."""
     for folder in (job.work, job.runtime):
-        shutil.rmtree(folder, ignore_errors=True)
+        clear_folder(Path(folder))
+
+
+def clear_folder(folder: Path) -> None:
+    """Remove a folder; harmless where there is none."""
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def log_of(job: Job) -> str:
