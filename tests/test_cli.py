@@ -1,0 +1,173 @@
+"""The command line: help with examples, sentences and exit codes, and no traceback unless asked for."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+
+from wildlab import cli
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.reporting.run import Outcome
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(list(arguments))
+    captured = capsys.readouterr()
+    return int(ended.value.code or 0), captured.out, captured.err
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """``failing(error)`` makes `wildlab list` raise it."""
+
+    def install(error: BaseException) -> None:
+        def fail(*_: Any, **__: Any) -> None:
+            raise error
+
+        monkeypatch.setattr("wildlab.reporting.studies.load_studies", fail)
+
+    return install
+
+
+@pytest.mark.parametrize(
+    "name", ["list", "run", "evaluate", "check", "import", "fetch", "simulate", "doctor"]
+)
+def test_every_command_shows_an_example(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    code, out, _ = call(capsys, name, "--help")
+    assert code == 0 and f"wildlab {name}" in out.split("Example")[1]
+
+
+def test_no_command_without_a_test_of_its_example() -> None:
+    assert len(cli.wildlab.commands) == 8
+    assert all(isinstance(command, click.Command) for command in cli.wildlab.commands.values())
+
+
+def test_help_is_quick_and_imports_no_heavy_package() -> None:
+    program = (
+        "import sys\nfrom wildlab.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'pandas', 'matplotlib', 'papermill', 'scipy', 'rich', 'pydantic'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    began = time.monotonic()
+    subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)
+    # Half a second is the promise; a machine that runs other tests beside it may take longer to start Python.
+    assert time.monotonic() - began < 3
+
+
+def test_list_as_a_table_and_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, _ = call(capsys, "list", "--out", str(tmp_path))
+    assert code == 0 and "consistency-bounds" in out and "not run" in out and "0 of 6" in out
+    code, out, _ = call(capsys, "list", "--json", "--out", str(tmp_path))
+    studies = {entry["study"]: entry for entry in json.loads(out)}
+    assert code == 0 and studies["consistency-bounds"]["state"] == "not run"
+    first = studies["consistency-bounds"]["published"][0]
+    assert (first["published"], first["here"], first["verdict"]) == (0.48, None, "not reproduced yet")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["rnu"], "Did you mean 'run'?"),
+        (["run"], "No study was named"),
+        (["run", "sensitivty"], "Did you mean 'sensitivity'"),
+        (["run", "--all", "sensitivity"], "not both"),
+        (["run", "--jobs", "0", "--all"], "--jobs"),
+        (["run", "--timeout", "0", "--all"], "--timeout"),
+        (["run", "--seed", "-1", "--all"], "--seed"),
+        (["check"], "FLIGHT"),
+        (["simulate", "static-antenna"], "--into"),
+    ],
+)
+def test_wrong_use_is_a_sentence_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], sentence: str
+) -> None:
+    code, _, err = call(capsys, *arguments)
+    assert code == 2 and sentence in err and "Traceback" not in err
+
+
+def test_a_folder_that_is_no_flight_is_a_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for command in ("check", "evaluate"):
+        code, _, err = call(capsys, command, str(tmp_path / "nothing"))
+        assert code == 2 and "nothing" in err and "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (WildlabError("it is raining", "wait", file="sky.toml"), 2, "sky.toml: it is raining. Wait."),
+        (RunFailed("it did not work", "try again"), 1, "It did not work. Try again."),
+        (KeyError("x"), 1, "WILDLAB_DEBUG=1"),
+        (KeyboardInterrupt(), 130, "What was finished is kept"),
+        (click.Abort(), 130, "What was finished is kept"),
+        (BrokenPipeError(), 0, ""),
+    ],
+)
+def test_errors_become_sentences(
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    failing: Any,
+    error: BaseException,
+    code: int,
+    sentence: str,
+) -> None:
+    monkeypatch.delenv("WILDLAB_DEBUG", raising=False)
+    if isinstance(error, BrokenPipeError):
+        monkeypatch.setattr(cli.os, "dup2", lambda *_: None)
+    failing(error)
+    found, _, err = call(capfd, "list")
+    assert found == code and sentence in err and "Traceback" not in err
+
+
+def test_debugging_shows_where(monkeypatch: pytest.MonkeyPatch, failing: Any) -> None:
+    monkeypatch.setenv("WILDLAB_DEBUG", "1")
+    failing(KeyError("x"))
+    with pytest.raises(KeyError):
+        cli.main(["list"])
+
+
+def test_run_prints_the_ledger_and_fails_if_one_failed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    given: dict[str, Any] = {}
+
+    def run_studies(names: Any, **options: Any) -> list[Outcome]:
+        given.update(options, names=names)
+        return [Outcome("a", "done", 1.0), Outcome("b", "failed", 1.0, "why"), Outcome("c", "skipped", 0.0)]
+
+    monkeypatch.setattr("wildlab.reporting.run.run_studies", run_studies)
+    code, out, err = call(capsys, "run", "a", "b", "--seed", "7", "--timeout", "0.5", "--out", str(tmp_path))
+    assert code == 1 and out.strip() == str(tmp_path / "index.html") and "1 of 3 failed: b." in err
+    assert (given["names"], given["seed"], given["timeout_s"]) == (("a", "b"), 7, 30.0)
+
+
+def test_doctor_fails_where_something_is_wrong(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from wildlab.doctor import Finding
+
+    findings = [Finding(True, "Python", "3.11"), Finding(False, "disk", "full", "Make room.")]
+    monkeypatch.setattr("wildlab.doctor.examine", lambda: findings)
+    code, out, _ = call(capsys, "doctor")
+    assert code == 2 and "ok     Python: 3.11" in out and "WRONG  disk: full\n       Make room." in out
+    code, out, _ = call(capsys, "doctor", "--json")
+    assert code == 2 and json.loads(out)[1] == {
+        "ok": False,
+        "name": "disk",
+        "found": "full",
+        "fix": "Make room.",
+    }
+
+
+def test_fetch_without_a_name_lists_the_data_sets(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call(capsys, "fetch", "--json")
+    assert code == 0 and {"dataset", "fetched", "title"} <= set(json.loads(out)[0])
+    code, _, err = call(capsys, "fetch", "nonsense")
+    assert code == 2 and "nonsense" in err
