@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +14,10 @@ import pandas as pd
 import pytest
 
 from wildlab.flight.manifest import make_manifest
+from wildlab.flight.recipe import import_flight
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
+from wildlab.flight.toml import dump_toml
 
 MANIFEST: dict[str, Any] = {
     "name": "small-flight",
@@ -88,3 +93,100 @@ def make_flight() -> Callable[..., Flight]:
         )
 
     return make
+
+
+@dataclass
+class Raw:
+    """Plain tables and a recipe for them, to be changed by a test and then imported."""
+
+    folder: Path
+    tables: dict[str, str]
+    recipe: dict[str, Any]
+
+    @property
+    def into(self) -> Path:
+        return self.folder / "flight"
+
+    def write(self) -> Path:
+        (self.folder / "raw").mkdir(exist_ok=True)
+        for name, text in self.tables.items():
+            (self.folder / "raw" / name).write_text(text, encoding="utf-8")
+        path = self.folder / "recipe.toml"
+        path.write_text(dump_toml(self.recipe), encoding="utf-8")
+        return path
+
+    def run(self) -> Flight:
+        return import_flight(self.write(), self.folder / "raw", self.into)
+
+    def replace(self, table: str, old: str, new: str) -> None:
+        assert old in self.tables[table]
+        self.tables[table] = self.tables[table].replace(old, new)
+
+    def set(self, dotted: str, value: Any) -> None:
+        """``set("poses.log.position.latitude.unit", "rad")``; None takes the key out."""
+        here: Any = self.recipe
+        *parents, last = dotted.split(".")
+        for parent in parents:
+            here = here[int(parent)] if isinstance(here, list) else here.setdefault(parent, {})
+        if value is None:
+            del here[last]
+        else:
+            here[last] = value
+
+
+@pytest.fixture
+def raw(tmp_path: Path) -> Raw:
+    """A right recipe: poses by time at 1 Hz, three photos, three clicks, one fixed and one moving target."""
+    nav = "time,lat,lon,height,qw,qx,qy,qz\n"
+    for second in range(5):
+        nav += f"2024-06-12T09:30:0{second}Z,{63.44 + second * 1e-4:.6f},10.4,140,1,0,0,0\n"
+    tables = {
+        "nav.csv": nav,
+        "photos.csv": "photo,time\nA,2024-06-12T09:30:01.5Z\n"
+        "B,2024-06-12T09:30:02.0Z\nC,2024-06-12T09:30:03Z\n",
+        "clicks.csv": "photo,x,y,what\nA,10,20,boat\nA,600,500,\nC,320,256,buoy\n",
+        "buoy.csv": "id,lat,lon,height,sd\nbuoy,63.44,10.401,40,0.02\n",
+        "boat.csv": "t,lat,lon,height\n0,63.44,10.4,40\n4,63.4401,10.4,40\n",
+    }
+    degrees = {name: {"column": name[:3], "unit": "deg"} for name in ("latitude", "longitude")}
+    position = {**degrees, "height": {"column": "height", "unit": "m"}}
+    recipe = {
+        "name": "small",
+        "platform": {"name": "X8"},
+        "camera": copy.deepcopy(MANIFEST["camera"]),
+        "time": {"kind": "utc", "epoch": datetime(2024, 6, 12, 9, 30, tzinfo=UTC)},
+        "frames": {"file": "photos.csv", "id": "photo", "time": {"column": "time"}},
+        "poses": {
+            "log": {
+                "file": "nav.csv",
+                "time": {"column": "time"},
+                "position": copy.deepcopy(position),
+                "attitude": {"quaternion": ["qw", "qx", "qy", "qz"], "order": "wxyz"},
+            }
+        },
+        "detections": [
+            {
+                "source": "click",
+                "file": "clicks.csv",
+                "frame": "photo",
+                "target": "what",
+                "pixel": {"u": {"column": "x", "unit": "px"}, "v": {"column": "y", "unit": "px"}},
+                "ground": {"height": {"value": 40.0, "unit": "m"}},
+            }
+        ],
+        "truth": [
+            {
+                "file": "buoy.csv",
+                "id": "id",
+                "position": copy.deepcopy(position),
+                "sd_horizontal": {"column": "sd", "unit": "m"},
+            },
+            {
+                "file": "boat.csv",
+                "target": "boat",
+                "time": {"column": "t", "format": "elapsed"},
+                "position": copy.deepcopy(position),
+            },
+        ],
+    }
+    return Raw(tmp_path, tables, recipe)

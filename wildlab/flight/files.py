@@ -89,11 +89,16 @@ def write_atomic(path: Path, data: bytes) -> None:
         raise
 
 
-def did_you_mean(wrong: str, known: Iterable[str]) -> str:
-    """A clause that names the closest known word, or all of them."""
-    known = sorted(known)
+def printable(text: str) -> str:
+    """Text as it is, or quoted where it holds what a terminal would obey."""
+    return text if text.isprintable() else repr(text)
+
+
+def did_you_mean(wrong: str, known: Iterable[str], most: int = 40) -> str:
+    """A clause that names the closest known word, and all of them (or the first `most`)."""
+    known = sorted(printable(word) for word in known)
     close = difflib.get_close_matches(wrong, known, n=1)
-    every = ", ".join(known)
+    every = ", ".join(known[:most]) + (", ..." if len(known) > most else "")
     return f"did you mean {close[0]!r}? Known are {every}" if close else f"use one of {every}"
 
 

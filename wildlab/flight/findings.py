@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, TABLES, extra_columns
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariances, frame_times
@@ -99,7 +100,7 @@ def _unknown_columns(name: str, table: pd.DataFrame) -> Iterator[Finding]:
         yield Finding(
             "warning",
             name,
-            column,
+            printable(column),
             "this column is not known, so nothing uses it",
             f"rename it if you meant {close[0]!r}" if close else "leave it, or take it out",
         )

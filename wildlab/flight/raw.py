@@ -19,7 +19,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import did_you_mean, inside
+from wildlab.flight.files import did_you_mean, inside, printable
 from wildlab.flight.recipe_parts import Quantity, Stamp, parse_zone
 from wildlab.flight.units import Dimension, factor
 
@@ -48,7 +48,7 @@ class RawTable:
     def fail(self, problem: str, fix: str, column: str, part: str, row: int | None = None) -> WildlabError:
         """An error about this table, to be raised."""
         where = "" if row is None else f"line {self.lines[row]}: "
-        return WildlabError(where + problem, fix, file=self.path, field=f"{column} (in [{part}])")
+        return WildlabError(where + problem, fix, file=self.path, field=f"{printable(column)} (in [{part}])")
 
 
 @dataclass
@@ -141,7 +141,10 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
         Where there is no such column, or a cell is empty that may not be.
     """
     if column not in table.header:
-        raise table.fail("this column is missing", did_you_mean(column, table.header), column, part)
+        fix = did_you_mean(column, table.header)
+        if len(table.header) == 1:
+            fix = "the first line is read as a single name: check the separator in the recipe"
+        raise table.fail("this column is missing", fix, column, part)
     if table.header.count(column) > 1:
         raise table.fail("two columns have this name", "rename one of them", column, part)
     cells = table.cells[column]

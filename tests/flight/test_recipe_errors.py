@@ -1,0 +1,405 @@
+"""Whatever is wrong with tables or recipe is one sentence with file, field and fix; nothing is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wildlab.errors import WildlabError
+
+Change = Callable[[Any], None]
+
+
+def in_table(table: str, old: str, new: str) -> Change:
+    return lambda raw: raw.replace(table, old, new)
+
+
+def in_recipe(dotted: str, value: Any) -> Change:
+    return lambda raw: raw.set(dotted, value)
+
+
+def both(*changes: Change) -> Change:
+    def change(raw: Any) -> None:
+        for one in changes:
+            one(raw)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "file", "field", "said"),
+    [
+        # missing file, missing column
+        (
+            lambda raw: raw.tables.pop("nav.csv"),
+            "nav.csv",
+            "poses.log.file",
+            "no such file, and [poses.log] of recipe.toml",
+        ),
+        (in_recipe("files", {"survey.pdf": "the survey"}), "survey.pdf", "files.file", "no such file"),
+        (
+            in_table("nav.csv", "lat,lon", "Lat,lon"),
+            "nav.csv",
+            "lat (in [poses.log.position.latitude])",
+            "this column is missing. Did you mean",
+        ),
+        (
+            in_table("clicks.csv", ",what", ",label"),
+            "clicks.csv",
+            "what (in [detections[0].target])",
+            "this column is missing. Use one of label, photo, x, y",
+        ),
+        (
+            in_table("nav.csv", "qw,qx", "qw,qw"),
+            "nav.csv",
+            "qw (in [poses.log.attitude.quaternion])",
+            "two columns have this name",
+        ),
+        # units
+        (
+            in_recipe("poses.log.position.latitude.unit", "degree"),
+            "recipe.toml",
+            "poses.log.position.latitude",
+            "'degree' is not a unit. Use one of deg, rad",
+        ),
+        (
+            in_recipe("poses.log.position.height.unit", "deg"),
+            "recipe.toml",
+            "poses.log.position.height",
+            "'deg' is a unit of angle, not of length. Use one of m",
+        ),
+        (
+            in_recipe("detections.0.pixel.u.unit", "percent"),
+            "recipe.toml",
+            "detections[0].pixel.u",
+            "Use one of px, proportion-of-width",
+        ),
+        (
+            in_recipe("truth.1.time.unit", "min"),
+            "recipe.toml",
+            "truth[1].time.unit",
+            "'min' is not a unit. Use one of s, ms, us",
+        ),
+        # poses
+        (
+            in_table("nav.csv", ",140,1,0,0,0\n2024-06-12T09:30:04Z", ",,1,0,0,0\n2024-06-12T09:30:04Z"),
+            "nav.csv",
+            "height",
+            "line 5: this cell is empty. Fill it",
+        ),
+        (in_table("nav.csv", "63.440200", "nan"), "nav.csv", "lat", "line 4: 'nan' is not a finite number"),
+        (in_table("nav.csv", "63.440200", "inf"), "nav.csv", "lat", "line 4: 'inf' is not a finite number"),
+        (in_table("nav.csv", "63.440200", "1e999"), "nav.csv", "lat", "'1e999' is not a finite number"),
+        (
+            in_table("nav.csv", "63.440200", "63 N"),
+            "nav.csv",
+            "lat",
+            "'63 N' is not a finite number. Mend the cell",
+        ),
+        (
+            in_table("nav.csv", "63.440200", "634.4"),
+            "nav.csv",
+            "lat",
+            "line 4: 634.4 deg is no latitude. Check the column and its unit",
+        ),
+        (
+            in_table(
+                "nav.csv", "10.4,140,1,0,0,0\n2024-06-12T09:30:04Z", "10.4,140,1,1,0,0\n2024-06-12T09:30:04Z"
+            ),
+            "nav.csv",
+            "qw, qx, qy, qz",
+            "line 5: the quaternion is not normalised, its length is 1.414. Check",
+        ),
+        # camera
+        (
+            in_recipe("camera.fx_px", 0.0),
+            "recipe.toml",
+            "camera.fx_px",
+            "the focal length is 0 px. Give the calibrated focal length",
+        ),
+        (
+            both(
+                in_recipe("camera.file", "buoy.csv"),
+                in_recipe("camera.fx_px", "sd"),
+                in_table("buoy.csv", "0.02", "0"),
+            ),
+            "buoy.csv",
+            "sd (in [camera.fx_px])",
+            "line 2: the focal length is 0 px. Give",
+        ),
+        (
+            both(in_recipe("camera.file", "clicks.csv"), in_recipe("camera.fx_px", "x")),
+            "clicks.csv",
+            "x (in [camera.fx_px])",
+            "line 3: the camera changes: 600 here, 10 before",
+        ),
+        (
+            in_recipe("camera.fx_px", "fx"),
+            "recipe.toml",
+            "camera",
+            "fx_px names a column, and there is no file",
+        ),
+        # times
+        (
+            in_table("nav.csv", "09:30:03Z", "09:30:01Z"),
+            "nav.csv",
+            "time_s (from [poses.log])",
+            "the timestamps are not increasing: 2.000 s is followed by 1.000 s. Sort",
+        ),
+        (
+            in_table("photos.csv", "09:30:03Z", "09:30:01Z"),
+            "photos.csv",
+            "time_s (from [frames])",
+            "not increasing",
+        ),
+        (
+            in_table("boat.csv", "\n4,", "\n0,"),
+            "boat.csv",
+            "time_s (from [truth])",
+            "timestamps of target 'boat' are not increasing",
+        ),
+        (
+            lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("T09", "T11")}),
+            "nav.csv",
+            "time_s (from [poses.log])",
+            "they do not overlap in time. Check the time zone of both",
+        ),
+        (
+            in_recipe("time.epoch", "2024-06-12T12:30:00Z"),
+            "boat.csv",
+            "time_s (from [truth])",
+            "the truth of 'boat' run",
+        ),
+        (
+            in_table("photos.csv", "2024-06-12T09:30:02.0Z", "noon"),
+            "photos.csv",
+            "time (in [frames.time])",
+            "line 3: 'noon' has no time zone, and others",
+        ),
+        (
+            in_table("photos.csv", "2024-06-12T09:30:02.0Z", "2024-06-12T09:61:02.0Z"),
+            "photos.csv",
+            "time",
+            "is not a time of the format 'iso'",
+        ),
+        (
+            lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("Z", "")}),
+            "photos.csv",
+            "time",
+            "has no time zone, and the recipe names none. Add zone to [time]",
+        ),
+        (
+            in_recipe("time.zone", "Europe/Trondheim"),
+            "recipe.toml",
+            "time.zone",
+            "'Europe/Trondheim' is not a time zone. Use UTC",
+        ),
+        (in_recipe("time.zone", "../../etc/passwd"), "recipe.toml", "time.zone", "is not a time zone"),
+        (
+            in_recipe("truth.1.time.format", "unix time"),
+            "recipe.toml",
+            "truth[1].time.format",
+            "is not a format of times. Use iso",
+        ),
+        (
+            in_recipe("truth.1.time.format", "%Q"),
+            "boat.csv",
+            "t (in [truth[1].time])",
+            "the format '%Q' cannot be used",
+        ),
+        (
+            both(in_recipe("truth.1.time.format", "unix"), in_table("boat.csv", "\n4,", "\n1718184602000,")),
+            "boat.csv",
+            "t",
+            "'1718184602000' s is centuries away. Check the unit",
+        ),
+        (
+            in_recipe("time.epoch", None),
+            "recipe.toml",
+            None,
+            "[truth[1]] counts the time elapsed since an epoch",
+        ),
+        (
+            in_recipe("time.kind", "sequence"),
+            "recipe.toml",
+            None,
+            "[frames] has a time; set kind".replace("; set", ". Set"),
+        ),
+        (in_recipe("frames.time", None), "recipe.toml", None, "[frames] has no time. Add it"),
+        # truth, detections
+        (
+            in_table("buoy.csv", "63.44,10.401", "10.401,63.44"),
+            "buoy.csv",
+            "north_m (from [truth])",
+            "far from the flight: target 'buoy' is",
+        ),
+        (
+            both(
+                in_table("buoy.csv", ",40,", ",400,"),
+                lambda raw: raw.tables.update({"boat.csv": raw.tables["boat.csv"].replace(",40", ",400")}),
+            ),
+            "buoy.csv",
+            "down_m (from [truth])",
+            "are above the highest pose of the platform",
+        ),
+        (
+            in_table("clicks.csv", "\nC,", "\nD,"),
+            "clicks.csv",
+            "frame_id (from [detections])",
+            "in a frame that is not in the table of frames, first 'D'",
+        ),
+        (
+            in_table("clicks.csv", "600,500", "600,"),
+            "clicks.csv",
+            "y (in [detections[0].pixel.v])",
+            "line 3: this cell is empty",
+        ),
+        (
+            in_table("photos.csv", "\nB,", "\nA,"),
+            "photos.csv",
+            "frame_id (from [frames])",
+            "'A' stands here more than once",
+        ),
+        (
+            in_recipe("detections.0.frame", None),
+            "clicks.csv",
+            "frame (in [detections[0]])",
+            "nothing says which frame a pixel is in",
+        ),
+        (
+            in_recipe("detections.0.ground.height.value", 500.0),
+            "clicks.csv",
+            "plane_down_m (from [detections])",
+            "3 of 3 ground planes are above the camera",
+        ),
+        # unknown keys, names
+        (in_recipe("cameras", {}), "recipe.toml", "cameras", "this key is not known. Did you mean 'camera'"),
+        (
+            in_recipe("poses.log.position.latitde", {}),
+            "recipe.toml",
+            "poses.log.position.latitde",
+            "this key is not known. Did you mean 'latitude'",
+        ),
+        (in_recipe("detections.0.pixels", 1), "recipe.toml", "detections[0].pixels", "Did you mean 'pixel'"),
+        (in_recipe("name", "../x"), "recipe.toml", "name", "cannot be the name of a flight"),
+        (
+            in_recipe("poses", {}),
+            "recipe.toml",
+            "poses",
+            "there are no poses. Add a part such as [poses.autopilot]",
+        ),
+        (
+            lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),
+            "recipe.toml",
+            "poses",
+            "'../x' cannot name a nav source",
+        ),
+        # paths
+        (
+            in_recipe("poses.log.file", "../../etc/passwd"),
+            "recipe.toml",
+            "poses.log.file",
+            "'../../etc/passwd' leaves the folder it belongs to. Give a name below",
+        ),
+        (in_recipe("truth.0.file", "/etc/passwd"), "recipe.toml", "truth[0].file", "leaves the folder"),
+        (in_recipe("frames.file", "C:\\photos.csv"), "recipe.toml", "frames.file", "leaves the folder"),
+        (in_recipe("files", {"../secret.txt": ""}), "recipe.toml", "files.file", "leaves the folder"),
+        (in_recipe("poses.log.file", ""), "recipe.toml", "poses.log.file", "leaves the folder"),
+        (in_recipe("poses.log.file", "."), "raw", "poses.log.file", "cannot be read"),
+        # what belongs together
+        (
+            in_recipe("poses.log.attitude.order", None),
+            "recipe.toml",
+            "poses.log.attitude",
+            "a quaternion comes with its order",
+        ),
+        (
+            in_recipe("poses.log.attitude", {"roll": {"value": 0.0, "unit": "deg"}}),
+            "recipe.toml",
+            "poses.log.attitude",
+            "roll, pitch and one yaw",
+        ),
+        (
+            in_recipe("poses.log.position.height", None),
+            "recipe.toml",
+            "poses.log.position",
+            "give all three of one kind".replace("give", "Give"),
+        ),
+        (in_recipe("poses.log.time", None), "recipe.toml", None, "neither a time nor a frame"),
+        (in_recipe("poses.log.frame", "x"), "recipe.toml", None, "has a time and a frame. Take one out"),
+        (
+            in_recipe(
+                "poses.log.position",
+                {name: {"value": 0.0, "unit": "m"} for name in ("north", "east", "down")},
+            ),
+            "recipe.toml",
+            None,
+            "there is no origin. Add [origin]",
+        ),
+        (
+            in_recipe("detections.0.pixel", None),
+            "recipe.toml",
+            "detections[0]",
+            "give one of these".replace("give", "Give"),
+        ),
+        (in_recipe("frames.unique", ["time"]), "recipe.toml", "frames", "either id or unique"),
+        (in_recipe("truth.0.target", "x"), "recipe.toml", "truth[0]", "either id (a column) or target"),
+        (
+            in_recipe("vertical", {"correction_m": 5.0}),
+            "recipe.toml",
+            "vertical",
+            "does not say which heights",
+        ),
+        (
+            in_recipe("vertical", {"correction_m": 5.0, "taken_off": ["poses"]}),
+            "recipe.toml",
+            "vertical",
+            "no note says why",
+        ),
+        (
+            in_recipe("poses.log.position.latitude", {"column": "lat", "value": 1.0, "unit": "deg"}),
+            "recipe.toml",
+            "poses.log.position.latitude",
+            "either a column or a value",
+        ),
+        # broken tables
+        (
+            in_table("nav.csv", "2024-06-12T09:30:03Z,", ""),
+            "nav.csv",
+            None,
+            "line 5 has 7 cells, and the first line has 8",
+        ),
+        (
+            lambda raw: raw.tables.update({"nav.csv": "time,lat\n"}),
+            "nav.csv",
+            None,
+            "there are no rows in it",
+        ),
+        (lambda raw: raw.tables.update({"nav.csv": ""}), "nav.csv", None, "there are no rows in it"),
+        (
+            lambda raw: raw.tables.update({"nav.csv": raw.tables["nav.csv"].replace(",", ";")}),
+            "nav.csv",
+            "lat",
+            "read as a single name: check the separator",
+        ),
+    ],
+)
+def test_one_thing_wrong(raw: Any, change: Change, file: str, field: str | None, said: str) -> None:
+    change(raw)
+    with pytest.raises(WildlabError) as caught:
+        raw.run()
+    error = caught.value
+    assert error.exit_code == 2
+    assert file in [Path(name).name for name in (error.file or "").split(" and ")]
+    if field is None:
+        assert error.field is None or error.field
+    else:
+        assert (error.field or "").startswith(field)
+    assert said in str(error)
+    assert error.fix
+    assert "\n" not in str(error)
+    assert not raw.into.exists()
+    assert sorted(path.name for path in raw.folder.iterdir()) == ["raw", "recipe.toml"]
