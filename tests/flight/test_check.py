@@ -284,7 +284,12 @@ def test_each_fault_is_a_sentence(
     assert [
         one.level for one in found if one.table == table and one.field == field and said in one.sentence
     ] == [level], found
-    assert all(one.sentence and one.fix and not one.sentence.endswith(".") for one in found)
+    for one in found:
+        place = f"{one.table}, {one.field}: " if one.field else f"{one.table}: "
+        assert one.sentence.startswith(place)
+        assert one.sentence.endswith(".")
+        assert one.fix[0].isupper()
+        assert one.fix.endswith(".")
     ranks = [("problem", "warning", "note").index(one.level) for one in found]
     assert ranks == sorted(ranks)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from wildlab.flight.findings import Finding
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariances
 
-__all__ = ["Finding", "Use", "check_flight", "usable_for"]
+__all__ = ["Finding", "Use", "check_flight", "find", "usable_for"]
 
 #: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
 ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg")
@@ -28,10 +28,22 @@ class Use:
 
 
 def check_flight(flight: Flight) -> list[Finding]:
-    """Everything that is wrong, doubtful or good to know about a flight, worst first.
+    """Everything that is wrong, doubtful or good to know about a flight, worst first, in whole sentences.
 
     Structural faults (missing columns, wrong types) are errors of `load_flight` and never come this far.
     """
+    return [
+        replace(
+            one,
+            sentence=f"{', '.join(filter(None, (one.table, one.field)))}: {one.sentence}.",
+            fix=f"{one.fix[:1].upper()}{one.fix[1:]}.",
+        )
+        for one in find(flight)
+    ]
+
+
+def find(flight: Flight) -> list[Finding]:
+    """The same in clauses, for those who make sentences of their own."""
     found = [
         *findings.values(flight),
         *findings.order(flight),
@@ -48,7 +60,7 @@ def check_flight(flight: Flight) -> list[Finding]:
 
 def usable_for(flight: Flight) -> list[Use]:
     """What the flight can be used for: georeferencing accuracy, tracking, navigation."""
-    broken = {finding.table for finding in check_flight(flight) if finding.level == "problem"}
+    broken = {finding.table for finding in find(flight) if finding.level == "problem"}
     good_nav = [name for name in flight.nav if f"nav/{name}" not in broken and len(flight.nav[name])]
     kinds = _kinds(flight)
     scored = flight.truth is not None and len(flight.truth) > 0

@@ -30,7 +30,8 @@ class Finding:
     """Something to know about a flight.
 
     ``problem``: what it concerns cannot be used. ``warning``: it can, but look. ``note``: good to know.
-    `table` is ``nav/<source>``, the name of a table, or ``flight.toml``.
+    `table` is ``nav/<source>``, the name of a table, or ``flight.toml``. What `check_flight` returns are
+    whole sentences, which name table and field.
     """
 
     level: Level

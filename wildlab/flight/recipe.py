@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.check import check_flight
+from wildlab.flight.check import find
 from wildlab.flight.files import check_model
 from wildlab.flight.manifest import CameraPart, Manifest, make_manifest
 from wildlab.flight.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
@@ -245,7 +245,7 @@ def _manifest(
 
 def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     """Raise the first problem that `check_flight` finds, in terms of the raw file it comes from."""
-    for finding in check_flight(flight):
+    for finding in find(flight):
         if finding.level != "problem":
             continue
         if finding.table.startswith("nav/"):
