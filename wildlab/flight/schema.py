@@ -111,6 +111,7 @@ TABLES: dict[str, Table] = {
             (
                 Column("frame_id", "text", "", "name of the image"),
                 Column("time_s", "float", "s", "when it was taken, on the camera's own clock"),
+                Column("time_onboard_s", "float", "s", "when the onboard computer stamped it", False, True),
                 Column("group", "text", "", "sub-flight it belongs to", required=False),
                 *_GIMBAL,
             ),
