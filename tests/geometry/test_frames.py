@@ -124,3 +124,14 @@ def test_exponential_and_logarithm_undo_each_other(rotation):
         atol=1e-9,
     )
     assert np.allclose(R[0] @ R[0].T, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(3,), (1, 3), (2, 3), (2, 4, 3)])
+def test_shapes_are_kept_for_one_row_and_for_many(shape):
+    origin = (0.5, 0.2, 10.0)
+    ned = np.random.default_rng(0).normal(0, 100, shape)
+    llh = frames.ned_to_geodetic(ned, origin)
+    assert llh.shape == shape
+    assert np.allclose(frames.geodetic_to_ned(*np.moveaxis(llh, -1, 0), origin), ned, atol=1e-6)
+    xyz = frames.geodetic_to_ecef(*np.moveaxis(llh, -1, 0))
+    assert frames.ecef_to_geodetic(xyz).shape == xyz.shape == shape

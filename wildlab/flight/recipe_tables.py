@@ -184,9 +184,7 @@ def _ground(rows: RawTable, ground: Ground, part: str, places: Places, under: Ar
         latitude = numbers(rows, ground.latitude, "angle", f"{part}.latitude")
         longitude = numbers(rows, ground.longitude, "angle", f"{part}.longitude")
     else:
-        # With a second row: pymap3d gives a single one back without its axis.
-        twice = np.concatenate([under, under])
-        latitude, longitude, _ = ned_to_geodetic(twice, places.origin)[: len(under)].T
+        latitude, longitude, _ = ned_to_geodetic(under, places.origin).T
     return geodetic_to_ned(latitude, longitude, height, places.origin)[:, 2]
 
 

@@ -118,7 +118,7 @@ def ned_to_geodetic(p_n: ArrayLike, origin: Origin) -> Array:
     """The inverse of :func:`geodetic_to_ned`: (N, 3) -> (N, 3) latitude, longitude (radians), height (m)."""
     p = np.asarray(p_n, float)
     llh = pymap3d.ned2geodetic(p[..., 0], p[..., 1], p[..., 2], *origin, deg=False)
-    return np.stack(llh, axis=-1).astype(float)
+    return _rows(llh, p.shape)
 
 
 def geodetic_to_ecef(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Array:
@@ -132,7 +132,12 @@ def ecef_to_geodetic(p_e: ArrayLike) -> Array:
     """The inverse of :func:`geodetic_to_ecef`: (N, 3) -> (N, 3) latitude, longitude (radians), height (m)."""
     p = np.asarray(p_e, float)
     llh = pymap3d.ecef2geodetic(p[..., 0], p[..., 1], p[..., 2], deg=False)
-    return np.stack(llh, axis=-1).astype(float)
+    return _rows(llh, p.shape)
+
+
+def _rows(parts: tuple[ArrayLike, ...], shape: tuple[int, ...]) -> Array:
+    """Coordinates side by side; pymap3d drops the axis of a single row, which comes back here."""
+    return np.stack([np.reshape(np.asarray(part, float), shape[:-1]) for part in parts], axis=-1)
 
 
 def ned_to_enu(p_n: ArrayLike) -> Array:
