@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import (
+    MAX_GAP_S,
     covariance_columns,
     covariances,
     frame_poses,
     frame_times,
     gimbal_angles,
+    longest_gap,
     poses_at,
     truth_at,
 )
@@ -153,3 +155,18 @@ def test_truth_of_fixed_and_moving_targets(make_flight: Callable[..., Flight]) -
     names, p = truth_at(truth.iloc[:0], [0.0])
     assert names == []
     assert p.shape == (0, 1, 3)
+
+
+def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample() -> None:
+    """A GPS that writes every two seconds explains gaps of two seconds, not one of four."""
+    stamps = np.array([0.0, 2.0, 4.0, 6.0, 10.0, 12.0])
+    truth = pd.DataFrame(
+        {"target_id": "boat", "time_s": stamps, "north_m": stamps, "east_m": -stamps, "down_m": 0.0}
+    )
+    names, where = truth_at(truth, [1.0, 5.0, 8.0, 11.0])
+    assert names == ["boat"]
+    assert np.allclose(where[0, [0, 1, 3], 0], [1.0, 5.0, 11.0])
+    assert np.isnan(where[0, 2]).all()
+    assert longest_gap(stamps) == 3.0
+    assert longest_gap(np.arange(0, 5, 0.1)) == MAX_GAP_S
+    assert np.isnan(truth_at(truth, [1.0], max_gap_s=1.0)[1]).all()

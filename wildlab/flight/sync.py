@@ -19,8 +19,10 @@ from wildlab.geometry.frames import quaternion_to_matrix
 
 Array = NDArray[np.float64]
 
-#: Longest stretch without a pose that is bridged by interpolation, unless the caller says otherwise.
+#: Stretches without a sample up to this long are bridged by interpolation, unless the caller says otherwise;
+#: longer ones where the log's own rate explains them, up to so many of its usual steps: none is missing.
 MAX_GAP_S = 1.0
+USUAL_STEPS = 1.5
 
 #: (row, column) of each of COVARIANCE_COLUMNS.
 _UPPER = np.triu_indices(6)
@@ -42,7 +44,7 @@ def poses_at(
     nav: pd.DataFrame,
     times: ArrayLike | None = None,
     frame_ids: Sequence[str] | pd.Series | None = None,
-    max_gap_s: float = MAX_GAP_S,
+    max_gap_s: float | None = None,
 ) -> tuple[Array, Array, Array | None]:
     """Poses of the platform at given times, or of given frames.
 
@@ -59,7 +61,8 @@ def poses_at(
     frame_ids
         (N,) names of frames.
     max_gap_s
-        No pose where the two nearest stamps in the log are further apart than this (but at a stamp itself).
+        No pose where the two nearest stamps in the log are further apart than this (but at a stamp itself);
+        if not given, what the log's own rate explains (`longest_gap`).
 
     Returns
     -------
@@ -104,7 +107,7 @@ def poses_at(
 
 
 def frame_poses(
-    flight: Flight, source: str | None = None, max_gap_s: float = MAX_GAP_S
+    flight: Flight, source: str | None = None, max_gap_s: float | None = None
 ) -> tuple[Array, Array, Array | None]:
     """Poses of the platform for every frame of a flight, row by row: see `poses_at`.
 
@@ -134,7 +137,7 @@ def covariance_columns(covariance: ArrayLike) -> pd.DataFrame:
     return pd.DataFrame(P[:, _UPPER[0], _UPPER[1]], columns=list(COVARIANCE_COLUMNS))
 
 
-def gimbal_angles(flight: Flight, max_gap_s: float = MAX_GAP_S) -> tuple[Array, Array]:
+def gimbal_angles(flight: Flight, max_gap_s: float | None = None) -> tuple[Array, Array]:
     """Pan and tilt of the gimbal for every frame, radians, (N,) each.
 
     From the columns of the frames where they have them, else from the gimbal table (linear in time), else the
@@ -159,7 +162,7 @@ def gimbal_angles(flight: Flight, max_gap_s: float = MAX_GAP_S) -> tuple[Array, 
 
 
 def truth_at(
-    truth: pd.DataFrame, times: ArrayLike, max_gap_s: float = MAX_GAP_S, offset_s: float = 0.0
+    truth: pd.DataFrame, times: ArrayLike, max_gap_s: float | None = None, offset_s: float = 0.0
 ) -> tuple[list[str], Array]:
     """Where every target truly was at given times.
 
@@ -197,8 +200,14 @@ def truth_at(
     return names, np.stack(where) if where else np.empty((0, len(at), 3))
 
 
+def longest_gap(stamps: ArrayLike) -> float:
+    """The longest stretch in seconds between stamps (N,) of a log that its own rate explains."""
+    steps = np.diff(np.asarray(stamps, float))
+    return max(MAX_GAP_S, USUAL_STEPS * float(np.median(steps))) if len(steps) else MAX_GAP_S
+
+
 def _neighbours(
-    stamps: Array, times: ArrayLike, max_gap_s: float, what: str
+    stamps: Array, times: ArrayLike, max_gap_s: float | None, what: str
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
     at = np.atleast_1d(np.asarray(times, float))
@@ -211,13 +220,14 @@ def _neighbours(
         )
     if len(stamps) == 0:
         raise WildlabError("the table is empty", "give it rows", file=what)
+    longest = longest_gap(stamps) if max_gap_s is None else max_gap_s
     after = np.clip(np.searchsorted(stamps, at, side="left"), 0, len(stamps) - 1)
     exact = stamps[after] == at
     before = np.where(exact, after, np.maximum(after - 1, 0))
     span = stamps[after] - stamps[before]
     inside = (at >= stamps[0]) & (at <= stamps[-1])
     share = np.divide(at - stamps[before], span, out=np.zeros(len(at)), where=span > 0)
-    return before, after, np.where(exact | (inside & (span <= max_gap_s)), share, np.nan)
+    return before, after, np.where(exact | (inside & (span <= longest)), share, np.nan)
 
 
 def _between(values: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
