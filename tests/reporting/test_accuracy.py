@@ -105,3 +105,17 @@ def test_claims_are_decided_by_their_share_of_flights(report, monkeypatch):
     table = many.decide_claims(report, "made-up", checks)
     assert table["verdict"].tolist() == ["holds", "does not hold", "cannot be decided"]
     assert [c["fraction"] for c in report._claims] == [1.0, 0.0, 0.6]
+
+
+def test_lengths_in_words():
+    assert accuracy.length(5.06) == "5.1 metres"
+    assert accuracy.length(0.404) == "40 centimetres"
+    assert accuracy.short_length(0.404) == "40 cm"
+    assert accuracy.span([50.6, 111.2, np.nan]) == "51 to 111"
+    assert accuracy.span([100.1, 99.9]) == "100"
+
+
+def test_too_few_points_are_not_praised():
+    few, many_points = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
+    assert "too few" in accuracy.summary_sentences(few, scatter(1, 0, 0))[0]
+    assert "nine times out of ten" in accuracy.summary_sentences(many_points, scatter(1, 0, 0))[0]

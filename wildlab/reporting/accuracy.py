@@ -14,6 +14,8 @@ from wildlab.geometry.calibration import BORESIGHT, Calibration
 from wildlab.pipeline.judge import errors_of
 from wildlab.reporting.report import Report
 
+#: Fewer points than this say little about a flight.
+FEW = 10
 #: Headings of the table of errors, by the fields of an error summary.
 ERROR_COLUMNS = {
     "n": "points",
@@ -104,6 +106,41 @@ def record_errors(
     if judged["inside_90"].notna().any():
         report.metric("ellipse_coverage_90", subject, judged["inside_90"].mean(), "1", n=s.n)
     return s
+
+
+def length(metres: float, unit: tuple[str, str] = ("metres", "centimetres")) -> str:
+    """A length in words: ``5.1 metres``, below a metre ``40 centimetres``."""
+    return f"{metres:.1f} {unit[0]}" if not metres < 0.95 else f"{100 * metres:.0f} {unit[1]}"
+
+
+def short_length(metres: float) -> str:
+    """A length for a tile: ``5.1 m``, below a metre ``40 cm``."""
+    return length(metres, ("m", "cm"))
+
+
+def span(values: Any) -> str:
+    """The range of values without decimals: ``51 to 111``, or one number where both ends are the same."""
+    low, high = f"{np.nanmin(values):.0f}", f"{np.nanmax(values):.0f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def summary_sentences(logged: ErrorSummary, scatter: Scatter) -> list[str]:
+    """What a ranger needs to know, in three sentences."""
+    bias = float(np.hypot(logged.bias_north, logged.bias_east))
+    if logged.n < FEW:
+        return [
+            f"Only {logged.n} points could be compared with the truth, too few to say how accurate "
+            "this flight is.",
+            f"Their median error is {length(logged.median)}, the largest {length(logged.max)}.",
+            "Mark more known points, in at least six images, and evaluate again.",
+        ]
+    return [
+        f"A position read from a single image of this flight is typically {length(logged.median)} "
+        "off, and nine "
+        f"times out of ten less than {length(logged.p90)}.",
+        f"Over all images the errors average to {length(bias)}.",
+        main_limit(scatter),
+    ]
 
 
 def main_limit(scatter: Scatter) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.reporting.figures import (
@@ -81,6 +82,7 @@ def errors_by_image(judged: pd.DataFrame, title: str, color: str = BLUE) -> Figu
     ax.plot(mean.index, mean, color=VERMILLION, lw=1.3)
     end_label(ax, mean.index[-1], float(mean.iloc[-1]), "mean per\nimage", VERMILLION)
     ax.set_ylim(0, None)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("image, in order")
     ax.set_ylabel("error (m)")
     ax.set_title(title)
