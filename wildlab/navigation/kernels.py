@@ -1,0 +1,373 @@
+"""The hot loops, compiled: strapdown steps and the MEKF.
+
+What they compute is written out again, short and slow, in `plain`; tests hold the two together. All compiled
+functions that call each other stay in this one file: the compiler's cache only looks at the file a function
+stands in, and would go on using the old version of what it calls in another one.
+
+Vectors are written into arrays made once before a loop, and loops run over sizes known to the compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+
+from wildlab.geometry.frames import Array
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+N_ERRORS = 15
+#: Kinds of measurement.
+POSITION, VELOCITY, HEADING = 0, 1, 2
+#: What became of a measurement.
+REJECTED, ACCEPTED, FORCED = 0, 1, 2
+
+
+def compiled(function: F) -> F:
+    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+
+
+@compiled
+def rotation_of(q: Array, R: Array) -> None:
+    """H (7.13)."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    R[0, 0] = w * w + x * x - y * y - z * z
+    R[0, 1] = 2 * (x * y - w * z)
+    R[0, 2] = 2 * (x * z + w * y)
+    R[1, 0] = 2 * (x * y + w * z)
+    R[1, 1] = w * w - x * x + y * y - z * z
+    R[1, 2] = 2 * (y * z - w * x)
+    R[2, 0] = 2 * (x * z - w * y)
+    R[2, 1] = 2 * (y * z + w * x)
+    R[2, 2] = w * w - x * x - y * y + z * z
+
+
+@compiled
+def multiply(a: Array, b: Array, out: Array) -> None:
+    """H (7.14)."""
+    out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+    out[1] = a[0] * b[1] + b[0] * a[1] + a[2] * b[3] - a[3] * b[2]
+    out[2] = a[0] * b[2] + b[0] * a[2] + a[3] * b[1] - a[1] * b[3]
+    out[3] = a[0] * b[3] + b[0] * a[3] + a[1] * b[2] - a[2] * b[1]
+
+
+@compiled
+def exponential(x: float, y: float, z: float, out: Array) -> None:
+    """The quaternion of a rotation vector."""
+    angle = np.sqrt(x * x + y * y + z * z)
+    # sin(a / 2) / a, by its series where the quotient would be 0 / 0.
+    scale = 0.5 - angle * angle / 48 if angle < 1e-4 else np.sin(angle / 2) / angle
+    out[0] = np.cos(angle / 2)
+    out[1], out[2], out[3] = scale * x, scale * y, scale * z
+
+
+@compiled
+def normalise(q: Array) -> None:
+    size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    for i in range(4):
+        q[i] /= size
+
+
+@compiled
+def strapdown_step(
+    x: Array, f: Array, w: Array, dt: float, earth: Array, work: Array, R_mid: Array, f_n: Array
+) -> None:
+    """One step of the state x (16,): position, velocity, quaternion, accelerometer bias, gyro bias.
+
+    f, w are the mean of the measurements over the step; ``work`` (3, 4) is scratch. Leaves the attitude
+    half-way in ``R_mid`` and the specific force in n in ``f_n``.
+    """
+    turn, q, back = work[0], work[1], work[2]
+    rx, ry, rz = (w[0] - x[13]) * dt, (w[1] - x[14]) * dt, (w[2] - x[15]) * dt
+    exponential(rx / 2, ry / 2, rz / 2, turn)
+    # The Earth turns n the other way.
+    exponential(-earth[3] * dt / 2, -earth[4] * dt / 2, -earth[5] * dt / 2, back)
+    multiply(back, x[6:10], q)
+    multiply(q, turn, x[6:10])
+    rotation_of(x[6:10], R_mid)
+    multiply(x[6:10], turn, q)
+    multiply(back, q, x[6:10])
+    normalise(x[6:10])
+    fx, fy, fz = f[0] - x[10], f[1] - x[11], f[2] - x[12]
+    for i in range(3):
+        f_n[i] = R_mid[i, 0] * fx + R_mid[i, 1] * fy + R_mid[i, 2] * fz
+    vx, vy, vz = x[3], x[4], x[5]
+    g = earth[0] + earth[1] * x[2]  # down is positive, and gravity grows downwards
+    x[3] += dt * (f_n[0] - g * earth[2] * x[0] - 2 * (earth[4] * vz - earth[5] * vy))
+    x[4] += dt * (f_n[1] - g * earth[2] * x[1] - 2 * (earth[5] * vx - earth[3] * vz))
+    x[5] += dt * (f_n[2] + g - 2 * (earth[3] * vy - earth[4] * vx))
+    x[0] += dt / 2 * (vx + x[3])
+    x[1] += dt / 2 * (vy + x[4])
+    x[2] += dt / 2 * (vz + x[5])
+
+
+@compiled
+def integrate(times: Array, f: Array, w: Array, earth: Array, start: Array, out: Array) -> None:
+    """Strapdown from the first row on; ``out`` (N, 16)."""
+    x = start.copy()
+    out[0] = x
+    work, R_mid, f_n = np.empty((3, 4)), np.empty((3, 3)), np.empty(3)
+    f_mean, w_mean = np.empty(3), np.empty(3)
+    for k in range(1, len(times)):
+        for i in range(3):
+            f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
+            w_mean[i] = (w[k - 1, i] + w[k, i]) / 2
+        strapdown_step(x, f_mean, w_mean, times[k] - times[k - 1], earth, work, R_mid, f_n)
+        out[k] = x
+
+
+@compiled
+def transition_times(
+    A: Array, B: Array, C: Array, E: Array, dt: float, kept_a: float, kept_g: float, M: Array, out: Array
+) -> None:
+    """``out = (Phi M)'`` for the transition matrix whose blocks are given; M (15, 15)."""
+    for i in range(3):
+        for j in range(N_ERRORS):
+            dv = (
+                A[i, 0] * M[6, j] + A[i, 1] * M[7, j] + A[i, 2] * M[8, j]
+                + B[i, 0] * M[9, j] + B[i, 1] * M[10, j] + B[i, 2] * M[11, j]
+                + C[i, 0] * M[12, j] + C[i, 1] * M[13, j] + C[i, 2] * M[14, j]
+            )  # fmt: skip
+            out[j, i] = M[i, j] + dt * (M[3 + i, j] + dv / 2)
+            out[j, 3 + i] = M[3 + i, j] + dv
+            out[j, 6 + i] = E[i, 0] * M[6, j] + E[i, 1] * M[7, j] + E[i, 2] * M[8, j] - dt * M[12 + i, j]
+            out[j, 9 + i] = kept_a * M[9 + i, j]
+            out[j, 12 + i] = kept_g * M[12 + i, j]
+
+
+@compiled
+def add_noise(P: Array, dt: float, q_v: float, q_a: float, drive_a: float, drive_g: float) -> None:
+    for i in range(3):
+        P[i, i] += q_v * dt**3 / 3
+        P[i, 3 + i] += q_v * dt * dt / 2
+        P[3 + i, i] += q_v * dt * dt / 2
+        P[3 + i, 3 + i] += q_v * dt
+        P[6 + i, 6 + i] += q_a * dt
+        P[9 + i, 9 + i] += drive_a
+        P[12 + i, 12 + i] += drive_g
+
+
+@compiled
+def kept_and_driven(dt: float, density: float, time: float) -> tuple[float, float]:
+    """A first-order Gauss-Markov process over dt: the factor that is left, the variance that is added."""
+    if np.isinf(time):
+        return 1.0, density * density * dt
+    kept = np.exp(-dt / time)
+    return kept, density * density * time / 2 * (1 - kept * kept)
+
+
+@compiled
+def invert(S: Array, m: int, out: Array) -> None:
+    """Inverse of a symmetric positive definite matrix of size 1 or 3."""
+    if m == 1:
+        out[0, 0] = 1 / S[0, 0]
+        return
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            out[a, i] = S[j, b] * S[k, c] - S[j, c] * S[k, b]
+    determinant = S[0, 0] * out[0, 0] + S[0, 1] * out[1, 0] + S[0, 2] * out[2, 0]
+    for i in range(3):
+        for a in range(3):
+            out[i, a] /= determinant
+
+
+@compiled
+def predict_measurement(
+    kind: int, x: Array, w: Array, value: Array, lever: Array, R: Array, y: Array, H: Array
+) -> int:
+    """Innovation y and Jacobian H (3, 15) of a measurement; how many rows of them count."""
+    H[:] = 0.0
+    rotation_of(x[6:10], R)
+    if kind == HEADING:
+        # value is the field in b, lever[0] the direction it has in truth, from north towards east.
+        field = R @ value
+        y[0] = lever[0] - np.arctan2(field[1], field[0])
+        y[0] -= 2 * np.pi * np.round(y[0] / (2 * np.pi))
+        level = field[0] * field[0] + field[1] * field[1]
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            # Column a of -R S(value).
+            d_north = -(R[0, b] * value[c] - R[0, c] * value[b])
+            d_east = -(R[1, b] * value[c] - R[1, c] * value[b])
+            H[0, 6 + a] = (field[0] * d_east - field[1] * d_north) / level
+        return 1
+    first = 0 if kind == POSITION else 3
+    arm = lever
+    if kind == VELOCITY:
+        arm = np.cross(w - x[13:16], lever)
+    for i in range(3):
+        y[i] = value[i] - x[first + i]
+        H[i, first + i] = 1.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            y[i] -= R[i, a] * arm[a]
+            H[i, 6 + a] = -(R[i, b] * arm[c] - R[i, c] * arm[b])
+            if kind == VELOCITY:
+                H[i, 12 + a] = R[i, b] * lever[c] - R[i, c] * lever[b]
+    return 3
+
+
+@compiled
+def correct(
+    x: Array, P: Array, H: Array, m: int, y: Array, variance: Array, S_inverse: Array, PH: Array,
+    K: Array, M: Array, work: Array,
+) -> None:  # fmt: skip
+    """Take in a measurement, Joseph form; the attitude error is then folded into the quaternion."""
+    dx = np.zeros(N_ERRORS)
+    for i in range(N_ERRORS):
+        for a in range(m):
+            K[i, a] = 0.0
+            for b in range(m):
+                K[i, a] += PH[i, b] * S_inverse[b, a]
+            dx[i] += K[i, a] * y[a]
+    # (I - K H) P (I - K H)' + K R K', the two products one after the other, H P being PH'.
+    for i in range(N_ERRORS):
+        for j in range(N_ERRORS):
+            M[i, j] = P[i, j]
+            for a in range(m):
+                M[i, j] -= K[i, a] * PH[j, a]
+    for i in range(N_ERRORS):
+        for a in range(m):
+            PH[i, a] = -K[i, a] * variance[a]
+            for j in range(N_ERRORS):
+                PH[i, a] += M[i, j] * H[a, j]
+    for i in range(N_ERRORS):
+        for j in range(N_ERRORS):
+            for a in range(m):
+                M[i, j] -= PH[i, a] * K[j, a]
+    for i in range(3):
+        x[i] += dx[i]
+        x[3 + i] += dx[3 + i]
+        x[10 + i] += dx[9 + i]
+        x[13 + i] += dx[12 + i]
+    # Four times the modified Rodrigues parameters, H (7.16), as a quaternion.
+    s = (dx[6] * dx[6] + dx[7] * dx[7] + dx[8] * dx[8]) / 16
+    turn, q = work[0], work[1]
+    turn[0] = (1 - s) / (1 + s)
+    for i in range(3):
+        turn[1 + i] = dx[6 + i] / 2 / (1 + s)
+    multiply(x[6:10], turn, q)
+    normalise(q)
+    x[6:10] = q
+    # What is left of the attitude error is now seen from the turned body: I - S(dx / 2) on both sides.
+    h0, h1, h2 = dx[6] / 2, dx[7] / 2, dx[8] / 2
+    for j in range(N_ERRORS):
+        a0, a1, a2 = M[6, j], M[7, j], M[8, j]
+        M[6, j] = a0 + h2 * a1 - h1 * a2
+        M[7, j] = a1 + h0 * a2 - h2 * a0
+        M[8, j] = a2 + h1 * a0 - h0 * a1
+    for j in range(N_ERRORS):
+        a0, a1, a2 = M[j, 6], M[j, 7], M[j, 8]
+        M[j, 6] = a0 + h2 * a1 - h1 * a2
+        M[j, 7] = a1 + h0 * a2 - h2 * a0
+        M[j, 8] = a2 + h1 * a0 - h0 * a1
+    for i in range(N_ERRORS):
+        for j in range(N_ERRORS):
+            P[i, j] = (M[i, j] + M[j, i]) / 2
+
+
+@compiled
+def mekf(
+    times: Array, f: Array, w: Array, gap: Array, row_of_node: Array, earth: Array, noise: Array, x: Array,
+    P: Array, node: Array, kind: Array, value: Array, variance: Array, lever: Array, gate: Array,
+    patience: float, states: Array, covariances: Array, innovations: Array, spreads: Array, nis: Array,
+    verdicts: Array,
+) -> None:  # fmt: skip
+    """The whole filter over a timeline; see `plain.mekf` for the same in short."""
+    work, R, R_start, R_mid = np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    A, B, C, E = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    f_mean, w_mean, f_n, y = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    H, S, S_inverse = np.empty((3, 15)), np.empty((3, 3)), np.empty((3, 3))
+    PH, K, M = np.empty((15, 3)), np.empty((15, 3)), np.empty((15, 15))
+    rejected_since = np.full(3, np.nan)
+    event = 0
+    for k in range(len(times)):
+        if k > 0:
+            dt = times[k] - times[k - 1]
+            kept_a, drive_a = kept_and_driven(dt, noise[2], noise[3])
+            kept_g, drive_g = kept_and_driven(dt, noise[4], noise[5])
+            q_v, q_a = noise[0] * noise[0], noise[1] * noise[1]
+            if gap[k] > 0:
+                # Nothing was measured: straight on, with what an airframe may do meanwhile as uncertainty.
+                for i in range(3):
+                    x[i] += dt * x[3 + i]
+                    for j in range(3):
+                        A[i, j] = B[i, j] = C[i, j] = 0.0
+                        E[i, j] = 1.0 if i == j else 0.0
+                q_v, q_a = noise[6] * noise[6] * gap[k], noise[7] * noise[7] * gap[k]
+            else:
+                for i in range(3):
+                    f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
+                    w_mean[i] = (w[k - 1, i] + w[k, i]) / 2
+                rotation_of(x[6:10], R_start)
+                exponential(
+                    -(w_mean[0] - x[13]) * dt, -(w_mean[1] - x[14]) * dt, -(w_mean[2] - x[15]) * dt, work[0]
+                )
+                rotation_of(work[0], E)
+                strapdown_step(x, f_mean, w_mean, dt, earth, work, R_mid, f_n)
+                for j in range(3):
+                    for i in range(3):
+                        b, c = (i + 1) % 3, (i + 2) % 3
+                        A[i, j] = -dt * (f_n[b] * R_start[c, j] - f_n[c] * R_start[b, j])
+                        C[i, j] = dt * dt / 2 * (f_n[b] * R_mid[c, j] - f_n[c] * R_mid[b, j])
+                        B[i, j] = -dt * R_mid[i, j]
+            for i in range(3):
+                x[10 + i] *= kept_a
+                x[13 + i] *= kept_g
+            transition_times(A, B, C, E, dt, kept_a, kept_g, P, M)
+            transition_times(A, B, C, E, dt, kept_a, kept_g, M, P)
+            add_noise(P, dt, q_v, q_a, drive_a, drive_g)
+        while event < len(node) and node[event] == k:
+            sort = kind[event]
+            m = predict_measurement(sort, x, w[k], value[event], lever[event], R, y, H)
+            growth = 1.0
+            while True:
+                for i in range(15):
+                    for a in range(m):
+                        PH[i, a] = 0.0
+                        for j in range(15):
+                            PH[i, a] += growth * P[i, j] * H[a, j]
+                for a in range(m):
+                    for b in range(m):
+                        S[a, b] = variance[event, a] if a == b else 0.0
+                        for j in range(15):
+                            S[a, b] += H[a, j] * PH[j, b]
+                invert(S, m, S_inverse)
+                square = 0.0
+                for a in range(m):
+                    for b in range(m):
+                        square += y[a] * S_inverse[a, b] * y[b]
+                if growth == 1.0:
+                    nis[event] = square
+                    innovations[event, :m] = y[:m]
+                    spreads[event, :m, :m] = S[:m, :m]
+                    if square <= gate[sort]:
+                        verdicts[event] = ACCEPTED
+                        rejected_since[sort] = np.nan
+                        break
+                    if np.isnan(rejected_since[sort]):
+                        rejected_since[sort] = times[k]
+                    if times[k] - rejected_since[sort] < patience:
+                        verdicts[event] = REJECTED
+                        break
+                    verdicts[event] = FORCED
+                    rejected_since[sort] = np.nan
+                elif square <= gate[sort] or growth > 1e12:
+                    break
+                growth *= 2.0
+            if verdicts[event] != REJECTED:
+                if growth > 1.0:
+                    for i in range(15):
+                        for j in range(15):
+                            P[i, j] *= growth
+                correct(x, P, H, m, y, variance[event], S_inverse, PH, K, M, work)
+            event += 1
+        row = row_of_node[k]
+        if row >= 0:
+            states[row] = x
+            covariances[row] = P

@@ -1,0 +1,68 @@
+"""Dead reckoning: inertial measurements integrated to position, velocity and attitude (H 7.18-7.20).
+
+The frame is n, fixed to the ground at its origin, with the Earth's rotation and the lean of the plumb line
+where an `Earth` has them (H 5.31-5.33 in ECEF); `flat_earth` gives the equations as H 7.3 prints them.
+A step takes the mean of the measurements at its ends, and the attitude half-way. Corrections for coning and
+sculling are left out: between samples at 50 Hz and more, an airframe's rates are straight lines to well below
+what its sensors resolve, and vibration that is already averaged or aliased would not gain from them either.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.geometry.frames import Array
+from wildlab.navigation import kernels
+from wildlab.navigation.gravity import Earth
+from wildlab.navigation.timeline import Gap, Imu, checked_imu, find_gaps
+
+
+class DeadReckoning(NamedTuple):
+    """Position and velocity in n (N, 3), quaternions (N, 4), at the samples; NaN behind the first gap."""
+
+    times: Array
+    position: Array
+    velocity: Array
+    quaternion: Array
+    gaps: list[Gap]
+
+
+def integrate_strapdown(
+    imu: Imu,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    quaternion: ArrayLike,
+    earth: Earth,
+    max_gap: float = 0.1,
+) -> DeadReckoning:
+    """Dead reckoning from the first inertial sample on.
+
+    Parameters
+    ----------
+    imu
+        N samples, their biases taken off.
+    position, velocity, quaternion
+        At the first sample: (3,) m, (3,) m/s, (4,) w, x, y, z.
+    max_gap
+        Longest interval between samples (s) that is integrated. Behind a longer one nothing is known: the
+        rows are NaN, and ``gaps`` says where.
+
+    Raises
+    ------
+    WildlabError
+        For inertial samples that are no such thing; see `timeline.checked_imu`.
+    """
+    samples = checked_imu(imu)
+    gaps = find_gaps(samples.times, max_gap)
+    n = int(np.searchsorted(samples.times, gaps[0].end)) if gaps else len(samples.times)
+    q = np.asarray(quaternion, float)
+    start = np.concatenate(
+        [np.asarray(position, float), np.asarray(velocity, float), q / np.linalg.norm(q), np.zeros(6)]
+    )
+    states = np.full((len(samples.times), 16), np.nan)
+    t, f, w = (part[:n] for part in samples)
+    kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
+    return DeadReckoning(samples.times, states[:, :3], states[:, 3:6], states[:, 6:10], gaps)
