@@ -69,39 +69,12 @@ def list_(out: Path | None, as_json: bool) -> None:
     Example:
       wildlab list
     """
-    from wildlab.reporting.standing import REPRODUCED, standing
+    from wildlab.reporting.standing import REPRODUCED, as_plain, standing
     from wildlab.reporting.studies import load_studies
 
     standings = [standing(study, _reports(out)) for study in load_studies().values()]
     if as_json:
-        _print_json(
-            [
-                {
-                    "study": one.study.name,
-                    "title": one.study.title,
-                    "section": one.study.section,
-                    "kind": one.study.kind,
-                    "state": one.state,
-                    "reason": one.reason,
-                    "seconds": one.seconds,
-                    "finished": one.finished or None,
-                    "published": [
-                        {
-                            "name": number.name,
-                            "subject": number.subject,
-                            "unit": number.unit,
-                            "published": number.published,
-                            "here": number.here,
-                            "verdict": number.verdict,
-                            "source": number.source,
-                        }
-                        for number in one.numbers
-                    ],
-                    "claims": [{"id": c.id, "verdict": c.verdict, "text": c.text} for c in one.claims],
-                }
-                for one in standings
-            ]
-        )
+        _print_json([as_plain(one) for one in standings])
         return
     rows = []
     for one in standings:
@@ -208,10 +181,9 @@ def check(flight: Path, as_json: bool) -> None:
         _print_json([{name: getattr(finding, name) for name in names} for finding in findings])
     else:
         for finding in findings:
-            fix = f" {finding.fix}" if finding.fix else ""
-            click.echo(f"{finding.level}: {finding.sentence}{fix}")
+            click.echo(f"{finding.level}: {_stopped(finding.sentence)} {_sentence(finding.fix)}".rstrip())
         warnings = sum(finding.level == "warning" for finding in findings)
-        click.echo(f"{_count(problems, 'problem')}, {_count(warnings, 'warning')}.")
+        click.echo(_sentence(f"{_count(problems, 'problem')}, {_count(warnings, 'warning')}"))
     if problems:
         sys.exit(2)
 
@@ -348,23 +320,24 @@ def _count(n: int, what: str) -> str:
     return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
 
 
+def _sentence(clause: str) -> str:
+    """The rooms give clauses, so that they can be joined; a reader gets a capital and a full stop."""
+    return _stopped(clause[:1].upper() + clause[1:])
+
+
+def _stopped(clause: str) -> str:
+    return clause if not clause or clause.endswith((".", "!", "?")) else f"{clause}."
+
+
 def _print_json(content: Any) -> None:
     click.echo(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
 def _print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Columns for a terminal; for a pipe, full width and nothing drawn."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(width=None if sys.stdout.isatty() else 10_000)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for index, heading in enumerate(headings):
-        table.add_column(heading, no_wrap=index + 1 < len(headings))
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    console.print(table)
+    widths = [max(len(row[column]) for row in [headings, *rows]) for column in range(len(headings))]
+    for index, row in enumerate([headings, *rows]):
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        click.echo(click.style(line, bold=True) if index == 0 else line)
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:

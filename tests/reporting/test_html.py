@@ -54,7 +54,10 @@ def test_failure_page_opens_offline_and_stays_text(
 ) -> None:
     status = {"study": HOSTILE, "reason": HOSTILE, "seconds": 3.0}
     path = tmp_path / "report.html"
-    path.write_text(failure_page(status, title=HOSTILE, step=HOSTILE, details=HOSTILE * 50), encoding="utf-8")
+    path.write_text(
+        failure_page(status, title=HOSTILE, step=HOSTILE, details=HOSTILE * 50, again=HOSTILE),
+        encoding="utf-8",
+    )
     assert "<script" not in path.read_text(encoding="utf-8")
     assert faults(path) == []
 

@@ -34,7 +34,9 @@ def _plain(html: str) -> str:
     return unescape(_TAG.sub("", html)).strip()
 
 
-def failure_page(status: dict[str, Any], *, title: str, step: str, details: str, footer: str = "") -> str:
+def failure_page(
+    status: dict[str, Any], *, title: str, step: str, details: str, again: str, footer: str = ""
+) -> str:
     """The whole page.
 
     Parameters
@@ -47,6 +49,8 @@ def failure_page(status: dict[str, Any], *, title: str, step: str, details: str,
         Heading near which it stopped; "" where it did not get that far.
     details
         For whoever mends it: the traceback.
+    again
+        What to type to run it again.
     """
     study = str(status["study"])
     where = (
@@ -57,7 +61,7 @@ def failure_page(status: dict[str, Any], *, title: str, step: str, details: str,
     after = f"{where}, after {status['seconds']:.0f} s."
     steps = [
         "If the sentence above names a file, an option or a download, mend that first.",
-        f"Run it again: `wildlab run {study}`",
+        f"Run it again: `{again}`",
         "If it stops again, open `notebook.ipynb` beside this page: it is the run as far as it came, "
         "and its last cells show what was being computed.",
     ]

@@ -44,6 +44,8 @@ class Job:
     dataset: str | None = None
     recipe: str | None = None
     parameters: dict[str, Any] = field(default_factory=dict)
+    #: What to type to run it again.
+    again: str = ""
     timeout_s: float = 1800.0
 
 
@@ -257,6 +259,8 @@ def _explain(error: BaseException, folder: Path) -> Failure:
         failed = _failed_cell(notebook)
         step = step_of(notebook, failed if failed is not None else (_STARTED or [0])[-1])
     hidden = {str(folder): "."}
+    reason = reason.strip()
+    reason += "" if reason.endswith((".", "!", "?")) else "."
     return Failure(clean_text(reason, hidden), step, clean_text(details, hidden))
 
 

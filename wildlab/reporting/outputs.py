@@ -49,7 +49,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
     details = failure.details or log_of(job)
     write_atomic(
         folder / "report.html",
-        failure_page(status, title=job.title, step=step, details=details, footer=footer),
+        failure_page(status, title=job.title, step=step, details=details, again=job.again, footer=footer),
     )
 
 

@@ -57,7 +57,12 @@ figure.table { margin: .8rem 0 var(--gap) }
 figure img { display: block; width: 100%; height: auto }
 figcaption, .note { color: var(--dim); font-size: .88rem; line-height: 1.45; margin-top: .45rem;
   max-width: 46rem }
-.scroll { overflow-x: auto; max-width: 100% }
+/* Shadows at the sides say that there is more; white patches that move along cover them at the ends. */
+.scroll { overflow-x: auto; max-width: 100%; background-color: #fff; background-repeat: no-repeat;
+  background-image: linear-gradient(to right, #fff 30%, #fff0), linear-gradient(to left, #fff 30%, #fff0),
+  linear-gradient(to right, #18222d33, #fff0), linear-gradient(to left, #18222d33, #fff0);
+  background-position: left, right, left, right; background-size: 40px 100%, 40px 100%, 12px 100%, 12px 100%;
+  background-attachment: local, local, scroll, scroll }
 .scroll:focus-visible, a:focus-visible, summary:focus-visible { outline: 2px solid var(--blue);
   outline-offset: 2px }
 table { border-collapse: collapse; width: 100%; margin: .4rem 0; font-size: .93rem;
@@ -104,10 +109,13 @@ footer p { margin: .25rem 0; max-width: none }
   h1 { font-size: 17pt }
   h2 { font-size: 12.5pt; margin-top: 1.5rem }
   h1, h2, h3 { break-after: avoid }
-  figure:not(.table), tr, .summary, .tiles, .formula { break-inside: avoid }
+  figure:not(.long), tr, .summary, .tiles, .formula { break-inside: avoid }
+  figcaption { break-before: avoid }
+  /* Paper cannot be unfolded. */
+  details::details-content { content-visibility: visible; display: block }
   figure img { max-height: 120mm; width: auto; max-width: 100% !important; min-width: 0 !important }
   .summary, .tag, .pill, .band, .full { print-color-adjust: exact; -webkit-print-color-adjust: exact }
-  .scroll { overflow: visible }
+  .scroll { overflow: visible; background: none }
   table { font-size: 8.4pt }
   th, td { padding: .22rem .45rem; white-space: normal }
   a { color: inherit; text-decoration: none }

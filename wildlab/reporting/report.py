@@ -36,6 +36,8 @@ TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed"
 
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
 _FULL_SIZE, _LEAST_SIZE = 116, 58
+#: Rows of a table that is still kept on one page of paper.
+LONGEST_UNBROKEN = 15
 _FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
@@ -198,7 +200,9 @@ class Report:
         label = f"<b>Table {self._tables}.</b> {inline(caption)}" if caption else ""
         body = _table(frame, columns or {}, digits)
         described = f' aria-label="{escape(caption or fold or f"Table {self._tables}")}"'
-        html = f'<figure class="table"><div class="scroll" role="region" tabindex="0"{described}>{body}</div>'
+        long = " long" if len(frame) > LONGEST_UNBROKEN else ""
+        box = f'<div class="scroll" role="region" tabindex="0"{described}>{body}</div>'
+        html = f'<figure class="table{long}">{box}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 

@@ -60,6 +60,7 @@ def make_job(
     notebooks: Path = NOTEBOOKS,
     timeout_s: float | None = None,
     name: str | None = None,
+    again: str | None = None,
 ) -> Job:
     """The job that runs a study, checked as far as it can be before it starts.
 
@@ -69,6 +70,8 @@ def make_job(
         A flight folder to use in place of the study's own.
     name
         Name of the report's folder; the study's if not given.
+    again
+        What to type to run it again, where that is not `wildlab run STUDY`.
 
     Raises
     ------
@@ -94,6 +97,7 @@ def make_job(
         dataset=study.dataset if own else None,
         recipe=study.recipe if own else None,
         parameters=parameters,
+        again=again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}"),
         timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,
     )
 
@@ -187,8 +191,15 @@ def evaluate_flight(
             f"the flight is named {name!r} like a study, whose report it would replace",
             "give the flight another name in flight.toml, or the report another folder with --out",
         )
-    study = Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION)
-    job = make_job(study, flight=folder, reports=reports, notebooks=notebooks, timeout_s=timeout_s, name=name)
+    job = make_job(
+        Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION),
+        flight=folder,
+        reports=reports,
+        notebooks=notebooks,
+        timeout_s=timeout_s,
+        name=name,
+        again=f"wildlab evaluate {folder.name}",
+    )
     return _run([job], [], studies, reports, 1, console)[0]
 
 

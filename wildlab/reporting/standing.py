@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -103,6 +103,22 @@ def standing(study: Study, reports: Path, published: Path = FOLDER) -> Standing:
         numbers=_numbers(study, metrics, state, published),
         claims=_claims(study, metrics, published),
     )
+
+
+def as_plain(one: Standing) -> dict[str, Any]:
+    """A standing for JSON: what `wildlab list --json` prints."""
+    return {
+        "study": one.study.name,
+        "title": one.study.title,
+        "section": one.study.section,
+        "kind": one.study.kind,
+        "state": one.state,
+        "reason": one.reason,
+        "seconds": one.seconds,
+        "finished": one.finished or None,
+        "published": [asdict(number) | {"difference": number.difference} for number in one.numbers],
+        "claims": [asdict(claim) for claim in one.claims],
+    }
 
 
 def _status(folder: Path) -> dict[str, Any]:

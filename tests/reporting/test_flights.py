@@ -1,0 +1,118 @@
+"""The flights studies need: kept until their source changes; absent data are a sentence, not a failure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.flight.conftest import make_flight
+from tests.reporting.conftest import OPEN, notebook, write
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.reporting import flights
+from wildlab.reporting.run import evaluate_flight, run_studies
+
+__all__ = ["make_flight"]
+
+SHOW = (
+    'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'
+    'report.metric("frames", "all", len(load_flight(flight).frames), "")\nreport.save()'
+)
+
+
+@pytest.fixture
+def simulated(monkeypatch: pytest.MonkeyPatch, make_flight: Callable[..., Flight]) -> list[tuple[str, int]]:
+    calls: list[tuple[str, int]] = []
+
+    def simulate(name: str, seed: int) -> Flight:
+        calls.append((name, seed))
+        return make_flight()
+
+    monkeypatch.setattr("wildlab.simulation.twins.simulate_twin", simulate)
+    return calls
+
+
+def test_a_twin_is_simulated_once_per_seed(tmp_path: Path, simulated: list[tuple[str, int]]) -> None:
+    one = flights.twin_flight("antenna", 1, tmp_path)
+    assert flights.twin_flight("antenna", 1, tmp_path) == one == tmp_path / ".flights" / "antenna-seed1"
+    flights.twin_flight("antenna", 2, tmp_path)
+    assert simulated == [("antenna", 1), ("antenna", 2)]
+    assert load_flight(one).name == "small-flight"
+    assert {path.name for path in one.parent.iterdir()} == {
+        *("antenna-seed1", "antenna-seed1.key", "antenna-seed2", "antenna-seed2.key")
+    }
+
+
+def test_it_is_simulated_again_when_its_parameters_change(
+    tmp_path: Path, simulated: list[tuple[str, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flights, "DATA", tmp_path / "data")
+    (tmp_path / "data" / "twins").mkdir(parents=True)
+    flights.twin_flight("antenna", 1, tmp_path)
+    (tmp_path / "data" / "twins" / "antenna.toml").write_text("height_m = 350")
+    flights.twin_flight("antenna", 1, tmp_path)
+    assert len(simulated) == 2
+
+
+def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> Flight:
+        raise WildlabError("it is raining", "wait")
+
+    monkeypatch.setattr("wildlab.simulation.twins.simulate_twin", fail)
+    with pytest.raises(WildlabError, match="raining"):
+        flights.twin_flight("antenna", 1, tmp_path)
+    assert list((tmp_path / ".flights").iterdir()) == []
+
+
+def studies(folder: Path) -> Path:
+    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW))
+    text = '[s]\ntitle = "S"\nnotebook = "georeferencing.ipynb"\n'
+    text += 'dataset = "openathena"\nrecipe = "openathena.toml"\n'
+    (folder / "studies.toml").write_text(text)
+    return folder
+
+
+def test_absent_data_are_skipped_or_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    (outcome,) = run_studies(everything=True, **where)
+    assert outcome.state == "skipped" and "Get it first: wildlab fetch openathena" in outcome.reason
+    page = (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
+    assert "wildlab fetch openathena" in page
+    with pytest.raises(WildlabError, match="wildlab fetch openathena") as caught:
+        run_studies(["s"], **where)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.slow
+def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    folder = tmp_path / "tuesday"
+    save_flight(make_flight(), folder)
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    outcome = evaluate_flight(folder, **where)
+    assert outcome.state == "done", outcome.reason
+    assert outcome.folder == (tmp_path / "reports" / "small-flight").resolve()
+    content = json.loads((outcome.folder / "metrics.json").read_text())
+    assert content["metrics"][0]["value"] == 3
+    assert "small-flight/report.html" in (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
+    origin = json.loads((outcome.folder / "provenance.json").read_text())["flight"]
+    assert origin["name"] == "small-flight" and "flight.toml" in origin["files"]
+    # The place of a flight whose locations are withheld gets into nothing that is written.
+    for path in outcome.folder.rglob("*"):
+        assert not path.is_file() or b"63.4" not in path.read_bytes()
+    (outcome,) = run_studies(["s"], flight=folder, **where)
+    assert outcome.state == "done" and outcome.name == "s-small-flight"
+
+
+def test_a_flight_named_like_a_study_would_replace_its_report(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    save_flight(make_flight(name="s"), tmp_path / "flight")
+    with pytest.raises(WildlabError, match="named 's' like a study"):
+        evaluate_flight(
+            tmp_path / "flight", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out"
+        )
