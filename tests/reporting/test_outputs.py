@@ -96,10 +96,16 @@ def test_a_file_in_the_place_of_the_folder_is_not_touched(tmp_path: Path) -> Non
 
 
 def test_leftovers_of_killed_runners_are_swept_and_those_of_running_ones_are_not(tmp_path: Path) -> None:
-    for name in (f".s.{os.getpid()}.part", ".s.999999999.part", ".other"):
+    for name in (f".s.{os.getpid()}.part", ".s.999999999.part", ".other", ".young.999999999.part"):
         (tmp_path / name).mkdir()
+        if "young" not in name:
+            os.utime(tmp_path / name, (0, 0))
     outputs.sweep(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {f".s.{os.getpid()}.part", ".other"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f".s.{os.getpid()}.part",
+        ".other",
+        ".young.999999999.part",
+    }
 
 
 def test_atomic_writing(tmp_path: Path) -> None:

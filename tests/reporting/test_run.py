@@ -18,7 +18,7 @@ from rich.console import Console
 from tests.reporting.conftest import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.reporting.run import Outcome, run_studies
+from wildlab.reporting.run import Outcome, _socket_folder, run_studies
 
 pytestmark = pytest.mark.slow
 
@@ -220,8 +220,11 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number
     assert runner.wait(20) != 0
     assert gone([int(pid) for pid in pids.read_text().split()])
     assert {path.name: path.read_text() for path in (reports / "slow").iterdir()} == former
-    if number == signal.SIGINT:
-        assert not list(reports.glob(".*.part"))
+    deadline = time.monotonic() + 5
+    while list(reports.glob(".*.part")) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not list(reports.glob(".*.part")), "nothing is left of the work, whoever ended it"
+    assert not list(_socket_folder().glob(f"wl{runner.pid}-*"))
 
 
 def test_wrong_use_is_an_error_before_anything_runs(tmp_path: Path) -> None:

@@ -8,8 +8,11 @@ then ends everything below this process, kernel included.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
+import signal
 import sys
 import threading
 import time
@@ -62,7 +65,7 @@ def work(pipe: connection.Connection, job: Job) -> None:
     """Body of the process. Sends ``("stage", text)``, ``("cell", index, count)`` and at last ``("done",)`` or
     ``("failed", Failure)``."""
     os.setsid()
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(job,), daemon=True).start()
     _keep_to_ourselves(job)
     try:
         _work(pipe, job)
@@ -72,29 +75,31 @@ def work(pipe: connection.Connection, job: Job) -> None:
         pipe.send(("done",))
 
 
-def _end_with_parent() -> None:
-    """A runner that was killed outright must not leave kernels behind."""
+def _end_with_parent(job: Job) -> None:
+    """A runner that was killed outright must leave neither kernels nor folders behind."""
     parent = parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])
-        end_tree(os.getpid())
+        _end_below(os.getpid())
+        for folder in (job.work, job.runtime):
+            shutil.rmtree(folder, ignore_errors=True)
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def end_tree(pid: int) -> None:
     """End a process and everything below it, at once; a process that is gone already is no error."""
+    _end_below(pid)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)
+
+
+def _end_below(pid: int) -> None:
     import psutil  # type: ignore[import-untyped]
 
-    try:
-        top = psutil.Process(pid)
-        below = top.children(recursive=True)
-    except psutil.NoSuchProcess:
-        return
-    # Itself last: until then it is the parent of the others, and this may be it.
-    for process in [*below, top]:
-        try:
-            process.kill()
-        except psutil.NoSuchProcess:
-            continue
+    with contextlib.suppress(psutil.NoSuchProcess):
+        for process in psutil.Process(pid).children(recursive=True):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
 
 
 def _keep_to_ourselves(job: Job) -> None:

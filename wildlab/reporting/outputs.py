@@ -9,6 +9,7 @@ import re
 import shutil
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -109,10 +110,13 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what runners that were killed have left behind."""
+    """Remove what runs have left that had no chance to do so themselves, because the machine stopped.
+
+    Only after a day: a runner in a container has process numbers of its own, and may look dead from here.
+    """
     for path in folder.glob(".*.part"):
         match = _PART.fullmatch(path.name)
-        if match and not _alive(int(match["pid"])):
+        if match and not _alive(int(match["pid"])) and time.time() - path.stat().st_mtime > 86_400:
             clear_folder(path)
 
 
