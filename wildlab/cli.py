@@ -136,21 +136,24 @@ def run(
 
 @wildlab.command()
 @click.argument("flight", type=FOLDER)
+@click.option("--source", help="Which poses to judge, where the flight has several (its nav/NAME.parquet).")
 @click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
 @click.option(
     "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes it may take.  [default: 30]"
 )
-def evaluate(flight: Path, out: Path | None, timeout: float | None) -> None:
+def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float | None) -> None:
     """How accurate is the georeferencing of a flight? FLIGHT is a folder made by `wildlab import`.
 
     \b
-    Example:
+    Examples:
       wildlab evaluate flights/tuesday
+      wildlab evaluate flights/antenna --source autopilot
     """
     from wildlab.reporting.run import evaluate_flight
 
     outcome = evaluate_flight(
         flight,
+        source=source,
         reports=_reports(out),
         timeout_s=None if timeout is None else timeout * 60,
         console=_console(),

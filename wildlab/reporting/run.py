@@ -172,6 +172,7 @@ def run_studies(
 def evaluate_flight(
     folder: Path,
     *,
+    source: str | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     timeout_s: float | None = None,
@@ -179,12 +180,22 @@ def evaluate_flight(
 ) -> Outcome:
     """Judge the georeferencing of a flight folder; the report goes to ``<reports>/<name of the flight>/``.
 
+    Parameters
+    ----------
+    source
+        Which of the flight's poses to judge; not needed where it has one navigation source, or one named
+        ``logged``.
+
     Raises
     ------
     WildlabError
-        If the folder is not a usable flight, or its name is that of a study.
+        If the folder is not a usable flight, it is not clear which poses are meant, or its name is that of a
+        study.
     """
-    name = _flight_name(folder)
+    from wildlab.flight.store import load_flight
+
+    flight = load_flight(folder)
+    name, (source, _) = flight.name, flight.pose_source(source)
     studies = load_studies(notebooks / "studies.toml")
     if name in studies:
         raise WildlabError(
@@ -192,13 +203,13 @@ def evaluate_flight(
             "give the flight another name in flight.toml, or the report another folder with --out",
         )
     job = make_job(
-        Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION),
+        Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION, parameters={"source": source}),
         flight=folder,
         reports=reports,
         notebooks=notebooks,
         timeout_s=timeout_s,
         name=name,
-        again=f"wildlab evaluate {folder.name}",
+        again=f"wildlab evaluate {folder.name} --source {source}",
     )
     return _run([job], [], studies, reports, 1, console)[0]
 
