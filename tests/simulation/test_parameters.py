@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import re
+import tomllib
 
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.simulation.parameters import TWINS, each_parameter, load_twin, parameters_table, twin_names
+from wildlab.simulation.parameters import (
+    PARTS,
+    TWINS,
+    each_parameter,
+    load_twin,
+    parameters_table,
+    part_names,
+    twin_names,
+)
+
+
+def complete(name: str) -> str:
+    """The text of a twin with its parts written out in it."""
+    lines = (TWINS / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    parts = next(tomllib.loads(line)["parts"] for line in lines if line.startswith("parts ="))
+    own = [line for line in lines if not line.startswith("parts =")]
+    return "\n".join([*own, *((PARTS / f"{part}.toml").read_text(encoding="utf-8") for part in parts)])
 
 
 @pytest.fixture
@@ -15,7 +32,7 @@ def altered(tmp_path):
     """Load the shipped twin with some text of its file replaced."""
 
     def load(old: str, new: str):
-        text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
+        text = complete("static-antenna")
         assert text.count(old) == 1, f"{old!r} is there {text.count(old)} times"
         path = tmp_path / "twin.toml"
         path.write_text(text.replace(old, new), encoding="utf-8")
@@ -58,6 +75,17 @@ def test_published_numbers_are_those_of_the_thesis():
         "mount.misalignment_roll": -1.7,
         "mount.misalignment_tilt": 3.9,
         "mount.misalignment_pan": 1.9,
+        "imu.rate": 250,
+        "imu.gyro_range": 100,
+        "imu.gyro_random_walk": 0.09,
+        "imu.gyro_bias_stability": 1.8,
+        "imu.accelerometer_range": 8,
+        "imu.accelerometer_random_walk": 0.008,
+        "imu.accelerometer_bias_stability": 3.6,
+        "imu.axis_misalignment": 0.05,
+        "imu.package_misalignment": 0.25,
+        "gnss.rate": 10,
+        "gnss.latency": 0,
         "autopilot.rate": 10,
         "autopilot.imu_roll": 1.1,
         "autopilot.imu_pitch": -5.7,
@@ -69,11 +97,57 @@ def test_published_numbers_are_those_of_the_thesis():
     }
 
 
+def exchanged_imu(tmp_path, part: str):
+    text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
+    assert text.count('"imu-adis16490"') == 1
+    path = tmp_path / "twin.toml"
+    path.write_text(text.replace("imu-adis16490", part), encoding="utf-8")
+    return load_twin(path)
+
+
+def test_one_part_can_be_put_in_the_place_of_another(tmp_path):
+    """The STIM300's numbers, typed a second time from H table A.6."""
+    imu = exchanged_imu(tmp_path, "imu-stim300").imu
+    assert (imu.gyro_range.number, imu.accelerometer_range.number) == (400, 10)
+    assert (imu.gyro_random_walk.number, imu.accelerometer_random_walk.number) == (0.15, 0.07)
+    assert (imu.gyro_bias_stability.number, imu.accelerometer_bias_stability.number) == (0.3, 50)
+    assert imu.axis_misalignment.si == pytest.approx(0.2e-3, rel=1e-5)
+    assert imu.package_misalignment.si == pytest.approx(1e-3, rel=1e-5)
+
+
+def test_a_part_that_does_not_exist_is_answered_with_those_there_are(tmp_path):
+    assert "imu-stim300" in part_names()
+    with pytest.raises(WildlabError, match=r"parts: there is no part 'imu-stim30'.*'imu-stim300'"):
+        exchanged_imu(tmp_path, "imu-stim30")
+    with pytest.raises(WildlabError, match=r"parts: there is no part '\.\./static-antenna'"):
+        exchanged_imu(tmp_path, "../static-antenna")
+
+
+def test_parts_are_a_list_of_names(altered):
+    with pytest.raises(WildlabError, match=r"parts: 'imu' is not a list of names"):
+        altered('section = "H 5.6.1"', 'section = "H 5.6.1"\nparts = "imu"')
+
+
+def test_what_a_twin_says_itself_goes_before_what_its_parts_say(tmp_path):
+    text = (TWINS / "static-antenna.toml").read_text(encoding="utf-8")
+    own = '[autopilot.rate]\nvalue = 5\nunit = "Hz"\nstatus = "chosen"\nreason = "for this test"\n'
+    path = tmp_path / "twin.toml"
+    path.write_text(f"{text}\n{own}", encoding="utf-8")
+    twin = load_twin(path)
+    assert twin.autopilot.rate.number == 5
+    assert twin.autopilot.roll_sd == load_twin("static-antenna").autopilot.roll_sd
+
+
 def test_units_are_converted_once():
     twin = load_twin("static-antenna")
     assert twin.autopilot.imu_pitch.si == pytest.approx(-0.0994838)
     assert twin.onboard_clock.drift.si == pytest.approx(5e-5)
     assert twin.camera.latency.si == pytest.approx(0.005)
+    assert twin.imu.gyro_bias_stability.si == pytest.approx(8.7266e-6, rel=1e-4)  # rad/s
+    assert twin.imu.gyro_random_walk.si == pytest.approx(2.61799e-5, rel=1e-4)  # rad/sqrt(s)
+    assert twin.imu.accelerometer_random_walk.si == pytest.approx(1.3333e-4, rel=1e-4)  # m/s/sqrt(s)
+    assert twin.imu.accelerometer_bias_stability.si == pytest.approx(3.5304e-5, rel=1e-4)
+    assert twin.imu.accelerometer_turn_on_bias.si == pytest.approx(0.034323, rel=1e-4)
 
 
 def test_the_table_names_value_unit_and_reason():

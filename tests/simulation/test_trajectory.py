@@ -20,24 +20,6 @@ from wildlab.simulation.trajectory import (
 WIND = np.array([4.0, -3.0, 0.0])
 
 
-def restless_loiter(turn="clockwise"):
-    """A loiter with wind, wander and sway, all on: (path, attitude)."""
-    rng = np.random.default_rng(7)
-    path = loiter(
-        (30.0, -50.0),
-        160.0,
-        350.0,
-        19.5,
-        wind=WIND[:2],
-        turn=turn,
-        start_angle=0.3,
-        radius_wander=random_wander(3.0, 20.0, 120.0, rng),
-        altitude_wander=random_wander(2.0, 20.0, 120.0, rng),
-    )
-    sway = tuple(random_wander(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
-    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), sway=sway)
-
-
 @pytest.mark.parametrize(("turn", "sense"), [("clockwise", 1), ("counter-clockwise", -1)])
 def test_still_air_circle_is_a_coordinated_turn(turn, sense):
     speed, radius, gravity = 20.0, 150.0, 9.82
@@ -67,7 +49,7 @@ def test_in_wind_the_airspeed_is_steady_and_the_ground_track_a_circle():
     assert np.einsum("ij,ij->i", v - WIND, a) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_coordinated_flight_has_no_sideslip_and_no_lateral_force():
+def test_coordinated_flight_has_no_sideslip_and_no_lateral_force(restless_loiter):
     path, _ = restless_loiter()
     t = np.linspace(0, 200, 1000)
     _, v, a = path(t)
@@ -81,7 +63,7 @@ def test_coordinated_flight_has_no_sideslip_and_no_lateral_force():
 
 
 @pytest.mark.parametrize("turn", ["clockwise", "counter-clockwise"])
-def test_velocity_and_acceleration_are_the_derivatives_of_position(turn):
+def test_velocity_and_acceleration_are_the_derivatives_of_position(turn, restless_loiter):
     path, _ = restless_loiter(turn)
     t, h = np.linspace(5, 1400, 2000), 1e-3
     (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
@@ -92,7 +74,7 @@ def test_velocity_and_acceleration_are_the_derivatives_of_position(turn):
     assert np.abs((v1 - v0) / (2 * h) - a).max() < 4e-7
 
 
-def test_angular_rate_is_the_derivative_of_attitude():
+def test_angular_rate_is_the_derivative_of_attitude(restless_loiter):
     _, attitude = restless_loiter()
     t, h = np.linspace(5, 1400, 2000), 1e-3
     turn = np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)
@@ -103,7 +85,7 @@ def test_angular_rate_is_the_derivative_of_attitude():
     assert np.abs(rate - angular_rates(attitude, t)).max() > 1e-5  # the bound could fail
 
 
-def test_dead_reckoning_with_ideal_inertial_sensors_returns_the_motion():
+def test_dead_reckoning_with_ideal_inertial_sensors_returns_the_motion(restless_loiter):
     """Strapdown at 200 Hz for two minutes, from the first pose alone."""
     path, attitude = restless_loiter()
     h, n = 0.005, 24_000

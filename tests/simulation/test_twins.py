@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,9 +19,13 @@ from wildlab.geometry.frames import (
 )
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import camera_pose
+from wildlab.simulation.aboard import payload_attitude
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import move
-from wildlab.simulation.twins import loiter_centre, simulate, simulate_twin, trajectory
+from wildlab.simulation.twins import OPTIONAL_TABLES, loiter_centre, simulate, simulate_twin, trajectory
+
+#: Most tests need no inertial readings, which take most of the time.
+quick = partial(simulate, without=OPTIONAL_TABLES)
 
 QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 
@@ -41,46 +47,59 @@ def twin():
 
 @pytest.fixture(scope="module")
 def flight():
-    return simulate_twin("static-antenna", 3)
+    return simulate_twin("static-antenna", 3, without=OPTIONAL_TABLES)
+
+
+@pytest.fixture(scope="module")
+def short(twin):
+    """The first seven minutes of it, for what needs inertial readings."""
+    return with_values(twin, flight__duration=420.0, camera__images=800, target__observations=40)
+
+
+@pytest.fixture(scope="module")
+def sensed(short):
+    return simulate(short, 3)
 
 
 def every_table(flight):
     return {**{f"nav/{name}": table for name, table in flight.nav.items()}, **flight.tables}
 
 
-def test_same_seed_same_bytes(flight, tmp_path):
-    again = simulate_twin("static-antenna", 3)
-    for name, table in every_table(flight).items():
+def test_same_seed_same_bytes(short, sensed, tmp_path):
+    again = simulate(short, 3)
+    for name, table in every_table(sensed).items():
         pd.testing.assert_frame_equal(table, every_table(again)[name], check_exact=True)
-    save_flight(flight, tmp_path / "a")
+    save_flight(sensed, tmp_path / "a")
     save_flight(again, tmp_path / "b")
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
-    assert len(files) == 7
+    assert len(files) == 10
     for name in files:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
 def test_another_seed_is_another_flight(flight):
-    other = simulate_twin("static-antenna", 4)
+    other = simulate_twin("static-antenna", 4, without=OPTIONAL_TABLES)
     for name in ("autopilot", "truth"):
         assert not np.allclose(flight.nav[name]["north_m"], other.nav[name]["north_m"], atol=0.5)
     assert not np.allclose(flight.detections["u_px"], other.detections["u_px"], atol=0.5)
     assert list(flight.nav) == list(other.nav)
 
 
-def test_one_sensors_errors_do_not_touch_anothers(twin, flight):
-    other = simulate(with_values(twin, camera__marking_sd=9.0, onboard_clock__latency=0.0), 3)
-    for name, table in flight.nav.items():
+def test_one_sensors_errors_do_not_touch_anothers(short, sensed):
+    changed = with_values(short, camera__marking_sd=9.0, onboard_clock__latency=0.0, imu__gyro_range=50.0)
+    other = simulate(changed, 3)
+    pd.testing.assert_frame_equal(sensed.gnss, other.gnss, check_exact=True)
+    for name, table in sensed.nav.items():
         pd.testing.assert_frame_equal(table, other.nav[name], check_exact=True)
-    assert flight.detections["frame_id"].equals(other.detections["frame_id"])
-    assert not flight.detections["u_px"].equals(other.detections["u_px"])
-    assert flight.frames["time_s"].equals(other.frames["time_s"])
-    assert not flight.frames["time_onboard_s"].equals(other.frames["time_onboard_s"])
+    assert sensed.detections["frame_id"].equals(other.detections["frame_id"])
+    assert not sensed.detections["u_px"].equals(other.detections["u_px"])
+    assert sensed.frames["time_s"].equals(other.frames["time_s"])
+    assert not sensed.frames["time_onboard_s"].equals(other.frames["time_onboard_s"])
 
 
 @pytest.mark.parametrize("seed", range(1, 9))
 def test_every_seed_has_552_observations_inside_the_image_in_batches(seed):
-    flight = simulate_twin("static-antenna", seed)
+    flight = simulate_twin("static-antenna", seed, without=["imu", "gnss"])
     d, frames = flight.detections, flight.frames
     assert len(d) == 552
     assert d["frame_id"].is_unique
@@ -99,13 +118,13 @@ def test_every_seed_has_552_observations_inside_the_image_in_batches(seed):
 
 
 def test_the_first_images_that_show_the_target_are_the_ones_marked(twin):
-    fewer = simulate(with_values(twin, target__observations=100), 3)
-    all_of_them = simulate(twin, 3)
+    fewer = quick(with_values(twin, target__observations=100), 3)
+    all_of_them = quick(twin, 3)
     assert fewer.detections["frame_id"].tolist() == all_of_them.detections["frame_id"].tolist()[:100]
 
 
 def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
-    flight = simulate(with_values(twin, camera__marking_sd=0.0, camera__latency=0.0), 5)
+    flight = quick(with_values(twin, camera__marking_sd=0.0, camera__latency=0.0), 5)
     m = flight.manifest
     at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
     p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
@@ -122,7 +141,7 @@ def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
 
 
 def test_marks_scatter_about_the_true_pixels_as_stated(twin):
-    exact, marked = (simulate(with_values(twin, camera__marking_sd=sd), 6).detections for sd in (0.0, 2.0))
+    exact, marked = (quick(with_values(twin, camera__marking_sd=sd), 6).detections for sd in (0.0, 2.0))
     off = (marked[["u_px", "v_px"]] - exact[["u_px", "v_px"]]).to_numpy()
     assert off.mean(axis=0) == pytest.approx([0, 0], abs=5 * 2 / np.sqrt(552))
     assert off.std(axis=0) == pytest.approx([2, 2], rel=5 / np.sqrt(2 * 552))
@@ -168,7 +187,7 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
         changed = with_values(calm, **changes)
         path, attitude = trajectory(changed, np.random.default_rng(0))
         motion = move(path, attitude, np.arange(0, 120, 0.01))
-        flight = simulate(with_values(changed, target__observations=1), 0)
+        flight = quick(with_values(changed, target__observations=1), 0)
         pose = camera_pose(flight.manifest.geometry_mount(), motion.position, motion.R_nb)
         uv = ground_to_pixel(flight.manifest.geometry_camera(), [0.0, 0.0, -2.0], *pose)
         off = np.linalg.norm(uv - [320, 256], axis=1)
@@ -180,11 +199,69 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
     assert np.linalg.norm(loiter_centre(twin)) > twin.flight.loiter_radius.number
 
 
+def test_imu_and_gnss_cover_the_flight_at_their_rates(short, sensed):
+    imu, gnss = sensed.imu, sensed.gnss
+    for table, rate in ((imu, 250), (gnss, 10)):
+        t = table["time_s"].to_numpy()
+        assert len(t) == 420 * rate + 1
+        assert t == pytest.approx(np.arange(len(t)) / rate)
+        assert np.isfinite(table.to_numpy()).all()
+    late = simulate(with_values(short, gnss__latency=120.0), 3, without=["imu"])
+    assert (late.gnss["time_s"] - gnss["time_s"]).to_numpy() == pytest.approx(0.12)
+    assert late.gnss.drop(columns="time_s").equals(gnss.drop(columns="time_s"))
+
+
+def test_the_antennas_ride_on_the_payload_as_the_levers_say(sensed):
+    truth = sensed.nav["truth-payload"].iloc[::15]  # 37.5 Hz and 10 Hz meet every 0.4 s
+    gnss = sensed.gnss.iloc[::4]
+    assert gnss["time_s"].to_numpy() == pytest.approx(truth["time_s"].to_numpy())
+    R = quaternion_to_matrix(truth[QUATERNION].to_numpy())
+    p = truth[["north_m", "east_m", "down_m"]].to_numpy()
+    names = [f"{axis}_m" for axis in ("north", "east", "down")]
+    for which, arm in (("", [0.5, 0.0, -0.1]), ("second_", [-0.5, 0.0, -0.1])):
+        lever = gnss[[f"{which}lever_{axis}_m" for axis in "xyz"]].to_numpy()
+        assert (lever == arm).all()
+        off = gnss[[which + name for name in names]].to_numpy() - (p + (R @ lever[..., None])[..., 0])
+        spread = np.sqrt((off**2).mean(axis=0))
+        stated = [np.hypot(0.01, 0.01)] * 2 + [np.hypot(0.015, 0.015)]
+        # Half of the variance wanders over 60 s: 420 s hold at least 3 independent errors of it.
+        assert spread == pytest.approx(stated, rel=0.5 * 5 * np.sqrt(0.5 / 7))
+        assert gnss["sd_horizontal_m"].iloc[0] == pytest.approx(stated[0])
+    speeds = [f"v_{axis}_m_s" for axis in ("north", "east", "down")]
+    slip = gnss[speeds].to_numpy() - truth[speeds].to_numpy()
+    assert np.sqrt((slip**2).mean(axis=0)) == pytest.approx([0.05] * 3, rel=0.5)  # the lever turns, too
+
+
+def test_the_payload_turns_against_the_airframe_slowly_by_about_a_degree(twin):
+    _, attitude = trajectory(twin, np.random.default_rng(0))
+    t = np.arange(1500.0)
+    turns = [
+        np.degrees(matrix_to_rotation_vector(np.swapaxes(attitude(t), 1, 2) @ payload(t)))
+        for payload in (payload_attitude(twin, attitude, seed) for seed in range(20))
+    ]
+    turn = np.array(turns)
+    # Sixteen sines, the slowest of 600 s: the mean square of a flight is theirs to some 10 %.
+    assert np.sqrt((turn**2).mean(axis=(0, 1))) == pytest.approx([0.8] * 3, rel=0.06)
+    # deg/s, were all sines in step
+    fastest = 0.8 * np.sqrt(2 / 16) * 16 * 2 * np.pi * (1 / 20 - 1 / 600) / np.log(600 / 20)
+    assert np.abs(np.diff(turn, axis=1)).max() < fastest
+
+
+def test_leaving_tables_out_changes_no_other(short, sensed):
+    fewer = quick(short, 3)
+    assert fewer.imu is None
+    assert fewer.gnss is None
+    for name, table in every_table(fewer).items():
+        pd.testing.assert_frame_equal(table, every_table(sensed)[name], check_exact=True)
+    with pytest.raises(WildlabError, match=r"without: 'frames' is not a table .* Use any of imu, gnss"):
+        simulate_twin("static-antenna", 3, without=["frames"])
+
+
 def test_onboard_stamps_are_early_late_and_drifting_but_in_order(flight, twin):
     frames = flight.frames
     stamps = frames["time_onboard_s"].to_numpy()
     assert (np.diff(stamps) > 0).all()
-    prompt = simulate(with_values(twin, onboard_clock__latency=0.0), 3).frames
+    prompt = quick(with_values(twin, onboard_clock__latency=0.0), 3).frames
     error = (prompt["time_onboard_s"] - prompt["time_s"]).to_numpy()
     assert error[0] == pytest.approx(-0.3)
     assert error[-1] - error[0] == pytest.approx(5e-5 * 7989 / 7.5)
@@ -215,23 +292,23 @@ def test_the_manifest_does_not_give_the_simulated_errors_away(twin, flight):
     assert stated.yaw_deg != real.yaw_sd.number
     assert stated.position_horizontal_m != real.horizontal_sd.number
     assert stated.pixel_px != twin.camera.marking_sd.number
-    other = simulate(with_values(twin, autopilot__roll_sd=3.0, autopilot__horizontal_sd=7.0), 3)
+    other = quick(with_values(twin, autopilot__roll_sd=3.0, autopilot__horizontal_sd=7.0), 3)
     assert other.manifest == flight.manifest
 
 
 @pytest.mark.parametrize("seed", [-1, 2**63, 1.5, True, "1"])
 def test_a_seed_is_a_whole_number_from_zero(seed):
     with pytest.raises(WildlabError, match=r"is not a seed\. Give a whole number from 0"):
-        simulate_twin("static-antenna", seed)
+        simulate_twin("static-antenna", seed, without=OPTIONAL_TABLES)
 
 
 def test_a_target_that_is_not_seen_often_enough_is_said(twin):
     with pytest.raises(
         WildlabError, match=r"target\.observations: .* in view in \d+ images only, not in 5000"
     ):
-        simulate(with_values(twin, target__observations=5000), 1)
+        quick(with_values(twin, target__observations=5000), 1)
 
 
 def test_a_camera_that_does_not_look_at_the_target_is_said(twin):
     with pytest.raises(WildlabError, match=r"flight\.altitude: the camera does not look down"):
-        simulate(with_values(twin, mount__tilt=120.0), 1)
+        quick(with_values(twin, mount__tilt=120.0), 1)

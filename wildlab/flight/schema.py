@@ -75,6 +75,18 @@ _GIMBAL = tuple(
     for axis in ("pan", "tilt")
 )
 
+#: Of a second antenna on the same clock, at the same times: two of them give a heading.
+SECOND_COLUMNS = ("second_north_m", "second_east_m", "second_down_m")
+#: From b to the (first) antenna and to the second one, in b: x ahead, y right, z down.
+LEVER_COLUMNS = (
+    *(f"lever_{axis}_m" for axis in "xyz"),
+    *(f"second_lever_{axis}_m" for axis in "xyz"),
+)
+_SECOND = tuple(
+    Column(name, "float", "m", f"{name.split('_')[1]} coordinate of a second antenna in frame n", False, True)
+    for name in SECOND_COLUMNS
+)
+
 NAV = Table(
     "nav",
     "pose of the platform from one source (one table per source, in nav/)",
@@ -145,8 +157,18 @@ TABLES: dict[str, Table] = {
                 Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
                 Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
                 Column("sd_velocity_m_s", "float", "m/s", "SD of each axis of the velocity", False, True),
+                *_SECOND,
+                *(
+                    Column(name, "float", "m", f"where that antenna is in b, along {name[-3]}", False)
+                    for name in LEVER_COLUMNS
+                ),
             ),
-            together=(("v_north_m_s", "v_east_m_s", "v_down_m_s"),),
+            together=(
+                ("v_north_m_s", "v_east_m_s", "v_down_m_s"),
+                SECOND_COLUMNS,
+                LEVER_COLUMNS[:3],
+                LEVER_COLUMNS[3:],
+            ),
         ),
         Table(
             "detections",

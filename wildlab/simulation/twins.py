@@ -7,6 +7,7 @@ source ``truth`` exists; nothing downstream needs it.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,19 @@ from wildlab.errors import WildlabError
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, in_image
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, helgesen_misalignment
+from wildlab.simulation.aboard import (
+    autopilot_tables,
+    gnss_table,
+    imu_table,
+    nav_table,
+    payload_attitude,
+    ticks,
+)
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.sensors import computer_stamps, gauss_markov, rounded, stream, turned_by
+from wildlab.simulation.sensors import computer_stamps, stream
 from wildlab.simulation.trajectory import (
     FlightPath,
     Motion,
@@ -37,13 +46,20 @@ from wildlab.simulation.trajectory import (
 AUTOPILOT = "autopilot"
 UNCALIBRATED = "autopilot-uncalibrated"
 TRUTH = "truth"
+PAYLOAD_TRUTH = "truth-payload"
+
+#: Tables that take most of the time and most of the room, and that not every study needs.
+OPTIONAL_TABLES = ("imu", "gnss")
 
 #: Column of the frames that holds the on-board computer's stamps.
 ONBOARD_STAMP = "time_onboard_s"
 
 
-def simulate_twin(name_or_path: str | Path, seed: int) -> Flight:
+def simulate_twin(name_or_path: str | Path, seed: int, without: Collection[str] = ()) -> Flight:
     """A twin as a flight in memory. The same seed gives the same flight, to the last bit.
+
+    The nav source ``truth`` is the pose of the airframe with the camera, ``truth-payload`` that of the
+    payload with the IMU and the antennas, which is what a navigation system with these sensors can know.
 
     Parameters
     ----------
@@ -51,6 +67,8 @@ def simulate_twin(name_or_path: str | Path, seed: int) -> Flight:
         A twin that comes with wildlab (``"static-antenna"``), or a file like those in ``data/twins``.
     seed
         A whole number from 0.
+    without
+        Tables to leave out, to save time: any of ``OPTIONAL_TABLES``. The others are the same without them.
 
     Raises
     ------
@@ -58,22 +76,30 @@ def simulate_twin(name_or_path: str | Path, seed: int) -> Flight:
         Where the twin or one of its parameters is unusable, the seed is negative, or the target does not come
         into view often enough.
     """
-    return simulate(load_twin(name_or_path), seed)
+    return simulate(load_twin(name_or_path), seed, without)
 
 
-def simulate(twin: TwinParameters, seed: int) -> Flight:
+def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> Flight:
     """As :func:`simulate_twin`, from parameters in memory."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**63:
         raise WildlabError(f"{seed!r} is not a seed", "give a whole number from 0", field="seed")
+    if unknown := sorted(set(without) - set(OPTIONAL_TABLES)):
+        raise WildlabError(
+            f"{unknown[0]!r} is not a table that can be left out",
+            f"use any of {', '.join(OPTIONAL_TABLES)}",
+            field="without",
+        )
     path, attitude = trajectory(twin, stream(seed, "trajectory"))
     manifest = twin_manifest(twin, int(seed))
     camera, mount = manifest.geometry_camera(), manifest.geometry_mount()
 
     duration, camera_rate = twin.flight.duration.si, twin.camera.frame_rate.si
-    true = move(path, attitude, _ticks(twin.autopilot.rate.si, duration))
-    calibrated, uncalibrated = _autopilot(twin, true, int(seed))
-    known = move(path, attitude, _ticks(twin.truth.rate.si, duration))
-    nav = {AUTOPILOT: calibrated, UNCALIBRATED: uncalibrated, TRUTH: _nav_table(known)}
+    true = move(path, attitude, ticks(twin.autopilot.rate.si, duration))
+    calibrated, uncalibrated = autopilot_tables(twin, true, int(seed))
+    known = move(path, attitude, ticks(twin.truth.rate.si, duration))
+    nav = {AUTOPILOT: calibrated, UNCALIBRATED: uncalibrated, TRUTH: nav_table(known)}
+    payload = payload_attitude(twin, attitude, int(seed))
+    nav[PAYLOAD_TRUTH] = nav_table(move(path, payload, ticks(twin.truth.rate.si, duration)))
     exposures = twin.camera.recording_start.si + np.arange(int(twin.camera.images.number)) / camera_rate
     frames = _frames(twin, exposures, int(seed))
     detections = _marks(twin, camera, mount, move(path, attitude, exposures), frames, int(seed))
@@ -88,7 +114,12 @@ def simulate(twin: TwinParameters, seed: int) -> Flight:
             "sd_vertical_m": [twin.target.sd.si],
         }
     )
-    return Flight(manifest, nav, {"frames": frames, "detections": detections, "truth": truth})
+    tables = {"frames": frames, "detections": detections, "truth": truth}
+    if "imu" not in without:
+        tables["imu"] = imu_table(twin, path, payload, int(seed))
+    if "gnss" not in without:
+        tables["gnss"] = gnss_table(twin, path, payload, int(seed))
+    return Flight(manifest, nav, tables)
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
@@ -207,46 +238,6 @@ def _circle(
     )
     gravity, trim = twin.place.gravity.si, f.trim_pitch.si
     return path, attitude_of(path, wind=wind, trim_pitch=trim, gravity=gravity, sway=sway)
-
-
-def _ticks(rate: float, duration: float) -> Array:
-    """Sample times from 0 to the end of the flight, (N,) s."""
-    return np.arange(math.floor(duration * rate + 1e-9) + 1) / rate
-
-
-def _nav_table(motion: Motion) -> pd.DataFrame:
-    q = matrix_to_quaternion(motion.R_nb)
-    columns = {"time_s": motion.times}
-    columns |= {f"{axis}_m": motion.position[:, i] for i, axis in enumerate(("north", "east", "down"))}
-    columns |= {f"q_{part}": q[:, i] for i, part in enumerate("wxyz")}
-    columns |= {f"v_{axis}_m_s": motion.velocity[:, i] for i, axis in enumerate(("north", "east", "down"))}
-    return pd.DataFrame(columns)
-
-
-def _autopilot(twin: TwinParameters, true: Motion, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The logged pose with the IMU's misalignment taken out, and left in: same errors, one difference."""
-    a, count, step = twin.autopilot, len(true.times), 1 / twin.autopilot.rate.si
-    rng = stream(seed, "autopilot attitude")
-    turn = gauss_markov(
-        count, step, [a.roll_sd.si, a.pitch_sd.si, a.yaw_sd.si], a.attitude_correlation_time.si, rng
-    ) + a.attitude_noise.si * rng.standard_normal((count, 3))
-    rng = stream(seed, "autopilot position")
-    spread = [a.horizontal_sd.si, a.horizontal_sd.si, a.vertical_sd.si]
-    shift = gauss_markov(count, step, spread, a.position_correlation_time.si, rng)
-    shift += a.position_noise.si * rng.standard_normal((count, 3))
-    rng = stream(seed, "autopilot velocity")
-    slip = gauss_markov(count, step, [a.velocity_sd.si] * 3, a.velocity_correlation_time.si, rng)
-    logged = Motion(
-        true.times,
-        rounded(true.position + shift, a.position_resolution.si),
-        true.velocity + slip,
-        true.acceleration,
-        turned_by(true.R_nb, turn),
-    )
-    # Of a level airframe the IMU reads these angles, so they are its attitude against the airframe.
-    imu = euler_to_matrix(a.imu_roll.si, a.imu_pitch.si, a.imu_yaw.si)
-    left_in = Motion(logged.times, logged.position, logged.velocity, logged.acceleration, logged.R_nb @ imu)
-    return _nav_table(logged), _nav_table(left_in)
 
 
 def _frames(twin: TwinParameters, exposures: Array, seed: int) -> pd.DataFrame:

@@ -1,0 +1,147 @@
+"""Inertial units: ideal ones agree with the motion, real ones have the statistics of their data sheets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wildlab.flight.files import read_toml
+from wildlab.simulation.imu import ideal_imu, misaligned_triad, read_imu, read_triad
+from wildlab.simulation.models import Imu
+from wildlab.simulation.parameters import PARTS
+from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+
+#: A triad that does not err; each test switches one error on.
+IDEAL = dict(
+    random_walk=0.0,
+    bias_stability=0.0,
+    bias_time=100.0,
+    turn_on_bias=0.0,
+    axis=0.0,
+    package=0.0,
+    limit=np.inf,
+    resolution=0.0,
+)
+
+
+def sheet(name: str) -> Imu:
+    return Imu.model_validate(read_toml(PARTS / f"imu-{name}.toml", "an IMU")["imu"])
+
+
+def allan_deviation(rate: np.ndarray, hertz: float, averaged: int) -> float:
+    """Overlapping Allan deviation of a signal (N,) for averages over that many samples."""
+    angle = np.concatenate([[0.0], np.cumsum(rate)]) / hertz
+    second = angle[2 * averaged :] - 2 * angle[averaged:-averaged] + angle[: -2 * averaged]
+    return float(np.sqrt(np.mean(second**2) / 2) / (averaged / hertz))
+
+
+def test_ideal_readings_are_those_of_the_motion_whatever_the_chunk(restless_loiter):
+    path, attitude = restless_loiter()
+    count = 40_000  # three chunks
+    force, rate = ideal_imu(path, attitude, 250.0, count)
+    t = np.arange(count) / 250
+    for some in (slice(0, 50), slice(16_380, 16_390), slice(32_760, 32_780), slice(-50, None)):
+        assert np.abs(force[some] - specific_forces(move(path, attitude, t[some]))).max() < 1e-9
+        # Two differences of different steps: each errs by some 1e-7 of a tenth of a radian per second.
+        assert np.abs(rate[some] - angular_rates(attitude, t[some])).max() < 1e-7
+
+
+def test_ideal_readings_carry_a_strapdown_round_the_loiter(restless_loiter):
+    """A minute of dead reckoning from the readings alone, by the trapezoidal rule."""
+    path, attitude = restless_loiter()
+    rate, count = 250.0, 15_001
+    force, spin = ideal_imu(path, attitude, rate, count)
+    h = 1 / rate
+    turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
+    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
+    down = np.array([0.0, 0.0, 9.81])
+    for i in range(count - 1):
+        a0 = R.apply(force[i]) + down
+        R = R * turns[i]
+        a = (a0 + R.apply(force[i + 1]) + down) / 2
+        p += h * v + h**2 / 2 * a
+        v += h * a
+    assert np.degrees((R.inv() * Rotation.from_matrix(end.R_nb[0])).magnitude()) < 1e-3
+    assert np.linalg.norm(v - end.velocity[0]) < 5e-3
+    assert np.linalg.norm(p - end.position[0]) < 0.1
+
+
+@pytest.mark.parametrize("name", ["adis16490", "stim300"])
+def test_standing_still_the_walks_are_those_of_the_data_sheet(name):
+    """Allan deviation at 1 s, where white noise is all there is: N / sqrt(T) (IEEE 952)."""
+    imu, seconds, hertz = sheet(name), 1000, 250
+    force = np.tile([0.0, 0.0, -9.81], (seconds * hertz, 1))
+    f, w = read_imu(force, np.zeros_like(force), imu, lambda n: np.random.default_rng([4, len(n)]))
+    per_root_hour = 60.0  # 1/sqrt(s) -> 1/sqrt(h)
+    for axis in range(3):
+        walk = np.degrees(allan_deviation(w[:, axis], hertz, hertz)) * per_root_hour
+        # 1000 independent seconds fix a deviation to 1/sqrt(2 * 1000) = 2.2 %, overlap to a little better.
+        assert walk == pytest.approx(imu.gyro_random_walk.number, rel=0.08)
+        walk = allan_deviation(f[:, axis], hertz, hertz) * per_root_hour
+        assert walk == pytest.approx(imu.accelerometer_random_walk.number, rel=0.08)
+
+
+@pytest.mark.parametrize("name", ["adis16490", "stim300"])
+def test_the_bias_in_the_run_has_the_allan_deviation_of_its_process(name):
+    """Of a Gauss-Markov process it is known in closed form (IEEE 952), and largest at 1.89 times tau."""
+    imu = sheet(name)
+    sd, tau = imu.gyro_bias_stability.si, imu.gyro_bias_time.si
+    count, hertz = 400_000, 1.0  # 1333 correlation times
+    quiet = {**IDEAL, "bias_stability": sd, "bias_time": tau}
+    bias = read_triad(np.zeros((count, 3)), hertz, np.random.default_rng(8), **quiet)
+    averaged = round(1.89 * tau)
+    x = averaged / hertz / tau
+    expected = sd * np.sqrt(2 / x * (1 - (3 - 4 * np.exp(-x) + np.exp(-2 * x)) / (2 * x)))
+    assert expected == pytest.approx(0.617 * sd, rel=0.01)
+    for axis in range(3):
+        # About 700 independent averages of that length: 1/sqrt(2 * 350) = 4 %.
+        assert allan_deviation(bias[:, axis], hertz, averaged) == pytest.approx(expected, rel=0.15)
+
+
+def test_the_turn_on_bias_is_drawn_once_per_flight():
+    still = np.zeros((10, 3))
+    runs = np.array(
+        [
+            read_triad(still, 250.0, np.random.default_rng(seed), **{**IDEAL, "turn_on_bias": 0.3})
+            for seed in range(2000)
+        ]
+    )
+    assert np.ptp(runs, axis=1).max() == 0
+    assert runs[:, 0].std(axis=0) == pytest.approx([0.3] * 3, rel=5 / np.sqrt(2 * 2000))
+    assert runs[:, 0].mean(axis=0) == pytest.approx([0] * 3, abs=5 * 0.3 / np.sqrt(2000))
+
+
+def test_misaligned_axes_stay_within_the_stated_angles():
+    rng = np.random.default_rng(3)
+    axis, package = np.radians([0.05, 0.25])
+    between, turned = [], []
+    for _ in range(3000):
+        lean = misaligned_triad(axis, 0.0, rng)
+        assert np.linalg.norm(lean, axis=1) == pytest.approx(1.0, abs=1e-12)
+        between.append(lean[~np.eye(3, dtype=bool)])
+        whole = misaligned_triad(0.0, package, rng)
+        assert np.allclose(whole @ whole.T, np.eye(3), atol=1e-12)
+        turned.append(Rotation.from_matrix(whole.T).as_rotvec())
+    for angles, limit in ((np.array(between), axis), (np.array(turned), package)):
+        assert 0.99 * limit < np.abs(angles).max() < 1.0001 * limit
+        # Even draws have the SD limit / sqrt(3).
+        assert angles.std() == pytest.approx(limit / np.sqrt(3), rel=0.03)
+
+
+def test_range_and_resolution_bound_the_reading():
+    true = np.array([[0.2512, -3.0, 0.0], [1e9, -1e9, 0.2549]])
+    reading = read_triad(true, 250.0, np.random.default_rng(0), **{**IDEAL, "limit": 2.0, "resolution": 0.01})
+    assert reading == pytest.approx(np.array([[0.25, -2.0, 0.0], [2.0, -2.0, 0.25]]))
+
+
+def test_gyros_and_accelerometers_err_apart():
+    asked = []
+
+    def stream(name):
+        asked.append(name)
+        return np.random.default_rng(len(asked))
+
+    read_imu(np.zeros((5, 3)), np.zeros((5, 3)), sheet("adis16490"), stream)
+    assert sorted(asked) == ["accelerometers", "gyros"]

@@ -1,0 +1,119 @@
+"""What sensors on the airframe write down: the autopilot's poses, inertial measurements, satellite fixes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion
+from wildlab.simulation.gnss import antenna_motion, fixes
+from wildlab.simulation.imu import ideal_imu, read_imu
+from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.sensors import gauss_markov, rounded, stream, turned_by
+from wildlab.simulation.trajectory import (
+    FlightPath,
+    Motion,
+    Signal,
+    angular_rates,
+    move,
+    random_wander,
+)
+
+
+def ticks(rate: float, duration: float) -> Array:
+    """Sample times from 0 to the end of the flight, (N,) s."""
+    return np.arange(math.floor(duration * rate + 1e-9) + 1) / rate
+
+
+def nav_table(motion: Motion) -> pd.DataFrame:
+    q = matrix_to_quaternion(motion.R_nb)
+    columns = {"time_s": motion.times}
+    columns |= {f"{axis}_m": motion.position[:, i] for i, axis in enumerate(("north", "east", "down"))}
+    columns |= {f"q_{part}": q[:, i] for i, part in enumerate("wxyz")}
+    columns |= {f"v_{axis}_m_s": motion.velocity[:, i] for i, axis in enumerate(("north", "east", "down"))}
+    return pd.DataFrame(columns)
+
+
+def autopilot_tables(twin: TwinParameters, true: Motion, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The logged pose with the IMU's misalignment taken out, and left in: same errors, one difference."""
+    a, count, step = twin.autopilot, len(true.times), 1 / twin.autopilot.rate.si
+    rng = stream(seed, "autopilot attitude")
+    turn = gauss_markov(
+        count, step, [a.roll_sd.si, a.pitch_sd.si, a.yaw_sd.si], a.attitude_correlation_time.si, rng
+    ) + a.attitude_noise.si * rng.standard_normal((count, 3))
+    rng = stream(seed, "autopilot position")
+    spread = [a.horizontal_sd.si, a.horizontal_sd.si, a.vertical_sd.si]
+    shift = gauss_markov(count, step, spread, a.position_correlation_time.si, rng)
+    shift += a.position_noise.si * rng.standard_normal((count, 3))
+    rng = stream(seed, "autopilot velocity")
+    slip = gauss_markov(count, step, [a.velocity_sd.si] * 3, a.velocity_correlation_time.si, rng)
+    logged = Motion(
+        true.times,
+        rounded(true.position + shift, a.position_resolution.si),
+        true.velocity + slip,
+        true.acceleration,
+        turned_by(true.R_nb, turn),
+    )
+    # Of a level airframe the IMU reads these angles, so they are its attitude against the airframe.
+    imu = euler_to_matrix(a.imu_roll.si, a.imu_pitch.si, a.imu_yaw.si)
+    left_in = Motion(logged.times, logged.position, logged.velocity, logged.acceleration, logged.R_nb @ imu)
+    return nav_table(logged), nav_table(left_in)
+
+
+def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signal:
+    """Attitude of the payload: that of the airframe, and the payload turned against it a little.
+
+    The IMU and the antennas are on the payload, the camera is on the airframe. (N,) s -> (N, 3, 3).
+    """
+    b, rng = twin.boresight, stream(seed, "boresight")
+    band = (b.shortest_period.si, b.longest_period.si)
+    roll, pitch, yaw = (random_wander(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd))
+
+    def turned(times: Array) -> Array:
+        return np.asarray(attitude(times) @ euler_to_matrix(roll(times), pitch(times), yaw(times)))
+
+    return turned
+
+
+def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
+    """Readings of the inertial unit over the whole flight."""
+    times = ticks(twin.imu.rate.si, twin.flight.duration.si)
+    true = ideal_imu(path, payload, twin.imu.rate.si, len(times), twin.place.gravity.si)
+    force, rate = read_imu(*true, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
+    columns = {"time_s": times}
+    columns |= {f"f_{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}
+    columns |= {f"w_{axis}_rad_s": rate[:, i] for i, axis in enumerate("xyz")}
+    return pd.DataFrame(columns)
+
+
+def gnss_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
+    """Fixes of the two receivers over the whole flight, and the velocity that the first one gives."""
+    g = twin.gnss
+    times = ticks(g.rate.si, twin.flight.duration.si)
+    motion, rate = move(path, payload, times), angular_rates(payload, times)
+    arms = {
+        "": (g.first_x.si, g.first_y.si, g.first_z.si),
+        "second_": (g.second_x.si, g.second_y.si, g.second_z.si),
+    }
+    noise = (g.horizontal_noise.si, g.vertical_noise.si)
+    wander = (g.horizontal_wander.si, g.vertical_wander.si)
+    columns = {"time_s": times + g.latency.si}
+    for which, arm in arms.items():
+        position, velocity = antenna_motion(motion, rate, arm)
+        rng = stream(seed, f"gnss {which or 'first_'}antenna")
+        fix = fixes(position, 1 / g.rate.si, rng, wander=wander, wander_time=g.wander_time.si, noise=noise)
+        fix = rounded(fix, g.resolution.si)
+        columns |= {f"{which}{axis}_m": fix[:, i] for i, axis in enumerate(("north", "east", "down"))}
+        if not which:
+            slip = g.velocity_noise.si * stream(seed, "gnss velocity").standard_normal(velocity.shape)
+            columns |= {
+                f"v_{axis}_m_s": (velocity + slip)[:, i] for i, axis in enumerate(("north", "east", "down"))
+            }
+    columns["sd_horizontal_m"] = np.full(len(times), math.hypot(noise[0], wander[0]))
+    columns["sd_vertical_m"] = np.full(len(times), math.hypot(noise[1], wander[1]))
+    columns["sd_velocity_m_s"] = np.full(len(times), g.velocity_noise.si)
+    for which, arm in arms.items():
+        columns |= {f"{which}lever_{axis}_m": np.full(len(times), arm[i]) for i, axis in enumerate("xyz")}
+    return pd.DataFrame(columns)

@@ -1,0 +1,165 @@
+"""Inertial measurement units: what ideal sensors would feel along a trajectory, and what a real unit reads.
+
+The errors are those of a data sheet (H tables A.5 and A.6): white noise whose integral walks (angle and
+velocity random walk), a bias that differs from one switching-on to the next and wanders during the run, axes
+that are not where they are said to be, a range and a resolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from wildlab.geometry.frames import Array
+from wildlab.simulation.models import Imu
+from wildlab.simulation.sensors import gauss_markov, rounded
+from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
+
+_CHUNK = 16_384  # samples at a time: what the sines of a wander need then fits into the processor's cache
+_ASIDE = 4  # samples on either side of a difference of fourth order with a step of two samples
+
+
+def ideal_imu(
+    path: FlightPath, attitude: Signal, rate: float, count: int, gravity: float = GRAVITY
+) -> tuple[Array, Array]:
+    """Specific force and angular rate of a body, as ideal sensors feel them.
+
+    The angular rate is a central difference of fourth order over the samples themselves, so that the attitude
+    is asked for once per sample only. With a step of two samples of 10 ms at most, motion with periods of two
+    seconds and more has a relative error of some 1e-7, far below any sensor's.
+
+    Parameters
+    ----------
+    path, attitude
+        Motion of the body in n; ``R`` takes a vector from the body to n.
+    rate
+        Samples per second, Hz, at least 100.
+    count
+        N samples, the first at time 0.
+
+    Returns
+    -------
+    force
+        (N, 3) m/s^2, in the body.
+    angular_rate
+        (N, 3) rad/s, of the body against n, in the body.
+    """
+    force, spin = np.empty((count, 3)), np.empty((count, 3))
+    for first in range(0, count, _CHUNK):
+        last = min(first + _CHUNK, count)
+        t = np.arange(first - _ASIDE, last + _ASIDE) / rate
+        R = attitude(t)
+        near, far = _mean_rate(R, 2, rate), _mean_rate(R, 4, rate)
+        spin[first:last] = (4 * near[2:-2] - far) / 3
+        _, _, acceleration = path(t[_ASIDE:-_ASIDE])
+        felt = acceleration - np.array([0.0, 0.0, gravity])
+        force[first:last] = np.einsum("nji,nj->ni", R[_ASIDE:-_ASIDE], felt)
+    return force, spin
+
+
+def _mean_rate(R: Array, step: int, rate: float) -> Array:
+    """Mean angular rate over ``2 * step`` samples around each sample that has so many on either side."""
+    turn = np.swapaxes(R[: -2 * step], -1, -2) @ R[2 * step :]
+    return np.asarray(Rotation.from_matrix(turn).as_rotvec() * (rate / (2 * step)))
+
+
+def misaligned_triad(axis: float, package: float, rng: np.random.Generator) -> Array:
+    """What three axes that are not where they should be read of a vector: (3, 3), to be multiplied by it.
+
+    Parameters
+    ----------
+    axis
+        Each axis leans towards each of the other two by an angle drawn evenly from -axis to axis, rad.
+    package
+        All three together are turned about each axis of the package by an angle drawn likewise, rad.
+    """
+    lean = rng.uniform(-axis, axis, (3, 3))
+    np.fill_diagonal(lean, 0.0)
+    turned = Rotation.from_rotvec(rng.uniform(-package, package, 3)).as_matrix()
+    axes = np.eye(3) + lean
+    return np.asarray((axes / np.linalg.norm(axes, axis=1, keepdims=True)) @ turned.T)
+
+
+def read_triad(
+    true: ArrayLike,
+    rate: float,
+    rng: np.random.Generator,
+    *,
+    random_walk: float,
+    bias_stability: float,
+    bias_time: float,
+    turn_on_bias: float,
+    axis: float,
+    package: float,
+    limit: float,
+    resolution: float,
+) -> Array:
+    """What three gyros or accelerometers read of the true values.
+
+    Parameters
+    ----------
+    true
+        (N, 3), in SI units.
+    rate
+        Hz.
+    random_walk
+        Noise density, in the unit of ``true`` times the root of a second: the SD of the integral after 1 s.
+    bias_stability, bias_time
+        SD and correlation time (s) of the bias that wanders during the run.
+    turn_on_bias
+        SD of the bias that stays from switching on to switching off.
+    axis, package
+        As in :func:`misaligned_triad`, rad.
+    limit, resolution
+        Beyond the one the reading stands still, and it is a multiple of the other.
+
+    Returns
+    -------
+    (N, 3).
+    """
+    x = np.asarray(true, float)
+    triad = misaligned_triad(axis, package, rng)
+    reading = x @ triad.T + turn_on_bias * rng.standard_normal(3)
+    reading += gauss_markov(len(x), 1 / rate, [bias_stability] * 3, bias_time, rng)
+    reading += random_walk * np.sqrt(rate) * rng.standard_normal(x.shape)
+    return np.clip(rounded(reading, resolution), -limit, limit)
+
+
+def read_imu(
+    force: ArrayLike, angular_rate: ArrayLike, imu: Imu, stream: Callable[[str], np.random.Generator]
+) -> tuple[Array, Array]:
+    """Readings of a unit with that data sheet, calibrated to the body: (N, 3) m/s^2 and (N, 3) rad/s.
+
+    ``stream`` gives the random numbers of each triad by its name.
+    """
+    rate, axis, package = imu.rate.si, imu.axis_misalignment.si, imu.package_misalignment.si
+    f = read_triad(
+        force,
+        rate,
+        stream("accelerometers"),
+        random_walk=imu.accelerometer_random_walk.si,
+        bias_stability=imu.accelerometer_bias_stability.si,
+        bias_time=imu.accelerometer_bias_time.si,
+        turn_on_bias=imu.accelerometer_turn_on_bias.si,
+        axis=axis,
+        package=package,
+        limit=imu.accelerometer_range.si,
+        resolution=imu.accelerometer_resolution.si,
+    )
+    w = read_triad(
+        angular_rate,
+        rate,
+        stream("gyros"),
+        random_walk=imu.gyro_random_walk.si,
+        bias_stability=imu.gyro_bias_stability.si,
+        bias_time=imu.gyro_bias_time.si,
+        turn_on_bias=imu.gyro_turn_on_bias.si,
+        axis=axis,
+        package=package,
+        limit=imu.gyro_range.si,
+        resolution=imu.gyro_resolution.si,
+    )
+    return f, w
