@@ -2,8 +2,10 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
-from wildlab.pipeline.at_rest import filter_errors
+from wildlab.errors import WildlabError
+from wildlab.pipeline.at_rest import filter_errors, judge_columns, summarise_at_rest
 from wildlab.tracking.kalman import filter_at_rest
 
 
@@ -22,3 +24,15 @@ def test_filtering_errors_is_filtering_positions():
     assert np.allclose(ours.x, direct.x - truth)
     assert np.allclose(ours.P, direct.P)
     assert np.allclose(ours.innovation[1:], direct.innovation[1:])
+
+
+def test_columns_are_those_the_flight_has_and_none_is_an_error(make_flight):
+    flight = make_flight(pixel_px=1.0)
+    with pytest.raises(WildlabError, match="no poses named 'autopilot'"):
+        judge_columns(flight, np.random.default_rng(0))
+    flight.nav["autopilot"] = flight.nav["logged"]
+    judged = judge_columns(flight, np.random.default_rng(0))
+    assert list(judged) == ["pixhawk-autopilot"]
+    found = summarise_at_rest(judged)
+    assert found["pixhawk-autopilot", "mae"] == pytest.approx(judged["pixhawk-autopilot"]["error_m"].mean())
+    assert found["filter", "at_end"] < found["pixhawk-autopilot", "mae"]

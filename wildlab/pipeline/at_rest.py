@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.store import Flight
@@ -26,8 +27,21 @@ BATCH_GAP_S = 10.0
 
 
 def judge_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
-    """The flight's detections judged once for each column that the flight has the data for."""
+    """The flight's detections judged once for each column that the flight has the data for.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has not even the autopilot's poses.
+    """
     frames = flight.table("frames")
+    if "autopilot" not in flight.nav:
+        raise WildlabError(
+            "the flight has no poses named 'autopilot'",
+            "give it nav/autopilot.parquet, or ask `wildlab evaluate` about it",
+            file=flight.folder,
+            field="nav",
+        )
     return {
         column: judge(flight, georeference(flight, observe(flight, source, stamps), rng))
         for column, (source, stamps) in COLUMNS.items()

@@ -1,0 +1,131 @@
+"""Every study, run as a user runs it: its promised metrics, its figures, its page in a browser."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wildlab.flight.recipe import import_flight
+from wildlab.paths import DATA, NOTEBOOKS
+from wildlab.reporting.run import evaluate_flight, run_studies
+
+pytestmark = pytest.mark.slow
+
+Faults = Callable[[Path], list[str]]
+ACCURACY = {
+    "horizontal_error_mean",
+    "horizontal_error_median",
+    "horizontal_error_p90",
+    "horizontal_error_max",
+    "bias_north",
+    "bias_east",
+    "sd_north",
+    "sd_east",
+    "ellipse_coverage_90",
+}
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("reports")
+
+
+def values(folder: Path | None) -> dict[tuple[str, str], dict[str, Any]]:
+    """The metrics of a report by (name, subject)."""
+    assert folder is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    return {(m["name"], m["subject"]): m for m in content["metrics"]}
+
+
+def run(name: str, reports: Path, **kwargs: Any) -> Path:
+    (outcome,) = run_studies([name], reports=reports, **kwargs)
+    assert outcome.state == "done", outcome.reason
+    assert outcome.folder is not None
+    return outcome.folder
+
+
+def test_sensitivity_meets_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("sensitivity", reports)
+    metrics = [m for (name, _), m in values(folder).items() if name == "horizontal_error"]
+    assert len(metrics) == 42
+    assert all(abs(m["value"] - m["published"]) <= 0.15 for m in metrics)
+    assert {m["subject"].split("/")[0] for m in metrics} == {"level", "turn", "ascent"}
+    assert {m["subject"].split("/")[2] for m in metrics} == {"100m", "400m"}
+    assert faults(folder / "report.html") == []
+
+
+def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("consistency-bounds", reports)
+    printed = [m for m in values(folder).values() if m["published"] is not None]
+    assert len(printed) == 6
+    assert faults(folder / "report.html") == []
+
+
+def test_static_point_over_a_few_flights(reports: Path, tmp_path: Path, faults: Faults) -> None:
+    notebooks = tmp_path / "notebooks"
+    shutil.copytree(NOTEBOOKS, notebooks)
+    studies = (notebooks / "studies.toml").read_text(encoding="utf-8")
+    assert "seeds = 100" in studies
+    (notebooks / "studies.toml").write_text(studies.replace("seeds = 100", "seeds = 4"), encoding="utf-8")
+    folder = run("static-point", reports, notebooks=notebooks)
+    found = values(folder)
+    for column in (
+        "pixhawk-autopilot",
+        "without-time-synchronization",
+        "without-misalignment-calibration",
+    ):
+        for name in ("mean_north", "mean_east", "sd_north", "sd_east", "mae"):
+            metric = found[name, column]
+            assert metric["low"] <= metric["value"] <= metric["high"]
+            assert metric["published"] is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 6)
+    for figure in ("02", "03a", "03b", "04b", "05a", "05b", "06", "07"):
+        assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
+        assert (folder / "figures" / f"fig-5-{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
+def test_survey_markers_beside_the_published_accuracy(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("georeferencing", "openathena")
+    import_flight(DATA / "recipes" / "openathena.toml", raw, tmp_path / "flight")
+    folder = run("survey-markers", reports, flight=tmp_path / "flight")
+    found = values(folder)
+    for subject in ("logged-pose", "calibrated-pose"):
+        assert {name for name, other in found if other == subject} == ACCURACY
+    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 5.6
+    assert found["horizontal_error_median", "logged-pose"]["value"] <= 5.2
+    assert found["horizontal_error_p90", "logged-pose"]["value"] <= 9.1
+    assert found["horizontal_error_mean", "recorded-answers"]["value"] == pytest.approx(9.05, abs=0.05)
+    assert faults(folder / "report.html") == []
+
+
+def test_a_flight_with_labelled_markers_is_evaluated(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("georeferencing", "openathena-f1")
+    import_flight(DATA / "recipes" / "openathena-f1.toml", raw, tmp_path / "flight")
+    outcome = evaluate_flight(tmp_path / "flight", reports=reports)
+    found = values(outcome.folder)
+    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 3.0
+    assert found["horizontal_error_mean", "logged-pose"]["n"] == 103
+    before, after = (
+        found["ellipse_coverage_90", subject]["value"]
+        for subject in ("logged-pose", "logged-pose/estimated-noise")
+    )
+    assert 0.8 <= after <= before <= 1.0
+    assert outcome.folder is not None
+    assert faults(outcome.folder / "report.html") == []
+
+
+def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
+    page = reports / "index.html"
+    assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")
+    assert faults(page) == []
