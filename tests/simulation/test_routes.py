@@ -1,0 +1,173 @@
+"""Courses between waypoints: their geometry, their speed through the wind, no contradictions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wildlab.geometry.frames import matrix_to_euler
+from wildlab.simulation.imu import ideal_imu
+from wildlab.simulation.routes import fly, lap_times, outline, shape_corners
+from wildlab.simulation.trajectory import angular_rates, attitude_of, move, random_wander
+
+WIND = np.array([-3.2, -3.2, 0.0])  # 4.5 m/s from the north-east
+ALTITUDE = [[0.0, 200.0], [100.0, 200.0], [160.0, 300.0]]
+
+
+def restless(shape="eight"):
+    """A course with wind, drift, climb, wander and sway, all on: (path, attitude)."""
+    rng = np.random.default_rng(5)
+    path = fly(
+        outline(shape_corners(shape, 500.0, 400.0), 80.0),
+        19.5,
+        400.0,
+        altitude=ALTITUDE,
+        wind=WIND[:2],
+        drift=(0.5, -0.3),
+        start=0.2,
+        track_wander=(random_wander(3.0, 20.0, 120.0, rng), random_wander(3.0, 20.0, 120.0, rng)),
+        altitude_wander=random_wander(2.0, 20.0, 120.0, rng),
+    )
+    sway = tuple(random_wander(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
+    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), sway=sway)
+
+
+def calm(course, **more):
+    return fly(course, 19.5, 600.0, altitude=[[0.0, 300.0]], **more)
+
+
+def test_a_course_touches_its_legs_and_turns_with_its_radius():
+    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    assert course[0] == pytest.approx(course[-1])
+    assert course[0] == pytest.approx([0.0, 0.0], abs=0.5)  # an eight starts in its middle
+    step = np.diff(course, axis=0)
+    assert np.linalg.norm(step, axis=1).max() < 0.51
+    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    bend = np.diff(heading) / np.linalg.norm(step[1:], axis=1)
+    curved = np.abs(bend) > 1e-6
+    # Where a leg meets an arc, only half of the bend has happened.
+    assert np.quantile(np.abs(bend[curved]), [0.1, 0.9]) == pytest.approx(1 / 80, rel=0.01)
+    # An eight turns as far to the left as to the right.
+    assert heading[-1] - heading[0] == pytest.approx(0.0, abs=1e-9)
+    track = outline(shape_corners("racetrack", 500.0, 200.0), 80.0)
+    heading = np.unwrap(np.arctan2(*np.diff(track, axis=0).T[::-1]))
+    assert heading[-1] - heading[0] == pytest.approx(2 * np.pi)  # clockwise once
+    assert track[0] == pytest.approx([0.0, 0.0], abs=0.5)
+
+
+def test_turns_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="do not fit"):
+        outline(shape_corners("eight", 300.0, 100.0), 80.0)
+    with pytest.raises(ValueError, match="exceed the wind"):
+        lap_times(outline(shape_corners("eight", 500.0, 400.0), 80.0), 19.5, (15.0, 15.0))
+
+
+def test_a_lap_in_still_air_takes_its_length_over_the_airspeed():
+    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    length = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
+    assert lap_times(course, 20.0, (0, 0))[-1] == pytest.approx(length / 20)
+    path = calm(course)
+    p0, p1 = path(np.array([50.0]))[0], path(np.array([50.0 + length / 19.5]))[0]
+    # Smoothing samples the laps at its own times, which cut corners a little differently on each.
+    assert p1 == pytest.approx(p0, abs=0.05)
+
+
+def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
+    course = outline(shape_corners("eight", 1500.0, 400.0), 80.0)
+    path = calm(course, wind=WIND[:2])
+    attitude = attitude_of(path, wind=WIND)
+    t = np.arange(0, 600, 0.1)
+    p, v, a = path(t)
+    airspeed = np.linalg.norm(v - WIND, axis=1)
+    level = np.linalg.norm(a, axis=1) < 1e-9
+    assert 0.4 < level.mean() < 0.9
+    assert airspeed[level] == pytest.approx(19.5, abs=1e-9)
+    assert 0.9 * 19.5 < airspeed.min() <= airspeed.max() < 1.02 * 19.5
+    roll = matrix_to_euler(attitude(t))[:, 0]
+    assert roll[level] == pytest.approx(0.0, abs=1e-9)
+    ground_speed = np.linalg.norm(v, axis=1)
+    steepest = np.arctan(ground_speed**2 / (9.81 * 80))
+    assert np.radians(45) > np.abs(roll).max() > np.radians(20)
+    assert (np.abs(roll) < steepest.max() + 0.05).all()
+    # On the ground the track is that of the drawn course, within what smoothing cuts off.
+    nearest = np.array([np.min(np.linalg.norm(course - q[:2], axis=1)) for q in p[::7]])
+    assert nearest.max() < 4.0
+    assert p[:, 2] == pytest.approx(-300.0)
+
+
+def test_head_and_tail_wind_give_the_ground_speeds_of_h_7_5_4():
+    """15 m/s upwind and 24 m/s downwind; across the wind the nose points into it."""
+    wind = np.array([4.5, 0.0, 0.0])
+    course = outline(shape_corners("racetrack", 1500.0, 400.0), 100.0)
+    path = calm(course, wind=wind[:2])
+    t = np.arange(0, 300, 0.1)
+    _, v, a = path(t)
+    level = np.linalg.norm(a, axis=1) < 1e-9
+    speed = np.linalg.norm(v, axis=1)
+    assert speed[level].min() == pytest.approx(15.0, abs=1e-9)
+    assert speed[level].max() == pytest.approx(24.0, abs=1e-9)
+    across = level & (np.abs(v[:, 0]) < 1e-9)
+    assert across.any()
+    yaw = matrix_to_euler(attitude_of(path, wind=wind)(t))[across, 2]
+    crab = np.arctan2(v[across, 1], v[across, 0]) - yaw
+    assert np.abs(np.degrees(crab)) == pytest.approx(np.degrees(np.arcsin(4.5 / 19.5)))
+
+
+def test_a_drifting_course_is_the_same_course_in_its_own_frame():
+    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    drift = np.array([3.0, -4.0])
+    t = np.arange(0, 300, 0.5)
+    moving, v, _ = calm(course, drift=drift, wind=(1.0, 2.0))(t)
+    resting, u, _ = calm(course, wind=np.array([1.0, 2.0]) - drift)(t)
+    assert moving[:, :2] - np.outer(t, drift) == pytest.approx(resting[:, :2], abs=1e-8)
+    assert v[:, :2] - drift == pytest.approx(u[:, :2], abs=1e-9)
+
+
+def test_altitude_follows_its_profile():
+    path = fly(outline(shape_corners("eight", 500.0, 400.0), 80.0), 19.5, 300.0, altitude=ALTITUDE)
+    p, v, _ = path(np.array([0.0, 50.0, 130.0, 200.0, 290.0]))
+    assert -p[:, 2] == pytest.approx([200, 200, 250, 300, 300], abs=1e-6)
+    assert v[2, 2] == pytest.approx(-100 / 60)
+
+
+@pytest.mark.parametrize("shape", ["eight", "racetrack"])
+def test_velocity_and_acceleration_are_the_derivatives_of_position(shape):
+    path, _ = restless(shape)
+    t, h = np.linspace(0, 400, 4000), 1e-3
+    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
+    _, v, a = path(t)
+    # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4): 2e-6.
+    assert np.abs((p1 - p0) / (2 * h) - v).max() < 2e-6
+    assert np.abs((v1 - v0) / (2 * h) - a).max() < 2e-6
+
+
+def test_angular_rate_is_the_derivative_of_attitude():
+    _, attitude = restless()
+    t, h = np.linspace(5, 395, 3000), 1e-3
+    rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
+    # As of the loiter; rolling into a turn adds some rad/s^3.
+    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
+    assert np.degrees(np.abs(rate)).max() < 60
+
+
+def test_ideal_inertial_readings_carry_a_strapdown_round_the_course():
+    path, attitude = restless()
+    rate, count = 250.0, 30_001
+    force, spin = ideal_imu(path, attitude, rate, count)
+    h = 1 / rate
+    turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
+    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
+    down = np.array([0.0, 0.0, 9.81])
+    before = R.apply(force[0]) + down
+    for i in range(count - 1):
+        R = R * turns[i]
+        after = R.apply(force[i + 1]) + down
+        a = (before + after) / 2
+        p += h * v + h**2 / 2 * a
+        v += h * a
+        before = after
+    assert np.degrees((R.inv() * Rotation.from_matrix(end.R_nb[0])).magnitude()) < 2e-3
+    assert np.linalg.norm(v - end.velocity[0]) < 0.02
+    assert np.linalg.norm(p - end.position[0]) < 0.5

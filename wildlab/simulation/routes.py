@@ -1,0 +1,178 @@
+"""Courses between waypoints: straight legs, turns of a given radius, through a steady wind.
+
+A route is first drawn as straight lines and arcs and flown at a steady airspeed (the wind triangle solved for
+every direction), and then smoothed by a B-spline, which is what an airframe does that needs a few seconds to
+roll into a turn. The spline gives position, velocity and acceleration in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
+
+from wildlab.geometry.frames import Array
+from wildlab.simulation.trajectory import FlightPath, Wander, no_wander
+
+Shape = Literal["eight", "racetrack"]
+
+_DEGREE = 7  # five derivatives without a jump: position up to the rate of the angular acceleration
+#: Time from a tenth to nine tenths of a step after smoothing, in spline intervals: 2.56 SDs of sqrt(8/12).
+_RISE = 2.1
+_SPACING = 0.5  # m between the points of an outline
+
+
+def shape_corners(shape: Shape, length: float, width: float) -> Array:
+    """Corners of a closed course, x along it and y to its right. (4, 2) m.
+
+    ``eight`` crosses itself in its middle, the origin, twice a lap; long and narrow it is a straight
+    fly-over, a turn and a fly-over back. ``racetrack`` passes the origin in the middle of one leg, always one way.
+    """
+    x, y = length / 2, width / 2
+    if shape == "eight":
+        return np.array([[-x, -y], [x, y], [x, -y], [-x, y]])
+    return np.array([[-x, 0.0], [x, 0.0], [x, width], [-x, width]])
+
+
+def outline(corners: ArrayLike, radius: float) -> Array:
+    """A closed course through waypoints, each cut by an arc of that radius. (M, 2) m, half a metre apart.
+
+    The first point is the middle of the first leg; the last one is the first again.
+
+    Raises
+    ------
+    ValueError
+        Where two turns do not fit on the leg between them.
+    """
+    c = np.asarray(corners, float)
+    legs = np.roll(c, -1, axis=0) - c
+    lengths = np.linalg.norm(legs, axis=1)
+    along = legs / lengths[:, None]
+    before = np.roll(along, 1, axis=0)
+    turn = np.arctan2(
+        before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.einsum("ij,ij->i", before, along)
+    )
+    cut = radius * np.tan(np.abs(turn) / 2)
+    if not np.all(cut + np.roll(cut, -1) <= lengths * (1 + 1e-9)):
+        raise ValueError("the turns do not fit on the legs between them")
+    pieces = []
+    for i in range(len(c)):
+        following = (i + 1) % len(c)
+        pieces.append(_line(c[i] + cut[i] * along[i], c[following] - cut[following] * along[i]))
+        pieces.append(_arc(c[following] - cut[following] * along[i], along[i], turn[following], radius))
+    half = _line(c[0] + cut[0] * along[0], c[1] - cut[1] * along[0])
+    middle = len(half) // 2
+    points = np.concatenate([*pieces, half[:1]])
+    course = np.concatenate([points[middle:-1], points[: middle + 1]])
+    apart = np.linalg.norm(np.diff(course, axis=0), axis=1)
+    return np.asarray(course[np.concatenate([[True], apart > 1e-9])])
+
+
+def _line(start: Array, end: Array) -> Array:
+    """Points from start up to, not including, the end."""
+    count = max(int(np.ceil(np.linalg.norm(end - start) / _SPACING)), 1)
+    return np.asarray(start + np.arange(count)[:, None] / count * (end - start))
+
+
+def _arc(start: Array, along: Array, turn: float, radius: float) -> Array:
+    """Points of the turn from start up to, not including, its end; a positive turn is to the right."""
+    count = max(int(np.ceil(abs(turn) * radius / _SPACING)), 1)
+    angle = np.arange(count) / count * abs(turn)
+    right = np.array([-along[1], along[0]]) * np.sign(turn)
+    sideways = 1 - np.cos(angle)
+    return np.asarray(start + radius * (np.outer(np.sin(angle), along) + np.outer(sideways, right)))
+
+
+def lap_times(course: ArrayLike, airspeed: float, wind: ArrayLike) -> Array:
+    """When each point of a course is passed, from 0, at a steady airspeed through a steady wind. (M,) s.
+
+    Raises
+    ------
+    ValueError
+        Where the airframe cannot hold the course against the wind.
+    """
+    step = np.diff(np.asarray(course, float), axis=0)
+    far = np.linalg.norm(step, axis=1)
+    along = step / far[:, None]
+    w = np.asarray(wind, float)
+    cross = along[:, 0] * w[1] - along[:, 1] * w[0]
+    if not np.hypot(*w) < airspeed:
+        raise ValueError("the airspeed must exceed the wind")
+    speed = along @ w + np.sqrt(airspeed**2 - cross**2)
+    return np.concatenate([[0.0], np.cumsum(far / speed)])
+
+
+def fly(
+    course: ArrayLike,
+    airspeed: float,
+    duration: float,
+    *,
+    altitude: ArrayLike,
+    wind: ArrayLike = (0.0, 0.0),
+    drift: ArrayLike = (0.0, 0.0),
+    start: float = 0.0,
+    roll_time: float = 2.0,
+    track_wander: tuple[Wander, Wander] | None = None,
+    altitude_wander: Wander | None = None,
+) -> FlightPath:
+    """Laps of a closed course over the ground.
+
+    Parameters
+    ----------
+    course
+        (M, 2) north and east, m, as :func:`outline` gives it.
+    airspeed, duration
+        m/s and s. The path is defined from a few seconds before 0 to a few after the duration.
+    altitude
+        Times and altitudes above the origin of n, (K, 2) s and m: linear between, steady before and after.
+    wind
+        Velocity of the air over the ground, north and east, m/s.
+    drift
+        Velocity of the whole course over the ground, m/s: a pattern that is moved along with a target.
+    start
+        How far round the airframe is at time 0, as a fraction of a lap.
+    roll_time
+        Time to roll into a turn (from a tenth to nine tenths of it), s.
+    track_wander, altitude_wander
+        Control errors north, east and in altitude, m.
+
+    Raises
+    ------
+    ValueError
+        Where the airframe cannot hold the course.
+    """
+    points = np.asarray(course, float)
+    over = np.asarray(drift, float)
+    passed = lap_times(points, airspeed, np.asarray(wind, float) - over)
+    interval = roll_time / _RISE
+    count = int(np.ceil(duration / interval)) + 6 * (_DEGREE + 1)
+    knots = interval * (np.arange(count) - 3 * (_DEGREE + 1))
+    lap = np.mod(knots + start * passed[-1], passed[-1])
+    profile = np.asarray(altitude, float)
+    rough = np.stack(
+        [
+            np.interp(lap, passed, points[:, 0]) + over[0] * knots,
+            np.interp(lap, passed, points[:, 1]) + over[1] * knots,
+            -np.interp(knots, profile[:, 0], profile[:, 1]),
+        ],
+        axis=-1,
+    )
+    # Control points at the middles of their basis functions: straight lines stay what they are.
+    support = interval * (np.arange(count + _DEGREE + 1) - (_DEGREE + 1) / 2) + knots[0]
+    spline = BSpline(support, rough, _DEGREE, extrapolate=False)
+    parts = (spline, spline.derivative(1), spline.derivative(2))
+    off = (*(track_wander or (no_wander(), no_wander())), altitude_wander or no_wander())
+    signs = (1.0, 1.0, -1.0)
+
+    def path(times: Array) -> tuple[Array, Array, Array]:
+        t = np.asarray(times, float)
+        p, v, a = (np.asarray(part(t)) for part in parts)
+        for axis, (wander, sign) in enumerate(zip(off, signs, strict=True)):
+            p[:, axis] += sign * wander(t)
+            v[:, axis] += sign * wander(t, 1)
+            a[:, axis] += sign * wander(t, 2)
+        return p, v, a
+
+    return path
