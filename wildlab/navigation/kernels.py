@@ -14,9 +14,11 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from wildlab.geometry.frames import Array
 
+Integers = NDArray[np.int64]
 F = TypeVar("F", bound=Callable[..., Any])
 
 N_ERRORS = 15
@@ -273,10 +275,10 @@ def correct(
 
 @compiled
 def mekf(
-    times: Array, f: Array, w: Array, gap: Array, row_of_node: Array, earth: Array, noise: Array, x: Array,
-    P: Array, node: Array, kind: Array, value: Array, variance: Array, lever: Array, gate: Array,
+    times: Array, f: Array, w: Array, gap: Array, row_of_node: Integers, earth: Array, noise: Array, x: Array,
+    P: Array, node: Integers, kind: Integers, value: Array, variance: Array, lever: Array, gate: Array,
     patience: float, states: Array, covariances: Array, innovations: Array, spreads: Array, nis: Array,
-    verdicts: Array,
+    verdicts: Integers,
 ) -> None:  # fmt: skip
     """The whole filter over a timeline; see `plain.mekf` for the same in short."""
     work, R, R_start, R_mid = np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

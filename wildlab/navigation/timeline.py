@@ -9,12 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-
-Integers = NDArray[np.int64]
+from wildlab.navigation.kernels import Integers
 
 
 class Imu(NamedTuple):

@@ -1,0 +1,340 @@
+"""The MEKF against its plain version, against finite differences, and against its own claims."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.navigation.flights import (
+    GNSS_SD,
+    GRAVITY,
+    LEVERS,
+    NOISE,
+    START_SD,
+    attitude,
+    begin,
+    fixes,
+    fly,
+    moved,
+    spoil,
+)  # fmt: skip
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
+from wildlab.navigation import kernels, plain
+from wildlab.navigation.aiding import headings, positions, standstill, velocities
+from wildlab.navigation.gravity import flat_earth, local_earth
+from wildlab.navigation.mekf import (
+    ACCEPTED,
+    FORCED,
+    REJECTED,
+    ImuNoise,
+    Start,
+    pose_covariance,
+    prepare,
+    run_mekf,
+)  # fmt: skip
+from wildlab.navigation.timeline import Imu
+
+EARTH = flat_earth(GRAVITY)
+
+
+def some_state(rng):
+    q = rng.standard_normal(4)
+    parts = [rng.uniform(-200, 200, 3), rng.uniform(-20, 20, 3), q / np.linalg.norm(q)]
+    return np.concatenate([*parts, rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.02, 0.02, 3)])
+
+
+def shifted(x, error):
+    """The state with an error composed on to it, H (7.23)."""
+    mrp = error[6:9] / 4
+    turn = Rotation.from_mrp(mrp)
+    q = (Rotation.from_quat(x[6:10], scalar_first=True) * turn).as_quat(scalar_first=True)
+    return np.concatenate([x[:6] + error[:6], q, x[10:] + error[9:]])
+
+
+def between(x, other):
+    """The error that takes ``x`` to ``other``."""
+    turn = Rotation.from_quat(x[6:10], scalar_first=True).inv() * Rotation.from_quat(
+        other[6:10], scalar_first=True
+    )
+    return np.concatenate([other[:6] - x[:6], 4 * turn.as_mrp(), other[10:] - x[10:]])
+
+
+def differences(function, steps):
+    """Columns of the derivative of a function of the error state at zero."""
+    return np.stack([(function(h) - function(-h)) / (2 * h.max()) for h in np.diag(steps)], axis=-1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_transition_is_the_derivative_of_a_step(seed):
+    rng = np.random.default_rng(seed)
+    x, f, w = some_state(rng), rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3)
+    earth, dt = flat_earth(GRAVITY).as_array(), 0.01
+    after = plain.strapdown_step(x, f, w, dt, earth)[0]
+    found = differences(
+        lambda e: between(after, plain.strapdown_step(shifted(x, e), f, w, dt, earth)[0]), np.full(15, 1e-4)
+    )
+    Phi = plain.transition(x, f, w, dt, earth, (1.0, 1.0))
+    # What a gyro bias does within one step is taken to first order of the angle turned in it.
+    assert np.abs(found - Phi)[:, :12].max() < 1e-7
+    assert np.abs(found - Phi)[:, 12:].max() < 2 * dt * dt
+    assert np.abs(Phi - np.eye(15)).max() > 0.05
+
+
+@pytest.mark.parametrize("kind", [kernels.POSITION, kernels.VELOCITY, kernels.HEADING])
+@pytest.mark.parametrize("seed", range(3))
+def test_measurement_jacobians_are_derivatives_of_the_innovation(kind, seed):
+    rng = np.random.default_rng(seed)
+    x, w, value, lever = some_state(rng), rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.uniform(-2, 2, 3)
+    y, H = plain.predict_measurement(kind, x, w, value, lever)
+    found = differences(
+        lambda e: -plain.predict_measurement(kind, shifted(x, e), w, value, lever)[0], np.full(15, 1e-4)
+    )
+    assert np.abs(found - H).max() < 1e-6
+    compiled_y, compiled_H = np.zeros(3), np.zeros((3, 15))
+    m = kernels.predict_measurement(kind, x, w, value, lever, np.empty((3, 3)), compiled_y, compiled_H)
+    assert np.abs(compiled_y[:m] - y).max() < 1e-12
+    assert np.abs(compiled_H[:m] - H).max() < 1e-12
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return fly()
+
+
+def spoilt(flight, seed, **options):
+    rng = np.random.default_rng(seed)
+    imu, biases = spoil(flight, rng)
+    return imu, begin(flight, biases, rng), fixes(flight, rng, **options), biases
+
+
+def test_compiled_and_plain_agree(flight):
+    """With every kind of measurement, a gap, an outage that the gate must forgive, and the turning Earth."""
+    imu, start, antennas, _ = spoilt(flight, 0, every=50)
+    short = imu.times < 40
+    keep = short & ~((imu.times > 20.0) & (imu.times < 21.3))
+    imu = Imu(*(part[keep] for part in imu))
+    rng = np.random.default_rng(1)
+    t = np.arange(1.0, 39, 0.7)
+    field = np.array([0.2, 0.0, 0.4]) @ attitude(t) + 0.01 * rng.standard_normal((len(t), 3))
+    later = np.where(antennas[0].times > 30, 2.0, 0)[:, None]
+    jumped = [antenna._replace(value=antenna.value + later) for antenna in antennas]
+    aiding = [
+        *jumped,
+        velocities(t, moved(t - 0.1)[0], 0.5, LEVERS[0], latency=0.1),
+        headings(t, field, 0.05),
+        standstill([3.0, 7.0], 30.0),
+    ]
+    earth = local_earth(0.9, 100.0)
+    wanted = np.sort(np.concatenate([[12.3456, 20.5], rng.uniform(0, 39, 40)]))
+    options = {"gate": 1e-4, "max_gap": 0.1, "gap_acceleration": 5.0, "gap_rate": 0.5}
+    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, patience=3.0, **options)
+    ready = prepare(imu, start, NOISE, aiding, wanted, **options)
+    states, covariances, nis, verdicts = plain.mekf(
+        ready.line, ready.measured, earth.as_array(), ready.noise, *start[1:], ready.gate, 3.0
+    )
+    known = np.isfinite(found.position).all(axis=1)
+    assert known.sum() > 30
+    assert not known[np.searchsorted(wanted, 20.5)]
+    biases = [found.accelerometer_bias, found.gyro_bias]
+    ours = np.hstack([found.position, found.velocity, found.quaternion, *biases])
+    assert np.abs(ours - states)[known].max() < 1e-9
+    scale = np.sqrt(np.einsum("kii,kjj->kij", covariances, covariances))
+    assert (np.abs(found.covariance - covariances) / scale)[known].max() < 1e-9
+    assert np.allclose(found.innovations.nis, nis, rtol=1e-7)
+    assert np.array_equal(found.innovations.verdict, verdicts)
+    assert {REJECTED, ACCEPTED, FORCED} == set(verdicts)
+
+
+def errors_of(found, motion, rows):
+    """Position, velocity and attitude error (true less estimated), (K, 9)."""
+    R = quaternion_to_matrix(found.quaternion)
+    turn = matrix_to_rotation_vector(np.swapaxes(R, -1, -2) @ motion.R_nb[rows])
+    return np.hstack([motion.position[rows] - found.position, motion.velocity[rows] - found.velocity, turn])
+
+
+def nees_of(errors, covariance, block):
+    return np.einsum(
+        "ki,kij,kj->k", errors[:, block], np.linalg.inv(covariance[:, block, block]), errors[:, block]
+    )
+
+
+def test_two_antennas_give_the_pose(flight):
+    imu, start, antennas, biases = spoilt(flight, 3)
+    found = run_mekf(imu, start, NOISE, EARTH, antennas, flight.imu.times[::10])
+    rows = np.arange(len(flight.imu.times))[::10]
+    late = found.times > 60
+    errors = errors_of(found, flight.motion, rows)[late]
+    assert np.abs(errors).max(axis=0)[:3].max() < 0.08
+    assert np.degrees(np.sqrt((errors[:, 6:] ** 2).mean(axis=0))).max() < 0.5
+    assert (found.innovations.verdict == ACCEPTED).mean() > 0.998
+    # Observed over turns, the gyros' bias comes out well below what was known of it at the start.
+    assert np.abs(found.gyro_bias[-1] - biases[-1, 3:]).max() < 0.5 * NOISE.gyro_bias_sd
+
+
+def test_an_outage_is_survived(flight):
+    """The covariance grows without GNSS and falls after; nothing good is left out when it comes back."""
+    imu, start, antennas, _ = spoilt(flight, 4, outage=(200.0, 260.0))
+    found = run_mekf(imu, start, NOISE, EARTH, antennas, np.array([199.0, 220, 240, 259.9, 262.0, 300]))
+    sd = np.sqrt(found.covariance[:, 0, 0])
+    assert sd[0] < sd[1] < sd[2] < sd[3]
+    assert sd[3] > 30 * sd[0]
+    assert sd[4] < 3 * sd[0]
+    assert sd[5] < 1.5 * sd[0]
+    back = found.innovations.times > 260
+    assert (found.innovations.verdict[back] == ACCEPTED).mean() > 0.99
+
+
+def test_a_filter_too_sure_of_itself_is_not_locked_out(flight):
+    """Told that its gyros are a hundred times better than they are, it drifts away in the outage."""
+    imu, start, antennas, _ = spoilt(flight, 5, outage=(100.0, 160.0))
+    sure = ImuNoise(NOISE[0] / 100, NOISE[1] / 100, 1e-4, np.inf, 1e-7, np.inf)
+    tight = start._replace(covariance=start.covariance * 1e-4)
+    found = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], patience=2.0)
+    verdict = found.innovations.verdict
+    assert (verdict == REJECTED).sum() > 5
+    assert (verdict == FORCED).sum() >= 1
+    assert np.linalg.norm(found.position[0] - flight.motion.position[-2]) < 5.0
+    never = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], patience=np.inf)
+    assert np.linalg.norm(never.position[0] - flight.motion.position[-2]) > 50.0
+
+
+def test_outliers_are_left_out_and_counted(flight):
+    imu, start, antennas, _ = spoilt(flight, 6)
+    bad = np.arange(200, len(antennas[0].times), 97)
+    antennas[0].value[bad] += 3.0
+    found = run_mekf(imu, start, NOISE, EARTH, antennas, flight.imu.times[6000::10])
+    rejected = found.innovations.times[
+        (found.innovations.verdict == REJECTED) & (found.innovations.source == 0)
+    ]
+    assert set(np.round(antennas[0].times[bad], 6)) <= set(np.round(rejected, 6))
+    assert len(rejected) <= len(bad) + 2
+    error = found.position - flight.motion.position[6000::10]
+    assert np.abs(error).max() < 0.1
+
+
+def test_a_gap_is_said_and_crossed_with_doubt(flight):
+    imu, start, antennas, _ = spoilt(flight, 7)
+    keep = ~((imu.times > 100) & (imu.times < 102))
+    gappy = Imu(*(part[keep] for part in imu))
+    wanted = np.array([99.0, 101.0, 102.0, 110.0, 150.0])
+    found = run_mekf(gappy, start, NOISE, EARTH, antennas, wanted)
+    assert len(found.gaps) == 1
+    assert found.gaps[0].end == pytest.approx(102.0)
+    assert np.isnan(found.position[1]).all()
+    turn = np.sqrt(np.trace(found.covariance[:, 6:9, 6:9], axis1=1, axis2=2))
+    assert turn[2] > 20 * turn[0]
+    assert turn[4] < 2 * turn[0]
+    rows = np.searchsorted(flight.imu.times, wanted - 1e-6)
+    quaternion = np.where(np.isnan(found.quaternion), 0.5, found.quaternion)
+    errors = errors_of(found._replace(quaternion=quaternion), flight.motion, rows)[2:]
+    spread = np.sqrt(np.einsum("kii->ki", found.covariance[2:, :9, :9]))
+    assert (np.abs(errors) < 5 * spread).all()
+
+
+def test_latency_puts_a_fix_where_it_belongs(flight):
+    imu, start, antennas, _ = spoilt(flight, 8)
+    late = [a._replace(times=a.times + 0.25) for a in antennas]
+    again = [
+        positions(a.times, a.value, GNSS_SD, lever, latency=0.25)
+        for a, lever in zip(late, LEVERS, strict=True)
+    ]
+    wanted = flight.imu.times[8000::50]
+    known = run_mekf(imu, start, NOISE, EARTH, again, wanted)
+    assert np.abs(known.position - flight.motion.position[8000::50]).max() < 0.1
+    ignored = run_mekf(imu, start, NOISE, EARTH, late, wanted, gate=0)
+    assert np.median(np.linalg.norm(ignored.position - flight.motion.position[8000::50], axis=1)) > 3.0
+
+
+def test_a_magnetometer_holds_the_heading_of_one_antenna(flight):
+    imu, start, antennas, _ = spoilt(flight, 9)
+    t = np.arange(0.5, 85, 0.5)  # before the first turn only the magnetometer knows the heading
+    rng = np.random.default_rng(10)
+    declination = 0.05
+    field_n = 0.15 * np.array([np.cos(declination), np.sin(declination), 0.0]) + [0, 0, 0.48]
+    field_b = field_n @ attitude(t) + 0.003 * rng.standard_normal((len(t), 3))
+    wanted = np.array([85.0])
+    row = [int(np.searchsorted(flight.imu.times, 85.0 - 1e-6))]
+    with_field = run_mekf(
+        imu, start, NOISE, EARTH, [antennas[0], headings(t, field_b, 0.03, declination)], wanted
+    )
+    without = run_mekf(imu, start, NOISE, EARTH, [antennas[0]], wanted)
+    error = errors_of(with_field, flight.motion, row)[0, 8]
+    assert abs(error) < 4 * np.sqrt(with_field.covariance[0, 8, 8])
+    assert np.sqrt(with_field.covariance[0, 8, 8]) < 0.25 * np.sqrt(without.covariance[0, 8, 8])
+
+
+def test_standing_still_holds_the_velocity():
+    times = np.arange(0, 60, 0.02)
+    rng = np.random.default_rng(11)
+    imu = Imu(
+        times,
+        np.array([0, 0, -GRAVITY]) + 0.02 * rng.standard_normal((len(times), 3)),
+        0.001 * rng.standard_normal((len(times), 3)),
+    )
+    start = Start(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    held = run_mekf(imu, start, NOISE, EARTH, [standstill(np.arange(1, 60, 1.0), 0.01)], [59.9])
+    free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
+    assert np.abs(held.velocity).max() < 0.02
+    assert np.sqrt(held.covariance[0, 3, 3]) < 0.02 < np.sqrt(free.covariance[0, 3, 3])
+
+
+def test_wanted_times_may_repeat_lie_outside_or_be_unknown(flight):
+    imu, start, antennas, _ = spoilt(flight, 12)
+    wanted = np.array([50.0, np.nan, 10.0, 50.0, -3.0, 1000.0])
+    found = run_mekf(imu, start, NOISE, EARTH, antennas, wanted)
+    assert np.array_equal(found.times, wanted, equal_nan=True)
+    assert np.isfinite(found.position[[0, 2, 3]]).all()
+    assert np.array_equal(found.position[0], found.position[3])
+    assert np.isnan(found.position[[1, 4, 5]]).all()
+    assert pose_covariance(found.covariance).shape == (6, 6, 6)
+    alone = run_mekf(imu, start, NOISE, EARTH, antennas, [10.0])
+    assert np.allclose(alone.position[0], found.position[2], atol=1e-12)
+
+
+def test_measurements_outside_the_estimate_are_counted(flight):
+    imu, start, antennas, _ = spoilt(flight, 13)
+    early = antennas[0]._replace(times=antennas[0].times - 100.0)
+    found = run_mekf(imu, start, NOISE, EARTH, [early, antennas[1]], [50.0])
+    assert found.unused == [int((early.times < 0).sum()), 0]
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: positions([1.0, 2.0], np.zeros((3, 3)), 1.0), "do not go with times of shape"),
+        (lambda: positions([1.0], np.zeros((1, 3)), 0.0), "standard deviation that is not a positive number"),
+        (lambda: velocities([1.0], np.zeros((1, 3)), np.nan), "GNSS velocities have a standard deviation"),
+    ],
+)
+def test_what_is_no_measurement_is_refused(make, sentence):
+    with pytest.raises(WildlabError, match=sentence):
+        make()
+
+
+def test_a_start_on_another_clock_is_refused(flight):
+    start = Start(1.4e9, np.zeros(16), np.eye(15))
+    with pytest.raises(WildlabError, match="on the same clock"):
+        run_mekf(flight.imu, start, NOISE, EARTH, [])
+
+
+PHASES = {"straight": (60, 90), "turn": (90, 130), "outage": (200, 260), "recovered": (262, 330)}
+
+
+def test_consistent_over_fifty_flights(flight):
+    """NEES over its degrees of freedom is 1 for an ideal filter, in every part of the flight."""
+    rows = np.arange(6000, len(flight.imu.times), 50)
+    times = flight.imu.times[rows]
+    nees, nis = [], []
+    for seed in range(50):
+        imu, start, antennas, _ = spoilt(flight, 1000 + seed, outage=(200.0, 260.0))
+        found = run_mekf(imu, start, NOISE, EARTH, antennas, times, gate=0)
+        errors = errors_of(found, flight.motion, rows)
+        nees.append([nees_of(errors, found.covariance, slice(a, a + 3)) / 3 for a in (0, 3, 6)])
+        nis.append(found.innovations.nis[found.innovations.times > 60].mean() / 3)
+    mean = np.mean(nees, axis=0)
+    for phase, (begin_s, end_s) in PHASES.items():
+        part = (times >= begin_s) & (times < end_s)
+        for name, value in zip(("position", "velocity", "attitude"), mean[:, part].mean(axis=1), strict=True):
+            print(f"{phase:10s} {name:9s} {value:.2f}")
+            assert 0.7 < value < 1.4, (phase, name)
+    assert np.mean(nis) == pytest.approx(1.0, abs=0.03)

@@ -1,0 +1,113 @@
+"""Starts against a flight whose pose is known."""
+
+import numpy as np
+import pytest
+
+from tests.navigation.flights import GRAVITY, LEVERS, fixes, fly
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import (
+    euler_to_matrix,
+    matrix_to_euler,
+    matrix_to_rotation_vector,
+    quaternion_to_matrix,
+)  # fmt: skip
+from wildlab.navigation.start import (
+    attitude_from_directions,
+    start_at,
+    start_at_rest,
+    start_from_baseline,
+    start_from_course,
+)  # fmt: skip
+from wildlab.navigation.timeline import Imu
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return fly(140.0)
+
+
+def turned_wrong(start, R):
+    return np.linalg.norm(matrix_to_rotation_vector(quaternion_to_matrix(start.state[6:10]).T @ R))
+
+
+def test_directions_give_the_attitude_back():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        R = euler_to_matrix(*rng.uniform(-3, 3, 3))
+        first, second = rng.standard_normal((2, 3))
+        found = attitude_from_directions(first, 2.0 * R @ first, second, R @ (3 * second + 0.5 * first))
+        assert np.abs(found - R).max() < 1e-12
+
+
+def test_parallel_directions_are_refused():
+    with pytest.raises(WildlabError, match="parallel, zero or not known"):
+        attitude_from_directions([0, 0, 1], [0, 0, 1], [0, 0, 2], [1, 0, 0])
+
+
+def test_the_baseline_gives_pose_and_velocity_in_flight_and_in_a_turn(flight):
+    motion = flight.motion
+    antennas = fixes(flight, np.random.default_rng(1), sd=1e-6)
+    for begin in (10.0, 110.0):
+        late = motion.times >= begin
+        imu = Imu(*(part[late] for part in flight.imu))
+        start = start_from_baseline(
+            imu, antennas[0].times, antennas[0].value, antennas[1].value, *LEVERS, gravity=GRAVITY
+        )
+        row = int(np.argmin(np.abs(motion.times - start.time)))
+        assert 0 <= start.time - begin < 0.3
+        assert turned_wrong(start, motion.R_nb[row]) < 0.05  # what level_sd says
+        assert np.abs(start.state[:3] - motion.position[row]).max() < 0.05
+        assert np.abs(start.state[3:6] - motion.velocity[row]).max() < 0.3
+        # 2 cm over a baseline of 1.5 m, about the level's own vertical.
+        down_b = motion.R_nb[row].T @ [0, 0, 1]
+        heading_sd = np.sqrt(down_b @ start.covariance[6:9, 6:9] @ down_b)
+        assert heading_sd == pytest.approx(0.02 / np.linalg.norm(LEVERS[1] - LEVERS[0]), rel=0.05)
+
+
+def test_the_course_gives_the_heading(flight):
+    motion = flight.motion
+    rows = np.arange(500, len(motion.times), 100)
+    late = motion.times > 100  # in a turn, where levelling without the acceleration would be 0.37 rad wrong
+    imu = Imu(*(part[late] for part in flight.imu))
+    start = start_from_course(
+        imu, motion.times[rows], motion.position[rows], motion.velocity[rows], gravity=GRAVITY
+    )
+    row = int(np.argmin(np.abs(motion.times - start.time)))
+    assert turned_wrong(start, motion.R_nb[row]) < 0.06
+    with pytest.raises(WildlabError, match=r"no GNSS velocity reaches 50\.0 m/s"):
+        start_from_course(
+            imu,
+            motion.times[rows],
+            motion.position[rows],
+            motion.velocity[rows],
+            gravity=GRAVITY,
+            min_speed=50.0,
+        )
+
+
+def test_a_start_on_the_ground_finds_its_heading_from_the_roll_out():
+    """At rest for 60 s, turned by 70 deg, then off along the nose; the gyros have a bias of 0.3 deg/s."""
+    times = np.arange(0, 100, 0.01)
+    yaw = 0.5 + 1.2 * np.clip((times - 60) / 10, 0, 1)
+    speed = np.clip(times - 75, 0, 10)
+    R = euler_to_matrix(0.02, 0.1, yaw)
+    heading = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
+    acceleration = heading * ((times > 75) & (times < 85))[:, None]
+    f = np.einsum("kji,kj->ki", R, acceleration - [0, 0, GRAVITY])
+    w = np.einsum("kji,j->ki", R, [0, 0, 1.0]) * (0.12 * ((times > 60) & (times < 70)))[:, None]
+    bias = np.array([0.004, -0.003, 0.005])
+    imu = Imu(times, f, w + bias)
+    t = np.arange(0.5, 99, 1.0)
+    v = np.array([np.interp(t, times, column) for column in (heading * speed[:, None]).T]).T
+    start = start_at_rest(imu, t, np.zeros((len(t), 3)), v, rest=(5.0, 55.0), gravity=GRAVITY)
+    roll, pitch, found = matrix_to_euler(quaternion_to_matrix(start.state[6:10]))
+    assert (roll, pitch, found) == pytest.approx((0.02, 0.1, 0.5), abs=2e-3)
+    assert start.state[13:] == pytest.approx(bias, abs=1e-6)
+    with pytest.raises(WildlabError, match="0 fixes after it move"):
+        start_at_rest(imu, t, np.zeros((len(t), 3)), 0 * v, rest=(5.0, 55.0), gravity=GRAVITY)
+
+
+def test_no_sample_near_the_start_is_said(flight):
+    nothing = np.zeros(3)
+    with pytest.raises(WildlabError, match="on the same clock"):
+        start_at(5000.0, flight.imu, nothing, nothing, [1, 0, 0], [1, 0, 0], gravity=GRAVITY)

@@ -1,0 +1,137 @@
+"""What holds dead reckoning down: measurements of position, velocity and heading, with their uncertainty.
+
+H 7.3 has the positions of two GNSS antennas, which give the heading as well. Beyond it: antennas' velocities,
+the direction of the magnetic field, and standing still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.navigation import kernels
+from wildlab.navigation.kernels import Integers
+from wildlab.navigation.timeline import Measurements, Timeline
+
+
+class Aiding(NamedTuple):
+    """Measurements of one kind from one source: (N,) times, (N, 3) values, variances and lever arms."""
+
+    kind: int
+    times: Array
+    value: Array
+    variance: Array
+    lever: Array
+
+
+def _aiding(
+    kind: int, times: ArrayLike, value: ArrayLike, sd: ArrayLike, lever: ArrayLike, what: str
+) -> Aiding:
+    t = np.asarray(times, float)
+    shape = (len(t), 3) if t.ndim == 1 else (0, 3)
+    try:
+        z, spread, arm = (np.array(np.broadcast_to(np.asarray(a, float), shape)) for a in (value, sd, lever))
+    except ValueError:
+        raise WildlabError(
+            f"{what} of shape {np.shape(value)} and standard deviations of shape {np.shape(sd)} do not go "
+            f"with times of shape {t.shape}",
+            "give times (N,), values (N, 3), and standard deviations (N, 3), (3,) or one number",
+            field=what,
+        ) from None
+    keep = np.isfinite(t) & np.isfinite(z).all(axis=1)
+    z, spread, arm, t = z[keep], spread[keep], arm[keep], t[keep]
+    if not (np.isfinite(spread).all() and (spread > 0).all()):
+        raise WildlabError(
+            f"{what} have a standard deviation that is not a positive number",
+            "give every measurement one",
+            field=what,
+        )
+    return Aiding(kind, t, z, spread**2, arm)
+
+
+def positions(
+    times: ArrayLike,
+    p_n: ArrayLike,
+    sd: ArrayLike,
+    lever_arm: ArrayLike = (0.0, 0.0, 0.0),
+    latency: float = 0.0,
+) -> Aiding:
+    """Positions of a GNSS antenna, H (7.25).
+
+    Parameters
+    ----------
+    times
+        (N,) s, as stamped.
+    p_n
+        (N, 3) m in n; rows with NaN are left out.
+    sd
+        Standard deviations, m: (N, 3), (3,) or one number.
+    lever_arm
+        Of the antenna in b, (3,) m.
+    latency
+        How long before its stamp a fix was valid, s.
+    """
+    t = np.asarray(times, float) - latency
+    return _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
+
+
+def velocities(
+    times: ArrayLike,
+    v_n: ArrayLike,
+    sd: ArrayLike,
+    lever_arm: ArrayLike = (0.0, 0.0, 0.0),
+    latency: float = 0.0,
+) -> Aiding:
+    """Velocities of a GNSS antenna in n, m/s; beyond H. Parameters as in :func:`positions`."""
+    t = np.asarray(times, float) - latency
+    return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
+
+
+def standstill(times: ArrayLike, sd: float) -> Aiding:
+    """Times (N,) at which the airframe is known to stand still, to ``sd`` m/s; beyond H."""
+    return _aiding(kernels.VELOCITY, times, np.zeros(3), sd, np.zeros(3), "times of standing still")
+
+
+def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: float = 0.0) -> Aiding:
+    """Directions of the magnetic field, of which only the level part is used; beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    field_b
+        (N, 3) in b, of any unit, calibrated for hard and soft iron.
+    sd
+        Of the heading that follows, rad: (N,) or one number.
+    declination
+        Of the field from true north, positive towards east, rad.
+    """
+    spread = np.asarray(sd, float)
+    spread = spread[:, None] if spread.ndim == 1 else spread
+    return _aiding(kernels.HEADING, times, field_b, spread, [declination, 0.0, 0.0], "magnetometer headings")
+
+
+def gather(aiding: Sequence[Aiding], line: Timeline) -> tuple[Measurements, Integers, list[int]]:
+    """Measurements in order of time, the index of the aiding of each, and how many of each lie outside."""
+    low, high = line.times[0], line.times[-1]
+    inside = [(source.times >= low) & (source.times <= high) for source in aiding]
+    unused = [int(np.sum(~keep)) for keep in inside]
+    pairs = list(zip(aiding, inside, strict=True))
+    t = np.concatenate([np.empty(0)] + [a.times[keep] for a, keep in pairs])
+    order = np.argsort(t, kind="stable")
+
+    def joined(parts: list[Array], tail: tuple[int, ...] = (3,)) -> Array:
+        return np.ascontiguousarray(np.concatenate([np.empty((0, *tail)), *parts])[order], float)
+
+    kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
+    source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
+    measured = Measurements(
+        np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),
+        joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]),
+    )  # fmt: skip
+    return measured, source, unused

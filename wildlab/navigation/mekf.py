@@ -1,0 +1,235 @@
+"""The multiplicative extended Kalman filter of H 7.3, with what a logged flight needs beyond it.
+
+Fifteen error states: position and velocity in n, attitude as four times the modified Rodrigues parameters in
+b (``q = q_hat * dq``, H 7.15-7.16), accelerometer bias, gyro bias. What may be measured is in `aiding`. H
+(7.26) lost the sign of its attitude block: (7.25), of which it is the derivative, has ``-R S(r)``, and so has
+the filter.
+
+Everything is computed after the flight, so a latency needs no model: a fix belongs to the time at which it
+was valid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import chi2
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.navigation import kernels
+from wildlab.navigation.aiding import Aiding, gather
+from wildlab.navigation.gravity import Earth
+from wildlab.navigation.kernels import Integers
+from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
+
+#: Verdicts on a measurement: left out by its gate; taken in; taken in after the covariance was widened.
+REJECTED, ACCEPTED, FORCED = kernels.REJECTED, kernels.ACCEPTED, kernels.FORCED
+
+
+class ImuNoise(NamedTuple):
+    """How an inertial sensor errs, as data sheets say it, in SI units; alike on all axes.
+
+    Attributes
+    ----------
+    velocity_random_walk
+        White noise of the specific force, m/s/sqrt(s) (a data sheet's m/s/sqrt(h) divided by 60).
+    angle_random_walk
+        White noise of the angular rate, rad/sqrt(s).
+    accelerometer_bias_sd, gyro_bias_sd
+        Of the slow part of the bias, m/s^2 and rad/s: its standard deviation after a long time, or, where the
+        time is infinite, its random walk in m/s^2/sqrt(s) and rad/s/sqrt(s).
+    accelerometer_bias_time, gyro_bias_time
+        Correlation time, s (H 7.24); infinite for a random walk.
+    """
+
+    velocity_random_walk: float
+    angle_random_walk: float
+    accelerometer_bias_sd: float
+    accelerometer_bias_time: float
+    gyro_bias_sd: float
+    gyro_bias_time: float
+
+
+class Start(NamedTuple):
+    """What is known at the start.
+
+    Attributes
+    ----------
+    time
+        s. Earlier measurements are not used.
+    state
+        (16,): position, velocity, quaternion, accelerometer bias, gyro bias.
+    covariance
+        (15, 15) of the errors.
+    """
+
+    time: float
+    state: Array
+    covariance: Array
+
+
+class Innovations(NamedTuple):
+    """Of E measurements in order of time.
+
+    Attributes
+    ----------
+    times, source
+        (E,) s, and the index of the aiding it came from.
+    innovation, S
+        (E, 3) and (E, 3, 3); a heading (rad) fills the first element only, the rest is NaN.
+    nis
+        (E,) normalised innovation squared, before anything was widened.
+    verdict
+        (E,) ``REJECTED``, ``ACCEPTED`` or ``FORCED``.
+    """
+
+    times: Array
+    source: Integers
+    innovation: Array
+    S: Array
+    nis: Array
+    verdict: Integers
+
+
+class Navigation(NamedTuple):
+    """The estimate at M times; NaN before the start, behind the last sample, and inside gaps.
+
+    ``covariance`` (M, 15, 15) is of the errors position, velocity (n), attitude (rad, b), biases; ``gaps``
+    are the intervals without inertial samples; ``unused`` counts, per aiding, the measurements outside the
+    estimate.
+    """
+
+    times: Array
+    position: Array
+    velocity: Array
+    quaternion: Array
+    accelerometer_bias: Array
+    gyro_bias: Array
+    covariance: Array
+    innovations: Innovations
+    gaps: list[Gap]
+    unused: list[int]
+
+
+class Prepared(NamedTuple):
+    """What both the compiled filter and the plain one take."""
+
+    line: Timeline
+    measured: Measurements
+    source: Integers
+    unused: list[int]
+    gaps: list[Gap]
+    noise: Array
+    gate: Array
+
+
+def prepare(
+    imu: Imu, start: Start, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array, gate: float,
+    max_gap: float, gap_acceleration: float, gap_rate: float,
+) -> Prepared:  # fmt: skip
+    samples = checked_imu(imu)
+    if not samples.times[0] <= start.time < samples.times[-1]:
+        raise WildlabError(
+            f"the start at {start.time} s is not within the inertial samples, {samples.times[0]} to "
+            f"{samples.times[-1]} s",
+            "check that inertial sensors and GNSS are on the same clock",
+            field="start",
+        )
+    others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
+    line = lay_out(samples, start.time, others, output_times, max_gap)
+    measured, source, unused = gather(aiding, line)
+    long_run = [
+        sd if np.isinf(time) else sd * np.sqrt(2 / time)  # spectral density from the standard deviation
+        for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
+    ]
+    numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], gap_acceleration, gap_rate])
+    limits = chi2.isf(gate, [3, 3, 1]) if gate > 0 else np.full(3, np.inf)
+    gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start.time]
+    return Prepared(line, measured, source, unused, gaps, numbers, np.asarray(limits, float))
+
+
+def run_mekf(
+    imu: Imu,
+    start: Start,
+    noise: ImuNoise,
+    earth: Earth,
+    aiding: Sequence[Aiding],
+    output_times: ArrayLike | None = None,
+    *,
+    gate: float = 1e-4,
+    patience: float = 5.0,
+    max_gap: float = 0.1,
+    gap_acceleration: float = 5.0,
+    gap_rate: float = 0.5,
+) -> Navigation:
+    """Position, velocity, attitude and biases with their covariance, from inertial measurements and aiding.
+
+    Parameters
+    ----------
+    imu
+        Inertial measurements; see `Imu`.
+    start
+        From `start.start_at` or of one's own.
+    noise, earth
+        How the sensors err, and what pulls: `gravity.local_earth`, or `gravity.flat_earth` as in H.
+    aiding
+        What :func:`positions`, :func:`velocities`, :func:`headings` and :func:`standstill` give.
+    output_times
+        (M,) s at which the estimate is wanted, camera stamps for instance; without them, at every inertial
+        sample (the covariances of 25 minutes at 250 Hz then take 0.7 GB).
+    gate
+        Probability with which a good measurement is left out as an outlier, by its NIS. 0 leaves none out.
+    patience
+        Where all measurements of a kind were left out for so long (s), the filter has lost its way rather
+        than the sensor: the covariance is then widened until the next one fits, which is marked ``FORCED``.
+    max_gap
+        Intervals between inertial samples longer than this (s) are crossed in a straight line, with
+        ``gap_acceleration`` (m/s^2) and ``gap_rate`` (rad/s) as standard deviations of what may have been.
+
+    Raises
+    ------
+    WildlabError
+        For arrays that do not fit, or a start outside the inertial samples.
+    """
+    wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
+    known = np.isfinite(wanted)
+    times, row = np.unique(wanted[known], return_inverse=True)
+    ready = prepare(imu, start, noise, aiding, times, gate, max_gap, gap_acceleration, gap_rate)
+    line, measured = ready.line, ready.measured
+    states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
+    n = len(measured.node)
+    innovation, S, nis = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
+    verdict = np.zeros(n, np.int64)
+    kernels.mekf(
+        line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
+        start.state.astype(float), start.covariance.astype(float), measured.node, measured.kind,
+        measured.value, measured.variance, measured.lever, ready.gate, float(patience), states, covariances,
+        innovation, S, nis, verdict,
+    )  # fmt: skip
+    for gap in ready.gaps:
+        unknown = (times > gap.start) & (times < gap.end)
+        states[unknown], covariances[unknown] = np.nan, np.nan
+    if len(times) != len(wanted):  # stamps that repeat, or are NaN
+        spread_out = np.full(len(wanted), -1)
+        spread_out[known] = row
+        states = np.vstack([states, np.full((1, 16), np.nan)])[spread_out]
+        covariances = np.concatenate([covariances, np.full((1, 15, 15), np.nan)])[spread_out]
+    elif not np.array_equal(times, wanted):
+        states, covariances = states[row], covariances[row]
+    what = Innovations(line.times[measured.node], ready.source, innovation, S, nis, verdict)
+    parts = (states[:, :3], states[:, 3:6], states[:, 6:10], states[:, 10:13], states[:, 13:])
+    return Navigation(wanted, *parts, covariances, what, ready.gaps, ready.unused)
+
+
+def pose_covariance(covariance: ArrayLike) -> Array:
+    """Position and attitude (rotation vector in b) out of the whole: (M, 15, 15) -> (M, 6, 6).
+
+    Four times the modified Rodrigues parameters are the rotation vector up to the third order of its size.
+    """
+    P = np.asarray(covariance, float)
+    keep = np.array([0, 1, 2, 6, 7, 8])
+    return P[..., keep[:, None], keep]

@@ -1,0 +1,239 @@
+"""Where a filter starts: position from a fix, attitude from two directions known in b and in n.
+
+One direction is the specific force, which at rest points up. The other is whatever tells the heading: the
+baseline between two antennas, the magnetic field, or, in flight, the course.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array, matrix_to_quaternion
+from wildlab.navigation.gravity import flat_earth
+from wildlab.navigation.mekf import Start
+from wildlab.navigation.strapdown import integrate_strapdown
+from wildlab.navigation.timeline import Imu, checked_imu
+
+
+def attitude_from_directions(
+    first_b: ArrayLike, first_n: ArrayLike, second_b: ArrayLike, second_n: ArrayLike
+) -> Array:
+    """``R_nb`` (3, 3) that takes the first direction over exactly and the second as well as can be (TRIAD).
+
+    Raises
+    ------
+    WildlabError
+        If the two directions are zero or parallel.
+    """
+    triads = []
+    for first, second in ((first_b, second_b), (first_n, second_n)):
+        a = np.asarray(first, float)
+        across = np.cross(a, np.asarray(second, float))
+        if not np.linalg.norm(across) > 1e-9:
+            raise WildlabError(
+                "the directions that the attitude should follow from are parallel, zero or not known",
+                "start at a time at which the specific force and the reference for the heading differ",
+                field="start",
+            )
+        a, across = a / np.linalg.norm(a), across / np.linalg.norm(across)
+        triads.append(np.stack([a, across, np.cross(a, across)], axis=-1))
+    return np.asarray(triads[1] @ triads[0].T, float)
+
+
+def start_at(
+    time: float,
+    imu: Imu,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    reference_b: ArrayLike,
+    reference_n: ArrayLike,
+    *,
+    gravity: float,
+    acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
+    window: float = 1.0,
+    position_sd: ArrayLike = 5.0,
+    velocity_sd: ArrayLike = 1.0,
+    level_sd: float = 0.05,
+    heading_sd: float = 0.2,
+    accelerometer_bias_sd: float = 0.2,
+    gyro_bias_sd: float = 0.01,
+) -> Start:
+    """A start from what is known at one time.
+
+    Parameters
+    ----------
+    time
+        s.
+    imu
+        Its mean specific force within ``window`` (s) around the time is taken as the direction of
+        ``acceleration`` less gravity.
+    position, velocity
+        Of b in n, (3,) m and m/s.
+    reference_b, reference_n
+        A direction that is not vertical, (3,) in b and in n, for the heading.
+    gravity
+        m/s^2.
+    acceleration
+        Of b in n, (3,) m/s^2: zero at rest.
+    position_sd, velocity_sd, level_sd, heading_sd, accelerometer_bias_sd, gyro_bias_sd
+        Standard deviations, in m, m/s, rad, rad, m/s^2, rad/s. ``level_sd`` is of roll and pitch together
+        with what the accelerometers' bias does to them, and is meant about level axes.
+
+    Raises
+    ------
+    WildlabError
+        If there is no inertial sample within the window, or the directions do not give an attitude.
+    """
+    samples = checked_imu(imu)
+    near = np.abs(samples.times - time) <= window / 2
+    if not near.any():
+        raise WildlabError(
+            f"there is no inertial sample within {window / 2} s of the start at {time} s",
+            "start later, or check that inertial sensors and GNSS are on the same clock",
+            field="start",
+        )
+    up = np.asarray(acceleration, float) - np.array([0.0, 0.0, gravity])
+    R = attitude_from_directions(samples.specific_force[near].mean(axis=0), up, reference_b, reference_n)
+    P = np.zeros((15, 15))
+    for first, sd in ((0, position_sd), (3, velocity_sd), (9, accelerometer_bias_sd), (12, gyro_bias_sd)):
+        block = slice(first, first + 3)
+        P[block, block] = np.diag(np.broadcast_to(np.asarray(sd, float), 3) ** 2)
+    P[6:9, 6:9] = R.T @ np.diag([level_sd**2, level_sd**2, heading_sd**2]) @ R
+    parts = (position, velocity, matrix_to_quaternion(R), np.zeros(3), gyro_bias)
+    return Start(float(time), np.concatenate([np.asarray(part, float) for part in parts]), P)
+
+
+def start_from_baseline(
+    imu: Imu, times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike,
+    lever_second: ArrayLike, *, gravity: float, baseline_sd: float = 0.02, **known: float,
+) -> Start:  # fmt: skip
+    """A start from the first pair of positions of two antennas.
+
+    Velocity and acceleration are those of a parabola through the first second of the first antenna's fixes.
+
+    Parameters
+    ----------
+    times
+        (N,) s, of both antennas' positions.
+    p_first, p_second
+        (N, 3) m in n.
+    lever_first, lever_second
+        (3,) m in b.
+    baseline_sd
+        Of the difference of the positions, m: the standard deviation of the heading follows from it.
+    known
+        Standard deviations and the window, as in :func:`start_at`.
+    """
+    t, p, other = np.asarray(times, float), np.asarray(p_first, float), np.asarray(p_second, float)
+    arm, baseline_b = np.asarray(lever_first, float), np.asarray(lever_second, float) - lever_first
+    begin = checked_imu(imu).times[0]
+    both = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(other).all(axis=1) & (t >= begin))
+    both = both[(t[both] <= t[both[:1]] + 1.0) | (np.arange(len(both)) < 3)]
+    if len(both) < 3:
+        raise WildlabError(
+            f"only {len(both)} pairs of antenna positions lie within the inertial samples",
+            "check that inertial sensors and GNSS are on the same clock",
+            field="start",
+        )
+    i = both[0]
+    _, v, a = np.polynomial.polynomial.polyfit(t[both] - t[i], p[both], 2)
+    length = float(np.linalg.norm(baseline_b))
+    known = {"heading_sd": baseline_sd / length, **known}
+    start = start_at(
+        t[i], imu, p[i], v, baseline_b, other[i] - p[i], gravity=gravity, acceleration=2 * a, **known
+    )
+    from_arm = _turned(start.state[6:10], arm)
+    return start._replace(state=np.concatenate([p[i] - from_arm, start.state[3:]]))
+
+
+def start_from_course(
+    imu: Imu, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, gravity: float, min_speed: float = 8.0,
+    **known: float,
+) -> Start:  # fmt: skip
+    """A start from the first fix in flight: the nose is taken to point where the airframe goes.
+
+    It does not in wind: ``heading_sd`` must cover the crab angle (wind across, over airspeed). The
+    acceleration is the slope of the velocities around that fix.
+
+    Parameters
+    ----------
+    times, p_n, v_n
+        (N,) s, (N, 3) m and (N, 3) m/s, valid at those times (a latency taken off).
+    min_speed
+        Level speed (m/s) from which a course counts.
+    """
+    t, p, v = np.asarray(times, float), np.asarray(p_n, float), np.asarray(v_n, float)
+    samples = checked_imu(imu).times
+    fast = (np.hypot(v[:, 0], v[:, 1]) >= min_speed) & np.isfinite(p).all(axis=1)
+    fast &= (t >= samples[0]) & (t < samples[-1])
+    if not fast.any():
+        raise WildlabError(
+            f"no GNSS velocity reaches {min_speed} m/s within the inertial samples",
+            "start from two antennas or a magnetometer instead, or check the clocks",
+            field="start",
+        )
+    i = int(np.argmax(fast))
+    before, after = max(i - 1, 0), min(i + 1, len(t) - 1)
+    a = (v[after] - v[before]) / (t[after] - t[before]) if after > before else np.zeros(3)
+    known = {"heading_sd": 0.4, "level_sd": 0.1, **known}
+    return start_at(t[i], imu, p[i], v[i], [1.0, 0.0, 0.0], v[i], gravity=gravity, acceleration=a, **known)
+
+
+def _turned(q: Array, vector: Array) -> Array:
+    w, u = q[0], q[1:]
+    return np.asarray(vector + 2 * np.cross(u, np.cross(u, vector) + w * vector), float)
+
+
+def start_at_rest(
+    imu: Imu, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, rest: tuple[float, float], gravity: float,
+    min_speed: float = 4.0, **known: float,
+) -> Start:  # fmt: skip
+    """A start on the ground, in the middle of a time of standing still, of which nobody knows the heading.
+
+    Roll and pitch are levelled, the gyros' mean is their bias. The heading is the one from which the gyros
+    alone lead to the course of the first fix that moves: along the runway, that is where the nose points.
+
+    Parameters
+    ----------
+    times, p_n, v_n
+        As in :func:`start_from_course`.
+    rest
+        From when to when it stands still, s; at least two inertial samples and one fix.
+    min_speed
+        Level speed (m/s) from which a course counts.
+    """
+    t, p, v = np.asarray(times, float), np.asarray(p_n, float), np.asarray(v_n, float)
+    samples = checked_imu(imu)
+    still = (samples.times >= rest[0]) & (samples.times <= rest[1])
+    fixes = (t >= rest[0]) & (t <= rest[1]) & np.isfinite(p).all(axis=1)
+    fast = np.hypot(v[:, 0], v[:, 1]) >= min_speed
+    moving = np.flatnonzero(fast & (t > rest[1]) & (t < samples.times[-1]))
+    if still.sum() < 2 or not fixes.any() or not len(moving):
+        raise WildlabError(
+            f"the rest from {rest[0]} to {rest[1]} s has {still.sum()} inertial samples and {fixes.sum()} "
+            f"fixes, and {len(moving)} fixes after it move at {min_speed} m/s",
+            "name a time of standing still before the flight, or start from the course",
+            field="start",
+        )
+    bias = samples.angular_rate[still].mean(axis=0)
+    time = float(samples.times[still][int(still.sum()) // 2])
+    window = 0.999 * 2 * min(time - rest[0], rest[1] - time)
+    known = {"heading_sd": 0.2, "gyro_bias_sd": 0.002, **known}
+
+    def towards(heading: float) -> Start:
+        nose = [np.cos(heading), np.sin(heading), 0.0]
+        return start_at(
+            time, imu, p[fixes].mean(axis=0), np.zeros(3), [1.0, 0.0, 0.0], nose, gravity=gravity,
+            gyro_bias=bias, window=window, **known,
+        )  # fmt: skip
+
+    i = moving[0]
+    rolling = (samples.times >= time) & (samples.times <= t[i])
+    part = Imu(samples.times[rolling], samples.specific_force[rolling], samples.angular_rate[rolling] - bias)
+    q = towards(0.0).state[6:10]
+    last = integrate_strapdown(part, p[i], v[i], q, flat_earth(gravity), max_gap=np.inf).quaternion[-1]
+    nose = _turned(last, np.array([1.0, 0.0, 0.0]))
+    return towards(float(np.arctan2(v[i, 1], v[i, 0]) - np.arctan2(nose[1], nose[0])))
