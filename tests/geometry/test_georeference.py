@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
+from wildlab.geometry.georeference import BLOCK, ground_to_pixel, intersect_plane, pixel_rays, pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, camera_rotation
 from wildlab.geometry.sensitivity import TAU2
 
@@ -113,3 +113,20 @@ def test_the_lever_arm_turns_with_the_airframe():
         Mount("down", lever_arm=(1.0, 0, 0)), np.zeros((1, 3)), euler_to_matrix([0.0], [0.0], [np.pi / 2])
     )
     assert np.allclose(p_nc, [[0, 1, 0]])
+
+
+def test_blocks_of_columns_are_the_plain_intersection():
+    """Over more than two blocks, with a pose per pixel and with one for all, misses included."""
+    rng = np.random.default_rng(0)
+    n = 2 * BLOCK + 17
+    uv = rng.uniform([0, 0], [640, 512], (n, 2))
+    R = euler_to_matrix(rng.normal(0, 0.1, n), rng.uniform(-1.5, 0.1, n), rng.uniform(-3, 3, n))
+    each = camera_pose(Mount("forward"), rng.uniform([-50, -50, -150], [50, 50, 5], (n, 3)), R)
+    one = camera_pose(Mount("forward"), np.array([1.0, 2.0, -90.0]), R[0])
+    for pose, plane in ((each, rng.uniform(-3, 3, n)), (each, 1.0), (one, 0.0), (one, rng.uniform(-3, 3, n))):
+        plain = intersect_plane(pixel_rays(WIDE, uv, pose[1]), pose[0], plane)
+        blocks = pixel_to_plane(WIDE, uv, *pose, plane)
+        assert np.array_equal(np.isnan(plain), np.isnan(blocks))
+        seen = np.abs(plain[:, 0]) < 1e5
+        assert np.allclose(plain[seen], blocks[seen], rtol=1e-11, atol=1e-9)
+        assert 0 < np.isnan(plain).any(axis=1).mean() < 1 or pose is one
