@@ -156,7 +156,7 @@ def test_text_loses_the_paths_of_this_machine() -> None:
     cleaned = privacy.clean_text(text)
     assert str(ROOT) not in cleaned and sys.prefix not in cleaned and "ipykernel" not in cleaned
     assert "[wildlab]/wildlab/a.py" in cleaned and cleaned.endswith("red")
-    assert privacy.clean_text(f"{ROOT}-else/x") == f"{ROOT}-else/x"
+    assert "[wildlab]" not in privacy.clean_text(f"{ROOT}-else/x")
 
 
 def test_an_executed_notebook_can_be_passed_on(tmp_path: Path) -> None:
