@@ -1,0 +1,233 @@
+"""The nonlinear observer of H 5.5: attitude with gyro bias, and translational motion in ECEF.
+
+Where H integrates, measurements come one by one. Between them the Riccati equation (5.50) has a closed form,
+and each is taken in with the gain that (5.48)-(5.49) tend to: with ``theta`` 1 that of a Kalman filter. The
+injection of the second vector is held in b until the next one, at most half as long again as usual.
+
+H's second vector is the baseline between two antennas. A log with one antenna has none;
+:func:`field_reference` takes the magnetic field, :func:`course_reference` the course, instead. Both are
+beyond H, and as wrong as the field's calibration or the crab angle. So are antennas' velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import (
+    Array,
+    Origin,
+    geodetic_to_ecef,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+)
+from wildlab.navigation import kernels
+from wildlab.navigation.aiding import Aiding, gather
+from wildlab.navigation.mekf import Start
+from wildlab.navigation.observer_kernel import observe
+from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
+
+REFERENCE = 3
+
+
+class Gains(NamedTuple):
+    """Tuning of the observer.
+
+    Attributes
+    ----------
+    k1, k2
+        Of the specific force and of the second vector, rad/s (H 5.36).
+    k_i
+        Of the gyro bias, 1/s (H 5.35c).
+    bias_bound
+        What the gyro bias does not exceed, rad/s; the estimate is kept within 1.2 times that.
+    theta
+        The time scale of H (5.41).
+    force_noise, correction_noise
+        Spectral densities behind Q in H (5.50): of the specific force, m/s/sqrt(s), and of what corrects it,
+        m/s^2/sqrt(s).
+    force_bound
+        Each component of the estimated specific force is cut off here, m/s^2 (H 5.39).
+    """
+
+    k1: float = 0.3
+    k2: float = 0.3
+    k_i: float = 0.01
+    bias_bound: float = 0.05
+    theta: float = 1.0
+    force_noise: float = 0.05
+    correction_noise: float = 0.1
+    force_bound: float = 80.0
+
+
+class Observed(NamedTuple):
+    """The estimate at M times; NaN outside and inside gaps.
+
+    ``specific_force`` (M, 3) is the estimate in n, less what accelerometers alone would say of it where
+    ``correction`` (M, 3), the observer's auxiliary state in n, is not zero.
+    """
+
+    times: Array
+    position: Array
+    velocity: Array
+    quaternion: Array
+    gyro_bias: Array
+    correction: Array
+    gaps: list[Gap]
+    unused: list[int]
+
+
+def _reference(times: ArrayLike, in_b: ArrayLike, in_n: ArrayLike) -> Aiding:
+    t = np.asarray(times, float)
+    b, n = (np.array(np.broadcast_to(np.asarray(a, float), (len(t), 3))) for a in (in_b, in_n))
+    sizes = np.linalg.norm(b, axis=1), np.linalg.norm(n, axis=1)
+    keep = np.isfinite(t) & (sizes[0] > 0) & (sizes[1] > 0) & np.isfinite(sizes[0] + sizes[1])
+    b, n = b[keep] / sizes[0][keep, None], n[keep] / sizes[1][keep, None]
+    return Aiding(REFERENCE, t[keep], n, np.ones_like(n), b)
+
+
+def baseline_reference(
+    times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike, lever_second: ArrayLike
+) -> Aiding:
+    """The vector from one antenna to the other, H (5.40): (N,) s, (N, 3) m in n each, (3,) m in b each."""
+    in_b = np.asarray(lever_second, float) - np.asarray(lever_first, float)
+    return _reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
+
+
+def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) -> Aiding:
+    """The magnetic field, calibrated, (N, 3) in b, and as it is there, (3,) in n; any units. Beyond H."""
+    return _reference(times, field_b, field_n)
+
+
+def course_reference(
+    times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0, latency: float = 0.0
+) -> Aiding:
+    """The nose along the velocity (N, 3) over the ground, from ``min_speed`` (m/s) on. Beyond H."""
+    v = np.array(v_n, float)
+    v[~(np.hypot(v[:, 0], v[:, 1]) >= min_speed)] = np.nan
+    return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
+
+
+class Prepared(NamedTuple):
+    """What both the compiled observer and the plain one take; positions and directions in e."""
+
+    line: Timeline
+    measured: Measurements
+    gains: Array
+    q: Array
+    bias: Array
+    x: Array
+    P: Array
+    unused: list[int]
+    gaps: list[Gap]
+
+
+def earth_axes(origin: Origin) -> tuple[Array, Array]:
+    """Where n lies in e: position (3,), and ``R_en`` (3, 3)."""
+    lat, lon, _ = origin
+    north = [-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)]
+    east = [-np.sin(lon), np.cos(lon), 0.0]
+    return geodetic_to_ecef(*origin), np.stack([north, east, np.cross(north, east)], axis=-1)
+
+
+def prepare(
+    imu: Imu,
+    start: Start,
+    origin: Origin,
+    aiding: Sequence[Aiding],
+    gains: Gains,
+    wanted: Array,
+    max_gap: float,
+) -> Prepared:
+    samples = checked_imu(imu)
+    if not samples.times[0] <= start.time < samples.times[-1]:
+        raise WildlabError(
+            f"the start at {start.time} s is not within the inertial samples, {samples.times[0]} to "
+            f"{samples.times[-1]} s",
+            "check that inertial sensors and GNSS are on the same clock",
+            field="start",
+        )
+    others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
+    line = lay_out(samples, start.time, others, wanted, max_gap)
+    p_e, R_en = earth_axes(origin)
+    in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == kernels.POSITION else 0.0)) for a in aiding]
+    measured, _, unused = gather(in_e, line)
+    between = np.diff(np.unique(measured.node[measured.kind == REFERENCE]))
+    apart = (
+        np.diff(line.times[np.unique(measured.node[measured.kind == REFERENCE])]) if len(between) else [0.0]
+    )
+    numbers = np.array(
+        [
+            gains.k1, gains.k2, gains.k_i, gains.bias_bound, 1.2 * gains.bias_bound, gains.theta,
+            gains.force_noise**2, gains.correction_noise**2, gains.force_bound, 1.5 * float(np.median(apart)),
+        ]
+    )  # fmt: skip
+    state = np.asarray(start.state, float)
+    x = np.concatenate([p_e + R_en @ state[:3], R_en @ state[3:6], np.zeros(3)])
+    q = matrix_to_quaternion(R_en @ quaternion_to_matrix(state[6:10]))
+    # What the estimated force may be off by at first: the accelerometers' bias, and gravity leaning with
+    # roll.
+    force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
+    spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
+    P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
+    gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start.time]
+    return Prepared(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
+
+
+def run_observer(
+    imu: Imu,
+    start: Start,
+    origin: Origin,
+    aiding: Sequence[Aiding],
+    output_times: ArrayLike | None = None,
+    *,
+    gains: Gains | None = None,
+    max_gap: float = 0.1,
+) -> Observed:
+    """Position, velocity, attitude and gyro bias, without a covariance: the observer has none to give.
+
+    Parameters
+    ----------
+    imu, start, output_times
+        As for `mekf.run_mekf`.
+    origin
+        Of n: latitude, longitude (rad), ellipsoidal height (m).
+    aiding
+        Positions, and velocities where there are any, as from `aiding`; and a second vector from
+        :func:`baseline_reference`, :func:`field_reference` or :func:`course_reference`. Without one, the
+        heading hangs on the estimated specific force alone, which shows it in turns only.
+    max_gap
+        Intervals between inertial samples longer than this (s) are crossed in a straight line.
+
+    Raises
+    ------
+    WildlabError
+        For arrays that do not fit, or a start outside the inertial samples.
+    """
+    wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
+    known = np.isfinite(wanted)
+    times, row = np.unique(wanted[known], return_inverse=True)
+    ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
+    line, measured = ready.line, ready.measured
+    out = np.full((len(times), 16), np.nan)
+    observe(
+        line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind, measured.value,
+        measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x, ready.P, out,
+    )  # fmt: skip
+    for gap in ready.gaps:
+        out[(times > gap.start) & (times < gap.end)] = np.nan
+    rows = np.full((len(wanted), 16), np.nan)
+    rows[known] = out[row]
+    p_e, R_en = earth_axes(origin)
+    quaternion = np.full((len(wanted), 4), np.nan)
+    filled = np.isfinite(rows[:, 0])
+    if filled.any():
+        quaternion[filled] = matrix_to_quaternion(R_en.T @ quaternion_to_matrix(rows[filled, :4]))
+    return Observed(
+        wanted, (rows[:, 7:10] - p_e) @ R_en, rows[:, 10:13] @ R_en, quaternion, rows[:, 4:7],
+        rows[:, 13:] @ R_en, ready.gaps, ready.unused,
+    )  # fmt: skip
