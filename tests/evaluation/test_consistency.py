@@ -35,7 +35,7 @@ def test_limits_of_a_mean_enclose_the_mean_of_draws() -> None:
 
 @pytest.mark.parametrize("arguments", [(0,), (2, 1.0), (2, 0.0), (2, 0.95, 0)])
 def test_limits_that_do_not_exist_are_refused(arguments: tuple[float, ...]) -> None:
-    with pytest.raises(WildlabError, match="(?i)give at least one of each"):
+    with pytest.raises(WildlabError, match=r"(?i)give at least one of each"):
         chi_square_interval(*arguments)  # type: ignore[arg-type]
 
 
@@ -64,7 +64,7 @@ def test_moments_without_truth_stay_in_their_row() -> None:
 
 def test_a_covariance_that_is_none_is_named_by_its_row() -> None:
     P = np.array([np.eye(2), np.diag([1.0, -1.0])])
-    with pytest.raises(WildlabError, match="(?i)covariance in row 1 is not positive definite"):
+    with pytest.raises(WildlabError, match=r"(?i)covariance in row 1 is not positive definite"):
         nees(np.ones((2, 2)), P)
     with pytest.raises(WildlabError, match=r"(?i)errors of shape \(2, 2\) do not go"):
         nees(np.ones((2, 2)), np.eye(3))

@@ -69,7 +69,7 @@ def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pyt
 
 
 def studies(folder: Path) -> Path:
-    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW))
+    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW, more='source = ""'))
     text = '[s]\ntitle = "S"\nnotebook = "georeferencing.ipynb"\n'
     text += 'dataset = "openathena"\nrecipe = "openathena.toml"\n'
     (folder / "studies.toml").write_text(text)
@@ -106,6 +106,22 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
         assert not path.is_file() or b"63.4" not in path.read_bytes()
     (outcome,) = run_studies(["s"], flight=folder, **where)
     assert outcome.state == "done" and outcome.name == "s-small-flight"
+
+
+def test_which_poses_are_meant_is_asked_before_anything_runs(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    flight = make_flight()
+    first = next(iter(flight.nav.values()))
+    flight.nav = {"autopilot": first, "observer": first}
+    save_flight(flight, tmp_path / "flight")
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    with pytest.raises(WildlabError, match="not clear which nav source") as caught:
+        evaluate_flight(tmp_path / "flight", **where)
+    assert "autopilot, observer" in caught.value.fix
+    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
+        evaluate_flight(tmp_path / "flight", source="mekf", **where)
+    assert not (tmp_path / "reports").exists()
 
 
 def test_a_flight_named_like_a_study_would_replace_its_report(
