@@ -288,8 +288,8 @@ def both(*changes: Change) -> Change:
         (
             in_recipe("poses", {}),
             "recipe.toml",
-            "poses",
-            "there are no poses. Add a part such as [poses.autopilot]",
+            None,
+            "there are no poses. Add a part such as [poses.autopilot], or at least [gnss]",
         ),
         (
             lambda raw: raw.recipe["poses"].update({"../x": raw.recipe["poses"].pop("log")}),

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from wildlab.flight.check import check_flight, usable_for
-from wildlab.flight.files import sha256_of
+from wildlab.flight.files import check_model, sha256_of
 from wildlab.flight.recipe import import_flight
+from wildlab.flight.recipe_model import Recipe
 from wildlab.flight.store import load_flight
 from wildlab.flight.sync import frame_poses, frame_times, truth_at
 from wildlab.flight.units import UNITS
@@ -30,7 +31,7 @@ def example(tmp_path: Path) -> Path:
     assert [name for name, _ in tables] == ["nav.csv", "photos.csv", "clicks.csv", "boat.csv"]
     for name, text in tables:
         (tmp_path / name).write_text(text, encoding="utf-8")
-    (recipe,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    recipe, *_ = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
     (tmp_path / "recipe.toml").write_text(recipe, encoding="utf-8")
     return tmp_path
 
@@ -80,6 +81,20 @@ def test_every_unit_is_in_the_readme() -> None:
     for dimension, units in UNITS.items():
         (row,) = re.findall(rf"^\| {dimension} \| (.*) \|$", README, re.MULTILINE)
         assert set(re.findall(r"`([^`]+)`", row)) == set(units)
+
+
+def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say() -> None:
+    """All of them put behind the example make a recipe."""
+    parts = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    assert len(parts) == 4
+    data = tomllib.loads("\n".join(parts))
+    data["time"]["epoch"] = datetime(2024, 6, 12, tzinfo=UTC)  # since the times of the parts count from it
+    recipe = check_model(Recipe, data, None)
+    assert recipe.imu is not None
+    assert recipe.imu.force.z.negate
+    assert recipe.gnss is not None
+    assert recipe.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
+    assert set(recipe.tables) == {"log", "gps"}
 
 
 def test_the_vertical_part_of_the_readme_is_toml() -> None:

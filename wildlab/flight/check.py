@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wildlab.flight import findings, findings_seen
+from wildlab.flight import findings, findings_inertial, findings_seen
 from wildlab.flight.findings import Finding
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariances
@@ -51,6 +51,7 @@ def find(flight: Flight) -> list[Finding]:
         *findings_seen.truth_place(flight),
         *findings_seen.identity(flight),
         *findings_seen.image(flight),
+        *findings_inertial.inertial(flight),
         *_missing(flight),
         *_uncertainty(flight),
         *_clocks(flight),
@@ -126,6 +127,15 @@ def _missing(flight: Flight) -> Iterator[Finding]:
             yield Finding(
                 "problem", f"nav/{name}", "", "there is no pose in it", "add rows, or remove the table"
             )
+    if flight.manifest.camera is None and flight.detections is None and flight.frames is None:
+        yield Finding(
+            "note",
+            "flight.toml",
+            "camera",
+            "there is no camera and there are no images: the flight is for navigation only",
+            "add frames, detections and the camera if there are any",
+        )
+        return
     if flight.detections is None or len(flight.detections) == 0:
         fix = "add detections, or use the flight for navigation only"
         yield Finding("warning", "detections", "", "nothing was detected in this flight", fix)
@@ -155,6 +165,8 @@ def _missing(flight: Flight) -> Iterator[Finding]:
 def _uncertainty(flight: Flight) -> Iterator[Finding]:
     assumed = flight.manifest.uncertainty
     lacking = [name for name in ASSUMED if getattr(assumed, name) is None]
+    if flight.manifest.camera is None:
+        return  # no point on the ground is computed
     for name, nav in flight.nav.items():
         P = covariances(nav)
         if P is not None and np.isfinite(P).any():

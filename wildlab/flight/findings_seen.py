@@ -9,6 +9,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.findings import POSITION, Finding, count, first_row
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import frame_poses
@@ -110,23 +111,8 @@ def _twice(table: str, field: str, names: pd.Series, fix: str) -> Iterator[Findi
 def image(flight: Flight) -> Iterator[Finding]:
     """Detections against the camera: pixels in the image, ground below the lens."""
     camera = flight.manifest.camera
-    ratio = camera.fx_px / camera.fy_px
-    if abs(ratio - 1) > FOCAL_RATIO:
-        yield Finding(
-            "note",
-            "flight.toml",
-            "camera.fx_px",
-            f"fx and fy differ by {100 * abs(ratio - 1):.1f} %, which no lens with square pixels does",
-            "check the calibration, and expect the boresight estimate to take up part of it",
-        )
-    if not (0 < camera.cx_px < camera.width_px and 0 < camera.cy_px < camera.height_px):
-        yield Finding(
-            "warning",
-            "flight.toml",
-            "camera.cx_px",
-            f"the principal point ({camera.cx_px:g}, {camera.cy_px:g}) lies outside of the image",
-            "check that the calibration is for this image size",
-        )
+    if camera is not None:
+        yield from _calibration(camera)
     if flight.detections is None:
         return
     detections = flight.detections
@@ -147,6 +133,15 @@ def image(flight: Flight) -> Iterator[Finding]:
     pixel = kind == "pixel"
     if not pixel.any():
         return
+    if camera is None:
+        yield Finding(
+            "problem",
+            "flight.toml",
+            "camera",
+            "there are pixels, and no camera they could be of",
+            "add the part [camera] with the calibration",
+        )
+        return
     u, v = detections["u_px"].to_numpy(), detections["v_px"].to_numpy()
     outside = pixel & ((u < -0.5) | (u > camera.width_px) | (v < -0.5) | (v > camera.height_px))
     if outside.any():
@@ -160,6 +155,26 @@ def image(flight: Flight) -> Iterator[Finding]:
             "check the unit of the pixels and the size of the image",
         )
     yield from _ground(flight, pixel)
+
+
+def _calibration(camera: CameraPart) -> Iterator[Finding]:
+    ratio = camera.fx_px / camera.fy_px
+    if abs(ratio - 1) > FOCAL_RATIO:
+        yield Finding(
+            "note",
+            "flight.toml",
+            "camera.fx_px",
+            f"fx and fy differ by {100 * abs(ratio - 1):.1f} %, which no lens with square pixels does",
+            "check the calibration, and expect the boresight estimate to take up part of it",
+        )
+    if not (0 < camera.cx_px < camera.width_px and 0 < camera.cy_px < camera.height_px):
+        yield Finding(
+            "warning",
+            "flight.toml",
+            "camera.cx_px",
+            f"the principal point ({camera.cx_px:g}, {camera.cy_px:g}) lies outside of the image",
+            "check that the calibration is for this image size",
+        )
 
 
 def _ground(flight: Flight, pixel: np.ndarray) -> Iterator[Finding]:

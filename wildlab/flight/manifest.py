@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
+from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, read_toml
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.camera import Camera
@@ -114,6 +115,37 @@ class ClocksPart(Strict):
 
     camera_offset_s: float = 0.0
     truth_offset_s: float = 0.0
+    gnss_offset_s: float = 0.0
+
+
+class GnssPart(Strict):
+    """The receiver: `lever_arm_m` from b to its antenna, in b (forward, right, down).
+
+    `latency_s`: how long after the instant it is of a fix is stamped. It belongs to the fix, the offset in
+    `[clocks]` to the clock; `wildlab.flight.sync.gnss_times` applies both.
+    """
+
+    name: str = ""
+    lever_arm_m: Vector = (0.0, 0.0, 0.0)
+    latency_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    note: str = ""
+
+
+class ImuPart(Strict):
+    """The inertial sensor, and its errors as a data sheet gives them. Absent = not known.
+
+    White noise as random walks; the slow part of a bias as its standard deviation, with the time over which
+    it changes.
+    """
+
+    name: str = ""
+    velocity_random_walk_m_s_sqrt_h: Spread | None = None
+    angle_random_walk_deg_sqrt_h: Spread | None = None
+    accelerometer_bias_m_s2: Spread | None = None
+    accelerometer_bias_time_s: Spread | None = None
+    gyro_bias_deg_h: Spread | None = None
+    gyro_bias_time_s: Spread | None = None
+    note: str = ""
 
 
 class VerticalPart(Strict):
@@ -175,8 +207,10 @@ class Manifest(Strict):
     locations: LocationsPart = LocationsPart()
     origin: OriginPart
     platform: PlatformPart
-    camera: CameraPart
+    camera: CameraPart | None = None
     mount: MountPart = MountPart()
+    imu: ImuPart = ImuPart()
+    gnss: GnssPart = GnssPart()
     time: TimePart
     clocks: ClocksPart = ClocksPart()
     vertical: VerticalPart = VerticalPart()
@@ -205,8 +239,17 @@ class Manifest(Strict):
         return self
 
     def geometry_camera(self) -> Camera:
-        """The camera, as geometry takes it."""
+        """The camera, as geometry takes it.
+
+        Raises
+        ------
+        WildlabError
+            Where the flight has none.
+        """
         c = self.camera
+        if c is None:
+            fix = "add the part [camera] to flight.toml, or use the flight for navigation only"
+            raise WildlabError(f"the flight {self.name} has no camera", fix, field="camera")
         distortion = (c.k1, c.k2, c.p1, c.p2, c.k3)
         return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, distortion)
 

@@ -13,6 +13,7 @@ import re
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,9 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable
+from wildlab.flight.matlab import read_matlab, table_of
 from wildlab.flight.recipe_parts import Quantity, Stamp, parse_zone
+from wildlab.flight.recipe_series import MatlabTable, Series
 from wildlab.flight.units import Dimension, factor
 
 Array = NDArray[np.float64]
@@ -35,19 +38,26 @@ _LATEST_S = 9.2e9
 
 @dataclass(frozen=True)
 class RawTable:
-    """One file of text: its columns, and for each row the line it ends on."""
+    """One table: its columns of text or (out of a MATLAB file) numbers, and for each row the line it ends on,
+    or its number."""
 
     path: Path
     header: tuple[str, ...]
-    cells: dict[str, Text]
+    cells: dict[str, Text | Array]
     lines: NDArray[np.int64]
+    counted_in: str = "line"
 
     def __len__(self) -> int:
         return len(self.lines)
 
+    def rows(self, chosen: NDArray[np.intp]) -> RawTable:
+        """Some of the rows."""
+        cells = {name: column[chosen] for name, column in self.cells.items()}
+        return RawTable(self.path, self.header, cells, self.lines[chosen], self.counted_in)
+
     def fail(self, problem: str, fix: str, column: str, part: str, row: int | None = None) -> WildlabError:
         """An error about this table, to be raised."""
-        where = "" if row is None else f"line {self.lines[row]}: "
+        where = "" if row is None else f"{self.counted_in} {self.lines[row]}: "
         return WildlabError(where + problem, fix, file=self.path, field=f"{printable(column)} (in [{part}])")
 
 
@@ -57,8 +67,10 @@ class RawFiles:
 
     folder: Path
     recipe: Path
+    matlab: dict[str, MatlabTable] = field(default_factory=dict)
     hashes: dict[str, str] = field(default_factory=dict)
     _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
+    _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def read(self, name: str, part: str) -> bytes:
         """The bytes of a file.
@@ -87,17 +99,63 @@ class RawFiles:
         return data
 
     def table(self, name: str, separator: str, part: str) -> RawTable:
-        """A file as a table of text, its first line the names of the columns.
+        """A file as a table of text, its first line the names of the columns; or one of the tables that the
+        recipe makes of MATLAB files.
 
         Raises
         ------
         WildlabError
-            Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first.
+            Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first;
+            or where it is no MATLAB file, or does not hold what the recipe says.
         """
+        if name in self.matlab:
+            return self._matlab_table(name)
         if (name, separator) not in self._tables:
             data = self.read(name, part)
             self._tables[name, separator] = _parse(self.folder / name, data, separator)
         return self._tables[name, separator]
+
+    def _matlab_table(self, name: str) -> RawTable:
+        block, part = self.matlab[name], f"tables.{name}"
+        if (name, "") not in self._tables:
+            path = self.folder / block.file
+            if block.file not in self._variables:
+                self._variables[block.file] = read_matlab(path, self.read(block.file, part))
+            cells = table_of(self._variables[block.file], block, path, part)
+            count = len(next(iter(cells.values())))
+            self._tables[name, ""] = RawTable(path, tuple(cells), cells, np.arange(1, count + 1), "row")
+        return self._tables[name, ""]
+
+    def series(self, block: Series, part: str) -> RawTable:
+        """The rows of a table that count.
+
+        Raises
+        ------
+        WildlabError
+            As `table`; and where a column of a condition is missing or not of numbers, or no row counts.
+        """
+        table = self.table(block.file, block.separator, part)
+        if not block.changed and not block.where:
+            return table
+        counts = np.ones(len(table), bool)
+        if block.changed:
+            columns = [texts(table, one, f"{part}.changed", may_be_empty=True) for one in block.changed]
+            counts[1:] = np.any([column[1:] != column[:-1] for column in columns], axis=0)
+        for i, one in enumerate(block.where):
+            value = plain_numbers(table, one.column, f"{part}.where[{i}]", may_be_empty=True)
+            if one.equals is not None:
+                counts &= value == one.equals
+            if one.differs is not None:
+                counts &= (value != one.differs) & ~np.isnan(value)
+            if one.above is not None:
+                counts &= value > one.above
+            if one.below is not None:
+                counts &= value < one.below
+        if not counts.any():
+            problem = f"none of the {len(table)} rows counts"
+            columns_named = ", ".join([*block.changed, *(one.column for one in block.where)])
+            raise table.fail(problem, "check the conditions in where and changed", columns_named, part)
+        return table.rows(np.flatnonzero(counts))
 
 
 def _parse(path: Path, data: bytes, separator: str) -> RawTable:
@@ -125,7 +183,7 @@ def _parse(path: Path, data: bytes, separator: str) -> RawTable:
         raise WildlabError(f"line {reader.line_num}: {error}", "mend that line", file=path) from None
     if not rows:
         raise WildlabError("there are no rows in it", "give it a line of column names and rows", file=path)
-    cells = {
+    cells: dict[str, Text | Array] = {
         name: np.array([cell.strip() for cell in column], dtype=object)
         for name, column in zip(header, zip(*rows, strict=True), strict=True)
     }
@@ -147,7 +205,11 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
         raise table.fail("this column is missing", fix, column, part)
     if table.header.count(column) > 1:
         raise table.fail("two columns have this name", "rename one of them", column, part)
-    cells = table.cells[column]
+    found = table.cells[column]
+    if found.dtype == object:
+        cells = np.asarray(found, dtype=object)
+    else:  # numbers, as a name or a label: without a needless fraction
+        cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
     empty = cells == ""
     if empty.any() and not may_be_empty:
         row = int(np.argmax(empty))
@@ -174,7 +236,10 @@ def numbers(
     scale = factor(quantity.unit, dimension, *image) * (-1 if quantity.negate else 1)
     if quantity.column is None:
         return np.full(len(table), scale * (0.0 if quantity.value is None else quantity.value))
-    return scale * plain_numbers(table, quantity.column, part, may_be_empty=may_be_empty)
+    found = plain_numbers(table, quantity.column, part, may_be_empty=may_be_empty)
+    if quantity.plus is not None:
+        found = found + plain_numbers(table, quantity.plus, f"{part}.plus", may_be_empty=may_be_empty)
+    return scale * found
 
 
 def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Array:
@@ -185,13 +250,18 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
     WildlabError
         Where there is no such column, or a cell is not a finite number.
     """
-    cells = texts(table, column, part, may_be_empty=may_be_empty)
-    found = pd.to_numeric(pd.Series(cells), errors="coerce").to_numpy(dtype=float)
-    bad = ~np.isfinite(found) & (cells != "")
+    cells = table.cells.get(column)
+    if cells is not None and cells.dtype != object:
+        found = np.asarray(cells, float)
+        bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
+    else:
+        cells = texts(table, column, part, may_be_empty=may_be_empty)
+        found = pd.to_numeric(pd.Series(cells), errors="coerce").to_numpy(dtype=float)
+        bad = ~np.isfinite(found) & (cells != "")
     if bad.any():
         row = int(np.argmax(bad))
         raise table.fail(
-            f"{_short(cells[row])} is not a finite number",
+            f"{_short(str(cells[row]))} is not a finite number",
             "mend the cell (a point before the decimals, no unit behind them), or take out the row",
             column,
             part,
@@ -273,7 +343,7 @@ def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -
     far = np.abs(seconds) + abs(start) / 1e9 > _LATEST_S
     if far.any():
         row = int(np.argmax(far))
-        problem = f"{_short(table.cells[name][row])} {stamp.unit} is centuries away"
+        problem = f"{_short(str(table.cells[name][row]))} {stamp.unit} is centuries away"
         raise table.fail(problem, "check the unit of the time in the recipe (s, ms or us)", name, part, row)
     return np.asarray(start + np.round(seconds * 1e9).astype(np.int64))
 

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.check import find
 from wildlab.flight.files import check_model
-from wildlab.flight.manifest import CameraPart, Manifest, make_manifest
+from wildlab.flight.manifest import CameraPart, GnssPart, ImuPart, Manifest, make_manifest
 from wildlab.flight.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe_model import Recipe, read_recipe
-from wildlab.flight.recipe_poses import Places, PoseRows, read_poses
+from wildlab.flight.recipe_poses import Fixes, Places, PoseRows, read_poses
+from wildlab.flight.recipe_sensors import SensorRows, read_sensors
 from wildlab.flight.recipe_tables import (
     FrameRows,
     frames_of_rows,
@@ -58,7 +59,7 @@ def import_flight(
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
         raise WildlabError("there is no such folder to import from", "check the source folder", file=folder)
-    flight = _build(recipe, RawFiles(folder, recipe_path))
+    flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables))
     _refuse_problems(flight, recipe, folder)
     return save_flight(flight, into, overwrite=overwrite)
 
@@ -69,22 +70,26 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     poses: dict[str, PoseRows] = {}
     for name, block in recipe.poses.items():
         part = f"poses.{name}"
-        table = raw.table(block.file, block.separator, part)
+        table = raw.series(block, part)
         ids = None
         if block.time is None:
             ids = frames_of_rows(frames, recipe, block, block.frame, table, part)
         poses[name] = read_poses(recipe, block, table, part, ids)
-    places = _places(recipe, poses)
-    epoch = _epoch(recipe, [frames.stamps, *(one.stamps for one in poses.values())])
+    sensors = read_sensors(recipe, raw)
+    places = _places(recipe, poses, sensors)
+    stamps = [frames.stamps, *(one.stamps for one in poses.values())]
+    epoch = _epoch(recipe, stamps + [one.stamps for one in sensors.values()])
     start = 0 if epoch is None else nanoseconds(epoch)
 
     time_s = np.arange(len(frames.table), dtype=float)
     if frames.stamps is not None:
         time_s = (frames.stamps - start) / 1e9
-    tables = {"frames": frames.table.assign(time_s=time_s)}
+    tables = {} if recipe.frames is None else {"frames": frames.table.assign(time_s=time_s)}
+    tables |= {name: one.table(start, places) for name, one in sensors.items()}
+    fixes = _fixes(recipe, tables)
     flight_time = time_s + recipe.clocks.camera_offset_s
     nav = {
-        name: one.nav(_pose_times(one, start, flight_time, frames, recipe, raw, name), places)
+        name: one.nav(_pose_times(one, start, flight_time, frames, recipe, raw, name), places, fixes)
         for name, one in poses.items()
     }
     if recipe.truth:
@@ -99,9 +104,11 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     manifest = _manifest(recipe, raw, camera, places, epoch, " ".join(filter(None, notes)))
     if recipe.detections:
         _refuse_problems(Flight(manifest, nav, tables), recipe, raw.folder)
-        lens, _, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
-        of_frame = pd.DataFrame(lens, index=frames.table["frame_id"])
-        image = (float(camera.width_px), float(camera.height_px))
+        of_frame = pd.DataFrame(np.full((len(frames.table), 3), np.nan), index=frames.table["frame_id"])
+        if nav:
+            lens, _, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
+            of_frame = pd.DataFrame(lens, index=frames.table["frame_id"])
+        image = (math.nan, math.nan) if camera is None else (float(camera.width_px), float(camera.height_px))
         detections = [
             read_detections(one, raw, recipe, f"detections[{i}]", frames, places, image, of_frame)
             for i, one in enumerate(recipe.detections)
@@ -112,8 +119,8 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     return Flight(manifest, nav, tables)
 
 
-def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart:
-    """The camera, numbers that stand in columns filled in.
+def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
+    """The camera, numbers that stand in columns filled in; None where the recipe has none.
 
     Raises
     ------
@@ -121,6 +128,8 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart:
         Where a column is missing or does not hold one constant, or a number makes no camera.
     """
     block = recipe.camera
+    if block is None:
+        return None
     data: dict[str, object] = {name: getattr(block, name) for name in CameraPart.model_fields}
     path = raw.recipe
     if block.file is not None:
@@ -148,17 +157,30 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart:
         raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
 
 
-def _places(recipe: Recipe, poses: dict[str, PoseRows]) -> Places:
-    """What takes positions to frame n; without an origin in the recipe, the first pose is it."""
+def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> Places:
+    """What takes positions to frame n; without an origin in the recipe, the first pose is it, or the first
+    satellite position where there are no poses."""
     vertical = recipe.vertical
     if recipe.origin is not None:
         o = recipe.origin
         origin = (math.radians(o.latitude_deg), math.radians(o.longitude_deg), o.height_m)
     else:
-        latitude, longitude, height = next(iter(poses.values())).position.values[0]
-        off = vertical.correction_m if "poses" in vertical.taken_off else 0.0
+        known = [("poses", one.position) for one in poses.values() if one.position is not None]
+        known += [("gnss", one.position) for one in sensors.values() if one.position is not None]
+        what, first = known[0]
+        latitude, longitude, height = first.values[0]
+        off = vertical.correction_m if what in vertical.taken_off else 0.0
         origin = (float(latitude), float(longitude), float(height) - off)
     return Places(origin, vertical.correction_m, vertical.taken_off)
+
+
+def _fixes(recipe: Recipe, tables: dict[str, pd.DataFrame]) -> Fixes | None:
+    """Where the receiver was, for poses without positions of their own."""
+    if recipe.gnss is None:
+        return None
+    table = tables["gnss"]
+    times = table["time_s"].to_numpy() + recipe.clocks.gnss_offset_s - recipe.gnss.latency_s
+    return Fixes(times, table[["north_m", "east_m", "down_m"]].to_numpy())
 
 
 def _epoch(recipe: Recipe, stamps: list[Nanoseconds | None]) -> datetime | None:
@@ -187,10 +209,11 @@ def _pose_times(
     of_frame = of_frame[~of_frame.index.duplicated()]
     strange = [frame for frame in poses.ids if frame not in of_frame.index] if poses.ids is not None else []
     if strange:
+        block = recipe.frames
         raise WildlabError(
-            f"{strange[0]!r} is not one of the frames of {recipe.frames.file}",
+            f"{strange[0]!r} is not one of the frames" + (f" of {block.file}" if block else ""),
             "add it there, or mend its name",
-            file=raw.folder / recipe.poses[name].file,
+            file=raw.folder / _file(recipe, recipe.poses[name].file),
             field=f"{recipe.poses[name].frame} (in [poses.{name}.frame])",
         )
     return np.asarray(of_frame.reindex(poses.ids), np.float64)
@@ -199,7 +222,7 @@ def _pose_times(
 def _manifest(
     recipe: Recipe,
     raw: RawFiles,
-    camera: CameraPart,
+    camera: CameraPart | None,
     places: Places,
     epoch: datetime | None,
     description: str,
@@ -225,6 +248,10 @@ def _manifest(
             "platform": recipe.platform,
             "camera": camera,
             "mount": recipe.mount,
+            "imu": {} if recipe.imu is None else {k: getattr(recipe.imu, k) for k in ImuPart.model_fields},
+            "gnss": {}
+            if recipe.gnss is None
+            else {k: getattr(recipe.gnss, k) for k in GnssPart.model_fields},
             "time": {"kind": recipe.time.kind, "epoch": epoch},
             "clocks": recipe.clocks,
             "vertical": {
@@ -248,17 +275,26 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     for finding in find(flight):
         if finding.level != "problem":
             continue
-        if finding.table.startswith("nav/"):
+        sensors = {"imu": recipe.imu, "gnss": recipe.gnss, "gimbal": recipe.gimbal}
+        sensor = sensors.get(finding.table)
+        if sensor is not None:
+            part, files = finding.table, [sensor.file]
+        elif finding.table.startswith("nav/"):
             name = finding.table.removeprefix("nav/")
             part, files = f"poses.{name}", [recipe.poses[name].file]
         elif finding.table == "frames":
-            part, files = "frames", [recipe.frames.file]
+            part, files = "frames", [recipe.frames.file] if recipe.frames else []
         else:
             blocks = recipe.truth if finding.table == "truth" else recipe.detections
             part, files = finding.table, [block.file for block in blocks]
         raise WildlabError(
             finding.sentence,
             finding.fix,
-            file=" and ".join(dict.fromkeys(str(folder / name) for name in files)),
+            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, name)) for name in files)),
             field=f"{finding.field} (from [{part}])",
         )
+
+
+def _file(recipe: Recipe, name: str) -> str:
+    """The file a block reads, also where it names one of the tables."""
+    return recipe.tables[name].file if name in recipe.tables else name

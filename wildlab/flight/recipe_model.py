@@ -33,26 +33,39 @@ from wildlab.flight.recipe_parts import (
     Velocity,
     Zone,
 )
+from wildlab.flight.recipe_series import (
+    Block,
+    Gimbal,
+    Inertial,
+    MatlabTable,
+    Satellite,
+    Separator,
+    Series,
+    check_table_names,
+)
 
-Separator = Annotated[str, Field(min_length=1, max_length=1)]
 
+class Poses(Series):
+    """A nav source: by time, or one pose per frame (by the column `frame`, or of this very file).
 
-class Block(Strict):
-    """What every part that reads a file has: its name below the source folder, and its separator."""
-
-    file: str
-    separator: Separator = ","
-
-
-class Poses(Block):
-    """A nav source: by time, or one pose per frame (by the column `frame`, or of this very file)."""
+    `position_from` is for logs of attitude alone: their positions are linear between those of the receiver.
+    """
 
     time: Stamp | None = None
     frame: str | None = None
-    position: Position
+    position: Position | None = None
+    position_from: Literal["gnss"] | None = None
     attitude: Attitude
     velocity: Velocity | None = None
     spreads: Spreads | None = None
+
+    @model_validator(mode="after")
+    def _one_position(self) -> Self:
+        if (self.position is None) == (self.position_from is None):
+            raise ValueError("poses have either a position or position_from; give one of both")
+        if self.position_from and self.time is None:
+            raise ValueError("position_from is for poses over time; add the time, or give a position")
+        return self
 
 
 class Group(Strict):
@@ -164,7 +177,7 @@ class Detections(Block):
         return "bearing" if self.range is None else "range-bearing"
 
 
-class Truth(Block):
+class Truth(Series):
     """Where targets really were: `id` names the column, or `target` the one target of the whole file. Without
     a time they are points that never move."""
 
@@ -229,13 +242,13 @@ class RecipeTime(Strict):
 class RecipeVertical(Strict):
     """What the heights are, and a constant to take off where a source is wrong.
 
-    `taken_off` names which heights: ``poses``, ``ground`` (of detections), ``positions`` (detections that are
-    positions), ``truth``.
+    `taken_off` names which heights: ``poses``, ``gnss``, ``ground`` (of detections), ``positions``
+    (detections that are positions), ``truth``.
     """
 
     reference: str = "ellipsoid"
     correction_m: float = 0.0
-    taken_off: tuple[Literal["poses", "ground", "positions", "truth"], ...] = ()
+    taken_off: tuple[Literal["poses", "gnss", "ground", "positions", "truth"], ...] = ()
     note: str = ""
 
     @model_validator(mode="after")
@@ -243,7 +256,7 @@ class RecipeVertical(Strict):
         if self.correction_m and not self.taken_off:
             raise ValueError(
                 "there is a correction, and taken_off does not say which heights to take it off; "
-                "name some of poses, ground, positions, truth"
+                "name some of poses, gnss, ground, positions, truth"
             )
         if self.correction_m and not self.note:
             raise ValueError("there is a correction, and no note says why; add the note")
@@ -258,7 +271,7 @@ class Recipe(Strict):
     locations: LocationsPart = LocationsPart()
     origin: OriginPart | None = None
     platform: PlatformPart
-    camera: RecipeCamera
+    camera: RecipeCamera | None = None
     mount: MountPart = MountPart()
     time: RecipeTime
     clocks: ClocksPart = ClocksPart()
@@ -266,8 +279,12 @@ class Recipe(Strict):
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
     files: dict[str, str] = Field(default_factory=dict)
-    frames: Frames
-    poses: dict[str, Poses]
+    tables: dict[str, MatlabTable] = Field(default_factory=dict)
+    frames: Frames | None = None
+    poses: dict[str, Poses] = Field(default_factory=dict)
+    imu: Inertial | None = None
+    gnss: Satellite | None = None
+    gimbal: Gimbal | None = None
     detections: tuple[Detections, ...] = ()
     truth: tuple[Truth, ...] = ()
 
@@ -284,16 +301,34 @@ class Recipe(Strict):
         for name in value:
             if not is_safe_name(name):
                 raise ValueError(f"{name!r} cannot name a nav source; use letters, digits, - and _ only")
-        if not value:
-            raise ValueError("there are no poses; add a part such as [poses.autopilot]")
         return value
+
+    @field_validator("tables")
+    @classmethod
+    def _safe_tables(cls, value: dict[str, MatlabTable]) -> dict[str, MatlabTable]:
+        return check_table_names(value)
+
+    @model_validator(mode="after")
+    def _enough(self) -> Self:
+        for name, poses in self.poses.items():
+            if poses.position_from and self.gnss is None:
+                raise ValueError(
+                    f"[poses.{name}] takes its positions from gnss, and there is none; add the part [gnss]"
+                )
+        if not self.poses and self.gnss is None:
+            raise ValueError("there are no poses; add a part such as [poses.autopilot], or at least [gnss]")
+        if self.camera is None and (self.frames is not None or any(one.pixel for one in self.detections)):
+            raise ValueError("there are images, and no camera; add the part [camera]")
+        return self
 
     @model_validator(mode="after")
     def _times(self) -> Self:
-        times = {"frames": self.frames.time}
+        times = {} if self.frames is None else {"frames": self.frames.time}
+        sensors = {"imu": self.imu, "gnss": self.gnss, "gimbal": self.gimbal}
+        times |= {name: one.time for name, one in sensors.items() if one is not None}
         times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
         times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
-        if self.time.kind == "utc" and self.frames.time is None:
+        if self.time.kind == "utc" and self.frames is not None and self.frames.time is None:
             raise ValueError('time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"')
         for name, time in times.items():
             if self.time.kind == "sequence" and time is not None:
@@ -309,19 +344,26 @@ class Recipe(Strict):
         for name, poses in self.poses.items():
             if poses.time is not None and poses.frame is not None:
                 raise ValueError(f"[poses.{name}] has a time and a frame; take one out")
-            if poses.time is None and poses.frame is None and poses.file != self.frames.file:
+            of_frames = self.frames is not None and (poses.frame or poses.file == self.frames.file)
+            if poses.time is None and not of_frames:
                 raise ValueError(
                     f"[poses.{name}] has neither a time nor a frame; "
                     "add the time, or name the column of the frame"
                 )
+            if poses.time is None and (poses.where or poses.changed):
+                raise ValueError(
+                    f"[poses.{name}] has no time, and where and changed are for logs over time; take them out"
+                )
             bearing = poses.attitude.yaw_from_bearing is not None
-            if bearing and (poses.time is not None or poses.position.form != "wgs84"):
+            local = poses.position is None or poses.position.form != "wgs84"
+            if bearing and (poses.time is not None or local):
                 raise ValueError(
                     f"[poses.{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
                     "longitude; give a yaw instead"
                 )
-        positions = {f"poses.{name}": one.position for name, one in self.poses.items()}
+        positions = {f"poses.{name}": one.position for name, one in self.poses.items() if one.position}
         positions |= {f"truth[{i}]": one.position for i, one in enumerate(self.truth)}
+        positions |= {} if self.gnss is None else {"gnss": self.gnss.position}
         positions |= {
             f"detections[{i}]": one.position for i, one in enumerate(self.detections) if one.position
         }

@@ -14,9 +14,13 @@ from wildlab.flight.units import Dimension, factor
 
 
 class Quantity(Strict):
-    """A column, or one constant for all rows. `negate` turns its sign: a slant is minus the pitch."""
+    """A column, or one constant for all rows. `negate` turns its sign: a slant is minus the pitch.
+
+    `plus` names a column in the same unit that is added first: what a logger had taken off, such as a bias.
+    """
 
     column: str | None = None
+    plus: str | None = None
     value: float | None = None
     unit: str
     negate: bool = False
@@ -27,6 +31,8 @@ class Quantity(Strict):
             raise ValueError(
                 "a quantity has either a column or a value; name the column, or give one value for all rows"
             )
+        if self.plus is not None and self.column is None:
+            raise ValueError("plus is added to a column, and there is none; name the column")
         return self
 
 
@@ -42,6 +48,8 @@ Angle = Annotated[Quantity, _of("angle")]
 Length = Annotated[Quantity, _of("length")]
 Speed = Annotated[Quantity, _of("speed")]
 Pixel = Annotated[Quantity, _of("pixel")]
+Acceleration = Annotated[Quantity, _of("acceleration")]
+Rate = Annotated[Quantity, _of("rate")]
 
 
 def parse_zone(text: str) -> tzinfo:
@@ -150,12 +158,24 @@ class Position(Strict):
 
 
 class Velocity(Strict):
-    """North, east, down; or east, north, up."""
+    """North, east, down; or east, north, up; or the speed over ground and its course, with down or up."""
 
-    north: Speed
-    east: Speed
+    north: Speed | None = None
+    east: Speed | None = None
+    speed: Speed | None = None
+    course: Angle | None = None
     down: Speed | None = None
     up: Speed | None = None
+
+    @model_validator(mode="after")
+    def _one_horizontal(self) -> Self:
+        names = ("north", "east", "speed", "course")
+        given = {name for name in names if getattr(self, name) is not None}
+        if given not in ({"north", "east"}, {"speed", "course"}):
+            raise ValueError(
+                "a velocity has either north and east, or speed and course; give both of one kind"
+            )
+        return self
 
     @model_validator(mode="after")
     def _one_vertical(self) -> Self:

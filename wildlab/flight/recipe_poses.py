@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from wildlab.flight.findings import NORM_TOLERANCE
 from wildlab.flight.raw import Array, Nanoseconds, RawTable, Text, numbers, plain_numbers, times
 from wildlab.flight.recipe_model import Poses, Recipe
-from wildlab.flight.recipe_parts import Attitude, Position, YawFromBearing
-from wildlab.flight.sync import covariance_columns
+from wildlab.flight.recipe_parts import Attitude, Position, Velocity, YawFromBearing
+from wildlab.flight.sync import between, covariance_columns
 from wildlab.geometry.flodell import metres_per_degree
 from wildlab.geometry.frames import (
     R_NED_ENU,
@@ -72,10 +72,19 @@ class Places:
 
 
 @dataclass(frozen=True)
-class PoseRows:
-    """Poses of one source, by time (`stamps`) or by frame (`ids`)."""
+class Fixes:
+    """Satellite positions: flight times (N,) and positions in n (N, 3)."""
 
-    position: RawPosition
+    times: Array
+    position: Array
+
+
+@dataclass(frozen=True)
+class PoseRows:
+    """Poses of one source, by time (`stamps`) or by frame (`ids`); without positions of its own, where those
+    of the receiver are to be taken."""
+
+    position: RawPosition | None
     rotation: Array
     velocity: Array | None
     covariance: Array | None
@@ -83,9 +92,15 @@ class PoseRows:
     ids: Text | None
     note: str
 
-    def nav(self, time_s: Array, places: Places) -> pd.DataFrame:
-        """The nav table, its positions in n."""
-        p, q = places.ned(self.position, "poses"), matrix_to_quaternion(self.rotation)
+    def nav(self, time_s: Array, places: Places, fixes: Fixes | None) -> pd.DataFrame:
+        """The nav table, its positions in n; without those poses that `fixes` have no position for."""
+        if self.position is not None:
+            p = places.ned(self.position, "poses")
+        elif fixes is not None:
+            p = between(fixes.times, fixes.position, time_s, "gnss")
+        else:
+            raise ValueError("poses without positions")
+        q = matrix_to_quaternion(self.rotation)
         columns: dict[str, Array | Text] = {"time_s": time_s}
         columns |= dict(zip(("north_m", "east_m", "down_m"), p.T, strict=True))
         columns |= dict(zip(("q_w", "q_x", "q_y", "q_z"), q.T, strict=True))
@@ -96,7 +111,7 @@ class PoseRows:
         table = pd.DataFrame(columns)
         if self.covariance is not None:
             table = pd.concat([table, covariance_columns(self.covariance)], axis=1)
-        return table
+        return table if self.position is not None else table[np.isfinite(p[:, 0])].reset_index(drop=True)
 
 
 def read_position(table: RawTable, position: Position, part: str) -> RawPosition:
@@ -133,6 +148,27 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
     return RawPosition(form, position.linear, np.column_stack(columns))
 
 
+def read_velocity(table: RawTable, velocity: Velocity, part: str) -> Array:
+    """North, east, down, (N, 3) m/s.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or a cell is not a number.
+    """
+
+    def speeds(name: str) -> Array:
+        return numbers(table, getattr(velocity, name), "speed", f"{part}.{name}")
+
+    if velocity.course is not None:
+        speed, course = speeds("speed"), numbers(table, velocity.course, "angle", f"{part}.course")
+        north, east = speed * np.cos(course), speed * np.sin(course)
+    else:
+        north, east = speeds("north"), speeds("east")
+    down = speeds("down") if velocity.up is None else -speeds("up")
+    return np.column_stack([north, east, down])
+
+
 def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Text | None) -> PoseRows:
     """One nav source. Where several rows are of one frame (`ids`), they have to say the same, and become one.
 
@@ -142,19 +178,10 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         Where a column is missing, a cell is not a number or not a time, a quaternion is not normalised, or
         rows of one frame differ.
     """
-    position = read_position(table, block.position, f"{part}.position")
+    position = None if block.position is None else read_position(table, block.position, f"{part}.position")
     velocity = spreads = stamps = None
     if block.velocity is not None:
-        v = block.velocity
-        vertical = v.down if v.down is not None else v.up
-        if vertical is None:
-            raise ValueError("a velocity without a vertical part")
-        triple = (("north", v.north), ("east", v.east), ("down" if v.down is not None else "up", vertical))
-        velocity = np.column_stack(
-            [numbers(table, q, "speed", f"{part}.velocity.{name}") for name, q in triple]
-        )
-        if v.up is not None:
-            velocity[:, 2] *= -1
+        velocity = read_velocity(table, block.velocity, f"{part}.velocity")
     if block.spreads is not None:
         s = block.spreads
         lengths = [numbers(table, q, "length", f"{part}.spreads") for q in (s.horizontal, s.vertical)]
@@ -164,7 +191,9 @@ def read_poses(recipe: Recipe, block: Poses, table: RawTable, part: str, ids: Te
         stamps = times(table, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch)
     attitude = _read_attitude(table, block.attitude, f"{part}.attitude")
     note = ""
-    if ids is not None:
+    if position is None:
+        note = f"The positions of nav/{part.removeprefix('poses.')} are linear between those of the receiver."
+    elif ids is not None:
         frame, first = _rows_of_frames(ids)
         for values in (position.values, attitude, velocity, spreads):
             if values is not None:

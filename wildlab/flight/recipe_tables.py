@@ -18,8 +18,9 @@ from wildlab.flight.raw import (
     texts,
     times,
 )
-from wildlab.flight.recipe_model import Block, Detections, Frames, Ground, Recipe, Truth
+from wildlab.flight.recipe_model import Detections, Frames, Ground, Recipe, Truth
 from wildlab.flight.recipe_poses import Places, read_position
+from wildlab.flight.recipe_series import Block
 from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
 
 
@@ -34,6 +35,7 @@ class FrameRows:
 
 def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
     """The images: one per row with its id, or one per unique combination of columns, numbered as they come.
+    None at all where the recipe has no frames.
 
     Raises
     ------
@@ -41,6 +43,8 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
         Where a column is missing, a cell cannot be read, or rows of one frame differ.
     """
     block = recipe.frames
+    if block is None:
+        return FrameRows(pd.DataFrame({"frame_id": np.empty(0, object)}), None, np.empty(0, object))
     rows = raw.table(block.file, block.separator, "frames")
     if block.id is not None:
         of_row = texts(rows, block.id, "frames.id")
@@ -110,6 +114,8 @@ def frames_of_rows(
     """
     if column is not None:
         return texts(table, column, f"{part}.frame")
+    if recipe.frames is None:
+        return None
     same = (block.file, block.separator) == (recipe.frames.file, recipe.frames.separator)
     return frames.of_row if same else None
 
@@ -198,7 +204,7 @@ def read_truth(
     WildlabError
         Where a column is missing or a cell cannot be read.
     """
-    rows = raw.table(block.file, block.separator, part)
+    rows = raw.series(block, part)
     names = np.full(len(rows), block.target, dtype=object)
     if block.id is not None:
         names = texts(rows, block.id, f"{part}.id")

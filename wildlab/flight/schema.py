@@ -157,6 +157,8 @@ TABLES: dict[str, Table] = {
                 Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
                 Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
                 Column("sd_velocity_m_s", "float", "m/s", "SD of each axis of the velocity", False, True),
+                Column("satellites", "float", "", "satellites the fix is from", False, True),
+                Column("fix", "float", "", "kind of fix, as the receiver numbers them", False, True),
                 *_SECOND,
                 *(
                     Column(name, "float", "m", f"where that antenna is in b, along {name[-3]}", False)

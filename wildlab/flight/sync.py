@@ -40,6 +40,20 @@ def frame_times(flight: Flight) -> Array:
     return np.asarray(stamps + flight.manifest.clocks.camera_offset_s)
 
 
+def gnss_times(flight: Flight) -> Array:
+    """Flight time each satellite position is of, in seconds: its stamp, the offset of its clock applied, and
+    the latency of the receiver taken off. (N,)
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no satellite positions.
+    """
+    manifest = flight.manifest
+    stamps = flight.table("gnss")["time_s"].to_numpy(float)
+    return np.asarray(stamps + manifest.clocks.gnss_offset_s - manifest.gnss.latency_s)
+
+
 def poses_at(
     nav: pd.DataFrame,
     times: ArrayLike | None = None,
@@ -204,6 +218,23 @@ def longest_gap(stamps: ArrayLike) -> float:
     """The longest stretch in seconds between stamps (N,) of a log that its own rate explains."""
     steps = np.diff(np.asarray(stamps, float))
     return max(MAX_GAP_S, USUAL_STEPS * float(np.median(steps))) if len(steps) else MAX_GAP_S
+
+
+def between(
+    stamps: ArrayLike, values: ArrayLike, times: ArrayLike, what: str, max_gap_s: float | None = None
+) -> Array:
+    """Values (N, K) of increasing stamps (N,) at other times (T,), linear in time; `what` is for messages.
+
+    (T, K); NaN outside of the stamps, and in a gap as in `poses_at`.
+
+    Raises
+    ------
+    WildlabError
+        Where the stamps do not increase, or there are none.
+    """
+    return _between(
+        np.asarray(values, float), *_neighbours(np.asarray(stamps, float), times, max_gap_s, what)
+    )
 
 
 def _neighbours(

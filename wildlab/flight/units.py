@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-Dimension = Literal["angle", "length", "speed", "pixel", "time"]
+Dimension = Literal["angle", "length", "speed", "acceleration", "rate", "pixel", "time"]
+
+#: Of the unit g, by definition; m/s^2.
+STANDARD_GRAVITY = 9.80665
 
 UNITS: dict[Dimension, dict[str, float]] = {
     "angle": {"deg": math.radians(1), "rad": 1.0, "deg-e7": math.radians(1e-7)},
     "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048},
     "speed": {"m/s": 1.0, "cm/s": 0.01, "km/h": 1 / 3.6, "ft/s": 0.3048, "kn": 1852 / 3600},
+    "acceleration": {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY, "ft/s2": 0.3048},
+    "rate": {"rad/s": 1.0, "deg/s": math.radians(1), "mrad/s": 1e-3, "deg/h": math.radians(1) / 3600},
     # A proportion counts from 0 at the left or upper edge to 1 at the other.
     "pixel": {"px": 1.0, "proportion-of-width": math.nan, "proportion-of-height": math.nan},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
