@@ -9,7 +9,8 @@ from scipy.integrate import cumulative_simpson
 
 from wildlab.geometry.frames import matrix_to_quaternion, rotation_vector_to_matrix
 from wildlab.navigation.aiding import Aiding, positions
-from wildlab.navigation.mekf import ImuNoise, Start
+from wildlab.navigation.mekf import Start
+from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.timeline import Imu
 from wildlab.simulation.sensors import gauss_markov
 from wildlab.simulation.trajectory import Motion, angular_rates, coordinated_attitude, specific_forces

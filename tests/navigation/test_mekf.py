@@ -26,12 +26,12 @@ from wildlab.navigation.mekf import (
     ACCEPTED,
     FORCED,
     REJECTED,
-    ImuNoise,
     Start,
     pose_covariance,
     prepare,
     run_mekf,
 )  # fmt: skip
+from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.timeline import Imu
 
 EARTH = flat_earth(GRAVITY)

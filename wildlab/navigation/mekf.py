@@ -24,34 +24,11 @@ from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather
 from wildlab.navigation.gravity import Earth
 from wildlab.navigation.kernels import Integers
+from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
 
 #: Verdicts on a measurement: left out by its gate; taken in; taken in after the covariance was widened.
 REJECTED, ACCEPTED, FORCED = kernels.REJECTED, kernels.ACCEPTED, kernels.FORCED
-
-
-class ImuNoise(NamedTuple):
-    """How an inertial sensor errs, as data sheets say it, in SI units; alike on all axes.
-
-    Attributes
-    ----------
-    velocity_random_walk
-        White noise of the specific force, m/s/sqrt(s) (a data sheet's m/s/sqrt(h) divided by 60).
-    angle_random_walk
-        White noise of the angular rate, rad/sqrt(s).
-    accelerometer_bias_sd, gyro_bias_sd
-        Of the slow part of the bias, m/s^2 and rad/s: its standard deviation after a long time, or, where the
-        time is infinite, its random walk in m/s^2/sqrt(s) and rad/s/sqrt(s).
-    accelerometer_bias_time, gyro_bias_time
-        Correlation time, s (H 7.24); infinite for a random walk.
-    """
-
-    velocity_random_walk: float
-    angle_random_walk: float
-    accelerometer_bias_sd: float
-    accelerometer_bias_time: float
-    gyro_bias_sd: float
-    gyro_bias_time: float
 
 
 class Start(NamedTuple):
@@ -233,3 +210,18 @@ def pose_covariance(covariance: ArrayLike) -> Array:
     P = np.asarray(covariance, float)
     keep = np.array([0, 1, 2, 6, 7, 8])
     return P[..., keep[:, None], keep]
+
+
+def log_likelihood(innovations: Innovations, since: float = -np.inf) -> float:
+    """How likely the measurements were, up to a constant: what a latency or a noise may be chosen by.
+
+    ``since`` (s) leaves out the time before. Rejected measurements count as much as the others, or the choice
+    that rejects most would win.
+    """
+    late = innovations.times >= since
+    total = 0.0
+    for one in (False, True):  # headings have one element, the others three
+        rows = late & (np.isnan(innovations.innovation[:, 2]) == one)
+        m = 1 if one else 3
+        total += float(np.sum(innovations.nis[rows] + np.linalg.slogdet(innovations.S[rows, :m, :m])[1]))
+    return -0.5 * total

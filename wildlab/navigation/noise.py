@@ -1,0 +1,119 @@
+"""How inertial sensors err, in the terms that data sheets use."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wildlab.geometry.frames import Array
+from wildlab.navigation.timeline import Imu, checked_imu
+
+
+class ImuNoise(NamedTuple):
+    """How an inertial sensor errs, in SI units; alike on all axes.
+
+    Attributes
+    ----------
+    velocity_random_walk
+        White noise of the specific force, m/s/sqrt(s).
+    angle_random_walk
+        White noise of the angular rate, rad/sqrt(s).
+    accelerometer_bias_sd, gyro_bias_sd
+        Of the slow part of the bias, m/s^2 and rad/s: its standard deviation after a long time, or, where the
+        time is infinite, its random walk in m/s^2/sqrt(s) and rad/s/sqrt(s).
+    accelerometer_bias_time, gyro_bias_time
+        Correlation time, s (H 7.24); infinite for a random walk.
+    """
+
+    velocity_random_walk: float
+    angle_random_walk: float
+    accelerometer_bias_sd: float
+    accelerometer_bias_time: float
+    gyro_bias_sd: float
+    gyro_bias_time: float
+
+
+def from_data_sheet(
+    *,
+    velocity_random_walk: float,
+    angle_random_walk_deg: float,
+    accelerometer_bias: float,
+    gyro_bias_deg: float,
+    bias_time: float,
+) -> ImuNoise:
+    """Noise in the units of data sheets.
+
+    Parameters
+    ----------
+    velocity_random_walk
+        m/s/sqrt(h).
+    angle_random_walk_deg
+        deg/sqrt(h).
+    accelerometer_bias
+        In-run stability, m/s^2 (a milli-g is 0.00981).
+    gyro_bias_deg
+        In-run stability, deg/h.
+    bias_time
+        How long biases keep, s. Data sheets do not say.
+    """
+    return ImuNoise(
+        velocity_random_walk / 60,
+        float(np.radians(angle_random_walk_deg)) / 60,
+        accelerometer_bias,
+        bias_time,
+        float(np.radians(gyro_bias_deg)) / 3600,
+        bias_time,
+    )
+
+
+#: H table A.5; the time is chosen: the minute or so at which Allan deviations of such sensors are lowest.
+ADIS16490 = from_data_sheet(
+    velocity_random_walk=0.008, angle_random_walk_deg=0.09, accelerometer_bias=3.6e-6 * 9.81,
+    gyro_bias_deg=1.8, bias_time=100.0,
+)  # fmt: skip
+#: H table A.6; the time as above.
+STIM300 = from_data_sheet(
+    velocity_random_walk=0.07, angle_random_walk_deg=0.15, accelerometer_bias=0.05e-3 * 9.81,
+    gyro_bias_deg=0.3, bias_time=100.0,
+)  # fmt: skip
+
+
+def with_axis_errors(noise: ImuNoise, imu: Imu, accelerometer_error: float, gyro_error: float) -> ImuNoise:
+    """Noise that covers scale factors and misalignments too, for the motion of a given flight.
+
+    A scale factor that is 1 % wrong makes an error of 1 % of whatever is measured. As long as that changes,
+    it is taken as a first-order process with its size and its correlation time, and its spectral density at
+    low frequencies is added to the random walks. The steady part is a matter of the biases.
+
+    Parameters
+    ----------
+    imu
+        N samples of the flight, without the time on the ground.
+    accelerometer_error, gyro_error
+        Scale factor and misalignment (rad) together, as data sheets give them, for instance 0.01.
+    """
+    samples = checked_imu(imu)
+    step = float(np.median(np.diff(samples.times)))
+    added = [
+        error * _density(signal, step)
+        for error, signal in (
+            (accelerometer_error, samples.specific_force),
+            (gyro_error, samples.angular_rate),
+        )
+    ]
+    return noise._replace(
+        velocity_random_walk=float(np.hypot(noise.velocity_random_walk, added[0])),
+        angle_random_walk=float(np.hypot(noise.angle_random_walk, added[1])),
+    )
+
+
+def _density(signal: Array, step: float) -> float:
+    """Root of the spectral density of a signal (N, 3) about its mean, per axis, were it of first order."""
+    off = signal - signal.mean(axis=0)
+    n = len(off)
+    power = (np.abs(np.fft.rfft(off, 2 * n, axis=0)) ** 2).sum(axis=1)
+    correlation = np.fft.irfft(power)[:n]
+    below = correlation < correlation[0] / np.e
+    time = step * max(int(np.argmax(below)) if below.any() else n, 1)
+    return float(np.sqrt(off.var(axis=0).mean() * 2 * time))
