@@ -26,7 +26,7 @@ def test_axis_errors_have_the_density_of_the_motion():
     """For motion that is of first order the density is known: the error's variance times twice its time."""
     times = np.arange(0, 2000, 0.02)
     rng = np.random.default_rng(0)
-    force = gauss_markov(len(times), 0.02, 3.0, np.full(3, 0.5), rng) + [0, 0, -9.81]
+    force = gauss_markov(len(times), 0.02, 3.0, np.full(3, 0.5), rng) - np.array([0, 0, 9.81])
     rate = gauss_markov(len(times), 0.02, 0.4, np.full(3, 0.2), rng)
     noise = with_axis_errors(ImuNoise(0, 0, 1, 2, 3, 4), Imu(times, force, rate), 0.01, 0.02)
     assert noise.velocity_random_walk == pytest.approx(0.01 * 3.0 * np.sqrt(2 * 0.5), rel=0.1)
