@@ -160,7 +160,7 @@ def test_the_table_names_value_unit_and_reason():
 
 
 RATE = '[camera.frame_rate]\nvalue = 7.5\nunit = "Hz"'
-RADIUS = '[flight.loiter_radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
+RADIUS = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
 
 
 @pytest.mark.parametrize(
@@ -179,11 +179,11 @@ RADIUS = '[flight.loiter_radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
         (RATE, RATE.replace("7.5", "true"), "camera.frame_rate.value", "[Tt]rue is neither", "Give one"),
         (RATE, RATE.replace("7.5", '"fast"'), "camera.frame_rate", "'fast' is not a number", "in Hz"),
         (RATE, RATE.replace("frame_rate", "frame_rat"), "camera.frame_rat", "not known", "'frame_rate'"),
-        (RADIUS, RADIUS.replace("chosen", "guessed"), "flight.loiter_radius.status", "guessed", "Mend"),
-        (RADIUS, RADIUS.replace("chosen", "published"), "flight.loiter_radius", "names no source", "Add"),
+        (RADIUS, RADIUS.replace("chosen", "guessed"), "loiter.radius.status", "guessed", "Mend"),
+        (RADIUS, RADIUS.replace("chosen", "published"), "loiter.radius", "names no source", "Add"),
         ("value = 552\n", "value = 552.5\n", "target.observations", "not a whole number", "Give one"),
         ("value = 7990\n", "value = 9990\n", None, "after the flight's end", "camera.images"),
-        ('value = "clockwise"', 'value = "left"', "flight.turn", "'left' is not known", "clockwise"),
+        ('value = "clockwise"', 'value = "left"', "loiter.turn", "'left' is not known", "clockwise"),
         ('value = "2018-06-01T10:00:00Z"', 'value = "2018-06-01"', "place.epoch", "not a time", "10:00:00Z"),
         ('name = "static-antenna"', 'name = "../up"', "name", "'../up' cannot be the name", "letters"),
         (
@@ -218,6 +218,66 @@ def test_a_choice_without_a_reason_is_refused(altered):
         WildlabError, match=r"target\.identifier: the value is called chosen but gives no reason"
     ):
         altered(old, old.replace("only a name", " "))
+
+
+LOITER = """
+[loiter.radius]
+value = 160.0
+unit = "m"
+status = "chosen"
+reason = "for this test"
+
+[loiter.turn]
+value = "clockwise"
+unit = ""
+status = "chosen"
+reason = "for this test"
+
+[loiter.course_at_target]
+value = 0.0
+unit = "deg"
+status = "chosen"
+reason = "for this test"
+"""
+
+
+@pytest.mark.parametrize(
+    ("twin", "old", "new", "found"),
+    [
+        ("slow-vessel", "[target.gps.", "[target.gsp.", r"target\.gsp: this key is not known"),
+        ("slow-vessel", "\n[route.shape]", LOITER + "\n[route.shape]", "a twin flies one course"),
+        ("static-antenna", "[loiter.", "[climb.", r"climb\.\w+: this key is not known"),
+        (
+            "slow-vessel",
+            'value = "eight"',
+            'value = "nine"',
+            "'nine' is not known. Use one of eight",
+        ),
+        ("slow-vessel", "value = 2001\n", "value = 3000\n", "the subset ends behind the last of 3635"),
+        (
+            "drifting-vessel",
+            "[target.motion.stray_longest_period]\nvalue = 900.0",
+            "[target.motion.stray_longest_period]\nvalue = 9.0",
+            r"target\.motion: stray_shortest_period is longer .* Exchange",
+        ),
+    ],
+)
+def test_courses_and_targets_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
+    text = complete(twin)
+    assert old in text
+    path = tmp_path / "twin.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(WildlabError, match=found):
+        load_twin(path)
+
+
+def test_a_target_that_moves_has_a_receiver(tmp_path):
+    text = complete("drifting-vessel")
+    parts = re.split(r"(?m)^(?=\[)", text)
+    path = tmp_path / "twin.toml"
+    path.write_text("".join(part for part in parts if not part.startswith("[target.gps.")), encoding="utf-8")
+    with pytest.raises(WildlabError, match="a target that moves needs both motion and gps"):
+        load_twin(path)
 
 
 def test_a_missing_parameter_is_named(altered):

@@ -20,9 +20,10 @@ from wildlab.geometry.frames import (
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.aboard import payload_attitude
+from wildlab.simulation.courses import loiter_centre, trajectory
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import move
-from wildlab.simulation.twins import OPTIONAL_TABLES, loiter_centre, simulate, simulate_twin, trajectory
+from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Most tests need no inertial readings, which take most of the time.
 quick = partial(simulate, without=OPTIONAL_TABLES)
@@ -181,9 +182,9 @@ def test_autopilot_errors_have_the_stated_size_and_wander():
 
 
 def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for(twin):
-    calm = with_values(twin, flight__radius_sd=0.0, flight__altitude_sd=0.0)
+    calm = with_values(twin, flight__track_sd=0.0, flight__altitude_sd=0.0)
     calm = with_values(calm, flight__roll_sd=0.0, flight__pitch_sd=0.0, flight__yaw_sd=0.0)
-    for changes in ({}, {"flight__turn": "counter-clockwise"}, {"flight__course_at_target": 120.0}):
+    for changes in ({}, {"loiter__turn": "counter-clockwise"}, {"loiter__course_at_target": 120.0}):
         changed = with_values(calm, **changes)
         path, attitude = trajectory(changed, np.random.default_rng(0))
         motion = move(path, attitude, np.arange(0, 120, 0.01))
@@ -194,9 +195,9 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
         at = np.nanargmin(off)
         assert off[at] < 2.0  # within a hundredth of a second of flight
         course = np.degrees(np.arctan2(motion.velocity[at, 1], motion.velocity[at, 0]))
-        assert course == pytest.approx(changed.flight.course_at_target.number, abs=0.2)
+        assert course == pytest.approx(changed.loiter.course_at_target.number, abs=0.2)
     # The camera looks out of the turn, so the target lies outside of the circle.
-    assert np.linalg.norm(loiter_centre(twin)) > twin.flight.loiter_radius.number
+    assert np.linalg.norm(loiter_centre(twin)) > twin.loiter.radius.number
 
 
 def test_imu_and_gnss_cover_the_flight_at_their_rates(short, sensed):

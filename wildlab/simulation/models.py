@@ -26,6 +26,9 @@ from wildlab.simulation.quantities import (
     word,
 )
 
+Latency = Annotated[Parameter, quantity("ms", 0, 1e4)]
+Arm = Annotated[Parameter, quantity("m", -1e3, 1e3)]
+
 
 class Place(Strict):
     """Where and when the twin flies."""
@@ -37,8 +40,8 @@ class Place(Strict):
     epoch: Annotated[Parameter, moment()]
 
 
-class LoiterFlight(Strict):
-    """The airframe and the circle it flies."""
+class AirframeFlight(Strict):
+    """The airframe, the wind, and how well course and attitude are held; the course itself stands apart."""
 
     platform: Text
     duration: Duration
@@ -46,11 +49,8 @@ class LoiterFlight(Strict):
     airspeed: Annotated[Parameter, quantity("m/s", high=100, above=0)]
     wind_speed: Speed
     wind_from: Angle
-    loiter_radius: Length
-    turn: Annotated[Parameter, word("clockwise", "counter-clockwise")]
-    course_at_target: Angle
     trim_pitch: Annotated[Parameter, quantity("deg", -30, 30)]
-    radius_sd: LengthSpread
+    track_sd: LengthSpread
     altitude_sd: LengthSpread
     path_shortest_period: Duration
     path_longest_period: Duration
@@ -61,10 +61,10 @@ class LoiterFlight(Strict):
     sway_longest_period: Duration
 
     @model_validator(mode="after")
-    def _flies(self) -> LoiterFlight:
+    def _flies(self) -> AirframeFlight:
         if self.wind_speed.number > 0.8 * self.airspeed.number:
             raise ValueError(
-                "wind_speed is more than 0.8 of airspeed, too much to hold a circle; "
+                "wind_speed is more than 0.8 of airspeed, too much to hold a course; "
                 "lower wind_speed or raise airspeed"
             )
         for band in ("path", "sway"):
@@ -74,14 +74,97 @@ class LoiterFlight(Strict):
         return self
 
 
-class StaticTarget(Strict):
-    """A point that never moves, and how often it is marked."""
+class Loiter(Strict):
+    """A circle beside the target, flown from wherever on it the log happens to begin."""
+
+    radius: Length
+    turn: Annotated[Parameter, word("clockwise", "counter-clockwise")]
+    course_at_target: Angle
+
+
+class Route(Strict):
+    """A closed course over the target (see `simulation.routes`), moved along with it."""
+
+    shape: Annotated[Parameter, word("eight", "racetrack")]
+    length: Length
+    width: Length
+    turn_radius: Length
+    course: Angle
+    ahead: Arm
+    right: Arm
+    drift_speed: Speed
+    drift_course: Angle
+    start: Annotated[Parameter, quantity("1", -1, 1)]
+    roll_time: Annotated[Parameter, quantity("s", high=20, above=0.2)]
+
+
+class Climb(Strict):
+    """One change of altitude during the flight."""
+
+    altitude: Length
+    start: Annotated[Parameter, quantity("s", 0, 7200)]
+    duration: Duration
+
+
+class TargetMotion(Strict):
+    """A steady course from where the target is at time 0, and what it strays from it."""
+
+    north: Annotated[Parameter, quantity("m", -1e4, 1e4)]
+    east: Annotated[Parameter, quantity("m", -1e4, 1e4)]
+    speed: Speed
+    course: Angle
+    stray_sd: LengthSpread
+    stray_shortest_period: Duration
+    stray_longest_period: Duration
+
+    @model_validator(mode="after")
+    def _band(self) -> TargetMotion:
+        if self.stray_shortest_period.number > self.stray_longest_period.number:
+            raise ValueError("stray_shortest_period is longer than stray_longest_period; exchange the two")
+        return self
+
+
+class TargetGps(Strict):
+    """The single-frequency receiver that a target carries, whose log counts as the truth about it."""
+
+    rate: Rate
+    horizontal_wander: LengthSpread
+    vertical_wander: LengthSpread
+    wander_time: Duration
+    horizontal_noise: LengthSpread
+    vertical_noise: LengthSpread
+    resolution: LengthSpread
+    ahead: Arm
+
+
+class Target(Strict):
+    """Something that is seen: a point that never moves, or, with a motion and a GPS, a vessel."""
 
     identifier: Text
     height: Annotated[Parameter, quantity("m", -1e3, 1e4)]
     sd: Annotated[Parameter, quantity("m", high=100, above=0)]
+    marked_by: Text
     observations: Count
+    choice: Annotated[Parameter, word("first", "missed at random")]
     border: Pixels
+    motion: TargetMotion | None = None
+    gps: TargetGps | None = None
+
+    @model_validator(mode="after")
+    def _logged(self) -> Target:
+        if (self.motion is None) != (self.gps is None):
+            raise ValueError(
+                "a target that moves needs both motion and gps, one that never moves neither; "
+                "add the one or take out the other"
+            )
+        return self
+
+
+class Subset(Strict):
+    """Detections in succession that a table of the source has apart."""
+
+    first: Count
+    observations: Count
 
 
 class TwinCamera(Strict):
@@ -156,10 +239,6 @@ class Assumed(Strict):
     roll: Annotated[Parameter, quantity("deg", high=45, above=0)]
     pitch: Annotated[Parameter, quantity("deg", high=45, above=0)]
     yaw: Annotated[Parameter, quantity("deg", high=180, above=0)]
-
-
-Latency = Annotated[Parameter, quantity("ms", 0, 1e4)]
-Arm = Annotated[Parameter, quantity("m", -100, 100)]
 
 
 class Boresight(Strict):

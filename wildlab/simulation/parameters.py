@@ -17,15 +17,19 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
 from wildlab.paths import DATA
 from wildlab.simulation.models import (
+    AirframeFlight,
     Assumed,
     Autopilot,
     Boresight,
+    Climb,
     Gnss,
     Imu,
-    LoiterFlight,
+    Loiter,
     OnboardClock,
     Place,
-    StaticTarget,
+    Route,
+    Subset,
+    Target,
     TruePose,
     TwinCamera,
     TwinMount,
@@ -44,8 +48,13 @@ class TwinParameters(Strict):
     description: str
     parts: tuple[str, ...] = ()
     place: Place
-    flight: LoiterFlight
-    target: StaticTarget
+    flight: AirframeFlight
+    loiter: Loiter | None = None
+    route: Route | None = None
+    climb: Climb | None = None
+    target: Target
+    second_target: Target | None = None
+    subset: Subset | None = None
     camera: TwinCamera
     mount: TwinMount
     onboard_clock: OnboardClock
@@ -64,6 +73,34 @@ class TwinParameters(Strict):
                 f"{value!r:.80} cannot be the name of a twin; use letters, digits, - and _ only, 80 at most"
             )
         return value
+
+    @model_validator(mode="after")
+    def _one_course(self) -> TwinParameters:
+        if (self.loiter is None) == (self.route is None):
+            raise ValueError("a twin flies one course; describe either loiter or route")
+        if self.loiter is not None and self.target.motion is not None:
+            raise ValueError("a loiter stands beside a target that never moves; describe a route")
+        if self.loiter is not None and self.climb is not None:
+            raise ValueError("a loiter is flown at one altitude; describe a route, or take out climb")
+        return self
+
+    @property
+    def targets(self) -> list[Target]:
+        """All targets, in their order."""
+        return [self.target] if self.second_target is None else [self.target, self.second_target]
+
+    @model_validator(mode="after")
+    def _apart(self) -> TwinParameters:
+        names = [target.identifier.text for target in self.targets]
+        if len(set(names)) < len(names):
+            raise ValueError("two targets have the same identifier; give each its own")
+        wanted = sum(int(target.observations.number) for target in self.targets)
+        if self.subset and self.subset.first.number + self.subset.observations.number - 1 > wanted:
+            raise ValueError(
+                f"the subset ends behind the last of {wanted} detections; lower subset.first or "
+                "subset.observations"
+            )
+        return self
 
     @model_validator(mode="after")
     def _recorded_in_flight(self) -> TwinParameters:
@@ -121,21 +158,32 @@ def _with_parts(data: dict[str, Any], path: Path) -> dict[str, Any]:
     filled: dict[str, Any] = {}
     for layer in [*(read_toml(PARTS / f"{name}.toml", "a part of twins") for name in wanted), data]:
         for group, content in layer.items():
-            before = filled.get(group)
-            if isinstance(before, dict) and isinstance(content, dict):
-                filled[group] = {**before, **content}
-            else:
-                filled[group] = content
+            filled[group] = _merged(filled.get(group), content)
     return filled
 
 
+def _merged(below: Any, above: Any) -> Any:
+    """Groups within groups are filled in; a parameter is taken as a whole, never half and half."""
+    if not (isinstance(below, dict) and isinstance(above, dict)) or "value" in above:
+        return above
+    return {**below, **{name: _merged(below.get(name), content) for name, content in above.items()}}
+
+
 def each_parameter(twin: TwinParameters) -> Iterator[tuple[str, str, Parameter]]:
-    """Group, name and parameter, in the order of the model."""
+    """Group (``"target.motion"`` within another), name and parameter, in the order of the model."""
     for group in type(twin).model_fields:
         part = getattr(twin, group)
         if isinstance(part, Strict):
-            for name in type(part).model_fields:
-                yield group, name, getattr(part, name)
+            yield from _each(group, part)
+
+
+def _each(group: str, part: Strict) -> Iterator[tuple[str, str, Parameter]]:
+    for name in type(part).model_fields:
+        value = getattr(part, name)
+        if isinstance(value, Parameter):
+            yield group, name, value
+        elif isinstance(value, Strict):
+            yield from _each(f"{group}.{name}", value)
 
 
 def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
@@ -148,7 +196,7 @@ def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
-                "parameter": f"{group}: {name}".replace("_", " "),
+                "parameter": f"{group}: {name}".replace("_", " ").replace(".", ", "),
                 "value": p.value if isinstance(p.value, str) else f"{p.value:.10g}",
                 "unit": "" if p.unit == "1" else p.unit,
                 "status": p.status,

@@ -28,7 +28,7 @@ def shape_corners(shape: Shape, length: float, width: float) -> Array:
     """Corners of a closed course, x along it and y to its right. (4, 2) m.
 
     ``eight`` crosses itself in its middle, the origin, twice a lap; long and narrow it is a straight
-    fly-over, a turn and a fly-over back. ``racetrack`` passes the origin in the middle of one leg, always one way.
+    fly-over, a turn and a fly-over back. ``racetrack`` passes the origin in the middle of one leg, one way.
     """
     x, y = length / 2, width / 2
     if shape == "eight":

@@ -1,0 +1,187 @@
+"""The twins with a vessel: counts and grouping as printed, marks on it, truth as its receiver logs it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.check import check_flight
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.flight.sync import frame_times, poses_at
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import camera_pose
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.targets import target_path, truth_table
+from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
+
+#: Twin, detections, segments (None: not printed), tracking period in s, seconds per fix of the truth.
+FLIGHTS = [
+    ("slow-vessel", 3635, None, 2940, 2.0),
+    ("fast-vessel", 264, 3, 180, 1.0),
+    ("drifting-vessel", 2200, None, 1500, 2.0),
+    ("drifting-vessel-eight", 2400, None, 1500, 2.0),
+    ("slow-vessel-eight", 600, 10, 750, 1.0),
+]
+NAMES = [flight[0] for flight in FLIGHTS]
+POSITION = ["north_m", "east_m", "down_m"]
+SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def named(request):
+    return request.param, simulate_twin(request.param, 2, without=OPTIONAL_TABLES)
+
+
+def detection_times(flight):
+    return flight.frames.set_index("frame_id").loc[flight.detections["frame_id"], "time_s"].to_numpy()
+
+
+def unspoiled(twin):
+    """The twin whose camera and detector do not err."""
+    camera = twin.camera
+    exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
+    return twin.model_copy(update={"camera": camera.model_copy(update=exact)})
+
+
+@pytest.mark.parametrize(("name", "count", "segments", "period", "fix"), FLIGHTS)
+def test_counts_and_grouping_are_those_printed_whatever_the_seed(name, count, segments, period, fix):
+    for seed in (1, 11):
+        flight = simulate_twin(name, seed, without=OPTIONAL_TABLES)
+        d, frames, truth = flight.detections, flight.frames, flight.truth
+        assert len(d) == count
+        assert d["frame_id"].is_unique  # no more than one detection in an image
+        assert d["detection_id"].is_unique
+        assert d["frame_id"].is_monotonic_increasing
+        assert d["u_px"].between(0, 640).all()
+        assert d["v_px"].between(0, 512).all()
+        assert (d["source"] == "detector").all()
+        assert (d["target_id"] == "vessel").all()
+        assert np.diff(frames["time_s"]) == pytest.approx(1 / 7.5)
+        assert np.ptp(frames["time_s"]) == pytest.approx(period, abs=0.2)
+        gaps = np.diff(detection_times(flight))
+        if segments is not None:
+            assert (gaps > 20).sum() + 1 == segments
+            assert (gaps > 5).sum() + 1 == segments  # nothing in between
+        else:
+            assert (gaps > 5).sum() + 1 >= 40  # many different periods
+        assert np.diff(truth["time_s"]) == pytest.approx(fix)
+
+
+def test_the_true_pose_puts_unspoiled_marks_on_the_vessel(named):
+    name, _ = named
+    twin = unspoiled(load_twin(name))
+    flight = simulate(twin, 2, without=OPTIONAL_TABLES)
+    at = (
+        pd.Series(frame_times(flight), flight.frames["frame_id"])
+        .loc[flight.detections["frame_id"]]
+        .to_numpy()
+    )
+    # The log has every exposure but for rounding in the fifteenth digit.
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at)
+    m = flight.manifest
+    uv = flight.detections[["u_px", "v_px"]].to_numpy()
+    pose = camera_pose(m.geometry_mount(), p_nb, R_nb)
+    ground = pixel_to_plane(m.geometry_camera(), uv, *pose, -twin.target.height.si)
+    assert np.abs(ground - target_path(twin.target, 2)(at)).max() < 1e-6
+    # and the truth in the flight is where the receiver says that is: metres off, no more
+    logged = np.stack(
+        [np.interp(at, flight.truth["time_s"], flight.truth[axis]) for axis in POSITION], axis=-1
+    )
+    off = np.linalg.norm((ground - logged)[:, :2], axis=1)
+    assert 0.3 < off.mean() < 6.0
+
+
+def test_check_finds_nothing_wrong(named, tmp_path):
+    save_flight(named[1], tmp_path / "twin")
+    loaded = load_flight(tmp_path / "twin")
+    assert [finding.sentence for finding in check_flight(loaded) if finding.level == "problem"] == []
+    assert [f.sentence for f in check_flight(loaded) if f.level == "warning"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_the_whole_flight_is_reproducible_and_free_of_problems(name, tmp_path):
+    flight, again = (simulate_twin(name, 4) for _ in range(2))
+    for folder, made in (("a", flight), ("b", again)):
+        save_flight(made, tmp_path / folder)
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert len(files) == 10
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 60e6
+    assert [f.sentence for f in check_flight(load_flight(tmp_path / "a")) if f.level == "problem"] == []
+    rate = np.degrees(flight.imu[[f"w_{axis}_rad_s" for axis in "xyz"]].abs().max())
+    assert (rate < 100).all()  # the range of the ADIS16490 is not reached
+
+
+def test_speeds_and_altitudes_are_those_printed(named):
+    name, flight = named
+    truth = flight.nav["truth"]
+    t, height = truth["time_s"].to_numpy(), -truth["down_m"].to_numpy()
+    printed = {
+        "slow-vessel": (200, 200),
+        "fast-vessel": (350, 350),
+        "drifting-vessel": (200, 300),
+        "drifting-vessel-eight": (200, 300),
+        "slow-vessel-eight": (300, 300),
+    }[name]
+    early, late = height[t < 700], height[t > 0.75 * t[-1]]
+    assert early.mean() == pytest.approx(printed[0], abs=3)
+    assert late.mean() == pytest.approx(printed[1], abs=3)
+    assert height.std() < 4 or printed[0] != printed[1]
+    ground_speed = np.linalg.norm(truth[SPEED].to_numpy()[:, :2], axis=1)
+    if name == "slow-vessel-eight":  # H 7.5.4: about 15 m/s upwind and about 24 m/s downwind
+        assert np.quantile(ground_speed, [0.01, 0.99]) == pytest.approx(
+            [15, 24], abs=1.2
+        )  # control adds half
+    bank = np.degrees(np.abs(matrix_to_euler(quaternion_to_matrix(truth.filter(like="q_").to_numpy()))[:, 0]))
+    assert 30 < bank.max() < 50
+
+
+def test_vessels_move_as_printed():
+    period = np.arange(0.0, 1500.0)
+    for seed in range(5):
+        way = np.diff(target_path(load_twin("drifting-vessel-eight").target, seed)(period[[0, -1]]), axis=0)
+        assert np.linalg.norm(way) == pytest.approx(200, abs=30)  # approximately 200 m
+        fast = target_path(load_twin("fast-vessel").target, seed)(period[:540])
+        speed = np.linalg.norm(np.diff(fast, axis=0), axis=1)
+        assert 5 < speed.min() < speed.max() < 17
+        course = np.degrees(np.unwrap(np.arctan2(*np.diff(fast, axis=0).T[1::-1])))
+        assert course.std() < 6  # it tried to hold its course
+
+
+def test_a_receivers_log_errs_as_its_parameters_say():
+    target = load_twin("slow-vessel").target
+    off = []
+    for seed in range(60):
+        log = truth_table(target, 1500.0, seed)
+        behind = np.array([np.cos(np.radians(60)), np.sin(np.radians(60)), 0.0])
+        true = target_path(target, seed)(log["time_s"].to_numpy())
+        off.append(log[POSITION].to_numpy() - true + behind)
+    error = np.array(off)
+    assert error.shape[1] == 751
+    # 60 flights of two and a half independent errors each.
+    assert np.sqrt((error**2).mean(axis=(0, 1))) == pytest.approx(
+        [1.51, 1.51, 2.53], rel=5 / np.sqrt(2 * 120)
+    )
+    lagged = (error[:, :-75] * error[:, 75:]).mean(axis=(0, 1)) / (error**2).mean(axis=(0, 1))
+    assert lagged == pytest.approx([np.exp(-0.5)] * 3, abs=0.15)
+
+
+def test_the_subset_is_1250_detections_in_succession():
+    flight = simulate_twin("slow-vessel", 1, without=OPTIONAL_TABLES)
+    group = flight.frames.set_index("frame_id")["group"]
+    inside = group.loc[flight.detections["frame_id"]].to_numpy() == "subset"
+    assert inside.sum() == 1250
+    assert np.flatnonzero(inside)[0] == 2000
+    assert np.diff(np.flatnonzero(inside)).max() == 1
+    assert set(group) == {"", "subset"}
+
+
+def test_a_target_at_rest_has_one_row_of_truth():
+    log = truth_table(load_twin("static-antenna").target, 1500.0, 1)
+    assert len(log) == 1
+    assert np.isnan(log["time_s"].iloc[0])
+    assert log[POSITION].to_numpy().tolist() == [[0.0, 0.0, -2.0]]

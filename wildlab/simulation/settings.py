@@ -1,0 +1,60 @@
+"""What `flight.toml` of a twin says."""
+
+from __future__ import annotations
+
+from wildlab.flight.manifest import Manifest, make_manifest
+from wildlab.geometry.mount import helgesen_misalignment
+from wildlab.simulation.parameters import TwinParameters
+
+
+def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
+    """What `flight.toml` of the twin says; its uncertainties are what one would assume, not the truth."""
+    c, m, assumed = twin.camera, twin.mount, twin.assumed
+    misalignment = helgesen_misalignment(
+        m.misalignment_roll.number, m.misalignment_tilt.number, m.misalignment_pan.number
+    )
+    return make_manifest(
+        {
+            "name": f"{twin.name}-{seed}",
+            "kind": "twin",
+            "description": twin.description,
+            "locations": {"sensitivity": "open"},
+            "origin": {
+                "latitude_deg": twin.place.latitude.number,
+                "longitude_deg": twin.place.longitude.number,
+                "height_m": twin.place.height.number,
+            },
+            "platform": {"name": twin.flight.platform.text},
+            "camera": {
+                "name": c.name.text,
+                "width_px": int(c.width.number),
+                "height_px": int(c.height.number),
+                "fx_px": c.fx.number,
+                "fy_px": c.fy.number,
+                "cx_px": c.cx.number,
+                "cy_px": c.cy.number,
+            },
+            "mount": {
+                "looks": "down",
+                "pan_deg": m.pan.number,
+                "tilt_deg": m.tilt.number,
+                "misalignment_roll_deg": misalignment[0],
+                "misalignment_tilt_deg": misalignment[1],
+                "misalignment_pan_deg": misalignment[2],
+            },
+            "time": {"kind": "utc", "epoch": twin.place.epoch.text},
+            "vertical": {"reference": "ellipsoid", "note": "the origin of n lies at sea level"},
+            "uncertainty": {
+                "pixel_px": assumed.pixel.number,
+                "position_horizontal_m": assumed.horizontal.number,
+                "position_vertical_m": assumed.vertical.number,
+                "plane_height_m": assumed.plane_height.number,
+                "roll_deg": assumed.roll.number,
+                "pitch_deg": assumed.pitch.number,
+                "yaw_deg": assumed.yaw.number,
+                "note": "what the published facts suggest; the simulated errors are set apart from it",
+            },
+            "scoring": {"rule": "labelled"},
+            "twin": {"name": twin.name, "seed": seed},
+        }
+    )

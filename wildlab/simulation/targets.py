@@ -1,0 +1,69 @@
+"""What targets do, and what the receivers they carry say about it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from wildlab.geometry.frames import Array
+from wildlab.simulation.gnss import fixes
+from wildlab.simulation.models import Target
+from wildlab.simulation.sensors import rounded, stream
+from wildlab.simulation.trajectory import Signal, random_wander
+
+
+def target_path(target: Target, seed: int) -> Signal:
+    """Where a target is in n: times (N,) s -> (N, 3) m. Without a motion it stays above the origin."""
+    motion, down = target.motion, -target.height.si
+    if motion is None:
+        return lambda times: np.broadcast_to([0.0, 0.0, down], (len(np.asarray(times)), 3))
+    rng = stream(seed, f"motion of {target.identifier.text}")
+    band = (motion.stray_shortest_period.si, motion.stray_longest_period.si)
+    north, east = (random_wander(motion.stray_sd.si, *band, rng) for _ in range(2))
+    start, course = (motion.north.si, motion.east.si), motion.course.si
+    velocity = motion.speed.si * np.array([np.cos(course), np.sin(course)])
+
+    def path(times: Array) -> Array:
+        t = np.asarray(times, float)
+        p = np.empty((len(t), 3))
+        p[:, 0] = start[0] + velocity[0] * t + north(t)
+        p[:, 1] = start[1] + velocity[1] * t + east(t)
+        p[:, 2] = down
+        return p
+
+    return path
+
+
+def truth_table(target: Target, duration: float, seed: int) -> pd.DataFrame:
+    """What counts as the truth about a target: a surveyed point, or the log of its receiver.
+
+    The antenna may be ahead of the middle that a camera sees, along the target's mean course.
+    """
+    name, path = target.identifier.text, target_path(target, seed)
+    gps, motion = target.gps, target.motion
+    if gps is None or motion is None:
+        times, position = np.array([np.nan]), path(np.zeros(1))
+    else:
+        times = np.arange(int(duration * gps.rate.si + 1e-9) + 1) / gps.rate.si
+        course = motion.course.si
+        antenna = path(times) + gps.ahead.si * np.array([np.cos(course), np.sin(course), 0.0])
+        position = fixes(
+            antenna,
+            1 / gps.rate.si,
+            stream(seed, f"gps of {name}"),
+            wander=(gps.horizontal_wander.si, gps.vertical_wander.si),
+            wander_time=gps.wander_time.si,
+            noise=(gps.horizontal_noise.si, gps.vertical_noise.si),
+        )
+        position = rounded(position, gps.resolution.si)
+    return pd.DataFrame(
+        {
+            "target_id": [name] * len(times),
+            "time_s": times,
+            "north_m": position[:, 0],
+            "east_m": position[:, 1],
+            "down_m": position[:, 2],
+            "sd_horizontal_m": np.full(len(times), target.sd.si),
+            "sd_vertical_m": np.full(len(times), target.sd.si),
+        }
+    )
