@@ -1,0 +1,109 @@
+"""Navigation of a whole flight: poses near the truth, honest errors where something is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import ImuPart
+from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.flight.sync import poses_at
+from wildlab.geometry.frames import matrix_to_rotation_vector
+from wildlab.pipeline.georeference import georeference, observe
+from wildlab.pipeline.judge import judge
+from wildlab.pipeline.navigate import imu_noise, navigate_mekf, navigate_observer
+from wildlab.simulation.twins import simulate_twin
+
+#: The figures of the twin's own inertial sensor (H appendix A.5).
+SENSOR = ImuPart(
+    name="ADIS16490",
+    velocity_random_walk_m_s_sqrt_h=0.008,
+    angle_random_walk_deg_sqrt_h=0.09,
+    accelerometer_bias_m_s2=3.5e-5,
+    accelerometer_bias_time_s=300.0,
+    gyro_bias_deg_h=1.8,
+    gyro_bias_time_s=300.0,
+)
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    """The first five minutes of the static twin's sensors, and its frames in that time."""
+    whole = simulate_twin("static-antenna", 3)
+    early = {
+        name: table[table["time_s"] < 420.0].reset_index(drop=True) if "time_s" in table else table
+        for name, table in whole.tables.items()
+        if name != "truth"
+    }
+    early["detections"] = whole.detections[whole.detections["frame_id"].isin(early["frames"]["frame_id"])]
+    manifest = whole.manifest.model_copy(update={"imu": SENSOR})
+    return Flight(manifest, whole.nav, {**early, "truth": whole.truth})
+
+
+def errors(flight: Flight, nav: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """RMS of position (3,) m and of the attitude's rotation vector (3,) deg, after the first minute."""
+    times = nav["time_s"].to_numpy()
+    p, R, _ = poses_at(nav, times)
+    p_true, R_true, _ = poses_at(flight.nav["truth"], times)
+    turn = matrix_to_rotation_vector(np.swapaxes(R_true, 1, 2) @ R)
+    late = times > 60.0
+    return np.sqrt(((p - p_true)[late] ** 2).mean(0)), np.degrees(np.sqrt((turn[late] ** 2).mean(0)))
+
+
+@pytest.mark.parametrize("navigate", [navigate_mekf, navigate_observer])
+def test_two_antennas_and_an_inertial_sensor_give_the_pose(flight, navigate):
+    """Centimetres and about a degree: the airframe's own wandering error of that size is in the sensors."""
+    found = navigate(flight, np.arange(0.0, 420.0, 0.2))
+    position, attitude = errors(flight, found.nav)
+    assert position.max() < 0.15
+    assert attitude.max() < 2.5
+    assert found.nav["time_s"].is_monotonic_increasing
+    assert len(found.biases) == len(found.nav)
+
+
+def test_poses_at_the_frames_are_one_more_source_of_the_flight(flight, tmp_path):
+    """Stored, loaded and used to place the antenna, nearer than with poses from another time."""
+    nav = navigate_observer(flight).nav
+    assert set(nav["time_s"]) <= set(flight.frames["time_s"])
+    save_flight(Flight(flight.manifest, {**flight.nav, "observer": nav}, flight.tables), tmp_path / "flight")
+    again = load_flight(tmp_path / "flight")
+    judged = judge(again, georeference(again, observe(again, "observer"), np.random.default_rng(0)))
+    assert judged["error_m"].notna().all()
+    assert judged["error_m"].mean() < 20.0
+
+
+def test_the_filter_states_its_covariance_and_its_innovations(flight):
+    found = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0))
+    assert set(COVARIANCE_COLUMNS) <= set(found.nav.columns)
+    assert set(found.innovations["source"]) == {"position", "second position", "velocity"}
+    assert (found.innovations["dof"] == 3).all()
+    without = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0), velocity=False)
+    assert "velocity" not in set(without.innovations["source"])
+
+
+def test_one_antenna_starts_from_the_course(flight):
+    tables = {**flight.tables, "gnss": flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]])}
+    single = Flight(flight.manifest, flight.nav, tables)
+    found = navigate_mekf(single, np.arange(0.0, 420.0, 0.5))
+    assert set(found.innovations["source"]) == {"position", "velocity"}
+    position, attitude = errors(flight, found.nav)
+    assert position.max() < 0.5
+    assert attitude.max() < 5.0
+
+
+def test_what_the_filter_must_know_is_asked_for(flight):
+    bare = Flight(flight.manifest.model_copy(update={"imu": ImuPart()}), flight.nav, flight.tables)
+    with pytest.raises(WildlabError, match="not stated") as caught:
+        imu_noise(bare)
+    assert caught.value.field == "imu.velocity_random_walk_m_s_sqrt_h"
+    gnss = flight.gnss.drop(columns=["sd_vertical_m"])
+    manifest = flight.manifest.model_copy(
+        update={"uncertainty": flight.manifest.uncertainty.model_copy(update={"position_vertical_m": None})}
+    )
+    with pytest.raises(WildlabError, match="how uncertain the satellite positions are"):
+        navigate_observer(Flight(manifest, flight.nav, {**flight.tables, "gnss": gnss}))
+    with pytest.raises(WildlabError, match="no table 'imu'"):
+        navigate_observer(Flight(flight.manifest, flight.nav, {"gnss": flight.gnss}))

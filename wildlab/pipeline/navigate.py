@@ -1,0 +1,219 @@
+"""A flight's inertial samples and satellite positions as poses: one more ``nav`` table."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
+from wildlab.flight.store import Flight
+from wildlab.flight.sync import covariance_columns, frame_times, gnss_times
+from wildlab.navigation.aiding import Aiding, positions, velocities
+from wildlab.navigation.gravity import local_earth
+from wildlab.navigation.mekf import ImuNoise, Start, pose_covariance, run_mekf
+from wildlab.navigation.observer import baseline_reference, course_reference, run_observer
+from wildlab.navigation.start import start_from_baseline, start_from_course
+from wildlab.navigation.timeline import Imu
+
+Array = NDArray[np.float64]
+
+POSITION = ["north_m", "east_m", "down_m"]
+VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"] + [
+    f"gyro_{axis}_rad_s" for axis in "xyz"
+]
+
+
+class Navigated(NamedTuple):
+    """What a navigation filter made of a flight.
+
+    Attributes
+    ----------
+    nav
+        A ``nav`` table; with covariance columns where the filter has one.
+    biases
+        ``time_s`` and the estimated biases; for the filter their standard deviations too (``sd_...``).
+    innovations
+        For the filter, one row for each measurement: ``time_s``, ``source`` (words), ``nis``, ``dof``,
+        ``verdict`` and the innovation's elements; empty for the observer.
+    """
+
+    nav: pd.DataFrame
+    biases: pd.DataFrame
+    innovations: pd.DataFrame
+
+
+class _Inputs(NamedTuple):
+    imu: Imu
+    aiding: dict[str, Aiding]
+    reference: Aiding
+    start: Start
+
+
+def navigate_mekf(flight: Flight, times: ArrayLike | None = None, *, velocity: bool = True) -> Navigated:
+    """Poses with covariance by the error-state filter of H 7.3.
+
+    Parameters
+    ----------
+    times
+        Flight times (M,) at which poses are wanted; those of the frames if not given.
+    velocity
+        Whether to use GNSS velocities where the flight has them; H uses positions only.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight lacks inertial samples, satellite positions, or what is known of their errors.
+    """
+    given = _inputs(flight, velocity)
+    latitude, _, height = flight.manifest.origin_tuple()
+    found = run_mekf(
+        given.imu,
+        given.start,
+        imu_noise(flight),
+        local_earth(latitude, height),
+        list(given.aiding.values()),
+        _wanted(flight, times),
+    )
+    nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
+    nav = nav.join(covariance_columns(pose_covariance(found.covariance)))
+    bias = np.hstack([found.accelerometer_bias, found.gyro_bias])
+    sd = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2)[:, 9:15])
+    biases = pd.DataFrame(np.hstack([bias, sd]), columns=[*BIASES, *(f"sd_{name}" for name in BIASES)])
+    names = np.array(list(given.aiding), object)
+    what = found.innovations
+    innovations = pd.DataFrame(
+        {
+            "time_s": what.times,
+            "source": names[what.source] if len(what.source) else np.empty(0, object),
+            "nis": what.nis,
+            "dof": np.isfinite(what.innovation).sum(axis=1),
+            "verdict": what.verdict,
+            "first": what.innovation[:, 0],
+            "second": what.innovation[:, 1],
+            "third": what.innovation[:, 2],
+        }
+    )
+    return _known(Navigated(nav, biases.assign(time_s=found.times), innovations))
+
+
+def navigate_observer(flight: Flight, times: ArrayLike | None = None, *, velocity: bool = True) -> Navigated:
+    """Poses by the nonlinear observer of H 5.5, which has no covariance. Parameters as `navigate_mekf`."""
+    given = _inputs(flight, velocity)
+    found = run_observer(
+        given.imu,
+        given.start,
+        flight.manifest.origin_tuple(),
+        [*given.aiding.values(), given.reference],
+        _wanted(flight, times),
+    )
+    biases = pd.DataFrame(found.gyro_bias, columns=BIASES[3:]).assign(time_s=found.times)
+    nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
+    return _known(Navigated(nav, biases, pd.DataFrame()))
+
+
+def imu_noise(flight: Flight) -> ImuNoise:
+    """How the flight's inertial sensor errs, from ``[imu]`` of the manifest.
+
+    Raises
+    ------
+    WildlabError
+        Where one of the figures is not stated there.
+    """
+    stated = flight.manifest.imu
+    hour = 3600.0
+    figures = {
+        "velocity_random_walk_m_s_sqrt_h": 1 / np.sqrt(hour),
+        "angle_random_walk_deg_sqrt_h": np.radians(1.0) / np.sqrt(hour),
+        "accelerometer_bias_m_s2": 1.0,
+        "accelerometer_bias_time_s": 1.0,
+        "gyro_bias_deg_h": np.radians(1.0) / hour,
+        "gyro_bias_time_s": 1.0,
+    }
+    missing = [name for name in figures if getattr(stated, name) is None]
+    if missing:
+        raise WildlabError(
+            f"how the inertial sensor errs is not stated ({missing[0]} and {len(missing) - 1} more)"
+            if len(missing) > 1
+            else f"how the inertial sensor errs is not stated ({missing[0]})",
+            "take the figures from its data sheet, or from the log's own standstill",
+            file=flight.folder,
+            field=f"imu.{missing[0]}",
+        )
+    return ImuNoise(*(float(getattr(stated, name)) * scale for name, scale in figures.items()))
+
+
+def _inputs(flight: Flight, velocity: bool) -> _Inputs:
+    imu, gnss = flight.table("imu"), flight.table("gnss")
+    samples = Imu(
+        imu["time_s"].to_numpy(float),
+        imu[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]].to_numpy(float),
+        imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float),
+    )
+    t, p = gnss_times(flight), gnss[POSITION].to_numpy(float)
+    sd = _position_sd(flight, gnss)
+    arms = [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
+    aiding = {"position": positions(t, p, sd, arms[0])}
+    two = set(SECOND_COLUMNS) <= set(gnss.columns)
+    moving = set(VELOCITY) <= set(gnss.columns)
+    v = gnss[VELOCITY].to_numpy(float) if moving else np.gradient(p, t, axis=0)
+    if velocity and moving and "sd_velocity_m_s" in gnss:
+        aiding["velocity"] = velocities(t, v, gnss["sd_velocity_m_s"].to_numpy(float)[:, None], arms[0])
+    gravity = local_earth(flight.manifest.origin_tuple()[0], flight.manifest.origin_tuple()[2]).gravity
+    if two:
+        second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
+        aiding["second position"] = positions(t, second, sd, arms[1])
+        reference = baseline_reference(t, p, second, *arms)
+        spread = float(np.sqrt(2) * np.nanmedian(sd))
+        start = start_from_baseline(samples, t, p, second, *arms, gravity=gravity, baseline_sd=spread)
+    else:
+        reference = course_reference(t, v)
+        start = start_from_course(samples, t, p, v, gravity=gravity)
+    return _Inputs(samples, aiding, reference, start)
+
+
+def _position_sd(flight: Flight, gnss: pd.DataFrame) -> Array:
+    """(N, 3) from the log, else from the manifest's ``[uncertainty]``."""
+    sds = []
+    for column, stated in (
+        ("sd_horizontal_m", flight.manifest.uncertainty.position_horizontal_m),
+        ("sd_vertical_m", flight.manifest.uncertainty.position_vertical_m),
+    ):
+        known = gnss[column].to_numpy(float) if column in gnss else np.full(len(gnss), np.nan)
+        known = np.where(known > 0, known, np.nan if stated is None else stated)
+        if not np.isfinite(known).any():
+            raise WildlabError(
+                "how uncertain the satellite positions are is not stated",
+                f"add the column {column}, or [uncertainty] position_horizontal_m and position_vertical_m",
+                file=flight.folder,
+                field=f"gnss.{column}",
+            )
+        sds.append(np.where(np.isnan(known), np.nanmax(known), known))
+    return np.stack([sds[0], sds[0], sds[1]], axis=-1)
+
+
+def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:
+    if set(columns) <= set(gnss.columns):
+        return np.asarray(gnss[list(columns)].iloc[0].to_numpy(float))
+    return np.array(flight.manifest.gnss.lever_arm_m)
+
+
+def _wanted(flight: Flight, times: ArrayLike | None) -> Array:
+    return np.unique(frame_times(flight) if times is None else np.asarray(times, float))
+
+
+def _nav_table(times: Array, p: Array, v: Array, q: Array) -> pd.DataFrame:
+    columns = ["time_s", *POSITION, *VELOCITY, "q_w", "q_x", "q_y", "q_z"]
+    return pd.DataFrame(np.column_stack([times, p, v, q]), columns=columns)
+
+
+def _known(found: Navigated) -> Navigated:
+    """Without the times at which there is no estimate."""
+    rows = np.isfinite(found.nav["north_m"].to_numpy())
+    return found._replace(
+        nav=found.nav[rows].reset_index(drop=True), biases=found.biases[rows].reset_index(drop=True)
+    )
