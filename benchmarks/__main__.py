@@ -3,16 +3,16 @@
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import pixel_to_plane
+from benchmarks import navigation, pixel_to_plane
 
 
 def main() -> None:
     console = Console()
-    for benchmark in (pixel_to_plane,):
+    for benchmark in (pixel_to_plane, navigation):
         title, rows = benchmark.run()
         table = Table("what", "time (ms)", "ratio", "wanted", title=title)
         for what, seconds, ratio, wanted in rows:
-            table.add_row(what, f"{1000 * seconds:.1f}", f"{ratio:.2f}", wanted)
+            table.add_row(what, f"{1000 * seconds:.1f}", f"{ratio:.2g}", wanted)
         console.print(table)
 
 

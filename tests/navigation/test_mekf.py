@@ -1,5 +1,7 @@
 """The MEKF against its plain version, against finite differences, and against its own claims."""
 
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -315,6 +317,20 @@ def test_a_start_on_another_clock_is_refused(flight):
     start = Start(1.4e9, np.zeros(16), np.eye(15))
     with pytest.raises(WildlabError, match="on the same clock"):
         run_mekf(flight.imu, start, NOISE, EARTH, [])
+
+
+def test_twenty_five_minutes_take_seconds():
+    """A bound with room for a busy machine: it takes 0.6 s. Compilation does not count."""
+    times = np.arange(0, 1500, 0.004)
+    imu = Imu(times, np.tile([0.0, 0.0, -GRAVITY], (len(times), 1)), np.zeros((len(times), 3)))
+    t = np.arange(0.1, 1500, 0.1)
+    antennas = [positions(t, np.tile(lever, (len(t), 1)), GNSS_SD, lever) for lever in LEVERS]
+    start = Start(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    run_mekf(imu, start, NOISE, EARTH, antennas, [0.5])
+    before = time.process_time()
+    found = run_mekf(imu, start, NOISE, EARTH, antennas, t)
+    assert time.process_time() - before < 5.0
+    assert np.abs(found.position[-2]).max() < 5 * GNSS_SD
 
 
 PHASES = {"straight": (60, 90), "turn": (90, 130), "outage": (200, 260), "recovered": (262, 330)}
