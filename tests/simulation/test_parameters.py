@@ -23,8 +23,12 @@ def complete(name: str) -> str:
     """The text of a twin with its parts written out in it."""
     lines = (TWINS / f"{name}.toml").read_text(encoding="utf-8").splitlines()
     parts = next(tomllib.loads(line)["parts"] for line in lines if line.startswith("parts ="))
-    own = [line for line in lines if not line.startswith("parts =")]
-    return "\n".join([*own, *((PARTS / f"{part}.toml").read_text(encoding="utf-8") for part in parts)])
+    text = "\n".join(line for line in lines if not line.startswith("parts ="))
+    for part in parts[::-1]:
+        for block in re.split(r"(?m)^(?=\[)", (PARTS / f"{part}.toml").read_text(encoding="utf-8"))[1:]:
+            if block.splitlines()[0] not in text:  # what is there goes before what comes
+                text += f"\n{block}"
+    return text
 
 
 @pytest.fixture
@@ -253,6 +257,9 @@ reason = "for this test"
             'value = "nine"',
             "'nine' is not known. Use one of eight",
         ),
+        ("crossing-vessels", "[pair.both]", "[climb.altitude]", r"climb\.start: this key is missing"),
+        ("crossing-vessels", "value = 349\n", "value = 900\n", "pair.both is more than the observations"),
+        ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "two targets have the same identifier"),
         ("slow-vessel", "value = 2001\n", "value = 3000\n", "the subset ends behind the last of 3635"),
         (
             "drifting-vessel",

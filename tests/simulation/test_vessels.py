@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.flight.check import check_flight
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.flight.sync import frame_times, poses_at
@@ -101,7 +102,7 @@ def test_check_finds_nothing_wrong(named, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "crossing-vessels", "static-antenna"])
 def test_the_whole_flight_is_reproducible_and_free_of_problems(name, tmp_path):
     flight, again = (simulate_twin(name, 4) for _ in range(2))
     for folder, made in (("a", flight), ("b", again)):
@@ -168,6 +169,66 @@ def test_a_receivers_log_errs_as_its_parameters_say():
     )
     lagged = (error[:, :-75] * error[:, 75:]).mean(axis=(0, 1)) / (error**2).mean(axis=(0, 1))
     assert lagged == pytest.approx([np.exp(-0.5)] * 3, abs=0.15)
+
+
+@pytest.mark.parametrize("seed", [1, 7, 19])
+def test_two_vessels_cross_and_are_seen_as_printed(seed):
+    twin = load_twin("crossing-vessels")
+    flight = simulate(twin, seed, without=OPTIONAL_TABLES)
+    d, truth = flight.detections, flight.truth
+    assert d.groupby("target_id").size().to_dict() == {"boat 1": 1535, "boat 2": 865}
+    assert not d.duplicated(["frame_id", "target_id"]).any()
+    assert d["frame_id"].duplicated().sum() == 349  # images with both
+    assert d["detection_id"].is_unique
+    assert d["u_px"].between(0, 640).all()
+    assert d["v_px"].between(0, 512).all()
+    assert np.ptp(flight.frames["time_s"]) == pytest.approx(19 * 60, abs=0.2)
+    # They meet about four minutes into the tracking period, and move at about 1 m/s.
+    begin = flight.frames["time_s"].iloc[0]
+    t = np.arange(begin, begin + 1140)
+    one, two = (target_path(target, seed)(t) for target in twin.targets)
+    apart = np.linalg.norm(one - two, axis=1)
+    assert apart.min() < 25
+    assert 120 < np.argmin(apart) < 360
+    assert apart[-1] > 200
+    for path in (one, two):
+        assert np.linalg.norm(np.diff(path, axis=0), axis=1).mean() == pytest.approx(1.0, abs=0.1)
+    assert list(truth["target_id"].unique()) == ["boat 1", "boat 2"]
+    for _, log in truth.groupby("target_id"):
+        assert np.diff(log["time_s"]) == pytest.approx(1.0)
+
+
+def test_marks_of_two_vessels_are_on_the_one_they_name():
+    twin = unspoiled(load_twin("crossing-vessels"))
+    flight = simulate(twin, 3, without=OPTIONAL_TABLES)
+    at = detection_times(flight)
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at)
+    m = flight.manifest
+    uv = flight.detections[["u_px", "v_px"]].to_numpy()
+    ground = pixel_to_plane(m.geometry_camera(), uv, *camera_pose(m.geometry_mount(), p_nb, R_nb), 0.0)
+    for target in twin.targets:
+        its = (flight.detections["target_id"] == target.identifier.text).to_numpy()
+        assert np.abs(ground[its] - target_path(target, 3)(at[its])).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("group", "key", "value", "found"),
+    [
+        ("pair", "both", 860, "first target is left with|both targets are in view"),
+        (
+            "second_target",
+            "observations",
+            6000,
+            r"second_target\.observations: .* in view in \d+ images only",
+        ),
+    ],
+)
+def test_pairs_that_are_not_seen_often_enough_are_said(group, key, value, found):
+    twin = load_twin("crossing-vessels")
+    part = getattr(twin, group)
+    part = part.model_copy(update={key: getattr(part, key).model_copy(update={"value": value})})
+    with pytest.raises(WildlabError, match=found):
+        simulate(twin.model_copy(update={group: part}), 1, without=OPTIONAL_TABLES)
 
 
 def test_the_subset_is_1250_detections_in_succession():

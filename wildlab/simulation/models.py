@@ -160,6 +160,12 @@ class Target(Strict):
         return self
 
 
+class Pair(Strict):
+    """Images in which both targets are marked."""
+
+    both: Annotated[Parameter, quantity("1", 0, 1e6, whole=True)]
+
+
 class Subset(Strict):
     """Detections in succession that a table of the source has apart."""
 

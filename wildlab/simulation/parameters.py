@@ -26,6 +26,7 @@ from wildlab.simulation.models import (
     Imu,
     Loiter,
     OnboardClock,
+    Pair,
     Place,
     Route,
     Subset,
@@ -54,6 +55,7 @@ class TwinParameters(Strict):
     climb: Climb | None = None
     target: Target
     second_target: Target | None = None
+    pair: Pair | None = None
     subset: Subset | None = None
     camera: TwinCamera
     mount: TwinMount
@@ -94,6 +96,10 @@ class TwinParameters(Strict):
         names = [target.identifier.text for target in self.targets]
         if len(set(names)) < len(names):
             raise ValueError("two targets have the same identifier; give each its own")
+        if (self.second_target is None) != (self.pair is None):
+            raise ValueError("two targets need pair.both, one does not; add the one or take out the other")
+        if self.pair and self.pair.both.number > min(target.observations.number for target in self.targets):
+            raise ValueError("pair.both is more than the observations of a target; lower pair.both")
         wanted = sum(int(target.observations.number) for target in self.targets)
         if self.subset and self.subset.first.number + self.subset.observations.number - 1 > wanted:
             raise ValueError(

@@ -130,12 +130,35 @@ def _in_view(twin: TwinParameters, manifest: Manifest, target: Target, uv: Array
 
 def _chosen(twin: TwinParameters, views: list[Numbers], seed: int) -> list[Numbers]:
     """Those of the images that show a target in which it is marked, per target."""
-    chosen = []
-    for which, (target, seen) in enumerate(zip(twin.targets, views, strict=True)):
-        wanted = int(target.observations.number)
-        if target.choice.text == "first":
-            chosen.append(seen[:wanted])
-        else:
-            rng = stream(seed, f"misses of {which}")
-            chosen.append(np.sort(rng.choice(seen, wanted, replace=False)))
-    return chosen
+    wanted = [int(target.observations.number) for target in twin.targets]
+    if twin.pair is not None:
+        return _pair_chosen(views, wanted, int(twin.pair.both.number), stream(seed, "misses"))
+    if twin.target.choice.text == "first":
+        return [views[0][: wanted[0]]]
+    return [np.sort(stream(seed, "misses").choice(views[0], wanted[0], replace=False))]
+
+
+def _pair_chosen(
+    views: list[Numbers], wanted: list[int], both: int, rng: np.random.Generator
+) -> list[Numbers]:
+    """Images for each of two targets, of which just ``both`` are common."""
+    in_common = np.intersect1d(views[0], views[1])
+    if len(in_common) < both:
+        raise WildlabError(
+            f"both targets are in view in {len(in_common)} images only, not in {both}",
+            "lower pair.both, or bring the courses of the targets nearer to each other",
+            field="pair.both",
+        )
+    together = rng.choice(in_common, both, replace=False)
+    # The second target first: where it is marked alone, the first one has been missed if it is in view.
+    second = rng.choice(np.setdiff1d(views[1], together), wanted[1] - both, replace=False)
+    left = np.setdiff1d(views[0], np.concatenate([together, second]))
+    if len(left) < wanted[0] - both:
+        raise WildlabError(
+            f"the first target is left with {both + len(left)} images, not {wanted[0]}, where the second is "
+            "marked in so many and both in so few",
+            "lower the observations of either, or raise camera.images",
+            field="target.observations",
+        )
+    first = rng.choice(left, wanted[0] - both, replace=False)
+    return [np.sort(np.concatenate([together, alone])) for alone in (first, second)]
