@@ -19,8 +19,8 @@ GRAVITY = 9.81  # m/s^2; anywhere on Earth to a few per mille
 #: Half of all samples lie above and half below: this one does not mind manoeuvres.
 PLAUSIBLE = (5.0, 20.0)  # m/s^2
 IN_G = (0.5, 2.0)
-#: Below the resolution of any sensor that feels gravity.
-WITHOUT = 3.0
+#: Means over a second of what is felt agree with the receiver much better than this.
+CLOSE = 1.4
 #: deg/s for rad/s is a factor of 57; a tenth of it is beyond any manoeuvre.
 FACTOR = 10.0
 #: Sustained over a second: more than one and a half turns.
@@ -29,7 +29,7 @@ FASTEST = 10.0  # rad/s
 TURNING, SLOWEST = 0.05, 5.0  # rad/s, m/s
 ENOUGH = 10
 #: Axes are judged where they were moved (rad/s, m/s^2), over so many intervals, by so clear a correlation.
-MOVED_RATE, MOVED_FORCE, INTERVALS, CLEAR = 0.05, 0.7, 30, 0.6
+MOVED_RATE, MOVED_FORCE, INTERVALS, CLEAR = 0.02, 0.7, 30, 0.6
 #: The mean force points within 45 deg of where it should, or away from it.
 ALONG = 0.7
 
@@ -39,15 +39,25 @@ AXES = "xyz"
 def units(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """Specific force in g, without gravity, or in another unit; angular rate in deg/s."""
     size = float(np.median(np.linalg.norm(imu.force, axis=1)))
-    if not PLAUSIBLE[0] <= size <= PLAUSIBLE[1]:
-        felt = f"the specific force is {size:.3g} m/s^2 long (median), and gravity alone is 9.8"
+    low, high = PLAUSIBLE
+    expected = "gravity alone is 9.8"
+    if moved is not None and moved.measured:
+        felt_then = np.linalg.norm(imu.mean_force(moved.start, moved.end), axis=1)
+        good = np.isfinite(felt_then)
+        if good.sum() >= INTERVALS:
+            size = float(np.median(felt_then[good]))
+            should = float(np.median(np.linalg.norm(moved.acceleration[good] - [0, 0, GRAVITY], axis=1)))
+            low, high = should / CLOSE, should * CLOSE
+            expected += f", with the accelerations of the receiver {should:.3g}"
+    if not low <= size <= high:
+        felt = f"the specific force is {size:.3g} m/s^2 long (median), and {expected}"
         if IN_G[0] <= size <= IN_G[1]:
             felt += ": it is in g, or gravity was taken off"
             fix = (
                 'set unit = "g" in [imu.force] of the recipe and import again; or, where gravity was taken '
                 "off, use the raw samples"
             )
-        elif size < WITHOUT:
+        elif size < low:
             felt += ": gravity was taken off, or the unit is wrong"
             fix = "use the raw samples of the accelerometer, and check the unit in [imu.force] of the recipe"
         else:

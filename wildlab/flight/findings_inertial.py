@@ -13,7 +13,7 @@ import pandas as pd
 
 from wildlab.flight import findings_axes
 from wildlab.flight.findings import Finding
-from wildlab.flight.inertial_data import Array, Inertial, Moves, fixes, moves, samples
+from wildlab.flight.inertial_data import STEP_S, Array, Inertial, Moves, fixes, moves, samples
 from wildlab.flight.store import Flight
 
 #: Longer without a sample than this, the attitude is not measured any more: half a roll takes no longer.
@@ -24,12 +24,16 @@ OUTAGE_S = 5.0
 COMMON = 0.5
 #: How far apart clocks are looked for, how finely, and from which offset on it is worth saying.
 LAG_S, COARSE_S, FINE_S, OFFSET_S = 60.0, 0.25, 0.02, 0.4
-#: Correlation that makes an offset believable, and by how much it has to be better than without one.
-ALIKE, BETTER = 0.6, 0.1
+#: Correlation that makes an offset believable, how much less it has to leave unexplained (as a ratio of
+#: variances) than no offset, and by what logarithm of the likelihood it has to be the better explanation.
+ALIKE, BETTER, SURE = 0.6, 1.2, 10.0
+#: Peaks that differ by less than this are equally high.
+ROUNDS = 0.01
 #: Without any correlation above this over all offsets, the logs are not of one flight.
 UNLIKE = 0.3
-#: Intervals and standard deviation (m/s^2) of the force without which nothing can be told.
-ENOUGH, LIVELY = 30, 0.5
+#: Intervals and standard deviation (m/s^2) of the force without which nothing can be told, and without which
+#: the lack of a correlation means nothing.
+ENOUGH, LIVELY, VERY_LIVELY = 30, 0.2, 0.3
 
 
 def inertial(flight: Flight) -> Iterator[Finding]:
@@ -113,8 +117,11 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     """Whether what the receiver says was felt is felt at another time."""
     expected = np.linalg.norm(moved.acceleration - [0.0, 0.0, findings_axes.GRAVITY], axis=1)
 
+    def felt_at(lag: float) -> Array:
+        return np.asarray(np.linalg.norm(imu.mean_force(moved.start + lag, moved.end + lag), axis=1))
+
     def alike(lag: float) -> float:
-        felt = np.linalg.norm(imu.mean_force(moved.start + lag, moved.end + lag), axis=1)
+        felt = felt_at(lag)
         good = np.isfinite(felt)
         # An offset that leaves little in common could fit by accident.
         if good.sum() < max(ENOUGH, len(felt) / 4) or min(felt[good].std(), expected[good].std()) < LIVELY:
@@ -126,12 +133,19 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     here = alike(0.0)
     if np.isnan(here) or np.isnan(found).all():
         return
-    middle = coarse[np.nanargmax(found)]
+    # Whoever flies rounds is as like himself a round later: of peaks equally high the nearest is meant.
+    high = np.flatnonzero(np.nan_to_num(found, nan=-1.0) > np.nanmax(found) - ROUNDS)
+    peaks = [i for i in high if found[i] == np.nanmax(found[max(0, i - 8) : i + 9])]
+    middle = coarse[min(peaks, key=lambda i: abs(coarse[i]))]
     fine = np.arange(middle - COARSE_S, middle + COARSE_S + FINE_S / 2, FINE_S)
     near = np.array([alike(lag) for lag in fine])
     best = float(fine[np.nanargmax(near)])
     most = float(np.nanmax(near))
-    if most < UNLIKE:
+    unexplained = (1 - here**2) / max(1 - most**2, 1e-12)
+    # Overlapping intervals count once.
+    likelier = float(np.sum(np.diff(moved.start, append=moved.end[-1]).clip(max=STEP_S))) / STEP_S
+    likelier *= 0.5 * np.log(unexplained)
+    if most < UNLIKE and moved.measured and np.nanstd(felt_at(0.0)) > VERY_LIVELY:
         yield Finding(
             "warning",
             "gnss",
@@ -140,7 +154,7 @@ def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
             f"(correlation {here:.2f}, and below {UNLIKE:g} for any offset up to {LAG_S:.0f} s)",
             "check that both are of the same flight and the same clock",
         )
-    elif most > ALIKE and most - here > BETTER and abs(best) > OFFSET_S:
+    elif most > ALIKE and abs(best) > OFFSET_S and unexplained > BETTER and likelier > SURE:
         offset = flight.manifest.clocks.gnss_offset_s + best
         yield Finding(
             "warning",

@@ -63,12 +63,14 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Moves:
-    """What the receiver says of intervals: start and end (K,), and the velocity at both (K, 3)."""
+    """What the receiver says of intervals: start and end (K,), and the velocity at both (K, 3), `measured` or
+    made of positions."""
 
     start: Array
     end: Array
     before: Array
     after: Array
+    measured: bool
 
     @property
     def acceleration(self) -> Array:
@@ -128,7 +130,8 @@ def moves(table: pd.DataFrame | None) -> Moves | None:
     if table is None:
         return None
     times = table["time_s"].to_numpy(float)
-    if VELOCITY[0] in table:
+    measured = VELOCITY[0] in table
+    if measured:
         velocity = table[list(VELOCITY)].to_numpy(float)
         good = np.isfinite(velocity).all(axis=1)
         times, velocity = times[good], velocity[good]
@@ -138,7 +141,7 @@ def moves(table: pd.DataFrame | None) -> Moves | None:
     first, last = _intervals(times)
     if len(first) == 0:
         return None
-    return Moves(times[first], times[last], velocity[first], velocity[last])
+    return Moves(times[first], times[last], velocity[first], velocity[last], measured)
 
 
 def turns(flight: Flight) -> Iterator[Turns]:

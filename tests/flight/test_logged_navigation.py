@@ -1,0 +1,228 @@
+"""Thor 75 and X-8 through their recipes: counts, rates, ranges, what the logs hide, and no false alarm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+from scipy.spatial.transform import Rotation
+
+from wildlab.flight.catalog import fetch, is_fetched, read_catalog
+from wildlab.flight.check import check_flight, usable_for
+from wildlab.flight.files import sha256_of
+from wildlab.flight.inertial_data import FORCE, RATE, turns
+from wildlab.flight.inertial_data import samples as inertial_samples
+from wildlab.flight.recipe import import_flight
+from wildlab.flight.store import Flight, load_flight
+from wildlab.flight.sync import gnss_times
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.paths import DATA
+
+NED = ["north_m", "east_m", "down_m"]
+SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+THOR = "thor_flight75_WaypointTracker_150squareWaypointNew_2012_10_10.mat"
+
+
+def _import(recipe: str, source: Path, into: Path) -> Flight:
+    def state() -> dict[Path, tuple[int, str]]:
+        return {path: (path.stat().st_mtime_ns, sha256_of(path)) for path in source.iterdir()}
+
+    before = state()
+    import_flight(DATA / "recipes" / f"{recipe}.toml", source, into)
+    assert state() == before
+    flight = load_flight(into)
+    (used,) = flight.manifest.sources
+    assert used.sha256 == before[source / used.file][1]
+    assert read_catalog()[recipe].files[0].sha256 == used.sha256
+    return flight
+
+
+@pytest.fixture(scope="module")
+def thor(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    folder = tmp_path_factory.mktemp("thor") / "flight"
+    return _import("umn-thor75", shared_data("logs", "umn_thor75"), folder)
+
+
+@pytest.fixture(scope="module")
+def x8(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    folder = tmp_path_factory.mktemp("x8") / "flight"
+    return _import("inertialnav-x8", shared_data("logs", "inertialnav_x8"), folder)
+
+
+def _euler_deg(nav: pd.DataFrame) -> np.ndarray:
+    return np.degrees(matrix_to_euler(quaternion_to_matrix(nav[QUATERNION].to_numpy())))
+
+
+def _gyro_fits(flight: Flight, moving: tuple[float, float]) -> np.ndarray:
+    """Correlation of the rates with those of the onboard attitude, each axis, while flying."""
+    imu = inertial_samples(flight)
+    (turn,) = turns(flight)
+    assert imu is not None
+    rate = imu.mean_rate(turn.start, turn.end)
+    good = np.isfinite(rate).all(axis=1) & (turn.start > moving[0]) & (turn.end < moving[1])
+    return np.array([np.corrcoef(rate[good, i], turn.rate[good, i])[0, 1] for i in range(3)])
+
+
+def test_thor_counts_and_rates(thor: Flight) -> None:
+    imu, gnss, nav = thor.table("imu"), thor.table("gnss"), thor.nav["onboard"]
+    assert len(imu) == 34811  # 34812 rows less the first, of zeros
+    step = np.diff(imu["time_s"])
+    assert (step.min(), step.max()) == pytest.approx((0.02, 0.02), abs=5e-5)
+    # 674 changes of GPS_TOW, one of them without a satellite
+    assert len(gnss) == 673
+    assert (gnss["satellites"] >= 4).all()
+    assert np.median(np.diff(gnss["time_s"])) == pytest.approx(1.0, abs=1e-3)
+    assert gnss["time_s"].iloc[0] == pytest.approx(22.04, abs=0.01)
+    assert np.diff(gnss["time_s"]).max() == pytest.approx(3.0, abs=0.01)
+    np.testing.assert_allclose(gnss_times(thor), gnss["time_s"] - 0.09)
+    # valid from 24.8 s, but for two seconds in a turn without satellites
+    assert len(nav) == 33473
+    assert nav["time_s"].iloc[0] == pytest.approx(24.8, abs=0.01)
+    assert np.diff(nav["time_s"]).max() == pytest.approx(2.02, abs=0.01)
+
+
+def test_thor_ranges(thor: Flight) -> None:
+    imu, gnss, nav = thor.table("imu"), thor.table("gnss"), thor.nav["onboard"]
+    for table in (gnss, nav):
+        assert np.abs(table[NED].to_numpy()).max() < 400  # degrees and radians both ended up there
+    assert np.hypot(gnss[SPEED[0]], gnss[SPEED[1]]).max() == pytest.approx(26.4, abs=0.5)
+    assert gnss["down_m"].min() == pytest.approx(-74, abs=2)
+    # away from the start, where the receiver was still settling
+    later = nav["time_s"] > 60
+    assert nav.loc[later, "down_m"].max() < 2
+    euler = _euler_deg(nav)
+    assert (euler[:, 0].min(), euler[:, 0].max()) == pytest.approx((-61, 43), abs=1)
+    assert (euler[:, 1].min(), euler[:, 1].max()) == pytest.approx((-18, 29), abs=1)
+    still = imu["time_s"].between(640, 690)
+    assert np.linalg.norm(imu.loc[still, list(FORCE)].mean()) == pytest.approx(9.81, abs=0.1)
+    assert (_gyro_fits(thor, (212, 579)) > [0.98, 0.97, 0.88]).all()
+
+
+def test_thor_has_the_raw_sensor(thor: Flight) -> None:
+    """With the biases back, every sample is a whole number of the sensor's steps: 0.05 deg/s and 3.33 mg."""
+    imu = thor.table("imu")
+    for columns, step in ((RATE, np.radians(0.05)), (FORCE, 0.00333 * 9.814)):
+        steps = imu[list(columns)].to_numpy() / step
+        assert np.abs(steps - np.round(steps)).max() < 1e-3
+
+
+def test_thor_takes_the_fix_where_it_changes(thor: Flight, shared_data: Callable[..., Path]) -> None:
+    log = scipy.io.loadmat(shared_data("logs", "umn_thor75", THOR), simplify_cells=True)["flight_data"]
+    changed = np.flatnonzero(np.diff(log["GPS_TOW"])) + 1
+    changed = changed[log["satVisible"][changed] > 0]
+    np.testing.assert_allclose(thor.table("gnss")["time_s"], log["time"][changed], atol=1e-6)
+    np.testing.assert_allclose(thor.table("gnss")["v_east_m_s"], log["ve"][changed])
+
+
+def test_x8_counts_and_rates(x8: Flight) -> None:
+    imu, gnss, nav = x8.table("imu"), x8.table("gnss"), x8.nav["onboard"]
+    assert len(imu) == 30650
+    step = np.diff(imu["time_s"])
+    assert np.median(step) == pytest.approx(0.02)
+    assert step.max() == pytest.approx(0.169)
+    assert len(gnss) == 3049  # 3050 less the one that is logged twice
+    assert np.median(np.diff(gnss["time_s"])) == pytest.approx(0.2)
+    assert np.diff(gnss["time_s"]).max() < 0.6  # the hole of 2.5 s is in the receiver's own stamps alone
+    assert (gnss["fix"] == 3).all()
+    assert set(gnss["satellites"]) <= set(range(6, 12))
+    # The attitude ends 0.22 s after the last position, latency taken off.
+    assert len(nav) == 30639
+    assert nav["time_s"].iloc[-1] == pytest.approx(gnss_times(x8)[-1], abs=0.02)
+
+
+def test_x8_ranges(x8: Flight) -> None:
+    imu, gnss, nav = x8.table("imu"), x8.table("gnss"), x8.nav["onboard"]
+    assert np.hypot(gnss[SPEED[0]], gnss[SPEED[1]]).max() == pytest.approx(32.15, abs=0.1)
+    assert np.abs(gnss[NED[:2]].to_numpy()).max() < 300
+    assert gnss["down_m"].min() == pytest.approx(-130, abs=3)
+    euler = _euler_deg(nav)
+    assert np.abs(euler[:, 0]).max() == pytest.approx(179, abs=1)
+    assert (euler[:, 1].min(), euler[:, 1].max()) == pytest.approx((-73, 75), abs=1)
+    still = imu["time_s"].between(20, 45)
+    assert np.linalg.norm(imu.loc[still, list(FORCE)].mean()) == pytest.approx(9.65, abs=0.05)
+    assert np.abs(imu.loc[still, list(RATE)].mean()).max() < 0.005
+    assert (_gyro_fits(x8, (280, 590)) > 0.99).all()
+    # attitudes through the vertical stay a rotation each
+    R = Rotation.from_quat(nav[QUATERNION].to_numpy(), scalar_first=True)
+    assert np.degrees((R[:-1].inv() * R[1:]).magnitude()).max() < 20
+
+
+def test_x8_velocity_is_that_of_its_positions(x8: Flight) -> None:
+    """The course in degrees, the vertical downwards: else speeds and positions would disagree."""
+    gnss = x8.table("gnss")
+    step = np.diff(gnss["time_s"])
+    moved = np.diff(gnss[NED].to_numpy(), axis=0)[5:]
+    meant = ((gnss[SPEED].to_numpy()[1:] + gnss[SPEED].to_numpy()[:-1]) / 2 * step[:, None])[5:]
+    for i in range(3):
+        assert np.corrcoef(moved[:, i], meant[:, i])[0, 1] > 0.95
+    assert np.polyfit(meant.ravel(), moved.ravel(), 1)[0] == pytest.approx(1, abs=0.06)
+
+
+@pytest.mark.parametrize("name", ["thor", "x8"])
+def test_no_false_alarm(name: str, request: pytest.FixtureRequest) -> None:
+    flight: Flight = request.getfixturevalue(name)
+    found = check_flight(flight)
+    assert [one for one in found if one.table in ("imu", "gnss", "nav/onboard")] == []
+    said = [one.field for one in found if one.level != "note"]
+    # That the heights of the X-8 are above sea level is so.
+    assert said == ([] if name == "thor" else ["vertical.reference"])
+    assert [use.usable for use in usable_for(flight)] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("thor", lambda f: _scaled(f, FORCE, 1 / 9.81), "it is in g"),
+        ("x8", lambda f: _scaled(f, FORCE, 1 / 9.81), "it is in g"),
+        ("thor", lambda f: _scaled(f, RATE, 57.3), "it is in deg/s"),
+        ("x8", lambda f: _scaled(f, RATE, 57.3), "it is in deg/s"),
+        ("thor", lambda f: _scaled(f, (*FORCE[1:], *RATE[1:]), -1), "has to point along -z"),
+        ("x8", lambda f: _scaled(f, (*FORCE[1:], *RATE[1:]), -1), "has to point along -z"),
+        (
+            "thor",
+            lambda f: _scaled(f, (*FORCE[:2], *RATE[:2]), -1),
+            "x goes with minus x, y goes with minus y",
+        ),
+        ("x8", lambda f: _scaled(f, (*FORCE[:2], *RATE[:2]), -1), "x goes with minus x, y goes with minus y"),
+        ("thor", lambda f: f.tables["gnss"].update(f.tables["gnss"]["time_s"] + 1), "stamps seem to be 1."),
+        ("x8", lambda f: f.tables["gnss"].update(f.tables["gnss"]["time_s"] - 1), "stamps seem to be 1."),
+    ],
+)
+def test_faults_made_in_real_logs(
+    name: str, change: Callable[[Flight], None], said: str, request: pytest.FixtureRequest
+) -> None:
+    right: Flight = request.getfixturevalue(name)
+    flight = Flight(
+        right.manifest, dict(right.nav), {key: table.copy() for key, table in right.tables.items()}
+    )
+    change(flight)
+    found = [one.sentence for one in check_flight(flight) if one.table in ("imu", "gnss")]
+    assert any(said in one for one in found), found
+
+
+def _scaled(flight: Flight, columns: tuple[str, ...], factor: float) -> None:
+    flight.tables["imu"][list(columns)] *= factor
+
+
+@pytest.mark.parametrize(
+    ("name", "licence", "folder"),
+    [("umn-thor75", "MIT", "umn_thor75"), ("inertialnav-x8", "BSD-3-Clause", "inertialnav_x8")],
+)
+def test_fetched_from_the_mirror(
+    name: str,
+    licence: str,
+    folder: str,
+    shared_data: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(shared_data("logs", folder).parents[1]))
+    (path,) = fetch(name, tmp_path)
+    assert path.suffix == ".mat"
+    assert is_fetched(name, tmp_path)
+    assert read_catalog()[name].licence == licence
