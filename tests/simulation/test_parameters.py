@@ -245,6 +245,14 @@ reason = "for this test"
 """
 
 
+PAIR = """[pair.both]
+value = 349
+unit = "1"
+status = "published"
+source = "H 6.4.4: 349 images had both vessels within the same image"
+"""
+
+
 @pytest.mark.parametrize(
     ("twin", "old", "new", "found"),
     [
@@ -257,7 +265,7 @@ reason = "for this test"
             'value = "nine"',
             "'nine' is not known. Use one of eight",
         ),
-        ("crossing-vessels", "[pair.both]", "[climb.altitude]", r"climb\.start: this key is missing"),
+        ("crossing-vessels", PAIR, "", "two targets need pair.both, one does not"),
         ("crossing-vessels", "value = 349\n", "value = 900\n", "pair.both is more than the observations"),
         ("crossing-vessels", 'value = "boat 2"', 'value = "boat 1"', "two targets have the same identifier"),
         ("slow-vessel", "value = 2001\n", "value = 3000\n", "the subset ends behind the last of 3635"),
