@@ -1,0 +1,62 @@
+"""Wrong input never passes in silence."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.navigation.flights import GRAVITY, NOISE, begin, fixes, fly, spoil
+from wildlab.navigation.gravity import flat_earth
+from wildlab.navigation.mekf import run_mekf
+from wildlab.navigation.timeline import Imu
+from wildlab.navigation.trouble import signs_of_trouble
+
+EARTH = flat_earth(GRAVITY)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return fly(200.0)
+
+
+def signs(flight, change=lambda imu, aiding: (imu, aiding), seed=0, **options):
+    rng = np.random.default_rng(seed)
+    imu, biases = spoil(flight, rng)
+    start, antennas = begin(flight, biases, rng), fixes(flight, rng, **options)
+    imu, aiding = change(imu, antennas)
+    wanted = imu.times[(imu.times > 60) & (imu.times < 199)][::10]
+    return signs_of_trouble(run_mekf(imu, start, NOISE, EARTH, aiding, wanted), aiding)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_good_flight_raises_no_doubt(flight, seed):
+    assert signs(flight, seed=seed) == []
+
+
+def without(imu, begin_s, end_s):
+    keep = (imu.times < begin_s) | (imu.times > end_s)
+    return Imu(*(part[keep] for part in imu))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda imu, a: (imu._replace(specific_force=imu.specific_force / GRAVITY), a), "lost its way"),
+        (lambda imu, a: (imu._replace(angular_rate=np.degrees(imu.angular_rate)), a), "lost its way"),
+        (lambda imu, a: (imu._replace(specific_force=imu.specific_force * [1, -1, -1]), a), "lost its way"),
+        (lambda imu, a: (imu._replace(angular_rate=imu.angular_rate * [1, -1, -1]), a), "lost its way"),
+        (lambda imu, a: (imu._replace(angular_rate=imu.angular_rate[:, [1, 0, 2]]), a), "did not fit"),
+        (lambda imu, a: (imu, [x._replace(times=x.times + 0.5) for x in a]), "lost its way"),
+        (lambda imu, a: (imu, [x._replace(variance=x.variance / 16) for x in a]), "miss what the filter"),
+        (lambda imu, a: (imu, [x._replace(times=x.times + 1.4e9) for x in a]), "on the same clock"),
+        (lambda imu, a: (without(imu, 100.0, 102.0), a), r"missing from 99\.99 to 102\.01 s"),
+    ],
+)
+def test_each_mistake_is_said(flight, change, sentence):
+    found = " ".join(signs(flight, change))
+    assert re.search(sentence, found), found
+
+
+def test_an_outage_is_said(flight):
+    (sentence,) = signs(flight, outage=(100.0, 160.0))
+    assert "From 100 to 160 s no measurement was taken in" in sentence
