@@ -5,7 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from tests.navigation.flights import GRAVITY, NOISE, begin, fixes, fly, spoil
+from tests.navigation.flights import GRAVITY, LEVERS, NOISE, attitude, begin, fixes, fly, spoil
+from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.navigation.gravity import flat_earth
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.timeline import Imu
@@ -55,6 +56,24 @@ def without(imu, begin_s, end_s):
 def test_each_mistake_is_said(flight, change, sentence):
     found = " ".join(signs(flight, change))
     assert re.search(sentence, found), found
+
+
+@pytest.mark.parametrize(
+    ("axes", "sentence"), [([1, -1, -1], "flies on its back"), ([-1, -1, 1], "flies tail first")]
+)
+def test_sensors_built_in_the_wrong_way_round_are_said(flight, axes, sentence):
+    """All axes turned alike: everything fits, with a start that is turned as well."""
+    rng = np.random.default_rng(0)
+    imu, biases = spoil(flight, rng)
+    start, (first, _) = begin(flight, biases, rng), fixes(flight, rng)
+    turned = Imu(imu.times, imu.specific_force * axes, imu.angular_rate * axes)
+    R = quaternion_to_matrix(start.state[6:10]) @ np.diag(axes)
+    start.state[6:10] = matrix_to_quaternion(R)
+    central = first._replace(value=first.value - attitude(first.times) @ LEVERS[0], lever=0 * first.lever)
+    wanted = imu.times[(imu.times > 60) & (imu.times < 199)][::10]
+    found = run_mekf(turned, start, NOISE, EARTH, [central], wanted)
+    (only,) = signs_of_trouble(found, [central])
+    assert sentence in only
 
 
 def test_an_outage_is_said(flight):

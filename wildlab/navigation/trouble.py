@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.geometry.frames import quaternion_to_matrix
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding
 from wildlab.navigation.mekf import FORCED, REJECTED, Navigation
@@ -28,7 +29,7 @@ def signs_of_trouble(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
     found, aiding
         What `mekf.run_mekf` gave, and what it was given.
     """
-    return [*_misfits(found, aiding), *_biases(found), *_absences(found, aiding)]
+    return [*_misfits(found, aiding), *_biases(found), *_postures(found), *_absences(found, aiding)]
 
 
 def _misfits(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
@@ -69,6 +70,27 @@ def _biases(found: Navigation) -> list[str]:
                 f"The bias of the {name} comes out as {np.quantile(size, 0.9):.2g} {unit}, more than sensors "
                 "that work have: check their units and axes."
             )
+    return sentences
+
+
+def _postures(found: Navigation) -> list[str]:
+    """All axes turned alike make an estimate that fits, of an airframe that flies in a way none does."""
+    v = found.velocity
+    fast = np.isfinite(v).all(axis=1) & (np.linalg.norm(v, axis=1) > 5.0)
+    if not fast.any():
+        return []
+    R, course = quaternion_to_matrix(found.quaternion[fast]), v[fast]
+    along = (R[:, :, 0] * course).sum(axis=1) / np.linalg.norm(course, axis=1)
+    sentences = []
+    if np.median(R[:, 2, 2]) < 0:
+        sentences.append(
+            "It flies on its back most of the time: the z axis of the inertial sensors points up, "
+            "rather than down."
+        )
+    if np.median(along) < -0.5:
+        sentences.append(
+            "It flies tail first most of the time: the x axis of the inertial sensors points back."
+        )
     return sentences
 
 
