@@ -36,7 +36,8 @@ TURN = 2.5
 
 @dataclass(frozen=True)
 class Inertial:
-    """Samples: times (N,), specific force and angular rate (N, 3), and the integrals of both over time."""
+    """Samples: times (N,), specific force and angular rate (N, 3), and the integrals of both over time, one
+    row per axis (3, N)."""
 
     times: Array
     force: Array
@@ -54,7 +55,7 @@ class Inertial:
 
     def _mean(self, total: Array, start: Array, end: Array) -> Array:
         first, last = (
-            np.column_stack([np.interp(at, self.times, one) for one in total.T]) for at in (start, end)
+            np.column_stack([np.interp(at, self.times, one) for one in total]) for at in (start, end)
         )
         mean = (last - first) / (end - start)[:, None]
         mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
@@ -105,13 +106,13 @@ def samples(flight: Flight) -> Inertial | None:
         return None
     values = table[["time_s", *FORCE, *RATE]].to_numpy(float)
     values = values[np.isfinite(values).all(axis=1)]
-    times = values[:, 0]
+    times = np.ascontiguousarray(values[:, 0])
     if len(times) < 2 or (np.diff(times) <= 0).any():
         return None
     step = np.diff(times)[:, None]
-    sums = np.zeros((len(times), 6))
-    np.cumsum((values[1:, 1:] + values[:-1, 1:]) / 2 * step, axis=0, out=sums[1:])
-    return Inertial(times, values[:, 1:4], values[:, 4:7], sums[:, :3], sums[:, 3:])
+    sums = np.zeros((6, len(times)))
+    sums[:, 1:] = np.cumsum((values[1:, 1:] + values[:-1, 1:]) / 2 * step, axis=0).T
+    return Inertial(times, values[:, 1:4], values[:, 4:7], sums[:3], sums[3:])
 
 
 def fixes(flight: Flight) -> pd.DataFrame | None:
