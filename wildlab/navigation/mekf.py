@@ -24,7 +24,7 @@ from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather
 from wildlab.navigation.gravity import Earth
 from wildlab.navigation.kernels import Integers
-from wildlab.navigation.noise import ImuNoise
+from wildlab.navigation.noise import ImuNoise as ImuNoise  # part of what a run takes, so also found here
 from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
 
 #: Verdicts on a measurement: left out by its gate; taken in; taken in after the covariance was widened.
