@@ -384,3 +384,9 @@ def test_imu_and_gnss_make_navigation_possible(make_flight: Callable[..., Flight
     assert usable_for(flight)[2].usable
     flight.tables["imu"].loc[1, "time_s"] = 0.0
     assert not usable_for(flight)[2].usable
+
+
+def test_pixels_need_a_camera(make_flight: Callable[..., Flight]) -> None:
+    (found,) = [one for one in check_flight(make_flight(camera=None)) if one.field == "camera"]
+    assert found.level == "problem"
+    assert "there are pixels, and no camera they could be of" in found.sentence

@@ -159,3 +159,24 @@ def test_geometry_is_in_radians(manifest_data: Mapping[str, Any]) -> None:
 def test_replacing_an_unknown_key_is_an_error(manifest_data: dict[str, Any]) -> None:
     with pytest.raises(WildlabError, match="camera_offset_s"):
         replace_in_manifest(make_manifest(manifest_data), {"clocks": {"camera_offset": 1.0}})
+
+
+def test_sensors_are_kept_and_checked(manifest_data: dict[str, Any], tmp_path: Path) -> None:
+    manifest_data["gnss"] = {"name": "u-blox", "lever_arm_m": [-0.4, 0.0, -0.1], "latency_s": 0.2}
+    manifest_data["imu"] = {"name": "ADIS16490", "velocity_random_walk_m_s_sqrt_h": 0.008}
+    manifest_data["clocks"] = {"gnss_offset_s": -1.5}
+    del manifest_data["camera"]
+    manifest = make_manifest(manifest_data)
+    (tmp_path / "flight.toml").write_text(manifest_toml(manifest), encoding="utf-8")
+    again = read_manifest(tmp_path / "flight.toml")
+    assert again == manifest
+    assert again.camera is None
+    assert again.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
+    assert again.imu.gyro_bias_deg_h is None
+    for part, key, value in (
+        ("gnss", "latency_s", -0.1),
+        ("gnss", "lever_arm_m", [1.0, 2.0]),
+        ("imu", "angle_random_walk_deg_sqrt_h", 0.0),
+    ):
+        with pytest.raises(WildlabError, match=rf"{part}\.{key}"):
+            replace_in_manifest(manifest, {part: {key: value}})
