@@ -1,7 +1,8 @@
 """Logged flights: the pose from IMU and GPS against the one that was computed on board.
 
-Nothing here is tuned to the comparison. The noise is that of the data sheets; the latency of the GPS is the
-one under which its own measurements are likeliest; both are the same for all figures.
+The latency of the GPS is the one under which its own measurements are likeliest. The noise is that of data
+sheets, with one freedom: which temperature drift stands behind the biases was settled with the comparison in
+sight, next to the likelihood's own optimum. All figures of a flight are from one setting.
 """
 
 import numpy as np

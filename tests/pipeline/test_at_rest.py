@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.pipeline.at_rest import filter_errors, judge_columns, summarise_at_rest
+from wildlab.pipeline.at_rest import METRICS, check_claims, filter_errors, judge_columns, summarise_at_rest
 from wildlab.tracking.kalman import filter_at_rest
 
 
@@ -36,3 +36,19 @@ def test_columns_are_those_the_flight_has_and_none_is_an_error(make_flight):
     found = summarise_at_rest(judged)
     assert found["pixhawk-autopilot", "mae"] == pytest.approx(judged["pixhawk-autopilot"]["error_m"].mean())
     assert found["filter", "at_end"] < found["pixhawk-autopilot", "mae"]
+
+
+def test_claims_are_decided_flight_by_flight():
+    """Two flights, one on which every claim is true and one on which none is."""
+    good = {("pixhawk-autopilot", "mae"): 5.0, ("pixhawk-autopilot", "mean_north"): 1.0,
+            ("pixhawk-autopilot", "mean_east"): 1.0, ("without-time-synchronization", "mae"): 6.0,
+            ("without-misalignment-calibration", "mae"): 16.0, ("filter", "lag1_north"): 0.5,
+            ("filter", "lag1_east"): 0.5, ("filter", "after_first_batch"): 0.9,
+            ("filter", "at_end"): 0.4}  # fmt: skip
+    bad = {**good, ("pixhawk-autopilot", "mean_north"): 3.0, ("without-time-synchronization", "mae"): 4.0,
+           ("without-misalignment-calibration", "mae"): 14.0, ("filter", "lag1_east"): 0.05,
+           ("filter", "after_first_batch"): 1.1, ("filter", "at_end"): 0.6}  # fmt: skip
+    checks = check_claims(pd.DataFrame([good, bad]), bound=0.1)
+    assert len(checks) == 6
+    assert all(list(true) == [True, False] for true in checks.values())
+    assert set(good) <= set(METRICS)

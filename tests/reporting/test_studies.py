@@ -75,6 +75,7 @@ def test_static_point_over_a_few_flights(reports: Path, tmp_path: Path, faults: 
     folder = run("static-point", reports, notebooks=notebooks)
     found = values(folder)
     for column in (
+        "observer",
         "pixhawk-autopilot",
         "without-time-synchronization",
         "without-misalignment-calibration",
@@ -85,7 +86,7 @@ def test_static_point_over_a_few_flights(reports: Path, tmp_path: Path, faults: 
             assert metric["published"] is not None
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 6)
-    for figure in ("02", "03a", "03b", "04b", "05a", "05b", "06", "07"):
+    for figure in ("02", "03a", "03b", "04a", "04b", "05a", "05b", "06", "07"):
         assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
         assert (folder / "figures" / f"fig-5-{figure}.png").is_file()
     assert faults(folder / "report.html") == []

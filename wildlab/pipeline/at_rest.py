@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
@@ -15,6 +16,7 @@ from wildlab.tracking.kalman import Filtered, filter_at_rest
 
 #: Navigation source and camera stamps behind each column of the tables.
 COLUMNS = {
+    "observer": ("observer", "time_s"),
     "pixhawk-autopilot": ("autopilot", "time_s"),
     "without-time-synchronization": ("autopilot", "time_onboard_s"),
     "without-misalignment-calibration": ("autopilot-uncalibrated", "time_s"),
@@ -24,6 +26,16 @@ COLUMNS = {
 TABLE_NAMES = ("mean_north", "mean_east", "sd_north", "sd_east", "mae")
 #: A pause in the observations longer than this (seconds) ends a batch.
 BATCH_GAP_S = 10.0
+
+#: Names, subjects and units of the metrics that stand for what `summarise_at_rest` gives, by its keys.
+METRICS = {(column, name): (name, column, "m") for column in COLUMNS for name in TABLE_NAMES} | {
+    ("filter", "after_first_batch"): ("filter_error_after_first_batch", "pixhawk-autopilot", "m"),
+    ("filter", "at_end"): ("filter_error_at_end", "pixhawk-autopilot", "m"),
+    ("filter", "nees_at_end"): ("filter_nees_at_end", "pixhawk-autopilot", "1"),
+    ("filter", "lag1_north"): ("lag1_autocorrelation_north", "pixhawk-autopilot", "1"),
+    ("filter", "lag1_east"): ("lag1_autocorrelation_east", "pixhawk-autopilot", "1"),
+    ("filter", "coverage"): ("ellipse_coverage_90", "pixhawk-autopilot", "1"),
+}
 
 
 def judge_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
@@ -87,3 +99,27 @@ def summarise_at_rest(judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
         ("filter", "lag1_east"): float(autocorrelation(followed.innovation[1:, 1], 1)[1]),
         ("filter", "coverage"): float(table["inside_90"].mean()),
     }
+
+
+def check_claims(spread: pd.DataFrame, bound: float) -> dict[str, NDArray[np.bool_]]:
+    """On which flights each claim of H 5.6.1 is true, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `summarise_at_rest` gives, one row for each flight.
+    bound
+        What the autocorrelation of white innovations stays below.
+    """
+    mae = spread["pixhawk-autopilot", "mae"]
+    off = np.hypot(spread["pixhawk-autopilot", "mean_north"], spread["pixhawk-autopilot", "mean_east"])
+    checks = {
+        "synchronisation-matters": spread["without-time-synchronization", "mae"] > mae,
+        "misalignment-matters-most": spread["without-misalignment-calibration", "mae"] > 3 * mae,
+        "innovations-coloured": spread[[("filter", "lag1_north"), ("filter", "lag1_east")]].min(axis=1)
+        > bound,
+        "metre-after-first-batch": spread["filter", "after_first_batch"] < 1.0,
+        "half-metre-at-end": spread["filter", "at_end"] < 0.5,
+        "mean-within-two-metres": off < 2.0,
+    }
+    return {claim: np.asarray(true, bool) for claim, true in checks.items()}

@@ -14,7 +14,8 @@ from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariance_columns, frame_times, gnss_times
 from wildlab.navigation.aiding import Aiding, positions, velocities
 from wildlab.navigation.gravity import local_earth
-from wildlab.navigation.mekf import ImuNoise, Start, pose_covariance, run_mekf
+from wildlab.navigation.mekf import Start, pose_covariance, run_mekf
+from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.observer import baseline_reference, course_reference, run_observer
 from wildlab.navigation.start import start_from_baseline, start_from_course
 from wildlab.navigation.timeline import Imu

@@ -52,6 +52,18 @@ Shares of the squared error: one-way analysis of variance with images as groups.
 whole
 images with replacement, middle 90 %."""
 
+METHOD_AT_REST = r"""Pixels are placed on the plane at the target's height by H (5.13). Mean, standard
+deviation and mean error are those of the distances to the known position. Without synchronisation the pose is
+taken at the stamp that the on-board computer gave the image; without calibration the attitude keeps the
+misalignment of the autopilot's IMU.
+
+The observer is the nonlinear one of H 5.5 on the simulated inertial samples and the two receivers' positions
+and velocities, with the gains of its defaults.
+
+The filter has the motion model of an object at rest ($\mathbf{F} = \mathbf{I}$, $\mathbf{Q} = \mathbf{0}$)
+and the autopilot's poses; $\mathbf{R}$ is each point's own ground covariance. Autocorrelations are divided by
+their value at lag zero; white noise of this length stays within the grey band at 95 % of the lags."""
+
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),
     "position_vertical": ("position_vertical_m", "position, vertical", "m"),

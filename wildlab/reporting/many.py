@@ -29,6 +29,29 @@ PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "difference", "drawn"), 2
 CLAIM_COLUMNS = {"claim": "claim", "source": "where", "verdict": "verdict", "share": "flights (%)"}
 
 
+def record_spread(
+    report: Report,
+    spread: pd.DataFrame,
+    keys: Mapping[tuple[str, str], tuple[str, str, str]],
+    n: Mapping[str, int],
+) -> None:
+    """Record medians over flights with the middle 90 % as their range.
+
+    Parameters
+    ----------
+    spread
+        One row for each flight; a flight on which a quantity was not computed has NaN.
+    keys
+        For each column of ``spread`` the metric's name, subject and unit.
+    n
+        How many observations stand behind each subject, where that is known.
+    """
+    for key, (name, subject, unit) in keys.items():
+        values = spread[key]
+        low, high = values.quantile(0.05), values.quantile(0.95)
+        report.metric(name, subject, values.median(), unit, n=n.get(subject), low=low, high=high)
+
+
 def beside_published(
     published: Mapping[tuple[str, str], float],
     spread: pd.DataFrame,
