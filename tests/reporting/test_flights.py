@@ -56,6 +56,10 @@ def test_it_is_simulated_again_when_its_parameters_change(
     (tmp_path / "data" / "twins" / "antenna.toml").write_text("height_m = 350")
     flights.twin_flight("antenna", 1, tmp_path)
     assert len(simulated) == 2
+    (tmp_path / "data" / "twins" / "parts").mkdir()
+    (tmp_path / "data" / "twins" / "parts" / "camera.toml").write_text("shared by twins")
+    flights.twin_flight("antenna", 1, tmp_path)
+    assert len(simulated) == 3
 
 
 def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

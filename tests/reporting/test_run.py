@@ -220,11 +220,15 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number
     assert runner.wait(20) != 0
     assert gone([int(pid) for pid in pids.read_text().split()])
     assert {path.name: path.read_text() for path in (reports / "slow").iterdir()} == former
-    deadline = time.monotonic() + 5
-    while list(reports.glob(".*.part")) and time.monotonic() < deadline:
+
+    def left() -> list[Path]:
+        return [*reports.glob(".*.part"), *_socket_folder().glob(f"wl{runner.pid}-*")]
+
+    # A notebook whose runner was killed tidies up after itself, which on a busy machine takes a while.
+    deadline = time.monotonic() + 30
+    while left() and time.monotonic() < deadline:
         time.sleep(0.1)
-    assert not list(reports.glob(".*.part")), "nothing is left of the work, whoever ended it"
-    assert not list(_socket_folder().glob(f"wl{runner.pid}-*"))
+    assert left() == [], "nothing is left of the work, whoever ended it"
 
 
 def test_wrong_use_is_an_error_before_anything_runs(tmp_path: Path) -> None:

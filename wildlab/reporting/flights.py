@@ -27,7 +27,8 @@ def twin_flight(twin: str, seed: int, reports: Path) -> Path:
     """
     from wildlab.simulation.twins import simulate_twin
 
-    key = _fingerprint([f"{twin} {seed}"], [DATA / "twins" / f"{twin}.toml"])
+    # Twins share parts, so a change of any of their files may be a change of this one.
+    key = _fingerprint([f"{twin} {seed}"], sorted((DATA / "twins").rglob("*.toml")))
     return _kept(reports, f"{twin}-seed{seed}", key, lambda _: simulate_twin(twin, seed))
 
 
