@@ -1,1 +1,1 @@
-"""What a flight is: a folder with a manifest and tables; its import from raw files, its checks, public data."""
+"""What a flight is: a folder with manifest and tables; import from raw files, checks, public data."""
