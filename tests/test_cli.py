@@ -6,15 +6,20 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 
+from tests.flight.conftest import make_flight
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError
+from wildlab.flight.store import Flight, save_flight
 from wildlab.reporting.run import Outcome
+
+__all__ = ["make_flight"]
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -164,3 +169,16 @@ def test_fetch_without_a_name_lists_the_data_sets(capsys: pytest.CaptureFixture[
     assert code == 0 and {"dataset", "fetched", "title"} <= set(json.loads(out)[0])
     code, _, err = call(capsys, "fetch", "nonsense")
     assert code == 2 and "nonsense" in err
+
+
+def test_check_says_what_a_flight_can_be_used_for(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    save_flight(make_flight(), tmp_path / "flight")
+    code, out, _ = call(capsys, "check", str(tmp_path / "flight"))
+    assert code == 0
+    assert "No problems" in out
+    assert "georeferencing accuracy: yes" in out
+    assert "navigation: no, it lacks inertial measurements" in out
+    code, out, _ = call(capsys, "check", "--json", str(tmp_path / "flight"))
+    assert {use["purpose"]: use["usable"] for use in json.loads(out)["usable_for"]}["navigation"] is False

@@ -174,19 +174,27 @@ def check(flight: Path, as_json: bool) -> None:
     Example:
       wildlab check flights/tuesday
     """
-    from wildlab.flight.check import check_flight
+    from wildlab.flight.check import check_flight, usable_for
     from wildlab.flight.store import load_flight
 
-    findings = check_flight(load_flight(flight))
+    loaded = load_flight(flight)
+    findings, uses = check_flight(loaded), usable_for(loaded)
     problems = sum(finding.level == "problem" for finding in findings)
     if as_json:
         names = ("level", "table", "field", "sentence", "fix")
-        _print_json([{name: getattr(finding, name) for name in names} for finding in findings])
+        _print_json(
+            {
+                "findings": [{name: getattr(finding, name) for name in names} for finding in findings],
+                "usable_for": [{"purpose": u.purpose, "usable": u.usable, "why": u.why} for u in uses],
+            }
+        )
     else:
         for finding in findings:
             click.echo(f"{finding.level}: {_stopped(finding.sentence)} {_sentence(finding.fix)}".rstrip())
         warnings = sum(finding.level == "warning" for finding in findings)
         click.echo(_sentence(f"{_count(problems, 'problem')}, {_count(warnings, 'warning')}"))
+        for use in uses:
+            click.echo(f"{use.purpose}: {'yes' if use.usable else 'no'}, {_stopped(use.why)}")
     if problems:
         sys.exit(2)
 
