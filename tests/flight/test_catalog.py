@@ -105,7 +105,7 @@ def test_no_network_and_no_mirror_is_one_sentence(dataset: Callable[[str], None]
         fetch("small", tmp_path / "here")
     assert caught.value.__cause__ is None
     assert caught.value.__suppress_context__
-    assert "a.csv: the file cannot be downloaded from http://127.0.0.1:1/a.csv" in str(caught.value)
+    assert "downloaded from http://127.0.0.1:1/a.csv (no connection)" in str(caught.value)
     assert "set WILDLAB_DATA_MIRROR to a folder" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []

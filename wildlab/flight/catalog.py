@@ -195,9 +195,8 @@ def _download(file: DataFile, target: Path) -> None:
         # Checked below: pooch would not name the hash it found.
         pooch.retrieve(file.url, None, target.name, target.parent, downloader=downloader)
     except OSError as error:  # what requests raises is an OSError too
-        first = str(error).strip().splitlines()[:1] or [type(error).__name__]
         raise WildlabError(
-            f"the file cannot be downloaded from {file.url} ({_short(first[0])})",
+            f"the file cannot be downloaded from {file.url} ({_in_words(error)})",
             f"check the network, or set {MIRROR_VARIABLE} to a folder that has the file",
             file=file.path,
         ) from None
@@ -212,5 +211,10 @@ def _verify(path: Path, file: DataFile, whence: Path | str, fix: str) -> None:
         )
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= 120 else text[:117] + "..."
+def _in_words(error: OSError) -> str:
+    """Why a download failed, without the library's own words for it."""
+    response = getattr(error, "response", None)
+    if response is not None:
+        return f"the server says {response.status_code}"
+    name = type(error).__name__
+    return "no answer in time" if "Timeout" in name else "no connection" if "Connection" in name else name
