@@ -146,7 +146,7 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
             ax.plot(times, y, lw=1.0, color=colour(name), label=name)
         ax.set_ylabel(label)
     if len(sources) > 1:
-        axes[-1].legend(loc="lower right", ncols=len(sources))
+        fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
     axes[0].set_title(title)
     axes[-1].set_xlabel("time (s)")
     return fig

@@ -254,13 +254,14 @@ def _claims(claims: list[Claim]) -> str:
         source = f' <span class="dim source">{escape(one.source)}</span>' if one.source else ""
         pill = f'<span class="pill {_PILLS.get(one.verdict, "")}">{escape(one.verdict)}</span>'
         rows.append(
-            f'<tr><th scope="row" class="text wide">{escape(one.text)}{source}</th><td>{on}</td>'
-            f'<td class="text">{pill}</td></tr>'
+            # The verdict stands beside the claim: on a phone the last column may be out of sight.
+            f'<tr><th scope="row" class="text wide">{escape(one.text)}{source}</th>'
+            f'<td class="text">{pill}</td><td>{on}</td></tr>'
         )
     return (
         '<div class="scroll" role="region" tabindex="0" aria-label="Claims"><table><thead><tr>'
-        '<th scope="col" class="text">claim</th><th scope="col">tested on</th>'
-        f'<th scope="col" class="text">verdict</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
+        '<th scope="col" class="text">claim</th><th scope="col" class="text">verdict</th>'
+        f'<th scope="col">tested on</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
     )
 
 
