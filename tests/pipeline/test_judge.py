@@ -6,10 +6,16 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight.sync import covariance_columns
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
+from wildlab.geometry.frames import (
+    euler_errors_to_body,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
 from wildlab.pipeline.calibrate import calibrate_flight
 from wildlab.pipeline.georeference import USUAL, assumed_deviations, georeference, observe, pose_errors
-from wildlab.pipeline.judge import errors_of, judge, recorded_answers
+from wildlab.pipeline.judge import draws_of, errors_of, judge, recorded_answers
 from wildlab.pipeline.noise import estimate_noise, judge_with_estimated_noise
 
 
@@ -142,3 +148,33 @@ def test_no_pixels_and_too_few_images_are_errors(make_flight):
         observe(flight)
     with pytest.raises(WildlabError, match="fewer than four images"):
         calibrate_flight(make_flight(n_images=3), np.random.default_rng(0))
+
+
+def test_a_minute_is_one_draw_where_there_are_times(make_flight):
+    long, short = make_flight(n_images=250), make_flight(n_images=40)
+    table = observe(long).table
+    draws = draws_of(long, table)
+    assert len(np.unique(draws)) == 5
+    for label in np.unique(draws):
+        times = table["time_s"][draws == label]
+        assert times.max() - times.min() < 60.0
+    # Over too soon to be halved by minutes, or without times: images.
+    assert set(draws_of(short, observe(short).table)) == set(short.frames["frame_id"])
+    long.manifest = long.manifest.model_copy(
+        update={"time": long.manifest.time.model_copy(update={"kind": "sequence"})}
+    )
+    assert set(draws_of(long, table)) == set(long.frames["frame_id"])
+
+
+def test_errors_that_wander_widen_what_is_stated(make_flight):
+    """The same errors in every image of a minute are worth one image of it, not sixty."""
+    flight = make_flight(n_images=300, pixel_px=1.0)
+    rng = np.random.default_rng(0)
+    wander = np.repeat(rng.normal(0, np.radians(1.0), (6, 3)), 600, axis=0)[: len(flight.nav["logged"])]
+    nav = flight.nav["logged"].iloc[: len(wander)].copy()
+    R = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy()) @ rotation_vector_to_matrix(wander)
+    nav[["q_w", "q_x", "q_y", "q_z"]] = matrix_to_quaternion(R)
+    flight.nav["logged"] = nav
+    found = calibrate_flight(flight, rng, splits=1).calibration
+    # Six draws of one degree each: about 0.4 deg, where 300 images would claim 0.06.
+    assert 0.2 < np.degrees(found.sd("roll")) < 0.8

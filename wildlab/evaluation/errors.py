@@ -102,6 +102,7 @@ def bootstrap_interval(
     """Interval for a statistic of errors (N, 2), by drawing whole images again and again.
 
     Errors of one image share its pose: drawing single clicks would give intervals that are far too narrow.
+    ``image`` may name anything that shares its error, a minute of a flight for instance.
 
     Returns
     -------

@@ -111,6 +111,7 @@ def calibrate(
     image: Sequence[object] | np.ndarray,
     estimate: Sequence[str] = BORESIGHT,
     covariance: ArrayLike | None = None,
+    draw: Sequence[object] | np.ndarray | None = None,
 ) -> Calibration:
     """Estimate what is constantly wrong with the camera's pose from points whose position is known.
 
@@ -128,6 +129,9 @@ def calibrate(
         Names from :data:`PARAMETERS`.
     covariance
         (N, 2, 2) ground covariances to weight with; without them all points count alike, as in H (5.17).
+    draw
+        (N,) which points share their error; those of an image, if not given. The covariance of the estimate
+        follows from how far different draws disagree.
 
     Returns
     -------
@@ -142,7 +146,7 @@ def calibrate(
     if unknown:
         raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
     uv, known = np.asarray(uv, float), np.asarray(known_points, float)
-    groups = np.unique(np.asarray(image), return_inverse=True)[1]
+    groups = np.unique(np.asarray(image if draw is None else draw), return_inverse=True)[1]
     whiten = _whitening(covariance, len(uv))
 
     def residuals(names: tuple[str, ...], scaled: Array) -> Array:
@@ -201,7 +205,7 @@ def calibrate(
         covariance=clustered * np.outer(scale, scale),
         undetermined=undetermined,
         n_points=int(usable.sum()),
-        n_images=len(np.unique(groups[usable])),
+        n_images=len(np.unique(np.asarray(image)[usable])),
     )
 
 

@@ -20,7 +20,7 @@ from wildlab.pipeline.georeference import (
     pose_errors,
     shifted_poses,
 )
-from wildlab.pipeline.judge import judge, known_points
+from wildlab.pipeline.judge import draws_of, judge, known_points
 
 Array = NDArray[np.float64]
 
@@ -63,6 +63,7 @@ def fit_flight(
         observations.table["frame_id"].to_numpy(),
         estimate,
         weights,
+        draws_of(flight, observations.table),
     )
 
 
@@ -75,8 +76,9 @@ def calibrate_flight(
 ) -> Calibrated:
     """Calibrate on a flight's known points, and judge each half of its images by the other half.
 
-    Images are halved at random, ``splits`` times over; a calibration from one half places the points of the
-    other. A clock offset is asked for only where the flight has times.
+    Draws (images, or minutes of them: see :func:`~wildlab.pipeline.judge.draws_of`) are halved at random,
+    ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
+    asked for only where the flight has times.
 
     Raises
     ------
@@ -95,10 +97,10 @@ def calibrate_flight(
             file=flight.folder,
             field="detections",
         )
-    images = plain["frame_id"].to_numpy()
+    draws = draws_of(flight, plain)
     rounds = []
     for _ in range(splits):
-        half = split_images(images, rng)
+        half = split_images(draws, rng)
         parts = [
             _judge_unseen(
                 flight,

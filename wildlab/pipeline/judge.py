@@ -95,6 +95,27 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
     return answers
 
 
+#: Images nearer in time than this (seconds) may share their pose error, which wanders over tens of seconds.
+DRAW_S = 60.0
+#: Fewer draws than this leave nothing to halve; then each image counts as one.
+FEWEST_DRAWS = 4
+
+
+def draws_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.str_]:
+    """Which detections (N,) are to be taken for one draw of the flight's errors, as labels.
+
+    Where the flight has times: all of a minute, for images that follow each other share more than images
+    show. Where it has none, or is over too soon for that: all of an image.
+    """
+    images = table["frame_id"].to_numpy(str)
+    times = table["time_s"].to_numpy(float)
+    if flight.manifest.time.kind == "sequence" or not np.isfinite(times).any():
+        return images
+    minutes = np.floor((times - np.nanmin(times)) / DRAW_S)
+    labels = np.where(np.isfinite(minutes), np.char.mod("minute %d", np.nan_to_num(minutes)), images)
+    return images if len(np.unique(labels)) < FEWEST_DRAWS else labels
+
+
 def known_points(
     flight: Flight, observations: Observations, judged: pd.DataFrame
 ) -> tuple[Observations, Array]:

@@ -11,7 +11,7 @@ from wildlab.geometry.calibration import split_images
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
-from wildlab.pipeline.judge import errors_of, judge, known_points
+from wildlab.pipeline.judge import draws_of, errors_of, judge, known_points
 
 
 def estimate_noise(flight: Flight, observations: Observations, judged: pd.DataFrame) -> PoseNoise:
@@ -53,7 +53,7 @@ def judge_with_estimated_noise(
     flight: Flight, observations: Observations, judged: pd.DataFrame, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Points judged again with ellipses from pose noise estimated on the other half of the images."""
-    half = split_images(judged["frame_id"].to_numpy(), rng)
+    half = split_images(draws_of(flight, judged), rng)
     parts = []
     for seen in (half, ~half):
         deviations = as_deviations(estimate_noise(flight, observations, judged[seen]))

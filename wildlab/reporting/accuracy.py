@@ -34,23 +34,20 @@ METHOD = r"""Pinhole camera with Brown distortion (exact inverse by Newton's met
 $\mathbf{R}_c^n = \mathbf{R}_b^n\mathbf{R}_m^b\mathbf{R}_c^m$ from the logged attitude and the mount (H 5.9 to
 5.12), ray cut with the horizontal plane at the height of the ground (H 5.13).
 
-Ellipses: covariances of pixel, pose, mount and plane height through the derivatives of the ground point;
-where the
-depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to be
-wrong, and
-1000 samples decide its size.
+Ellipses: covariances of pixel, pose, mount and plane height through the derivatives of the ground point.
+Where the depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to
+be wrong, and 1000 samples decide its size.
 
 Calibration: three angles of the camera's base (and the clock, where there is one), nonlinear least squares
-with a
-soft-L1 loss on errors weighted with their ellipses (after H 5.15 to 5.17); standard deviations from a
-sandwich
-estimate with images as the clusters. A parameter counts as undetermined where the data know it no better
-than one
-would guess, or where it is parallel to others with a correlation beyond 0.99.
+with a soft-L1 loss on errors weighted with their ellipses (after H 5.15 to 5.17); standard deviations from a
+sandwich estimate. A parameter counts as undetermined where the data know it no better than one would guess,
+or where it is parallel to others with a correlation beyond 0.99.
 
-Shares of the squared error: one-way analysis of variance with images as groups. Intervals: 1000 draws of
-whole
-images with replacement, middle 90 %."""
+What counts as one draw of the errors, for halves, intervals and standard deviations: all points of an image;
+where the images have times, all of a minute, because the error of a pose wanders over tens of seconds.
+
+Shares of the squared error: one-way analysis of variance with images as groups. Intervals: a thousand times
+as many draws with replacement as there are, middle 90 %."""
 
 METHOD_AT_REST = r"""Pixels are placed on the plane at the target's height by H (5.13). Mean, standard
 deviation and mean error are those of the distances to the known position. Without synchronisation the pose is
