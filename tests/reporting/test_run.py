@@ -206,7 +206,9 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number
         (reports / "slow" / name).write_text(text)
     program = tmp_path / "program.py"
     program.write_text(
-        "from pathlib import Path\nfrom wildlab.reporting.run import run_studies\n"
+        "import signal\nfrom pathlib import Path\nfrom wildlab.reporting.run import run_studies\n"
+        # In the background of a script Ctrl-C is ignored from birth; in a terminal it is not.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"if __name__ == '__main__':\n    run_studies(['slow'], notebooks=Path({str(notebooks)!r}), "
         f"reports=Path({str(reports)!r}))\n"
     )
