@@ -144,7 +144,9 @@ def violations(root: Path) -> list[str]:
 def undeclared(root: Path) -> list[str]:
     """Packages imported by ``root/wildlab`` that are here only because another package brought them."""
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
+    # `cluster` is for those who have one: what it brings is imported where it is needed and nowhere else.
+    wanted = project["dependencies"] + project.get("optional-dependencies", {}).get("cluster", [])
+    declared = {canonicalize_name(Requirement(text).name) for text in wanted}
     providers = metadata.packages_distributions()
     found = set()
     for path in (root / "wildlab").rglob("*.py"):
