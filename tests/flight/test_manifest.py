@@ -164,6 +164,9 @@ def test_replacing_an_unknown_key_is_an_error(manifest_data: dict[str, Any]) -> 
 def test_sensors_are_kept_and_checked(manifest_data: dict[str, Any], tmp_path: Path) -> None:
     manifest_data["gnss"] = {"name": "u-blox", "lever_arm_m": [-0.4, 0.0, -0.1], "latency_s": 0.2}
     manifest_data["imu"] = {"name": "ADIS16490", "velocity_random_walk_m_s_sqrt_h": 0.008}
+    manifest_data["imu"] |= {"accelerometer_turn_on_m_s2": 0.03, "gyro_turn_on_deg_h": 180.0}
+    manifest_data["imu"] |= {"misalignment_deg": 0.25, "scale_error_percent": 1.0}
+    manifest_data["uncertainty"] = {"velocity_horizontal_m_s": 0.3, "velocity_vertical_m_s": 0.5}
     manifest_data["clocks"] = {"gnss_offset_s": -1.5}
     del manifest_data["camera"]
     manifest = make_manifest(manifest_data)
@@ -173,10 +176,16 @@ def test_sensors_are_kept_and_checked(manifest_data: dict[str, Any], tmp_path: P
     assert again.camera is None
     assert again.gnss.lever_arm_m == (-0.4, 0.0, -0.1)
     assert again.imu.gyro_bias_deg_h is None
+    assert again.imu.gyro_turn_on_deg_h == 180.0
+    assert again.uncertainty.velocity_vertical_m_s == 0.5
     for part, key, value in (
         ("gnss", "latency_s", -0.1),
         ("gnss", "lever_arm_m", [1.0, 2.0]),
         ("imu", "angle_random_walk_deg_sqrt_h", 0.0),
+        ("imu", "gyro_turn_on_deg_h", -1.0),
+        ("imu", "misalignment_deg", 90.0),
+        ("imu", "scale_error_percent", 100.0),
+        ("uncertainty", "velocity_horizontal_m_s", 0.0),
     ):
         with pytest.raises(WildlabError, match=rf"{part}\.{key}"):
             replace_in_manifest(manifest, {part: {key: value}})

@@ -15,6 +15,7 @@ from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.judge import judge
 from wildlab.pipeline.navigate import imu_noise, navigate_mekf, navigate_observer
+from wildlab.simulation.parameters import load_twin, twin_names
 from wildlab.simulation.twins import simulate_twin
 
 #: The figures of the twin's own inertial sensor (H appendix A.5).
@@ -82,6 +83,35 @@ def test_the_filter_states_its_covariance_and_its_innovations(flight):
     assert (found.innovations["dof"] == 3).all()
     without = navigate_mekf(flight, np.arange(0.0, 120.0, 1.0), velocity=False)
     assert "velocity" not in set(without.innovations["source"])
+
+
+def test_the_manifest_says_how_uncertain_velocities_are_where_the_log_does_not(flight):
+    silent = {**flight.tables, "gnss": flight.gnss.drop(columns="sd_velocity_m_s")}
+    some = np.arange(0.0, 60.0, 1.0)
+    nothing = navigate_mekf(Flight(flight.manifest, flight.nav, silent), some)
+    assert "velocity" not in set(nothing.innovations["source"])
+    stated = {"velocity_horizontal_m_s": 0.05, "velocity_vertical_m_s": 0.05}
+    manifest = flight.manifest.model_copy(
+        update={"uncertainty": flight.manifest.uncertainty.model_copy(update=stated)}
+    )
+    found = navigate_mekf(Flight(manifest, flight.nav, silent), some)
+    logged = navigate_mekf(flight, some)
+    pd.testing.assert_frame_equal(found.nav, logged.nav)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in twin_names() if load_twin(name).imu])
+def test_every_twin_with_sensors_states_what_the_filter_must_know(name):
+    """Poses at every frame, within half a metre and a degree or so of the payload's own."""
+    twin = simulate_twin(name, 5)
+    found = navigate_mekf(twin)
+    times = found.nav["time_s"].to_numpy()
+    assert len(times) == len(twin.frames)
+    p, R, _ = poses_at(found.nav, times)
+    p_true, R_true, _ = poses_at(twin.nav["truth-payload"], times)
+    turn = matrix_to_rotation_vector(np.swapaxes(R_true, 1, 2) @ R)
+    assert np.sqrt(((p - p_true) ** 2).mean(0)).max() < 0.5
+    assert np.degrees(np.sqrt((turn**2).mean(0))).max() < 1.5
 
 
 def test_one_antenna_starts_from_the_course(flight):

@@ -17,6 +17,7 @@ from wildlab.simulation.parameters import (
     part_names,
     twin_names,
 )
+from wildlab.simulation.settings import twin_manifest
 
 
 def complete(name: str) -> str:
@@ -117,6 +118,31 @@ def test_one_part_can_be_put_in_the_place_of_another(tmp_path):
     assert (imu.gyro_bias_stability.number, imu.accelerometer_bias_stability.number) == (0.3, 50)
     assert imu.axis_misalignment.si == pytest.approx(0.2e-3, rel=1e-5)
     assert imu.package_misalignment.si == pytest.approx(1e-3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("part", "figures"),
+    [
+        # H tables A.5 and A.6, typed again; g is 9.80665 m/s^2.
+        ("imu-adis16490", (0.008, 0.09, 3.6e-6 * 9.80665, 1.8, 3.5e-3 * 9.80665, 180.0, 0.254951)),
+        ("imu-stim300", (0.07, 0.15, 50e-6 * 9.80665, 0.3, 0.75e-3 * 9.80665, 10.0, 0.058431)),
+    ],
+)
+def test_the_manifest_states_the_data_sheet_of_the_sensor(tmp_path, part, figures):
+    manifest = twin_manifest(exchanged_imu(tmp_path, part), 1)
+    stated = manifest.imu
+    assert (
+        stated.velocity_random_walk_m_s_sqrt_h,
+        stated.angle_random_walk_deg_sqrt_h,
+        stated.accelerometer_bias_m_s2,
+        stated.gyro_bias_deg_h,
+        stated.accelerometer_turn_on_m_s2,
+        stated.gyro_turn_on_deg_h,
+        stated.misalignment_deg,
+    ) == pytest.approx(figures, rel=1e-5)
+    assert stated.accelerometer_bias_time_s == stated.gyro_bias_time_s == 300.0
+    assert manifest.gnss.lever_arm_m == (0.5, 0.0, -0.1)
+    assert manifest.gnss.latency_s == 0.0
 
 
 def test_a_part_that_does_not_exist_is_answered_with_those_there_are(tmp_path):

@@ -135,7 +135,9 @@ class ImuPart(Strict):
     """The inertial sensor, and its errors as a data sheet gives them. Absent = not known.
 
     White noise as random walks; the slow part of a bias as its standard deviation, with the time over which
-    it changes.
+    it changes. The rest stays as it is from switching on to switching off: `..._turn_on_...` is the standard
+    deviation of the bias found then, `misalignment_deg` how far an axis may point from where it should, and
+    `scale_error_percent` how far a factor may be off.
     """
 
     name: str = ""
@@ -145,6 +147,10 @@ class ImuPart(Strict):
     accelerometer_bias_time_s: Spread | None = None
     gyro_bias_deg_h: Spread | None = None
     gyro_bias_time_s: Spread | None = None
+    accelerometer_turn_on_m_s2: Spread | None = None
+    gyro_turn_on_deg_h: Spread | None = None
+    misalignment_deg: Annotated[float, Field(gt=0, le=45)] | None = None
+    scale_error_percent: Annotated[float, Field(gt=0, le=50)] | None = None
     note: str = ""
 
 
@@ -162,6 +168,8 @@ class UncertaintyPart(Strict):
     pixel_px: Spread | None = None
     position_horizontal_m: Spread | None = None
     position_vertical_m: Spread | None = None
+    velocity_horizontal_m_s: Spread | None = None
+    velocity_vertical_m_s: Spread | None = None
     roll_deg: Spread | None = None
     pitch_deg: Spread | None = None
     yaw_deg: Spread | None = None

@@ -162,8 +162,9 @@ def _inputs(flight: Flight, velocity: bool) -> _Inputs:
     two = set(SECOND_COLUMNS) <= set(gnss.columns)
     moving = set(VELOCITY) <= set(gnss.columns)
     v = gnss[VELOCITY].to_numpy(float) if moving else np.gradient(p, t, axis=0)
-    if velocity and moving and "sd_velocity_m_s" in gnss:
-        aiding["velocity"] = velocities(t, v, gnss["sd_velocity_m_s"].to_numpy(float)[:, None], arms[0])
+    spread_v = _velocity_sd(flight, gnss)
+    if velocity and moving and spread_v is not None:
+        aiding["velocity"] = velocities(t, v, spread_v, arms[0])
     gravity = local_earth(flight.manifest.origin_tuple()[0], flight.manifest.origin_tuple()[2]).gravity
     if two:
         second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
@@ -195,6 +196,15 @@ def _position_sd(flight: Flight, gnss: pd.DataFrame) -> Array:
             )
         sds.append(np.where(np.isnan(known), np.nanmax(known), known))
     return np.stack([sds[0], sds[0], sds[1]], axis=-1)
+
+
+def _velocity_sd(flight: Flight, gnss: pd.DataFrame) -> Array | None:
+    """(N, 1) from the log, else (3,) from the manifest's ``[uncertainty]``; None if neither says."""
+    if "sd_velocity_m_s" in gnss:
+        return gnss["sd_velocity_m_s"].to_numpy(float)[:, None]
+    stated = flight.manifest.uncertainty
+    level, vertical = stated.velocity_horizontal_m_s, stated.velocity_vertical_m_s
+    return None if level is None or vertical is None else np.array([level, level, vertical])
 
 
 def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.mount import helgesen_misalignment
+from wildlab.simulation.models import Gnss, Imu
 from wildlab.simulation.parameters import TwinParameters
 
 
@@ -42,6 +46,8 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
                 "misalignment_tilt_deg": misalignment[1],
                 "misalignment_pan_deg": misalignment[2],
             },
+            "imu": _imu(twin.imu),
+            "gnss": _gnss(twin.gnss),
             "time": {"kind": "utc", "epoch": twin.place.epoch.text},
             "vertical": {"reference": "ellipsoid", "note": "the origin of n lies at sea level"},
             "uncertainty": {
@@ -58,3 +64,26 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
             "twin": {"name": twin.name, "seed": seed},
         }
     )
+
+
+def _imu(imu: Imu) -> dict[str, Any]:
+    """The unit's data sheet; a figure that is zero is not stated."""
+    turned = math.hypot(imu.axis_misalignment.number, imu.package_misalignment.number)
+    figures = {
+        "velocity_random_walk_m_s_sqrt_h": imu.accelerometer_random_walk.number,
+        "angle_random_walk_deg_sqrt_h": imu.gyro_random_walk.number,
+        "accelerometer_bias_m_s2": imu.accelerometer_bias_stability.si,
+        "accelerometer_bias_time_s": imu.accelerometer_bias_time.si,
+        "gyro_bias_deg_h": imu.gyro_bias_stability.number,
+        "gyro_bias_time_s": imu.gyro_bias_time.si,
+        "accelerometer_turn_on_m_s2": imu.accelerometer_turn_on_bias.si,
+        "gyro_turn_on_deg_h": imu.gyro_turn_on_bias.number,
+        "misalignment_deg": turned,
+    }
+    return {"name": imu.name.text, **{name: value for name, value in figures.items() if value > 0}}
+
+
+def _gnss(gnss: Gnss) -> dict[str, Any]:
+    """The receiver with the first antenna; where the second one is stands in the table."""
+    arm = (gnss.first_x.si, gnss.first_y.si, gnss.first_z.si)
+    return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si}
