@@ -8,11 +8,14 @@ from scipy.stats import chi2, kstest
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import (
+    average,
     chi_square_interval,
     nees,
     nis,
+    position_nees,
     share_inside,
     simulate_filter_runs,
+    whiten,
 )
 
 
@@ -86,3 +89,62 @@ def test_limits_hold_for_a_real_filter_and_expose_an_overconfident_one() -> None
 def test_the_same_seed_gives_the_same_runs() -> None:
     one, two = (simulate_filter_runs(np.random.default_rng(5), runs=3, steps=4) for _ in range(2))
     np.testing.assert_array_equal(one.nees, two.nees)
+
+
+def test_the_truth_has_an_uncertainty_of_its_own() -> None:
+    rng = np.random.default_rng(6)
+    P, own = np.array([[4.0, 1.0], [1.0, 2.0]]), np.diag([0.5, 3.0])
+    e = rng.multivariate_normal([0, 0], P, 20_000) + rng.multivariate_normal([0, 0], own, 20_000)
+    assert kstest(nees(e, P, own), chi2(2).cdf).pvalue > 0.01
+    assert np.mean(nees(e, P)) > 2.5
+    np.testing.assert_allclose(nees(e, P, np.zeros((2, 2))), nees(e, P))
+    with pytest.raises(WildlabError, match=r"(?i)truth covariance of shape \(4, 4\) does not go"):
+        nees(e, P, np.eye(4))
+
+
+def test_position_alone_is_the_marginal() -> None:
+    rng = np.random.default_rng(7)
+    root = rng.standard_normal((4, 4))
+    P = root @ root.T + np.eye(4)
+    e = rng.multivariate_normal(np.zeros(4), P, 20_000)
+    own = np.diag([2.0, 1.0])
+    np.testing.assert_allclose(position_nees(e, P, own), nees(e[:, :2], P[:2, :2] + own))
+    assert kstest(position_nees(e, P), chi2(2).cdf).pvalue > 0.01
+    assert kstest(nees(e, P), chi2(4).cdf).pvalue > 0.01
+
+
+def test_whitened_errors_have_unit_covariance() -> None:
+    rng = np.random.default_rng(8)
+    P = np.array([[9.0, -2.0], [-2.0, 1.0]])
+    e = rng.multivariate_normal([0, 0], P, 50_000)
+    e[3] = np.nan
+    w = whiten(e, P)
+    assert np.isnan(w[3]).all()
+    np.testing.assert_allclose(np.cov(w[4:].T), np.eye(2), atol=0.03)
+    np.testing.assert_allclose(np.sum(w[4:] ** 2, axis=1), nees(e, P)[4:])
+
+
+def test_an_average_knows_how_many_values_it_is_of() -> None:
+    rng = np.random.default_rng(9)
+    inside = [average(rng.chisquare(2, 40), 2).inside for _ in range(3000)]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.012)
+    a = average([1.0, np.nan, 3.0], 2)
+    assert (a.mean, a.n, a.worth) == (2.0, 2, 2.0)
+    assert (a.low, a.high) == chi_square_interval(2, runs=2)
+    none = average([np.nan], 2)
+    assert np.isnan(none.mean)
+    assert (none.n, none.worth, none.inside) == (0, 0.0, False)
+
+
+def test_values_that_repeat_each_other_are_worth_fewer() -> None:
+    rng = np.random.default_rng(10)
+    inside, naive = [], []
+    for _ in range(2000):
+        repeated = np.repeat(rng.chisquare(2, 10), 8)
+        inside.append(average(repeated, 2, worth=10).inside)
+        naive.append(average(repeated, 2).inside)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
+    assert np.mean(naive) < 0.6
+    # More than there are, or less than one, is not believed.
+    assert average([1.0, 2.0], 2, worth=9.0).worth == 2.0
+    assert average([1.0, 2.0], 2, worth=0.2).worth == 1.0

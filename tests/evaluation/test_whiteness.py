@@ -1,8 +1,18 @@
 """Autocorrelation against its definition and against processes whose answer is known."""
 
 import numpy as np
+import pytest
+from scipy.stats import kstest
 
-from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, ljung_box, white_bound
+from wildlab.errors import WildlabError
+from wildlab.evaluation.whiteness import (
+    autocorrelation,
+    effective_sample_size,
+    innovation_whiteness,
+    ljung_box,
+    portmanteau,
+    white_bound,
+)
 
 
 def first_order(n, rho, rng):
@@ -40,3 +50,38 @@ def test_a_first_order_process_is_found_coloured():
 
 def test_a_constant_series_has_no_autocorrelation():
     assert np.isnan(autocorrelation(np.ones(10), 3)).all()
+
+
+def test_portmanteau_of_one_element_is_ljung_and_box():
+    x = np.random.default_rng(3).normal(size=80)
+    statistic, p_value = ljung_box(x, 10)
+    ours = portmanteau(x[:, None], 10)
+    # Theirs has T (T + 2), Hosking's T^2.
+    assert np.isclose(ours[0] * (80 + 2) / 80, statistic)
+    assert abs(ours[1] - p_value) < 0.05
+
+
+def test_portmanteau_of_correlated_elements_that_are_white_in_time():
+    rng = np.random.default_rng(4)
+    mix = np.array([[1.0, 0.0], [5.0, 0.3]])
+    p_values = [portmanteau(rng.normal(size=(400, 2)) @ mix.T, 8)[1] for _ in range(400)]
+    assert kstest(p_values, "uniform").pvalue > 0.01
+
+
+def test_what_one_element_tells_of_the_next_of_another_is_found():
+    x = np.random.default_rng(5).normal(size=401)
+    pair = np.column_stack([x[1:], x[:-1]])
+    white = innovation_whiteness(pair, 10)
+    assert (np.abs(white.autocorrelation[:, 1]) < 2 * white.bound).all()
+    assert white.p_value < 1e-9
+
+
+def test_innovations_that_are_missing_are_left_out():
+    v = np.random.default_rng(6).normal(size=(60, 2))
+    holes = np.insert(v, [0, 20, 20, 45], np.nan, axis=0)
+    got, expected = innovation_whiteness(holes, 7), innovation_whiteness(v, 7)
+    np.testing.assert_array_equal(got.autocorrelation, expected.autocorrelation)
+    assert (got.n, got.bound, got.statistic) == (60, white_bound(60), expected.statistic)
+    np.testing.assert_allclose(got.autocorrelation[1], autocorrelation(v[:, 1], 7))
+    with pytest.raises(WildlabError, match=r"(?i)60 innovations are too few for 59 lags"):
+        innovation_whiteness(v, 59)

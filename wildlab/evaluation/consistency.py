@@ -14,8 +14,11 @@ from wildlab.errors import WildlabError
 
 Array = NDArray[np.float64]
 
+#: What every error in this room is, H (3.11). NEES does not depend on the sign; means and biases do.
+ERROR_CONVENTION = "truth minus estimate"
 
-def chi_square_interval(dof: int, probability: float = 0.95, runs: int = 1) -> tuple[float, float]:
+
+def chi_square_interval(dof: int, probability: float = 0.95, runs: float = 1) -> tuple[float, float]:
     """Two-sided interval in which NEES or NIS lies with ``probability`` if the filter is consistent (H
     example 3.1).
 
@@ -25,6 +28,8 @@ def chi_square_interval(dof: int, probability: float = 0.95, runs: int = 1) -> t
         Number of states (NEES) or of elements of a measurement (NIS).
     runs
         Of how many independent runs the value is the mean; their sum has ``runs * dof`` degrees of freedom.
+        For a mean over the time of one run: as many as its correlated values are worth, which need not be
+        whole (`wildlab.evaluation.whiteness.effective_sample_size`).
 
     Returns
     -------
@@ -44,19 +49,19 @@ def chi_square_interval(dof: int, probability: float = 0.95, runs: int = 1) -> t
     return float(chi2.ppf(tail, dof * runs) / runs), float(chi2.ppf(1 - tail, dof * runs) / runs)
 
 
-def nees(errors: ArrayLike, covariances: ArrayLike) -> Array:
-    """Normalised estimation error squared, H (3.11): ``e' P^-1 e``.
+def whiten(errors: ArrayLike, covariances: ArrayLike) -> Array:
+    """Errors in units of their own standard deviation: ``L^-1 e`` with ``P = L L'``.
 
     Parameters
     ----------
     errors
-        (N, n), truth minus estimate. A row with NaN (no truth at that time) gives NaN.
+        (N, n). A row with NaN gives NaN.
     covariances
-        (N, n, n) of the estimates, or (n, n) for all.
+        (N, n, n), or (n, n) for all. One with NaN gives NaN.
 
     Returns
     -------
-    (N,)
+    (N, n); of unit covariance where the errors have the covariances stated.
 
     Raises
     ------
@@ -72,7 +77,7 @@ def nees(errors: ArrayLike, covariances: ArrayLike) -> Array:
         )
     P = np.broadcast_to(P, (*e.shape, e.shape[1]))
     known = np.isfinite(e).all(axis=1) & np.isfinite(P).all(axis=(1, 2))
-    values = np.full(len(e), np.nan)
+    values = np.full(e.shape, np.nan)
     try:
         L = np.linalg.cholesky(P[known])
     except np.linalg.LinAlgError:
@@ -81,14 +86,119 @@ def nees(errors: ArrayLike, covariances: ArrayLike) -> Array:
         raise WildlabError(
             f"the covariance in row {row} is not positive definite", "look at the filter that made it"
         ) from None
-    whitened = np.linalg.solve(L, e[known][..., None])[..., 0]
-    values[known] = np.sum(whitened**2, axis=1)
+    values[known] = np.linalg.solve(L, e[known][..., None])[..., 0]
     return values
+
+
+def nees(errors: ArrayLike, covariances: ArrayLike, truth_covariance: ArrayLike | None = None) -> Array:
+    """Normalised estimation error squared, H (3.11): ``e' P^-1 e``, `ERROR_CONVENTION`.
+
+    Parameters
+    ----------
+    errors
+        (N, n), truth minus estimate. A row with NaN (no truth at that time) gives NaN.
+    covariances
+        (N, n, n) of the estimates, or (n, n) for all.
+    truth_covariance
+        Likewise, of the errors of the truth itself, which are independent of the filter's: then the
+        difference has the sum of both. Left out, the truth is taken for exact.
+
+    Returns
+    -------
+    (N,)
+
+    Raises
+    ------
+    WildlabError
+        If the shapes do not fit, or a covariance is not positive definite.
+    """
+    P = np.asarray(covariances, dtype=float)
+    if truth_covariance is not None:
+        own = np.asarray(truth_covariance, dtype=float)
+        if own.shape[-2:] != P.shape[-2:]:
+            raise WildlabError(
+                f"a truth covariance of shape {own.shape} does not go with covariances of shape {P.shape}",
+                "give one of the same states",
+            )
+        P = P + own
+    # A sum with NaN stays NaN: squares of a row that is not known are not known.
+    return np.asarray(np.sum(whiten(errors, P) ** 2, axis=1))
+
+
+def position_nees(
+    errors: ArrayLike, covariances: ArrayLike, truth_covariance: ArrayLike | None = None
+) -> Array:
+    """NEES of the position alone, as H 7.5 uses it where the true velocity is not known well.
+
+    Parameters
+    ----------
+    errors
+        (N, n), truth minus estimate; the first two states are north and east.
+    covariances
+        (N, n, n) of the estimates.
+    truth_covariance
+        (2, 2) or (N, 2, 2) of the true positions, m^2; left out, they are taken for exact.
+
+    Returns
+    -------
+    (N,), two degrees of freedom.
+
+    Raises
+    ------
+    WildlabError
+        As `nees`.
+    """
+    e, P = np.asarray(errors, dtype=float), np.asarray(covariances, dtype=float)
+    return nees(e[:, :2], P[..., :2, :2], truth_covariance)
 
 
 def nis(innovations: ArrayLike, covariances: ArrayLike) -> Array:
     """Normalised innovation squared, H (3.12); shapes as in `nees`."""
     return nees(innovations, covariances)
+
+
+class Average(NamedTuple):
+    """Mean of NEES or NIS (ANEES, ANIS; not divided by the degrees of freedom) beside its 95 % interval.
+
+    ``n``: values it is of. ``worth``: how many independent ones they are worth.
+    """
+
+    mean: float
+    low: float
+    high: float
+    n: int
+    worth: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the mean is what a consistent filter's would be."""
+        return bool(self.low <= self.mean <= self.high)
+
+
+def average(values: ArrayLike, dof: int, worth: float | None = None) -> Average:
+    """Mean over the known values (N,), and the interval in which that of a consistent filter lies.
+
+    Parameters
+    ----------
+    values
+        NEES or NIS; NaN where not known.
+    dof
+        Degrees of freedom of each; what the mean should be.
+    worth
+        How many independent values they are worth, at least one: all of them for independent runs, which is
+        taken where it is left out. Neighbouring moments of one run share their error and are worth fewer.
+
+    Raises
+    ------
+    WildlabError
+        If ``dof`` is below 1.
+    """
+    array = np.asarray(values, dtype=float)
+    known = array[np.isfinite(array)]
+    n = len(known)
+    runs = max(1.0, float(n if worth is None or not np.isfinite(worth) else min(worth, n)))
+    low, high = chi_square_interval(dof, runs=runs)
+    return Average(float(known.mean()) if n else float("nan"), low, high, n, runs if n else 0.0)
 
 
 def share_inside(values: ArrayLike, interval: tuple[float, float]) -> float:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2, norm
+
+from wildlab.errors import WildlabError
 
 Array = NDArray[np.float64]
 
@@ -47,3 +51,58 @@ def effective_sample_size(series: ArrayLike, max_lag: int) -> float:
     first = np.flatnonzero(~(r > 0))
     r = r[: first[0]] if len(first) else r
     return float(len(x) / (1 + 2 * r.sum()))
+
+
+class Whiteness(NamedTuple):
+    """Whether a sequence of innovations is white.
+
+    ``autocorrelation`` (m, lags + 1) of each element, ``bound`` what that of white noise stays below at each
+    lag in 95 % of cases; ``statistic`` and ``p_value`` of all elements and lags at once (`portmanteau`);
+    ``n``: innovations it is from.
+    """
+
+    autocorrelation: Array
+    bound: float
+    statistic: float
+    p_value: float
+    n: int
+
+
+def innovation_whiteness(innovations: ArrayLike, lags: int) -> Whiteness:
+    """The third criterion of H 3.5 for a sequence of innovations (N, m).
+
+    Rows with NaN (no measurement) are left out, so that lags count measurements. Where the covariances of
+    the innovations differ much, whiten them first (`wildlab.evaluation.consistency.whiten`).
+
+    Raises
+    ------
+    WildlabError
+        If fewer innovations are left than ``lags + 2``.
+    """
+    v = np.asarray(innovations, float)
+    v = v[np.isfinite(v).all(axis=1)]
+    if len(v) < lags + 2:
+        raise WildlabError(
+            f"{len(v)} innovations are too few for {lags} lags", "ask for fewer lags, or a longer track"
+        )
+    statistic, p_value = portmanteau(v, lags)
+    correlation = np.stack([autocorrelation(column, lags) for column in v.T])
+    return Whiteness(correlation, white_bound(len(v)), statistic, p_value, len(v))
+
+
+def portmanteau(series: ArrayLike, lags: int) -> tuple[float, float]:
+    """Hosking's statistic over lags 1..``lags`` of a series (T, m), and the probability of a larger one if
+    white.
+
+    The test of Ljung and Box for several elements at once, correlations between them included; for one
+    element it is theirs. Chi-square with ``m^2 lags`` degrees of freedom.
+    """
+    x = np.asarray(series, float)
+    x = x - x.mean(axis=0)
+    T, m = x.shape
+    inverse = np.linalg.pinv(x.T @ x / T)
+    statistic = 0.0
+    for lag in range(1, lags + 1):
+        C = x[lag:].T @ x[: T - lag] / T
+        statistic += T**2 / (T - lag) * float(np.trace(C.T @ inverse @ C @ inverse))
+    return statistic, float(chi2.sf(statistic, m * m * lags))

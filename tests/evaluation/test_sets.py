@@ -1,0 +1,105 @@
+"""OSPA and GOSPA: closed forms, the axioms of a metric, and each against its definition by brute force."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.sets import gospa, ospa
+
+coordinates = st.floats(-40, 40, allow_nan=False, width=32)
+points = st.integers(0, 4).flatmap(lambda n: arrays(np.float64, (n, 2), elements=coordinates))
+cutoffs = st.floats(0.5, 30)
+orders = st.sampled_from([1.0, 2.0, 3.0])
+NONE = np.empty((0, 2))
+
+
+def test_empty_sets():
+    assert ospa(NONE, NONE, 10).distance == 0
+    assert gospa(NONE, NONE, 10).distance == 0
+    three = np.arange(6.0).reshape(3, 2)
+    assert ospa(NONE, three, 10) == pytest.approx((10, 0, 10))
+    assert gospa(three, NONE, 10, 2) == pytest.approx((np.sqrt(150), 0, np.sqrt(150), 0, 3, 0))
+    assert gospa([], three, 10, 1) == pytest.approx((15, 0, 0, 15, 0, 3))
+
+
+def test_known_values():
+    truth, estimates = [[0.0, 0.0], [100.0, 0.0]], [[103.0, 4.0], [0.0, 0.0], [50.0, 50.0]]
+    assert ospa(truth, estimates, 10, 2) == pytest.approx(
+        (np.sqrt((25 + 100) / 3), np.sqrt(25 / 3), np.sqrt(100 / 3))
+    )
+    assert gospa(truth, estimates, 10, 2) == pytest.approx((np.sqrt(25 + 50), 5, 0, np.sqrt(50), 0, 1))
+    # Beyond the cut-off a pair is a miss and a false target.
+    assert gospa([[0.0, 0.0]], [[11.0, 0.0]], 10, 2) == pytest.approx((10, 0, np.sqrt(50), np.sqrt(50), 1, 1))
+
+
+def by_definition(x, y, cutoff, order):
+    """Both distances over every way to pair the points."""
+    x, y = sorted((x, y), key=len)
+    d = [[min(np.linalg.norm(a - b), cutoff) ** order for b in y] for a in x]
+    best = min(
+        (sum(d[i][j] for i, j in enumerate(way)) for way in itertools.permutations(range(len(y)), len(x))),
+        default=0.0,
+    )
+    surplus = cutoff**order * (len(y) - len(x))
+    first = ((best + surplus) / len(y)) ** (1 / order) if len(y) else 0.0
+    return first, (best + surplus / 2) ** (1 / order)
+
+
+@given(points, points, cutoffs, orders)
+def test_against_every_pairing(x, y, cutoff, order):
+    first, second = by_definition(x, y, cutoff, order)
+    assert ospa(x, y, cutoff, order).distance == pytest.approx(first, abs=1e-9)
+    assert gospa(x, y, cutoff, order).distance == pytest.approx(second, abs=1e-9)
+
+
+@given(points, points, points, cutoffs, orders)
+def test_triangle_inequality(x, y, z, cutoff, order):
+    for distance in (ospa, gospa):
+        xy, yz, xz = (
+            distance(a, b, cutoff, order).distance for a, b in itertools.combinations((x, y, z), 2)
+        )  # in the order xy, xz, yz
+        assert xy <= yz + xz + 1e-9
+
+
+@given(points, points, cutoffs, orders, st.randoms(use_true_random=False))
+def test_symmetry_and_permutations(x, y, cutoff, order, random):
+    mixed = y[random.sample(range(len(y)), len(y))]
+    for distance in (ospa, gospa):
+        there, back = distance(x, mixed, cutoff, order), distance(y, x, cutoff, order)
+        assert there.distance == pytest.approx(back.distance, abs=1e-9)
+        assert distance(y, mixed, cutoff, order).distance == pytest.approx(0, abs=1e-9)
+    one, other = gospa(x, y, cutoff, order), gospa(y, x, cutoff, order)
+    assert (one.n_missed, one.n_false) == (other.n_false, other.n_missed)
+
+
+@given(points, points, cutoffs, orders)
+def test_parts_add_up(x, y, cutoff, order):
+    o, g = ospa(x, y, cutoff, order), gospa(x, y, cutoff, order)
+    assert o.distance**order == pytest.approx(o.localisation**order + o.cardinality**order, abs=1e-6)
+    assert g.distance**order == pytest.approx(
+        g.localisation**order + g.missed**order + g.false**order, abs=1e-6
+    )
+    assert len(x) - g.n_missed == len(y) - g.n_false
+    assert o.distance <= cutoff * (1 + 1e-12)
+
+
+@pytest.mark.parametrize(("cutoff", "order"), [(0, 2), (-1, 2), (np.inf, 2), (np.nan, 2), (1, 0.5)])
+def test_what_is_no_metric_is_refused(cutoff, order):
+    with pytest.raises(WildlabError, match="make no metric"):
+        ospa(NONE, NONE, cutoff, order)
+
+
+def test_points_that_do_not_fit_are_refused():
+    with pytest.raises(
+        WildlabError, match=r"(?i)points of shape \(1, 2\) do not go with points of shape \(1, 3\)"
+    ):
+        gospa([[0.0, 0.0]], [[0.0, 0.0, 0.0]], 1)
+    with pytest.raises(WildlabError, match=r"(?i)a point is not finite"):
+        gospa([[0.0, np.nan]], [[0.0, 0.0]], 1)

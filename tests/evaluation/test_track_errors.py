@@ -1,0 +1,102 @@
+"""Track errors against geometry that can be done in the head."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import ERROR_CONVENTION
+from wildlab.evaluation.track_errors import SLOWEST_M_S, summarise_track, track_errors, wrap
+
+
+def test_errors_are_truth_minus_estimate():
+    assert ERROR_CONVENTION == "truth minus estimate"
+    e = track_errors([[10.0, 5.0, 3.0, 4.0]], [[7.0, 9.0, 0.0, 2.0]])
+    np.testing.assert_allclose(e.position, [[3.0, -4.0]])
+    np.testing.assert_allclose(e.speed, [5.0 - 2.0])
+
+
+@pytest.mark.parametrize(
+    ("velocity", "along", "across"),
+    # The truth is 2 m north and 1 m east of the estimate; what is right of a course is 90 degrees clockwise.
+    [((1, 0), 2, 1), ((0, 1), 1, -2), ((-1, 0), -2, -1), ((0, -1), -1, 2)],
+)
+def test_along_and_across_the_course(velocity, along, across):
+    e = track_errors([[2.0, 1.0, *velocity]], [[0.0, 0.0, 1.0, 0.0]])
+    np.testing.assert_allclose([e.along[0], e.across[0]], [along, across], atol=1e-12)
+
+
+@given(st.lists(st.floats(-50, 50), min_size=8, max_size=8))
+def test_along_and_across_are_the_same_error_turned(values):
+    t, x = np.array(values).reshape(2, 1, 4)
+    e = track_errors(t, x)
+    if np.hypot(*t[0, 2:]) > SLOWEST_M_S:
+        assert np.hypot(e.along, e.across) == pytest.approx(np.hypot(*e.position[0]), abs=1e-9)
+    else:
+        assert np.isnan(e.along).all()
+
+
+def test_course_errors_do_not_jump_through_north():
+    degrees = np.radians([[1.0], [359.0], [180.0]])
+    t = np.column_stack([np.zeros((3, 2)), 5 * np.cos(degrees), 5 * np.sin(degrees)])
+    other = np.radians([[359.0], [1.0], [0.0]])
+    x = np.column_stack([np.zeros((3, 2)), 2 * np.cos(other), 2 * np.sin(other)])
+    np.testing.assert_allclose(np.degrees(track_errors(t, x).course), [2.0, -2.0, 180.0], atol=1e-9)
+    summary = summarise_track(track_errors(t[:2], x[:2]))
+    assert summary.mean_course == pytest.approx(0.0, abs=1e-12)
+    assert np.degrees(summary.rmse_course) == pytest.approx(2.0)
+
+
+@given(st.floats(-1e3, 1e3))
+def test_wrap_keeps_the_direction(angle):
+    wrapped = float(wrap(angle))
+    assert -np.pi < wrapped <= np.pi
+    assert np.exp(1j * wrapped) == pytest.approx(np.exp(1j * angle), abs=1e-9)
+
+
+def test_a_target_at_rest_has_no_course():
+    e = track_errors([[3.0, 4.0, 0.01, 0.0]], [[0.0, 0.0, 1.0, 0.0]])
+    assert np.isnan([e.along[0], e.across[0], e.course[0]]).all()
+    summary = summarise_track(e)
+    assert (summary.n, summary.mae) == (1, 5.0)
+    assert np.isnan(summary.mean_course)
+
+
+def test_rows_without_truth_are_counted_and_not_dropped():
+    truth = np.zeros((5, 4))
+    truth[3:] = np.nan
+    truth[0, 2:] = np.nan  # a position without a velocity can be compared
+    estimate = np.zeros((5, 4))
+    estimate[:, 0] = [3.0, np.nan, -4.0, 9.0, np.nan]
+    e = track_errors(truth, estimate)
+    assert e.position.shape == (5, 2)
+    np.testing.assert_array_equal(np.isnan(e.position[:, 0]), [False, True, False, True, True])
+    summary = summarise_track(e)
+    assert (summary.n, summary.no_truth, summary.no_estimate) == (2, 2, 2)
+    assert summary.mae == pytest.approx(3.5)
+    assert summary.rmse == pytest.approx(np.sqrt(12.5))
+    assert summary.mean_north == pytest.approx(0.5)
+    assert (summary.rmse_north, summary.rmse_east) == pytest.approx((np.sqrt(12.5), 0.0))
+
+
+def test_nothing_to_compare_is_nan_and_not_a_crash():
+    summary = summarise_track(track_errors(np.full((3, 4), np.nan), np.zeros((3, 4))))
+    assert (summary.n, summary.no_truth) == (0, 3)
+    assert np.isnan(summary.mae)
+
+
+def test_squares_add_up():
+    rng = np.random.default_rng(0)
+    s = summarise_track(track_errors(rng.normal(size=(200, 4)) * 5, rng.normal(size=(200, 4))))
+    assert s.rmse**2 == pytest.approx(s.rmse_north**2 + s.rmse_east**2)
+    assert s.mae <= s.rmse
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    with pytest.raises(WildlabError, match=r"(?i)truth of shape \(2, 4\) does not go"):
+        track_errors(np.zeros((2, 4)), np.zeros((3, 4)))
+    with pytest.raises(WildlabError, match="velocity east"):
+        track_errors(np.zeros((2, 2)), np.zeros((2, 2)))
