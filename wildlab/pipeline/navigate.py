@@ -61,7 +61,8 @@ def navigate_mekf(flight: Flight, times: ArrayLike | None = None, *, velocity: b
     Parameters
     ----------
     times
-        Flight times (M,) at which poses are wanted; those of the frames if not given.
+        Flight times (M,) at which poses are wanted; if not given those of the frames, or, of a flight without
+        any, those of the inertial samples.
     velocity
         Whether to use GNSS velocities where the flight has them; H uses positions only.
 
@@ -214,7 +215,9 @@ def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Arra
 
 
 def _wanted(flight: Flight, times: ArrayLike | None) -> Array:
-    return np.unique(frame_times(flight) if times is None else np.asarray(times, float))
+    if times is None:
+        times = frame_times(flight) if "frames" in flight.tables else flight.table("imu")["time_s"].to_numpy()
+    return np.unique(np.asarray(times, float))
 
 
 def _nav_table(times: Array, p: Array, v: Array, q: Array) -> pd.DataFrame:
