@@ -158,7 +158,7 @@ def test_a_mirror_without_the_file(
 def test_an_unknown_data_set_lists_the_known() -> None:
     with pytest.raises(WildlabError, match=r"no data set 'openatena'.*Did you mean 'openathena'"):
         fetch("openatena")
-    with pytest.raises(WildlabError, match="Use one of inertialnav-x8, openathena, umn-thor75"):
+    with pytest.raises(WildlabError, match="Use one of autoferry, inertialnav-x8, openathena, umn-thor75"):
         dataset_folder("../..")
 
 

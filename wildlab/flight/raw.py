@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable
 from wildlab.flight.matlab import read_matlab, table_of
+from wildlab.flight.readers.autoferry import read_part
 from wildlab.flight.recipe_parts import Quantity, Stamp, parse_zone
-from wildlab.flight.recipe_series import MatlabTable, Series
+from wildlab.flight.recipe_series import LogTable, MatlabTable, Series
 from wildlab.flight.units import Dimension, factor
 
 Array = NDArray[np.float64]
@@ -68,6 +69,7 @@ class RawFiles:
     folder: Path
     recipe: Path
     matlab: dict[str, MatlabTable] = field(default_factory=dict)
+    logs: dict[str, LogTable] = field(default_factory=dict)
     hashes: dict[str, str] = field(default_factory=dict)
     _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
     _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -100,14 +102,16 @@ class RawFiles:
 
     def table(self, name: str, separator: str, part: str) -> RawTable:
         """A file as a table of text, its first line the names of the columns; or one of the tables that the
-        recipe makes of MATLAB files.
+        recipe makes of MATLAB files and logs.
 
         Raises
         ------
         WildlabError
             Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first;
-            or where it is no MATLAB file, or does not hold what the recipe says.
+            or where it is no MATLAB file or log of that format, or does not hold what the recipe says.
         """
+        if name in self.logs:
+            return self._log_table(name)
         if name in self.matlab:
             return self._matlab_table(name)
         if (name, separator) not in self._tables:
@@ -124,6 +128,14 @@ class RawFiles:
             cells = table_of(self._variables[block.file], block, path, part)
             count = len(next(iter(cells.values())))
             self._tables[name, ""] = RawTable(path, tuple(cells), cells, np.arange(1, count + 1), "row")
+        return self._tables[name, ""]
+
+    def _log_table(self, name: str) -> RawTable:
+        block = self.logs[name]
+        if (name, "") not in self._tables:
+            path = self.folder / block.file
+            cells, frames = read_part(path, self.read(block.file, f"logs.{name}"), block.part)
+            self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
         return self._tables[name, ""]
 
     def series(self, block: Series, part: str) -> RawTable:

@@ -59,7 +59,7 @@ def import_flight(
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
         raise WildlabError("there is no such folder to import from", "check the source folder", file=folder)
-    flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables))
+    flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
     _refuse_problems(flight, recipe, folder)
     return save_flight(flight, into, overwrite=overwrite)
 
@@ -296,5 +296,7 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
 
 
 def _file(recipe: Recipe, name: str) -> str:
-    """The file a block reads, also where it names one of the tables."""
+    """The file a block reads, also where it names one of the tables or logs."""
+    if name in recipe.logs:
+        return recipe.logs[name].file
     return recipe.tables[name].file if name in recipe.tables else name

@@ -7,7 +7,7 @@ signs, constants, and the few operations named here. `data/recipes/README.md` ex
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
@@ -23,20 +23,18 @@ from wildlab.flight.manifest import (
     UncertaintyPart,
 )
 from wildlab.flight.recipe_parts import (
-    Angle,
     Attitude,
-    Length,
-    Pixel,
     Position,
     Spreads,
     Stamp,
     Velocity,
     Zone,
 )
+from wildlab.flight.recipe_seen import Detections, Frames, Truth
 from wildlab.flight.recipe_series import (
-    Block,
     Gimbal,
     Inertial,
+    LogTable,
     MatlabTable,
     Satellite,
     Separator,
@@ -65,133 +63,6 @@ class Poses(Series):
             raise ValueError("poses have either a position or position_from; give one of both")
         if self.position_from and self.time is None:
             raise ValueError("position_from is for poses over time; add the time, or give a position")
-        return self
-
-
-class Group(Strict):
-    """Label of the sub-flight: straight from a column, or by where a number lies between edges.
-
-    `clear`: no number may come closer to an edge than this; else the groups are not as separate as thought.
-    """
-
-    column: str
-    edges: tuple[float, ...] = ()
-    labels: tuple[str, ...] = ()
-    clear: Annotated[float, Field(ge=0)] = 0.0
-
-    @model_validator(mode="after")
-    def _edges_and_labels(self) -> Self:
-        edges, labels = len(self.edges), len(self.labels)
-        if (edges or labels) and labels != edges + 1:
-            raise ValueError(
-                f"{edges} edges make {edges + 1} groups, and there are {labels} labels; "
-                "give one label more than edges, or neither"
-            )
-        if any(b <= a for a, b in zip(self.edges, self.edges[1:], strict=False)):
-            raise ValueError("the edges do not increase; put them in order")
-        return self
-
-
-class Frames(Block):
-    """The images: one per row with its `id`, or one per `unique` combination of columns."""
-
-    id: str | None = None
-    unique: tuple[str, ...] = ()
-    prefix: str = ""
-    time: Stamp | None = None
-    group: Group | None = None
-    pan: Angle | None = None
-    tilt: Angle | None = None
-
-    @model_validator(mode="after")
-    def _named(self) -> Self:
-        if (self.id is None) == (not self.unique):
-            raise ValueError("frames are named by either id or unique; give one of both")
-        if self.prefix and not self.unique:
-            raise ValueError("a prefix is for frames made by unique; leave it out")
-        if (self.pan is None) != (self.tilt is None):
-            raise ValueError("a gimbal has both pan and tilt; give both, one as a value if it is fixed")
-        return self
-
-
-class PixelPart(Strict):
-    """To the right and downwards."""
-
-    u: Pixel
-    v: Pixel
-
-
-class Ground(Strict):
-    """How high the ground is at a detection: as down in frame n, or as a height above the ellipsoid, at a
-    place (without one: under the camera)."""
-
-    down: Length | None = None
-    height: Length | None = None
-    latitude: Angle | None = None
-    longitude: Angle | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        if (self.down is None) == (self.height is None):
-            raise ValueError("the ground has either down or height; give one of both")
-        place = self.latitude is not None
-        if place != (self.longitude is not None) or (place and self.down is not None):
-            raise ValueError("a place is a latitude and a longitude beside a height; give both, or neither")
-        return self
-
-
-class Detections(Block):
-    """Detections of one source. One of pixel, position, or azimuth and elevation says what was measured."""
-
-    source: str
-    id: str | None = None
-    prefix: str = ""
-    frame: str | None = None
-    target: str | None = None
-    pixel: PixelPart | None = None
-    position: Position | None = None
-    azimuth: Angle | None = None
-    elevation: Angle | None = None
-    range: Length | None = None
-    ground: Ground | None = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        bearing = self.azimuth is not None and self.elevation is not None
-        partly = any(part is not None for part in (self.azimuth, self.elevation, self.range))
-        if (self.pixel is not None) + (self.position is not None) + partly != 1 or partly != bearing:
-            raise ValueError(
-                "a detection is a pixel, a position, or azimuth and elevation (with or without range); "
-                "give one of these"
-            )
-        if self.prefix and self.id is not None:
-            raise ValueError("a prefix is for detections without an id; leave it out")
-        return self
-
-    @property
-    def kind(self) -> str:
-        if self.pixel is not None:
-            return "pixel"
-        if self.position is not None:
-            return "position"
-        return "bearing" if self.range is None else "range-bearing"
-
-
-class Truth(Series):
-    """Where targets really were: `id` names the column, or `target` the one target of the whole file. Without
-    a time they are points that never move."""
-
-    id: str | None = None
-    target: str | None = None
-    time: Stamp | None = None
-    position: Position
-    sd_horizontal: Length | None = None
-    sd_vertical: Length | None = None
-
-    @model_validator(mode="after")
-    def _named(self) -> Self:
-        if (self.id is None) == (self.target is None):
-            raise ValueError("truth is named by either id (a column) or target (one name); give one of both")
         return self
 
 
@@ -280,6 +151,7 @@ class Recipe(Strict):
     scoring: ScoringPart = ScoringPart()
     files: dict[str, str] = Field(default_factory=dict)
     tables: dict[str, MatlabTable] = Field(default_factory=dict)
+    logs: dict[str, LogTable] = Field(default_factory=dict)
     frames: Frames | None = None
     poses: dict[str, Poses] = Field(default_factory=dict)
     imu: Inertial | None = None
@@ -303,10 +175,13 @@ class Recipe(Strict):
                 raise ValueError(f"{name!r} cannot name a nav source; use letters, digits, - and _ only")
         return value
 
-    @field_validator("tables")
-    @classmethod
-    def _safe_tables(cls, value: dict[str, MatlabTable]) -> dict[str, MatlabTable]:
-        return check_table_names(value)
+    @model_validator(mode="after")
+    def _safe_tables(self) -> Self:
+        check_table_names({**self.tables, **self.logs})
+        twice = sorted(set(self.tables) & set(self.logs))
+        if twice:
+            raise ValueError(f"{twice[0]!r} names a table and a log; give each its own name")
+        return self
 
     @model_validator(mode="after")
     def _enough(self) -> Self:
@@ -317,7 +192,8 @@ class Recipe(Strict):
                 )
         if not self.poses and self.gnss is None:
             raise ValueError("there are no poses; add a part such as [poses.autopilot], or at least [gnss]")
-        if self.camera is None and (self.frames is not None or any(one.pixel for one in self.detections)):
+        images = self.frames is not None and self.frames.sensor is None
+        if self.camera is None and (images or any(one.pixel for one in self.detections)):
             raise ValueError("there are images, and no camera; add the part [camera]")
         return self
 

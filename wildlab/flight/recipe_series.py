@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, is_safe_name, leaves_folder
 from wildlab.flight.manifest import GnssPart, ImuPart
+from wildlab.flight.readers.autoferry import Part
 from wildlab.flight.recipe_parts import Acceleration, Angle, Length, Position, Rate, Speed, Stamp, Velocity
 
 Separator = Annotated[str, Field(min_length=1, max_length=1)]
@@ -112,9 +114,7 @@ class MatlabTable(Strict):
     @field_validator("file")
     @classmethod
     def _stays(cls, value: str) -> str:
-        if leaves_folder(value):
-            raise ValueError(f"the path {value!r} leaves its folder; name a file below the source folder")
-        return value
+        return _below(value)
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
@@ -126,15 +126,33 @@ class MatlabTable(Strict):
         return self
 
 
-def check_table_names(tables: dict[str, MatlabTable]) -> dict[str, MatlabTable]:
-    """The tables as they are.
+class LogTable(Strict):
+    """A table out of a log of a known format: one of the parts that its reader tells apart."""
+
+    file: str
+    format: Literal["autoferry"]
+    part: Part
+
+    @field_validator("file")
+    @classmethod
+    def _stays(cls, value: str) -> str:
+        return _below(value)
+
+
+def _below(value: str) -> str:
+    if leaves_folder(value):
+        raise ValueError(f"the path {value!r} leaves its folder; name a file below the source folder")
+    return value
+
+
+def check_table_names(tables: Mapping[str, MatlabTable | LogTable]) -> None:
+    """Raise where a name could be taken for a file.
 
     Raises
     ------
     ValueError
-        ``"problem; fix"`` where a name could be taken for a file.
+        ``"problem; fix"``.
     """
     for name in tables:
         if not is_safe_name(name):
             raise ValueError(f"{name!r} cannot name a table; use letters, digits, - and _ only")
-    return tables

@@ -18,8 +18,9 @@ from wildlab.flight.raw import (
     texts,
     times,
 )
-from wildlab.flight.recipe_model import Detections, Frames, Ground, Recipe, Truth
+from wildlab.flight.recipe_model import Recipe
 from wildlab.flight.recipe_poses import Places, read_position
+from wildlab.flight.recipe_seen import Detections, Frames, Ground, Truth
 from wildlab.flight.recipe_series import Block
 from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
 
@@ -57,6 +58,8 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
     columns: dict[str, Text | Array | Nanoseconds] = {"frame_id": of_row}
     if block.group is not None:
         columns["group"] = _groups(rows, block)
+    if block.sensor is not None:
+        columns["sensor"] = texts(rows, block.sensor, "frames.sensor")
     if block.pan is not None and block.tilt is not None:
         columns["pan_rad"] = numbers(rows, block.pan, "angle", "frames.pan")
         columns["tilt_rad"] = numbers(rows, block.tilt, "angle", "frames.tilt")
@@ -167,9 +170,10 @@ def read_detections(
     elif block.position is not None:
         position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
         columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
-    elif block.azimuth is not None and block.elevation is not None:
+    elif block.azimuth is not None:
         columns["azimuth_rad"] = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
-        columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
+        if block.elevation is not None:
+            columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
         if block.range is not None:
             columns["range_m"] = numbers(rows, block.range, "length", f"{part}.range")
     if block.ground is not None:

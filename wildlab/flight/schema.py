@@ -20,7 +20,7 @@ DType = Literal["float", "text"]
 #: Detection kinds and the columns each of them must fill.
 DETECTION_KINDS: dict[str, tuple[str, ...]] = {
     "pixel": ("u_px", "v_px"),
-    "bearing": ("azimuth_rad", "elevation_rad"),
+    "bearing": ("azimuth_rad",),
     "range-bearing": ("azimuth_rad", "elevation_rad", "range_m"),
     "position": ("north_m", "east_m", "down_m"),
 }
@@ -119,12 +119,13 @@ TABLES: dict[str, Table] = {
     for table in (
         Table(
             "frames",
-            "one row per image",
+            "one row per image, or per look of another sensor; one that saw nothing has no detections",
             (
                 Column("frame_id", "text", "", "name of the image"),
                 Column("time_s", "float", "s", "when it was taken, on the camera's own clock"),
                 Column("time_onboard_s", "float", "s", "when the onboard computer stamped it", False, True),
                 Column("group", "text", "", "sub-flight it belongs to", required=False),
+                Column("sensor", "text", "", "which sensor looked, where there are several", required=False),
                 *_GIMBAL,
             ),
             together=(("pan_rad", "tilt_rad"),),

@@ -1,0 +1,243 @@
+"""The Autoferry JSON: its three spellings of a measurement, hostile files, and the published scenarios."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.catalog import find_dataset
+from wildlab.flight.check import check_flight, usable_for
+from wildlab.flight.files import sha256_of
+from wildlab.flight.readers import autoferry
+from wildlab.flight.readers.autoferry import SENSORS, read_part
+from wildlab.flight.recipe import import_flight
+from wildlab.flight.store import Flight, load_flight
+from wildlab.paths import DATA
+
+HERE = Path("log.json")
+SCENARIOS = {2: "gunnerus", 3: "gunnerus", 5: "gunnerus", 13: "jet-boat", 17: "jet-boat"}
+
+
+def frame(sensor: Any, time: Any, measurement: Any, own: Any = (100.0, -50.0)) -> dict[str, Any]:
+    return {"sensorID": sensor, "ownshipPosition": own, "time": time, "measurement": measurement}
+
+
+def target(identity: Any = 1, time: Any = 5.0, position: Any = (1.0, 2.0, 0.0)) -> dict[str, Any]:
+    return {"targetID": identity, "time": time, "position": position}
+
+
+GOOD = [
+    frame(4, 10.0, [0.1, -3.0]),
+    frame(1, 10.5, [[1.0, 2.0, 3.0], [10.0, 20.0, 30.0]], [0.0, 5.0]),
+    frame(3, 10.2, 0.7),
+    frame(2, 11.0, [7.0, -8.0]),
+    frame(1, 11.5, []),
+    frame(3, 12.0, []),
+]
+
+
+def read(content: Any, part: Any = "frames") -> tuple[dict[str, Any], Any]:
+    return read_part(HERE, json.dumps(content).encode(), part)
+
+
+def test_frames_are_in_order_of_time_and_none_is_lost():
+    columns, rows = read(GOOD)
+    assert list(columns["frame"]) == [
+        "eo-0001",
+        "ir-0001",
+        "lidar-0001",
+        "radar-0001",
+        "lidar-0002",
+        "ir-0002",
+    ]
+    np.testing.assert_array_equal(rows, [1, 3, 2, 4, 5, 6])
+    np.testing.assert_array_equal(columns["time"], np.sort(columns["time"]))
+    assert columns["east"][2] == 5.0
+
+
+def test_a_list_a_pair_a_number_and_nothing():
+    lidar, rows = read(GOOD, "lidar")
+    np.testing.assert_array_equal(
+        np.column_stack([lidar["north"], lidar["east"]]), [[1, 15], [2, 25], [3, 35]]
+    )
+    assert list(lidar["frame"]) == ["lidar-0001"] * 3
+    np.testing.assert_array_equal(rows, [2, 2, 2])
+    radar, _ = read(GOOD, "radar")
+    assert (radar["north"].tolist(), radar["east"].tolist()) == ([107.0], [-58.0])
+    ir, _ = read(GOOD, "ir")
+    assert (ir["bearing"].tolist(), list(ir["frame"])) == ([0.7], ["ir-0001"])
+    assert read(GOOD, "eo")[0]["bearing"].tolist() == [0.1, -3.0]
+    assert len(read(GOOD[:1], "radar")[1]) == 0
+
+
+def test_truth_is_each_sample_once():
+    content = [[target(), target(2, 4.0)], [target(), target(2, 4.5, [3, 4, 5])], target(1, 6.0)]
+    columns, rows = read(content, "truth")
+    assert list(columns["target"]) == ["1", "1", "2", "2"]
+    assert columns["time"].tolist() == [5.0, 6.0, 4.0, 4.5]
+    assert (columns["north"][3], columns["east"][3], columns["down"][3]) == (3, 4, 5)
+    np.testing.assert_array_equal(rows, [1, 3, 1, 2])
+    assert len(read([[], []], "truth")[1]) == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "field", "problem"),
+    [
+        ({}, "the file", "holds an object where a list of frames is expected"),
+        ([], "the file", "holds a list of 0 where"),
+        ([3], "sensorID", "frame 1: is 3, and has no 'sensorID'"),
+        ([GOOD[0], {"sensorID": 1}], "time", "frame 2: has no 'time'"),
+        ([frame(5, 1.0, [])], "sensorID", "frame 1: is 5; known are 1 (lidar), 2 (radar)"),
+        ([frame(True, 1.0, [])], "sensorID", "is True"),
+        ([frame([1], 1.0, [])], "sensorID", "is a list of 1"),
+        ([frame("1", 1.0, [])], "sensorID", "is '1'"),
+        ([frame(1, "noon", [])], "time", "'noon' is not a finite number"),
+        ([frame(1, None, [])], "time", "None is not a finite number"),
+        ([frame(1, True, [])], "time", "True is not a finite number"),
+        ([frame(1, 10**400, [])], "time", "a huge number is not a finite number"),
+        ([frame(1, 1.0, [], 4.0)], "ownshipPosition", "is 4.0 where a list is expected"),
+        ([frame(1, 1.0, [], [4.0])], "ownshipPosition", "has 1 numbers where 2 are expected"),
+        ([frame(1, 1.0, [], [4.0, 1e9])], "ownshipPosition", "is further away than 1000 km"),
+        ([frame(1, 1.0, 0.5)], "measurement", "is 0.5 where a list is expected"),
+        ([frame(1, 1.0, [1.0, 2.0, 3.0])], "measurement", "a list of 3 is no list of norths"),
+        ([frame(1, 1.0, [[1.0, 2.0], [3.0]])], "measurement", "alike in length"),
+        ([frame(1, 1.0, [[1.0], 3.0])], "measurement", "alike in length"),
+        ([frame(2, 1.0, [[1.0, "x"], [3.0, 4.0]])], "measurement", "'x' is not a finite number"),
+        ([frame(2, 1.0, [[[1.0]], [[2.0]]])], "measurement", "a list of 1 is not a finite number"),
+        ([frame(3, 1.0, [[0.1, 0.2]])], "measurement", "a list of 2 is not a finite number"),
+        ([frame(4, 1.0, [0.1, 57.0])], "measurement", "the bearing 57 is more than a turn"),
+        ([frame(4, 1.0, {"a": 1})], "measurement", "an object is not a finite number"),
+    ],
+)
+def test_hostile_detections_are_refused(content: Any, field: str, problem: str):
+    with pytest.raises(WildlabError) as caught:
+        read(content, "radar")
+    assert (caught.value.file, caught.value.field) == ("log.json", field)
+    assert problem in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "field", "problem"),
+    [
+        ([4], "the frame", "frame 1: is 4 where a list is expected"),
+        ([[[]]], "targetID", "is a list of 0, and has no 'targetID'"),
+        ([[target("havfruen")]], "targetID", "is 'havfruen', not a number of a target"),
+        ([[target(position=[1, 2])]], "position", "has 2 numbers where 3 are expected"),
+        ([[target(time=[])]], "time", "a list of 0 is not a finite number"),
+        (
+            [[target()], [target(position=[9, 2, 0])]],
+            "position",
+            "frame 2: target 1 is elsewhere at the same",
+        ),
+    ],
+)
+def test_hostile_truth_is_refused(content: Any, field: str, problem: str):
+    with pytest.raises(WildlabError) as caught:
+        read(content, "truth")
+    assert caught.value.field == field
+    assert problem in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"", "is not readable JSON"),
+        (b"\xff\xfe", "is not readable JSON"),
+        (b"[" * 100_000, "is not readable JSON"),
+        (b'[{"time": NaN}]', "NaN is not JSON"),
+        (b'[{"time": -Infinity}]', "-Infinity is not JSON"),
+        (b'[{"time": 1, "time": 2}]', "a name stands twice"),
+        (b"[" + b"9" * 5000 + b"]", "is not readable JSON"),
+    ],
+)
+def test_what_is_no_json_is_refused(data: bytes, problem: str):
+    with pytest.raises(WildlabError, match="Copy the published file again") as one:
+        read_part(HERE, data, "frames")
+    assert problem in str(one.value)
+
+
+def test_a_file_that_is_too_large_is_not_parsed(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(autoferry, "MOST_BYTES", 3 << 20)
+    with pytest.raises(WildlabError, match="has more than 3 MiB"):
+        read_part(HERE, b" " * ((3 << 20) + 1), "frames")
+
+
+def small(folder: Path) -> Path:
+    """Two files in place of those of scenario 2."""
+    place = folder / "raw" / "scenario2"
+    place.mkdir(parents=True)
+    content = [{**one, "time": one["time"] + 1.6e9} for one in GOOD]
+    (place / "scenario2_detections.json").write_text(json.dumps(content))
+    truth = [
+        [target(i, 1.6e9 + t, [t + i, 2 * t, 0]) for i in (1, 2)] for t in np.arange(9.0, 13.1, 0.5).tolist()
+    ]
+    (place / "scenario2_groundTruth.json").write_text(json.dumps(truth))
+    return folder / "raw"
+
+
+def test_a_flight_of_what_was_and_was_not_seen(tmp_path: Path):
+    import_flight(DATA / "recipes" / "autoferry-2.toml", small(tmp_path), tmp_path / "flight")
+    flight = load_flight(tmp_path / "flight")
+    frames, detections = flight.table("frames"), flight.table("detections")
+    assert (flight.name, flight.manifest.kind, list(flight.nav)) == ("autoferry-2", "logged", ["ownship"])
+    assert list(frames["sensor"]) == ["eo", "ir", "lidar", "radar", "lidar", "ir"]
+    np.testing.assert_allclose(frames["time_s"], [0, 0.2, 0.5, 1.0, 1.5, 2.0])
+    assert detections.groupby("source", sort=False)["kind"].first().to_dict() == {
+        "lidar": "position", "radar": "position", "ir": "bearing", "eo": "bearing",
+    }  # fmt: skip
+    assert not detections["frame_id"].isin(["lidar-0002", "ir-0002"]).any()
+    assert list(flight.table("truth")["target_id"].unique()) == ["havfruen", "gunnerus"]
+    assert [use.usable for use in usable_for(flight)] == [False, True, False]
+    assert not [one for one in check_flight(flight) if one.level == "problem"]
+
+
+def test_a_wrong_file_leaves_no_flight(tmp_path: Path):
+    source = small(tmp_path)
+    (source / "scenario2" / "scenario2_groundTruth.json").write_text("[[3]]")
+    with pytest.raises(WildlabError, match=r"scenario2_groundTruth\.json.*targetID"):
+        import_flight(DATA / "recipes" / "autoferry-2.toml", source, tmp_path / "flight")
+    assert not (tmp_path / "flight").exists()
+
+
+@pytest.fixture(scope="module")
+def scenarios(
+    shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
+) -> dict[int, Flight]:
+    source, into = shared_data("tracking", "autoferry"), tmp_path_factory.mktemp("autoferry")
+    for number in SCENARIOS:
+        import_flight(DATA / "recipes" / f"autoferry-{number}.toml", source, into / str(number))
+    return {number: load_flight(into / str(number)) for number in SCENARIOS}
+
+
+def test_the_published_scenarios(scenarios: dict[int, Flight]):
+    for number, flight in scenarios.items():
+        assert set(flight.table("frames")["sensor"]) == set(SENSORS.values())
+        assert set(flight.table("truth")["target_id"]) == {"havfruen", SCENARIOS[number]}
+        assert 79 < flight.table("frames")["time_s"].iloc[-1] < 152
+        assert not [one for one in check_flight(flight) if one.level == "problem"]
+    # Counted in the files with other means: grep -o sensorID, and the lists of frames 1 and 2 of scenario 2.
+    first = scenarios[2]
+    assert first.table("frames")["sensor"].value_counts().to_dict() == {
+        "ir": 1012, "eo": 591, "lidar": 234, "radar": 70,
+    }  # fmt: skip
+    seen = first.table("detections")
+    np.testing.assert_allclose(
+        seen.loc[seen["frame_id"] == "eo-0001", "azimuth_rad"],
+        [0.42121200533586833, -2.1709064241401057, 1.068133430517189, 1.2572239053389533],
+    )
+    assert seen.loc[seen["frame_id"] == "ir-0001", "azimuth_rad"].item() == -2.2054613959028848
+
+
+def test_the_catalogue_has_the_files_as_published(shared_data: Callable[..., Path]):
+    root = shared_data("tracking", "autoferry")
+    files = find_dataset("autoferry").files
+    assert len(files) == 2 * len(SCENARIOS)
+    for one in files:
+        assert sha256_of(root / one.path) == one.sha256
+        assert one.url.endswith(one.path)
