@@ -1,4 +1,4 @@
-"""The Kalman filter, H (3.5), as two functions without a state of their own."""
+"""The Kalman filter, H (3.5) and (3.7), as functions without a state of their own."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class Update(NamedTuple):
 
 def predict(x: Array, P: Array, F: Array, Q: Array) -> tuple[Array, Array]:
     """Prior estimate (n,) and covariance (n, n), H (3.5a)-(3.5b)."""
-    return F @ x, F @ P @ F.T + Q
+    prior = F @ P @ F.T + Q
+    return F @ x, (prior + prior.T) / 2
 
 
 def update(x: Array, P: Array, z: Array, H: Array, R: Array) -> Update:
@@ -30,7 +31,21 @@ def update(x: Array, P: Array, z: Array, H: Array, R: Array) -> Update:
 
     H (3.5c)-(3.5h), Joseph form.
     """
-    innovation = z - H @ x
+    return correct(x, P, z - H @ x, H, R)
+
+
+def correct(x: Array, P: Array, innovation: Array, H: Array, R: Array) -> Update:
+    """Posterior of the extended filter, H (3.7d)-(3.7h), Joseph form.
+
+    Parameters
+    ----------
+    innovation
+        (m,) measurement minus prediction, angles wrapped.
+    H
+        (m, n) derivative of the prediction at ``x``.
+    R
+        (m, m).
+    """
     S = H @ P @ H.T + R
     gain = np.asarray(np.linalg.solve(S, H @ P).T, float)
     kept = np.eye(len(x)) - gain @ H

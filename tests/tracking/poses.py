@@ -1,0 +1,52 @@
+"""Poses and targets for the tests of sensors and filters: a camera over a plane, looking roughly down."""
+
+import numpy as np
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from wildlab.geometry.camera import Camera, project
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.mount import Mount, camera_pose, camera_rotation
+from wildlab.tracking.measurement import CameraPoses
+
+CAMERA = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0)
+CROOKED = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0, 1.5, (-0.2, 0.05, 1e-3, -2e-3, 0.01))
+ANGLE = st.floats(-0.4, 0.4)
+POSE = st.tuples(
+    *(st.floats(-300, 300),) * 2, st.floats(50, 400), ANGLE, ANGLE, st.floats(-np.pi, np.pi),
+    st.tuples(ANGLE, ANGLE, ANGLE), st.tuples(*(st.floats(-2, 2),) * 3),
+)  # fmt: skip
+#: Where in the image the target is, as a share of it.
+PIXEL = st.tuples(st.floats(0.05, 0.95), st.floats(0.05, 0.95))
+
+
+def posed(pose):
+    """Body pose, mount and `CameraPoses` of one drawn pose."""
+    north, east, height, roll, pitch, yaw, misalignment, lever = pose
+    p_nb, R_nb = np.array([north, east, -height]), euler_to_matrix(roll, pitch, yaw)
+    mount = Mount(misalignment=misalignment, lever_arm=lever)
+    return p_nb, R_nb, mount, CameraPoses(*camera_pose(mount, p_nb, R_nb), camera_rotation(mount), lever)
+
+
+def disturbed(p_nb, R_nb, mount, error):
+    """The camera's pose with errors dp, da (four times MRP) of the body: q = q_hat * dq."""
+    turn = Rotation.from_mrp(np.asarray(error[3:]) / 4).as_matrix()
+    return CameraPoses(
+        *camera_pose(mount, p_nb + error[:3], R_nb @ turn), camera_rotation(mount), mount.lever_arm
+    )
+
+
+def overflight(n=60, seed=0, sd_pixel=2.0, velocity=(1.5, -0.8), period=0.3):
+    """Level circling over a slow target at the origin: times, pixels, poses, truth (N, 4)."""
+    rng = np.random.default_rng(seed)
+    times = period * np.arange(n)
+    truth = np.column_stack([np.outer(times, velocity), np.tile(velocity, (n, 1))])
+    course = 0.1 * times
+    p_nb = np.column_stack([60 * np.sin(course), 60 * np.cos(course), np.full(n, -300.0)])
+    attitude = rng.normal(0, 0.03, (n, 2))
+    R_nb = euler_to_matrix(attitude[:, 0], attitude[:, 1], course)
+    mount = Mount()
+    poses = CameraPoses(*camera_pose(mount, p_nb, R_nb), camera_rotation(mount))
+    target = np.column_stack([truth[:, :2], np.zeros(n)])
+    p_c = np.einsum("nji,nj->ni", poses.R_nc, target - poses.p_nc)
+    return times, project(CAMERA, p_c) + rng.normal(0, sd_pixel, (n, 2)), poses, truth

@@ -1,0 +1,173 @@
+"""Differenced measurements against the augmented filter they stand for, and thinning."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.tracking import measurement as m
+from wildlab.tracking.coloured import difference_model, run_coloured, thin
+from wildlab.tracking.motion import constant_velocity, singer
+from wildlab.tracking.run import Start, run_filter, start_from_first
+
+CV = partial(constant_velocity, sd_acceleration=0.3)
+SINGER = partial(singer, alpha=0.1, variance=0.2)
+R_W = np.array([[0.5, 0.1], [0.1, 0.8]])
+SLOW = np.array([[0.9, 0.05], [-0.02, 0.8]])
+
+
+def data(n=40, longest=0.9, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.uniform(0.02, longest, n)), np.cumsum(rng.normal(0, 1.5, (n, 2)), axis=0)
+
+
+def augmented(times, z, motion, start, F_c, R_first):
+    """Target and noise in one state, measured without any noise of its own; starts before the first row.
+
+    A prior of the position so wide that the first measurement makes it is what a start on it means.
+    """
+    n = len(start.x)
+    wide = start.P.copy()
+    wide[:2, :2] = 1e7 * np.eye(2)
+    P = np.block([[wide, np.zeros((n, 2))], [np.zeros((2, n)), R_first]])
+    x, H = np.zeros(n + 2), np.hstack([np.eye(2, n), np.eye(2)])
+    for k, one in enumerate(z):
+        if k:
+            F, Q = np.eye(n + 2), np.zeros((n + 2, n + 2))
+            F[:n, :n], Q[:n, :n] = motion(times[k] - times[k - 1])
+            F[n:, n:], Q[n:, n:] = F_c, R_W
+            x, P = F @ x, F @ P @ F.T + Q
+        S = H @ P @ H.T
+        K = P @ H.T @ np.linalg.inv(S)
+        x = x + K @ (one - H @ x)
+        P = (np.eye(n + 2) - K @ H) @ P @ (np.eye(n + 2) - K @ H).T
+        yield x[:n], P[:n, :n]
+
+
+@pytest.mark.parametrize("F_c", [np.eye(2), SLOW], ids=["constant", "fading"])
+@pytest.mark.parametrize(("motion", "n"), [(CV, 4), (SINGER, 6)], ids=["constant velocity", "singer"])
+def test_differencing_is_the_augmented_filter(motion, n, F_c):
+    """With the first measurement's noise at R_w, the start on it is the augmented filter's posterior."""
+    times, z = data()
+    start = start_from_first(times, z, 1.0, 3.0, n=n, sd_acceleration=0.5)
+    P = start.P.copy()
+    P[:2, :2] = R_W
+    start = start._replace(P=P)
+    track = run_coloured(times, z, R_W, motion, start, F_c=F_c)
+    assert track.used.all()
+    for row, (x, P) in enumerate(augmented(times, z, motion, start, F_c, R_W)):
+        assert np.allclose(track.x[row], x, rtol=1e-4, atol=1e-4)
+        assert np.allclose(track.P[row], P, rtol=1e-4, atol=1e-4)
+
+
+def test_the_model_is_the_print():
+    rng = np.random.default_rng(0)
+    F, Q = SINGER(0.4)
+    H = np.eye(2, 6)
+    model = difference_model(F, Q, H, SLOW, R_W)
+    R = H @ Q @ H.T + R_W
+    T = Q @ H.T @ np.linalg.inv(R)
+    assert np.allclose(model.H, H @ F - SLOW @ H)
+    assert np.allclose(model.R, R)
+    assert np.allclose(model.T, T)
+    assert np.allclose(model.F, F - T @ model.H)
+    assert np.allclose(model.Q, Q - Q @ H.T @ np.linalg.inv(R) @ H @ Q)
+    # And what it is for: noises that have nothing to do with each other, and the same next state.
+    v, w = (
+        rng.multivariate_normal(np.zeros(6), Q, 100_000),
+        rng.multivariate_normal(np.zeros(2), R_W, 100_000),
+    )
+    both = v @ H.T + w
+    rest = v - both @ T.T
+    assert np.abs(rest.T @ both / 100_000).max() < 5 * np.sqrt(Q.max() * R.max() / 100_000)
+
+
+def test_the_interval_is_the_one_between_the_two_measurements():
+    """A steady target seen at uneven times: every innovation is zero once its speed is known."""
+    times = np.array([0.0, 0.1, 0.9, 1.0, 1.7, 1.75])
+    velocity = np.array([3.0, -2.0])
+    start = Start(0.0, np.array([0, 0, *velocity]), np.diag([1, 1, 1e-8, 1e-8]), row=0)
+    offset = np.array([40.0, -70.0])  # a standing error is no news to differences
+    track = run_coloured(times, np.outer(times, velocity) + offset, R_W, CV, start)
+    assert np.allclose(track.innovation[1:], 0, atol=1e-9)
+    assert np.allclose(track.x[:, :2], np.outer(times, velocity), atol=1e-9)
+
+
+def test_after_a_gap_the_position_itself_is_used():
+    times, z = data(20)
+    times[10:] += 5.0
+    start = start_from_first(times, z, 1.0, 3.0)
+    track = run_coloured(times, z, R_W, CV, start)
+    before = run_coloured(times[:10], z[:10], R_W, CV, start)
+    direct = run_filter(
+        times[10:11], z[10:11], R_W, m.positions(), CV, Start(times[9], before.x[-1], before.P[-1])
+    )
+    assert np.allclose(track.x[10], direct.x[0])
+    assert np.allclose(track.P[10], direct.P[0])
+    assert np.allclose(track.S[10], direct.S[0])
+    patient = run_coloured(times, z, R_W, CV, start, longest_gap=10.0)
+    assert not np.allclose(patient.x[10], direct.x[0])
+
+
+def test_a_measurement_that_is_not_used_is_no_reference():
+    times, z = data(20, longest=0.3)
+    start = start_from_first(times, z, 1.0, 3.0)
+    far, gone = z.copy(), z.copy()
+    far[8] += 500
+    gone[8] = np.nan
+    left_out = run_coloured(np.delete(times, 8), np.delete(z, 8, 0), R_W, CV, start, output_times=times)
+    gated = run_coloured(times, far, R_W, CV, start, gate=0.9999)
+    assert not gated.used[8]
+    assert gated.nis[8] > 100
+    missing = run_coloured(times, gone, R_W, CV, start)
+    assert np.isnan(missing.nis[8])
+    for track in (gated, missing):
+        assert track.used.sum() == 19
+        assert np.allclose(track.x, left_out.x)
+        assert np.allclose(track.P, left_out.P)
+
+
+def test_a_start_without_a_measurement_takes_the_first_as_it_is():
+    times, z = data(5)
+    start = Start(0.0, np.zeros(4), np.diag([100.0, 100, 9, 9]))
+    track = run_coloured(times, z, R_W, CV, start)
+    direct = run_filter(times[:1], z[:1], R_W, m.positions(), CV, start)
+    assert np.allclose(track.x[0], direct.x[0])
+
+
+def test_two_at_once_say_nothing_of_the_velocity():
+    times, z = data(6)
+    times[3] = times[2]
+    start = start_from_first(times, z, 1.0, 3.0)
+    track = run_coloured(times, z, R_W, CV, start, output_times=times)
+    assert track.used.all()
+    without = run_coloured(times[:3], z[:3], R_W, CV, start)
+    assert np.allclose(track.x[3], without.x[2])
+    assert np.allclose(track.P[3], without.P[2])
+
+
+def test_several_detections_are_refused():
+    times, z = data(4)
+    with pytest.raises(WildlabError, match="several detections in a frame"):
+        run_coloured(times, np.stack([z, z], axis=1), R_W, CV, start_from_first(times, z, 1.0))
+
+
+@given(
+    steps=st.lists(st.floats(0, 3), min_size=1, max_size=60),
+    interval=st.floats(0.01, 5),
+    seed=st.integers(0, 99),
+)
+def test_thinning_keeps_as_many_as_it_may(steps, interval, seed):
+    times = np.cumsum(steps)
+    usable = np.random.default_rng(seed).random(len(times)) < 0.8
+    kept = thin(times, interval, usable)
+    assert not kept[~usable].any()
+    assert (np.diff(times[kept]) >= interval * (1 - 1e-8)).all()
+    for row in np.flatnonzero(usable & ~kept):  # none left out without one kept shortly before
+        before = times[:row][kept[:row]]
+        assert len(before)
+        assert times[row] - before[-1] < interval
+    assert np.array_equal(thin(times, interval), thin(times, interval, np.ones(len(times), bool)))

@@ -1,0 +1,157 @@
+"""Sensors: their predictions against geometry's, and every derivative against finite differences."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
+from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
+from wildlab.tracking import measurement as m
+from wildlab.tracking.noise import constant_noise, noise_by_altitude
+
+
+def slope(function, k, step):
+    """Derivative by central differences of the fourth order, columns one after the other."""
+    columns = []
+    for i in range(k):
+        d = np.zeros(k)
+        d[i] = step[i]
+        near, far = function(d) - function(-d), function(2 * d) - function(-2 * d)
+        columns.append((8 * near - far) / (12 * step[i]))
+    return np.stack(columns, axis=-1)
+
+
+POSE_STEP = np.repeat([0.05, 1e-4], 3)
+
+
+def target_at(camera, poses, share, plane):
+    uv = np.array([share[0] * camera.width, share[1] * camera.height])
+    target = pixel_to_plane(camera, uv, poses.p_nc, poses.R_nc, plane)
+    assume(np.isfinite(target).all() and np.linalg.norm(target - poses.p_nc) < 3000)
+    return uv, target
+
+
+@pytest.mark.parametrize("camera", [CAMERA, CROOKED], ids=["pinhole", "distorting"])
+@given(pose=POSE, share=PIXEL, plane=st.floats(-3, 3))
+def test_pixel_and_its_derivatives(camera, pose, share, plane):
+    p_nb, R_nb, mount, poses = posed(pose)
+    uv, target = target_at(camera, poses, share, plane)
+    seen = m.predict_pixel(camera, target[:2], poses, plane)
+    assert np.allclose(seen.z, uv, atol=1e-6)
+    by_position = slope(lambda d: m.predict_pixel(camera, target[:2] + d, poses, plane).z, 2, [0.05, 0.05])
+    assert np.allclose(seen.H_position, by_position, rtol=1e-5, atol=1e-6)
+    by_pose = slope(
+        lambda d: ground_to_pixel(camera, target, *disturbed(p_nb, R_nb, mount, d)[:2]), 6, POSE_STEP
+    )
+    assert np.allclose(seen.H_pose, by_pose, rtol=1e-5, atol=1e-3)
+
+
+@given(pose=POSE, share=PIXEL, plane=st.floats(-3, 3))
+def test_azimuth_and_elevation_and_their_derivatives(pose, share, plane):
+    p_nb, R_nb, mount, poses = posed(pose)
+    uv, target = target_at(CROOKED, poses, share, plane)
+    assume(np.hypot(*(uv - [318, 250])) > 20)  # near the axis the azimuth turns faster than differences see
+    seen = m.predict_azimuth_elevation(target[:2], poses, plane)
+    assert np.allclose(seen.z, m.azimuth_elevation_of_pixel(CROOKED, uv), atol=1e-8)
+
+    def away(prediction):
+        return m.difference(prediction.z, seen.z, (True, False))
+
+    by_position = slope(
+        lambda d: away(m.predict_azimuth_elevation(target[:2] + d, poses, plane)), 2, [0.01, 0.01]
+    )
+    assert np.allclose(seen.H_position, by_position, rtol=1e-5, atol=1e-8)
+    by_pose = slope(
+        lambda d: away(m.predict_azimuth_elevation(target[:2], disturbed(p_nb, R_nb, mount, d), plane)),
+        6, POSE_STEP / 5,
+    )  # fmt: skip
+    assert np.allclose(seen.H_pose, by_pose, rtol=1e-5, atol=1e-4)
+
+
+@given(
+    target=st.tuples(*(st.floats(-500, 500),) * 2),
+    platform=st.tuples(*(st.floats(-500, 500),) * 2),
+    yaw=st.floats(-10, 10),
+)
+def test_range_and_bearing_and_their_derivatives(target, platform, yaw):
+    target, platform = np.array(target), np.array(platform)
+    assume(np.hypot(*(target - platform)) > 1)
+    seen = m.predict_range_bearing(target, platform, yaw)
+    assert np.isclose(seen.z[0], np.hypot(*(target - platform)))
+    ahead = platform + seen.z[0] * np.array([np.cos(yaw + seen.z[1]), np.sin(yaw + seen.z[1])])
+    assert np.allclose(ahead, target, atol=1e-6)
+    assert -np.pi <= seen.z[1] < np.pi
+
+    def away(position, p, turned):
+        return m.difference(m.predict_range_bearing(position, p, turned).z, seen.z, (False, True))
+
+    step = 1e-3 * min(seen.z[0], 10)
+    by_position = slope(lambda d: away(target + d, platform, yaw), 2, [step] * 2)
+    assert np.allclose(seen.H_position, by_position, atol=1e-6)
+    by_pose = slope(lambda d: away(target, platform + d[:2], yaw + d[5]), 6, [step] * 3 + [1e-3] * 3)
+    assert np.allclose(seen.H_pose, by_pose, atol=1e-6)
+
+
+@given(pose=POSE, share=PIXEL)
+def test_behind_the_camera_nothing_is_seen(pose, share):
+    """The point opposite has the same quotients x/z, y/z: only its depth gives it away."""
+    *_, poses = posed(pose)
+    _, target = target_at(CAMERA, poses, share, 0.0)
+    opposite = 2 * poses.p_nc - target
+    for seen in (
+        m.predict_pixel(CAMERA, opposite[:2], poses, opposite[2]),
+        m.predict_azimuth_elevation(opposite[:2], poses, opposite[2]),
+    ):
+        assert np.isnan(seen.z).all()
+        assert np.isnan(seen.H_position).all()
+    below = m.predict_pixel(CAMERA, poses.p_nc[:2], poses, poses.p_nc[2])  # the lens itself
+    assert np.isnan(below.z).all()
+
+
+def test_where_an_angle_is_not_defined_there_is_none():
+    poses = m.CameraPoses(np.array([0.0, 0.0, -100.0]), np.eye(3), np.eye(3))
+    assert np.isnan(m.predict_azimuth_elevation([0.0, 0.0], poses, 0.0).z).all()
+    assert np.isnan(m.azimuth_elevation_of_pixel(CAMERA, [318.0, 250.0])).all()
+    assert np.isnan(m.predict_range_bearing([3.0, 4.0], [3.0, 4.0], 0.0).z).all()
+
+
+def test_angles_differ_by_the_short_way_round():
+    assert np.allclose(m.wrap([np.pi, 3 * np.pi, -np.pi, 0.1]), [-np.pi, -np.pi, -np.pi, 0.1])
+    gap = m.difference([3.1, 3.1], [-3.1, -3.1], (True, False))
+    assert np.allclose(gap, [6.2 - 2 * np.pi, 6.2])
+
+
+def test_rows_of_a_run_have_their_own_poses():
+    drawn = [(10.0, 20.0, 100.0, 0.1, -0.2, 1.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0)),
+             (-10.0, 5.0, 120.0, -0.1, 0.1, 2.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0))]  # fmt: skip
+    singles = [posed(one)[3] for one in drawn]
+    together = m.CameraPoses(
+        *(np.stack(part) for part in list(zip(*singles, strict=True))[:2]), *singles[0][2:]
+    )
+    planes, position = np.array([0.0, 2.0]), np.array([3.0, 4.0])
+    for row, one in enumerate(singles):
+        for sensor, expected in (
+            (m.pixels(CAMERA, together, planes), m.predict_pixel(CAMERA, position, one, planes[row])),
+            (
+                m.azimuths_elevations(together, planes),
+                m.predict_azimuth_elevation(position, one, planes[row]),
+            ),
+        ):
+            for ours, theirs in zip(sensor.predict(row, position), expected, strict=True):
+                assert np.allclose(ours, theirs)
+    batch = m.predict_pixel(CAMERA, np.tile(position, (2, 1)), together, planes)
+    assert np.allclose(batch.z[1], m.predict_pixel(CAMERA, position, singles[1], 2.0).z)
+    platform, yaw = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([0.0, 0.5])
+    both = m.ranges_bearings(platform, yaw).predict(1, position)
+    alone = m.bearings(platform, yaw).predict(1, position)
+    assert np.allclose(both.z, m.predict_range_bearing(position, [1.0, 1.0], 0.5).z)
+    assert alone.z.shape == (1,)
+    assert np.isclose(alone.z[0], both.z[1])
+    assert np.allclose(alone.H_pose, both.H_pose[1:])
+
+
+def test_noise_follows_the_altitude():
+    R = noise_by_altitude([100.0, 350.0])
+    assert np.allclose(R[1], 17.5**2 * np.eye(2))
+    assert np.allclose(constant_noise(2, 3.0, 4.0), np.tile(np.diag([9.0, 16.0]), (2, 1, 1)))

@@ -1,0 +1,128 @@
+"""Motion models: steps that add up, closed forms, and the print's limits."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from filterpy.common import van_loan_discretization
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad_vec
+
+from wildlab.errors import WildlabError
+from wildlab.tracking import motion
+
+STEPS = st.just(0.0) | st.floats(1e-6, 200)
+CONTINUOUS = {
+    "rest": motion.rest,
+    "random walk": partial(motion.random_walk, density=0.7),
+    "singer, slow": partial(motion.singer, alpha=0.02, variance=0.3),
+    "singer, fast": partial(motion.singer, alpha=4.0, variance=0.3),
+    "singer, no fading": partial(motion.singer, alpha=0.0, variance=0.3),
+}
+HELD = {
+    "constant position": partial(motion.constant_position, sd_velocity=0.4),
+    "constant velocity": partial(motion.constant_velocity, sd_acceleration=0.4),
+    "constant velocity, Flodell": partial(motion.flodell_constant_velocity, sd_acceleration=0.4),
+    "singer as printed": partial(motion.singer, alpha=0.1, variance=0.3, printed=True),
+}
+ALL = CONTINUOUS | HELD
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(a=STEPS, b=STEPS)
+def test_transitions_compose(name, a, b):
+    whole, first, second = (ALL[name](t)[0] for t in (a + b, a, b))
+    assert np.allclose(second @ first, whole, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", CONTINUOUS)
+@given(a=STEPS, b=STEPS)
+def test_noise_of_continuous_models_adds_up(name, a, b):
+    (_, whole), (_, first), (F, second) = (CONTINUOUS[name](t) for t in (a + b, a, b))
+    assert np.allclose(F @ first @ F.T + second, whole, rtol=1e-8, atol=1e-8 * np.abs(whole).max() + 1e-300)
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(dt=STEPS)
+def test_noise_is_a_covariance_and_nothing_happens_in_no_time(name, dt):
+    F, Q = ALL[name](dt)
+    assert np.array_equal(Q, Q.T)
+    sd = np.sqrt(np.diag(Q))
+    sd[sd == 0] = 1.0
+    assert np.linalg.eigvalsh(Q / np.outer(sd, sd))[0] > -1e-10
+    F, Q = ALL[name](0.0)
+    assert np.array_equal(F, np.eye(len(F)))
+    assert not Q.any()
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("dt", [-0.1, np.nan, np.inf])
+def test_steps_backwards_are_refused(name, dt):
+    with pytest.raises(WildlabError, match="time step"):
+        ALL[name](dt)
+
+
+def test_constant_velocity_is_the_print():
+    T, sd = 0.3, 0.05
+    F, Q = motion.constant_velocity(T, sd)
+    G = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
+    assert np.allclose(F, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]])
+    assert np.allclose(Q, sd**2 * G @ G.T)
+    _, Q = motion.flodell_constant_velocity(T, sd)
+    assert np.allclose(Q, np.diag([0, 0, 1, 1]) * sd**2 * T**2)
+
+
+@given(alpha=st.floats(1e-3, 3), dt=st.floats(1e-3, 5))
+def test_singer_agrees_with_van_loan_and_with_the_integral(alpha, dt):
+    F, Q = motion.singer(dt, alpha, 0.3)
+    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -alpha]])
+    F1, Q1 = van_loan_discretization(A, np.array([[0], [0], [np.sqrt(2 * alpha * 0.3)]]), dt)
+    units = np.array([dt**2, dt, 1])
+    assert np.allclose(F[::2, ::2], F1, rtol=1e-10, atol=1e-12)
+    assert np.allclose(
+        Q[::2, ::2] / np.outer(units, units), Q1 / np.outer(units, units), rtol=1e-6, atol=1e-9
+    )
+
+    def kernel(s):
+        g = motion.singer(s, alpha, 0.3)[0][::2, 4]
+        return 0.6 * alpha * np.outer(g, g)
+
+    Q2, _ = quad_vec(kernel, 0, dt, epsrel=1e-10, norm="max")
+    assert np.allclose(Q[::2, ::2], Q2, rtol=1e-7, atol=0)
+    assert not Q[::2, 1::2].any()
+
+
+@given(exponent=st.floats(-8, -2), dt=st.floats(1e-3, 100))
+def test_the_printed_noise_is_the_limit_of_short_steps(exponent, dt):
+    alpha = 10**exponent / dt
+    _, exact = motion.singer(dt, alpha, 0.3)
+    _, printed = motion.singer(dt, alpha, 0.3, printed=True)
+    rows, columns = np.nonzero(printed)
+    ratio = exact[rows, columns] / printed[rows, columns]
+    assert np.allclose(ratio, 1, atol=2 * alpha * dt + 1e-12)
+
+
+def test_singer_ends_in_its_stationary_acceleration():
+    F, Q = motion.singer(1e4, 0.5, 0.3)
+    assert np.allclose(Q[4:, 4:], 0.3 * np.eye(2))
+    assert np.allclose(F[0, 4], 1e4 / 0.5 - 1 / 0.25)
+    assert np.isclose(motion.singer_variance(2.0, 0.1, 0.3), 4 / 3 * 1.1)
+
+
+@given(dt=st.floats(0, 50), longest=st.floats(0.05, 60))
+def test_in_steps_is_the_loop(dt, longest):
+    model = HELD["constant velocity"]
+    F, Q = motion.in_steps(dt, model, longest)
+    n = next(n for n in range(1, 10_000) if dt / n <= longest * (1 + 1e-9))
+    F1, Q1 = model(dt / n)
+    F2, Q2 = np.eye(4), np.zeros((4, 4))
+    for _ in range(n):
+        F2, Q2 = F1 @ F2, F1 @ Q2 @ F1.T + Q1
+    assert np.allclose(F, F2)
+    assert np.allclose(Q, Q2, rtol=1e-9, atol=1e-15)
+
+
+def test_in_steps_wants_a_length():
+    with pytest.raises(WildlabError, match="positive length of step"):
+        motion.in_steps(1.0, motion.rest, 0.0)

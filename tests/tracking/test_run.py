@@ -1,0 +1,265 @@
+"""Whole flights: the extended filter is the linear one on a linear model, and bad input is answered."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tests.tracking.poses import CAMERA, overflight
+from wildlab.errors import WildlabError
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.tracking import measurement as m
+from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.motion import constant_velocity, in_steps, random_walk, rest, singer
+from wildlab.tracking.run import Start, run_filter, start_from_first
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+R2 = 9.0 * np.eye(2)
+PIXELS = 4.0 * np.eye(2)
+START = Start(0.0, np.zeros(4), np.diag([100.0, 100.0, 25.0, 25.0]))
+
+
+def walk_of(n=40, seed=0):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.05, 2.0, n))
+    return times, np.cumsum(rng.normal(0, 2, (n, 2)), axis=0)
+
+
+def by_hand(times, z, R, motion=CV, start=START):
+    """The loop of H (3.5)."""
+    x, P, then = start.x, start.P, start.time
+    H = np.eye(2, len(x))
+    for t, one in zip(times, z, strict=True):
+        x, P = predict(x, P, *motion(t - then))
+        done = update(x, P, one, H, R)
+        x, P, then = done.x, done.P, t
+        yield done
+
+
+MODELS = {
+    "constant velocity": (CV, 4),
+    "singer": (partial(singer, alpha=0.2, variance=0.3), 6),
+    "random walk": (partial(random_walk, density=1.0), 2),
+    "rest": (rest, 2),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_on_a_linear_model_the_extended_filter_is_the_kalman_filter(name):
+    motion, n = MODELS[name]
+    times, z = walk_of()
+    start = Start(0.0, np.zeros(n), 50.0 * np.eye(n))
+    track = run_filter(times, z, R2, m.positions(), motion, start)
+    for row, done in enumerate(by_hand(times, z, R2, motion, start)):
+        assert np.allclose(track.x[row], done.x, rtol=1e-10, atol=1e-10)
+        assert np.allclose(track.P[row], done.P, rtol=1e-10, atol=1e-10)
+        assert np.allclose(track.innovation[row], done.innovation)
+        assert np.allclose(track.S[row], done.S)
+        assert np.isclose(track.nis[row], done.innovation @ np.linalg.solve(done.S, done.innovation))
+    assert track.used.all()
+
+
+def test_a_vessel_is_found_from_its_pixels_and_the_filter_knows_how_well():
+    nees = []
+    for seed in range(40):
+        times, uv, poses, truth = overflight(seed=seed)
+        ground = pixel_to_plane(CAMERA, uv, poses.p_nc, poses.R_nc, 0.0)
+        start = start_from_first(times, ground, 5.0, 3.0)
+        track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, start)
+        error = track.x[-1] - truth[-1]
+        nees.append(error @ np.linalg.solve(track.P[-1], error))
+        assert track.used.all()
+        assert np.isnan(track.nis[0])  # the first started the filter
+    assert 2.0 < np.mean(nees) < 5.0  # 4 in the mean; the truth manoeuvres less than the model allows
+
+
+@pytest.mark.parametrize("only", ["bearing", "range and bearing", "azimuth and elevation"])
+def test_other_sensors_find_it_too(only):
+    rng = np.random.default_rng(3)
+    times, uv, poses, truth = overflight(120)
+    ship = np.column_stack([400 * np.cos(0.06 * times), 400 * np.sin(0.06 * times)])
+    yaw = 0.05 * times
+    exact = m.predict_range_bearing(truth[:, :2], ship, yaw).z
+    if only == "azimuth and elevation":
+        sensor, R = m.azimuths_elevations(poses, 0.0), np.diag([0.05, 0.002]) ** 2
+        z = m.azimuth_elevation_of_pixel(CAMERA, uv)
+    elif only == "bearing":
+        sensor, R = m.bearings(ship, yaw), np.eye(1) * 0.01**2
+        z = m.wrap(exact[:, 1:] + rng.normal(0, 0.01, (120, 1)))
+    else:
+        sensor, R = m.ranges_bearings(ship, yaw), np.diag([5.0, 0.01]) ** 2
+        z = exact + rng.normal(0, [5.0, 0.01], (120, 2))
+        z[:, 1] += 2 * np.pi  # the same direction
+    start = Start(0.0, np.array([20.0, -15.0, 0, 0]), np.diag([400.0, 400, 9, 9]))
+    track = run_filter(times, z, R, sensor, partial(constant_velocity, sd_acceleration=0.01), start)
+    assert track.used.all()
+    error = track.x[-1] - truth[-1]
+    assert error @ np.linalg.solve(track.P[-1], error) < 18.5  # 99.9 % of chi-square with four degrees
+    assert np.hypot(*error[:2]) < 10
+
+
+def test_estimates_between_measurements_are_predictions_from_the_last():
+    times, z = walk_of()
+    asked = np.sort(np.concatenate([times, times[:-1] + 0.03, [times[-1] + 100, -1.0]]))
+    track = run_filter(times, z, R2, m.positions(), CV, START, output_times=asked)
+    plain = run_filter(times, z, R2, m.positions(), CV, START)
+    assert np.isnan(track.x[0]).all()  # before the start
+    at = np.searchsorted(asked, times)
+    assert np.allclose(track.x[at], plain.x)
+    F, Q = CV(0.03)
+    assert np.allclose(track.x[at[:-1] + 1], plain.x[:-1] @ F.T)
+    assert np.allclose(track.P[at[:-1] + 1], F @ plain.P[:-1] @ F.T + Q)
+    assert np.allclose(track.P[-1], np.add(*[CV(100)[0] @ plain.P[-1] @ CV(100)[0].T, CV(100)[1]]))
+
+
+def test_start_on_the_first_position_is_not_counted_twice():
+    times, z = walk_of()
+    z[0] = np.nan
+    start = start_from_first(times, z, 3.0, 2.0)
+    assert start.row == 1
+    assert np.array_equal(start.x, [*z[1], 0, 0])
+    assert np.array_equal(start.P, np.diag([9.0, 9, 4, 4]))
+    track = run_filter(times, z, R2, m.positions(), CV, start)
+    assert np.isnan(track.x[0]).all()
+    assert np.array_equal(track.x[1], start.x)
+    assert np.isnan(track.nis[:2]).all()
+    assert track.used.tolist() == [False] + [True] * (len(z) - 1)
+    six = start_from_first(times, z, 3.0, 2.0, n=6, sd_acceleration=0.5)
+    assert np.array_equal(np.diag(six.P), [9, 9, 4, 4, 0.25, 0.25])
+    with pytest.raises(WildlabError, match="no measurement gives a position to start from"):
+        start_from_first(times, z * np.nan, 3.0)
+
+
+def test_two_measurements_at_once_are_both_used():
+    times, z = walk_of(6)
+    times[3] = times[2]
+    track = run_filter(times, z, R2, m.positions(), CV, START)
+    assert track.used.all()
+    one = (z[2] + z[3]) / 2
+    mean = run_filter(
+        np.delete(times, 3), np.vstack([z[:2], one, z[4:]]),
+        np.stack([R2, R2, R2 / 2, R2, R2]), m.positions(), CV, START,
+    )  # fmt: skip
+    assert np.allclose(track.x[-1], mean.x[-1])
+    assert np.allclose(track.P[-1], mean.P[-1])
+    assert np.allclose(track.x[2], track.x[3])  # asked at the same time, the same answer
+
+
+def test_detections_that_are_missing_change_nothing():
+    times, z = walk_of()
+    motion = partial(in_steps, motion=partial(random_walk, density=1.0), longest=0.1)
+    start = Start(0.0, np.zeros(2), 25 * np.eye(2))
+    gaps = np.arange(len(z)) % 3 == 1
+    z[gaps, 0] = np.nan
+    noise = np.tile(R2, (len(z), 1, 1))
+    noise[5] = np.nan  # neither is a measurement of unknown covariance one
+    gaps[5] = True
+    track = run_filter(times, z, noise, m.positions(), motion, start)
+    kept = run_filter(times[~gaps], z[~gaps], R2, m.positions(), motion, start, output_times=times)
+    assert np.array_equal(track.used, ~gaps)
+    assert np.isnan(track.innovation[gaps]).all()
+    assert np.isnan(track.S[gaps]).all()
+    assert (track.chosen[gaps] == -1).all()
+    assert np.allclose(track.x, kept.x)
+    assert np.allclose(track.P, kept.P)
+
+
+def test_a_target_behind_the_camera_is_not_updated():
+    times, uv, poses, _ = overflight(20)
+    R_nc = poses.R_nc.copy()
+    R_nc[7] = R_nc[7] @ np.diag([1.0, -1.0, -1.0])  # looks up
+    turned = poses._replace(R_nc=R_nc)
+    p_nc = poses.p_nc.copy()
+    p_nc[9] = np.nan  # and here nobody knows where the camera is
+    start = Start(times[0], np.zeros(4), np.diag([25.0, 25, 4, 4]))
+    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, turned._replace(p_nc=p_nc), 0.0), CV, start)
+    assert not track.used[[7, 9]].any()
+    assert np.isnan(track.nis[[7, 9]]).all()
+    assert track.used.sum() == 18
+    assert np.isfinite(track.x).all()
+    for row in (7, 9):
+        F, Q = CV(times[row] - times[row - 1])
+        assert np.allclose(track.x[row], F @ track.x[row - 1])
+        assert np.allclose(track.P[row], F @ track.P[row - 1] @ F.T + Q)
+
+
+def test_the_gate_keeps_out_what_is_too_far():
+    times, z = walk_of(30)
+    z[12] += 200
+    open_to_all = run_filter(times, z, R2, m.positions(), CV, START)
+    track = run_filter(times, z, R2, m.positions(), CV, START, gate=0.99)
+    assert open_to_all.used.all()
+    assert not track.used[12]
+    assert track.nis[12] > 9.21  # 99 % of chi-square with two degrees
+    assert (track.nis[track.used] <= 9.2104).all()
+    assert np.isfinite(track.innovation[12]).all()
+    assert track.chosen[12] == 0
+
+
+def test_of_several_detections_the_nearest_is_used():
+    times, uv, poses, _ = overflight(30)
+    rng = np.random.default_rng(1)
+    both = np.stack([uv + rng.uniform(60, 200, (30, 1)) * rng.choice([-1, 1], (30, 2)), uv], axis=1)
+    order = rng.integers(0, 2, 30)
+    both = np.take_along_axis(both, np.stack([order, 1 - order], axis=1)[..., None], axis=1)
+    start = Start(times[0], np.zeros(4), np.diag([9.0, 9, 4, 4]))
+    sensor = m.pixels(CAMERA, poses, 0.0)
+    track = run_filter(times, both, PIXELS, sensor, CV, start)
+    assert np.array_equal(track.chosen, 1 - order)
+    alone = run_filter(times, uv, PIXELS, sensor, CV, start)
+    assert np.allclose(track.x, alone.x)
+    both[4] = np.nan
+    both[5, track.chosen[5]] = np.nan
+    gated = run_filter(times, both, PIXELS, sensor, CV, start, gate=0.999)
+    assert gated.chosen[4] == -1
+    assert gated.chosen[5] == 1 - track.chosen[5]
+    assert gated.used.sum() == 28
+
+
+def test_out_of_order_names_the_row():
+    times, z = walk_of(5)
+    late = times.copy()
+    late[3] = 0.0
+    with pytest.raises(WildlabError, match=r"times: row 3 at 0.0 s comes after row 2 at .*Sort the rows"):
+        run_filter(late, z, R2, m.positions(), CV, START)
+    with pytest.raises(WildlabError, match=r"output_times: row 1 at"):
+        run_filter(times, z, R2, m.positions(), CV, START, output_times=[2.0, 1.0])
+    late[3] = np.nan
+    with pytest.raises(WildlabError, match=r"row 3 has no time"):
+        run_filter(late, z, R2, m.positions(), CV, START)
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros((2, 2)), np.diag([1.0, 0.0]), np.diag([1.0, -1.0]), np.array([[1, 0.5], [0, 1.0]])]
+)
+def test_a_singular_noise_names_the_row(bad):
+    times, z = walk_of(5)
+    R = np.tile(R2, (5, 1, 1))
+    R[2] = bad
+    with pytest.raises(WildlabError, match=r"R of row 2 is not a covariance"):
+        run_filter(times, z, R, m.positions(), CV, START)
+
+
+def test_a_singular_innovation_covariance_names_the_row():
+    times, z = walk_of(5)
+    wrong = START._replace(P=-20.0 * np.eye(4))
+    with pytest.raises(WildlabError, match=r"innovation covariance S of row 0 is not positive definite"):
+        run_filter(times, z, R2, m.positions(), CV, wrong)
+
+
+def test_shapes_that_do_not_fit_are_named():
+    times, z = walk_of(5)
+    with pytest.raises(WildlabError, match="one row of measurements for each time"):
+        run_filter(times[:-1], z, R2, m.positions(), CV, START)
+    with pytest.raises(WildlabError, match=r"R has the shape \(3, 3\)"):
+        run_filter(times, z, np.eye(3), m.positions(), CV, START)
+
+
+@pytest.mark.slow
+def test_covariance_stays_one_over_a_hundred_thousand_updates():
+    rng = np.random.default_rng(0)
+    n = 100_000
+    times = np.cumsum(rng.uniform(0, 0.2, n))
+    track = run_filter(times, rng.normal(0, 1, (n, 2)), 1e-4 * R2, m.positions(), CV, START)
+    assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
+    assert np.linalg.eigvalsh(track.P).min() > 0

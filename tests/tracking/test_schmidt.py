@@ -1,0 +1,277 @@
+"""The Schmidt filter against the full augmented filter, and its soundness under any sequence of poses."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.tracking.poses import CAMERA, overflight
+from wildlab.errors import WildlabError
+from wildlab.tracking import measurement as m
+from wildlab.tracking import schmidt
+from wildlab.tracking.kalman import correct
+from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.schmidt import PoseUncertainty
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+PIXELS = 4.0 * np.eye(2)
+START = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 9.0, 9.0]))
+UNITS = np.repeat([1.0, 0.02], 3)
+SEEDS = st.integers(0, 2**31)
+
+
+def random_pose_covariance(rng, spread=0.0):
+    """Somewhere about (1 m, 0.02 rad), correlated; ``spread`` is the SD of the log of its size."""
+    A = rng.normal(size=(6, 9)) * UNITS[:, None] * np.exp(spread * rng.normal(size=(6, 1)))
+    return A @ A.T / 9
+
+
+def joint(P, C, P_pose):
+    return np.block([[P, C], [C.T, P_pose]])
+
+
+def lowest(P, C, P_pose):
+    """Least eigenvalue of the joint covariance, in units in which every variance is one."""
+    J = joint(P, C, P_pose)
+    sd = np.sqrt(np.diag(J))
+    return np.linalg.eigvalsh(J / np.outer(sd, sd))[0]
+
+
+def dense(times, uv, R, poses, covariances, start, motion, kept=lambda dt: 1.0, carry=None):
+    """A full filter of all ten states with the gain of the last six put to zero, written without blocks.
+
+    The pose's error has the transition ``phi`` and whatever process noise makes its covariance the next one.
+    """
+    x, P = np.zeros(10), joint(start.P, np.zeros((4, 6)), covariances[0])
+    x[:4] = start.x
+    then = start.time
+    for k, t in enumerate(times):
+        F, Q = np.eye(10), np.zeros((10, 10))
+        F[:4, :4], Q[:4, :4] = motion(t - then)
+        if carry is not None and k:
+            F[4:, 4:] = carry(covariances[k - 1], covariances[k])
+        F[4:, 4:] *= kept(t - then)
+        P = F @ P @ F.T + Q
+        P[4:, 4:] = covariances[k]  # process noise of the pose's error
+        x[:4] = F[:4, :4] @ x[:4]
+        one = m.CameraPoses(poses.p_nc[k], poses.R_nc[k], poses.R_bc)
+        seen = m.predict_pixel(CAMERA, x[:2], one, 0.0)
+        H = np.zeros((2, 10))
+        H[:, :2], H[:, 4:] = seen.H_position, seen.H_pose
+        S = H @ P @ H.T + R
+        K = P @ H.T @ np.linalg.inv(S)
+        K[4:] = 0
+        x = x + K @ (uv[k] - seen.z)
+        left = np.eye(10) - K @ H
+        P = left @ P @ left.T + K @ R @ K.T
+        then = t
+        yield x[:4], P, S
+
+
+def growing(n, seed=0):
+    """Pose covariances that only grow: with them the thesis's constant C is sound."""
+    rng = np.random.default_rng(seed)
+    return np.cumsum(
+        [random_pose_covariance(rng)] + [0.02 * random_pose_covariance(rng) for _ in range(n - 1)], 0
+    )
+
+
+@pytest.mark.parametrize("correlation_time", [np.inf, 8.0])
+def test_it_is_the_full_filter_with_no_gain_for_the_pose(correlation_time):
+    times, uv, poses, _ = overflight(50)
+    covariances = growing(50)
+    pose = PoseUncertainty(covariances, correlation_time)
+    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    full = dense(times, uv, PIXELS, poses, covariances, START, CV, lambda dt: np.exp(-dt / correlation_time))
+    for row, (x, P, S) in enumerate(full):
+        assert np.allclose(track.x[row], x, rtol=1e-9, atol=1e-9)
+        assert np.allclose(track.P[row], P[:4, :4], rtol=1e-8, atol=1e-9)
+        assert np.allclose(track.S[row], S, rtol=1e-8)
+    assert not track.limited.any()
+
+
+def test_scaled_is_the_full_filter_whose_pose_error_keeps_its_size_in_standard_deviations():
+    times, uv, poses, _ = overflight(50)
+    rng = np.random.default_rng(4)
+    covariances = np.array([random_pose_covariance(rng, 0.3) for _ in times])
+
+    def root(A):  # through the eigenvectors of the product itself, not by way of a Cholesky factor
+        values, vectors = np.linalg.eig(A)
+        return np.real(vectors @ np.diag(np.sqrt(values)) @ np.linalg.inv(vectors))
+
+    pose = PoseUncertainty(covariances, change="scaled")
+    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    full = dense(
+        times, uv, PIXELS, poses, covariances, START, CV,
+        carry=lambda old, new: root(new @ np.linalg.inv(old)),
+    )  # fmt: skip
+    for row, (x, P, S) in enumerate(full):
+        assert np.allclose(track.x[row], x, rtol=1e-7, atol=1e-7)
+        assert np.allclose(track.P[row], P[:4, :4], rtol=1e-7, atol=1e-7)
+        assert np.allclose(track.S[row], S, rtol=1e-7)
+    assert not track.limited.any()
+
+
+@pytest.mark.parametrize("change", ["kept", "scaled"])
+def test_with_a_perfect_pose_it_is_the_extended_filter(change):
+    times, uv, poses, _ = overflight(50)
+    sensor = m.pixels(CAMERA, poses, 0.0)
+    plain = run_filter(times, uv, PIXELS, sensor, CV, START)
+    pose = PoseUncertainty(np.zeros((50, 6, 6)), change=change)
+    track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=pose)
+    for ours, theirs in zip(track, plain, strict=True):
+        assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12, equal_nan=True)
+
+
+@given(seed=SEEDS)
+def test_update_is_the_print(seed):
+    """H (7.34), (7.35) and (7.38) term by term."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(10, 12))
+    J = A @ A.T
+    P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
+    H, Ho, R, v = rng.normal(size=(2, 4)), rng.normal(size=(2, 6)), np.diag([1.0, 2.0]), rng.normal(size=2)
+    done = schmidt.update_schmidt(np.zeros(4), P, C, Po, v, H, Ho, R)
+    S = H @ P @ H.T + H @ C @ Ho.T + Ho @ C.T @ H.T + Ho @ Po @ Ho.T + R
+    K = (P @ H.T + C @ Ho.T) @ np.linalg.inv(S)
+    left = np.eye(4) - K @ H
+    P_new = (
+        left @ P @ left.T - C @ Ho.T @ K.T + K @ H @ C @ Ho.T @ K.T - K @ Ho @ C.T
+        + K @ Ho @ C.T @ H.T @ K.T + K @ Ho @ Po @ Ho.T @ K.T + K @ R @ K.T
+    )  # fmt: skip
+    scale = np.abs(J).max()
+    assert np.allclose(done.S, S)
+    assert np.allclose(done.gain, K)
+    assert np.allclose(done.x, K @ v)
+    assert np.allclose(done.P, P_new, atol=1e-10 * scale)
+    assert np.allclose(done.C, C - K @ (H @ C + Ho @ Po), atol=1e-10 * scale)
+
+
+def test_without_memory_it_is_the_inflated_filter():
+    """H (7.40)-(7.41): the pose's covariance counts as more noise."""
+    times, uv, poses, _ = overflight(40)
+    covariances = growing(40)
+    sensor = m.pixels(CAMERA, poses, 0.0)
+    track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=PoseUncertainty(covariances, 0.0))
+    x, P, then = START.x, START.P, 0.0
+    for row, t in enumerate(times):
+        F, Q = CV(t - then)
+        x, P = F @ x, F @ P @ F.T + Q
+        seen = sensor.predict(row, x[:2])
+        H = m.on_state(seen.H_position, 4)
+        noise = PIXELS + seen.H_pose @ covariances[row] @ seen.H_pose.T
+        done = correct(x, P, uv[row] - seen.z, H, noise)
+        x, P, then = done.x, done.P, t
+        assert np.allclose(track.x[row], x)
+        assert np.allclose(track.P[row], P)
+        assert np.allclose(track.S[row], done.S)
+
+
+def test_a_standing_error_of_the_pose_is_owned_up_to():
+    """One bias of the attitude per flight: the plain filter is sure of itself and wrong, this one is not."""
+    covariance = np.diag(UNITS / 2) ** 2
+    plain, aware = [], []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        times, uv, poses, truth = overflight(60, seed)
+        error = rng.multivariate_normal(np.zeros(6), covariance)
+        # The true pose is off by the error from the one that the filter is told.
+        seen = [
+            m.predict_pixel(
+                CAMERA, truth[k, :2], m.CameraPoses(poses.p_nc[k], poses.R_nc[k], poses.R_bc), 0.0
+            )
+            for k in range(60)
+        ]
+        shifted = uv + np.array([one.H_pose @ error for one in seen])
+        for pose, nees in ((None, plain), (PoseUncertainty(np.tile(covariance, (60, 1, 1))), aware)):
+            track = run_filter(times, shifted, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+            off = (track.x[-1] - truth[-1])[:2]
+            nees.append(off @ np.linalg.solve(track.P[-1][:2, :2], off))
+    assert np.mean(plain) > 10
+    assert 1.4 < np.mean(aware) < 2.6  # 2 in the mean; 60 flights scatter by 0.26
+
+
+@given(seed=SEEDS, shrink=st.floats(1e-6, 1))
+def test_a_cross_covariance_is_shortened_only_where_it_must_be(seed, shrink):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(10, 14)) * np.concatenate([np.array([5, 5, 1, 1.0]), UNITS])[:, None]
+    J = A @ A.T
+    P, C, Po = J[:4, :4], J[:4, 4:], J[4:, 4:]
+    same, limited = schmidt.limit_cross(C, P, Po)
+    assert same is C
+    assert not limited
+    mixed = np.diag(rng.uniform(shrink, 1, 6) ** 0.5)
+    after = mixed @ Po @ mixed
+    sound = lowest(P, C, after) > 1e-9
+    new, limited = schmidt.limit_cross(C, P, after)
+    assert limited == (not sound)
+    assert lowest(P, new, after) > -1e-12
+    again, limited = schmidt.limit_cross(new, P, after)
+    assert np.allclose(again, new, rtol=1e-8)
+
+
+@given(seed=SEEDS)
+def test_scaling_carries_the_pose_covariance_and_comes_back(seed):
+    rng = np.random.default_rng(seed)
+    before, after = random_pose_covariance(rng, 1.0), random_pose_covariance(rng, 1.0)
+    # With C = P^o the target is the pose's error itself, and C Phi' its covariance with the next one.
+    phi = schmidt.scale_cross(np.eye(6), before, after).T
+    unit = np.outer(UNITS, UNITS)
+    assert np.allclose(phi @ before @ phi.T / unit, after / unit, rtol=1e-7, atol=1e-9)
+    C = rng.normal(size=(4, 6)) * UNITS
+    back = schmidt.scale_cross(schmidt.scale_cross(C, before, after), after, before)
+    assert np.allclose(back / UNITS, C / UNITS, rtol=1e-7, atol=1e-7)
+    assert np.allclose(schmidt.scale_cross(C, before, before) / UNITS, C / UNITS)
+    degrees = np.diag(np.repeat([1.0, np.degrees(1)], 3))
+    other = schmidt.scale_cross(C @ degrees, degrees @ before @ degrees, degrees @ after @ degrees)
+    assert np.allclose(other / UNITS, schmidt.scale_cross(C, before, after) @ degrees / UNITS, rtol=1e-7)
+
+
+def test_directions_without_variance_carry_no_covariance():
+    rng = np.random.default_rng(0)
+    Po = random_pose_covariance(rng)
+    Po[2] = Po[:, 2] = 0.0
+    C = 0.1 * rng.normal(size=(4, 6)) * UNITS
+    new, limited = schmidt.limit_cross(C, 25 * np.eye(4), Po)
+    assert limited
+    assert not new[:, 2].any()
+    assert np.allclose(new[:, [0, 1, 3, 4, 5]], C[:, [0, 1, 3, 4, 5]])
+
+
+def hard_flight(n, seed=0):
+    """Pose covariances of any size and shape from one frame to the next, as no navigation filter has them."""
+    rng = np.random.default_rng(seed)
+    period = 200
+    _, uv, poses, _ = overflight(period, sd_pixel=1.0)
+    rows = np.arange(n) % period
+    repeated = m.CameraPoses(poses.p_nc[rows], poses.R_nc[rows], poses.R_bc)
+    steps = rng.uniform(0, 0.3, n)
+    A = rng.normal(size=(n, 6, 7)) * UNITS[:, None] * np.exp(2.0 * rng.normal(size=(n, 6, 1)))
+    covariances = A @ np.swapaxes(A, 1, 2) / 7
+    return np.cumsum(steps), uv[rows], repeated, covariances
+
+
+def test_the_thesis_form_alone_does_not_stay_sound():
+    """Why C is limited: left as it is, the covariance of the target turns negative within a few frames."""
+    times, uv, poses, covariances = hard_flight(300)
+    with pytest.raises((AssertionError, WildlabError, np.linalg.LinAlgError)):
+        for _, P, _ in dense(times, uv, PIXELS, poses, covariances, START, CV):
+            assert np.linalg.eigvalsh(P[:4, :4])[0] > 0
+
+
+@pytest.mark.parametrize("change", ["kept", "scaled"])
+@pytest.mark.parametrize("n", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_covariance_stays_one_with_a_new_pose_in_every_frame(change, n):
+    times, uv, poses, covariances = hard_flight(n)
+    pose = PoseUncertainty(covariances, change=change)
+    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    assert track.used.mean() > 0.9
+    assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
+    sd = np.sqrt(np.diagonal(track.P, axis1=1, axis2=2))
+    assert np.linalg.eigvalsh(track.P / (sd[:, :, None] * sd[:, None, :])).min() > 0
+    assert (np.linalg.eigvalsh(track.S[track.used]) > 0).all()
+    if change == "kept":
+        assert track.limited.any()

@@ -1,0 +1,105 @@
+"""Which detection belongs to a target: validation region and nearest neighbour, H 3.3, 6.2.3, 6.3.2."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.tracking.measurement import Sensor, difference, on_state
+
+
+class Nearest(NamedTuple):
+    """The detection with the smallest normalised innovation squared."""
+
+    detection: int
+    innovation: Array  # (m,)
+    S: Array  # (m, m)
+    nis: float
+
+
+def gate_threshold(probability: float, m: int) -> float:
+    """Largest NIS inside the validation region of a measurement with ``m`` elements, H (3.9)."""
+    return float(chi2.ppf(probability, m))
+
+
+def innovation_squared(innovation: ArrayLike, S: ArrayLike) -> Array:
+    """NIS (...), H (3.12), of innovations (..., m) with covariances (..., m, m)."""
+    v = np.asarray(innovation, float)
+    return np.asarray(
+        np.einsum("...i,...i->...", v, np.linalg.solve(np.asarray(S, float), v[..., None])[..., 0])
+    )
+
+
+def nearest_detection(
+    z: Array, predicted: Array, spread: Array, R: Array, angles: tuple[bool, ...], row: int
+) -> Nearest | None:
+    """The nearest of K detections (K, m) by NIS, or None where all are NaN.
+
+    Parameters
+    ----------
+    predicted, spread
+        (m,) and (m, m): the expected measurement and its covariance, without noise.
+    R
+        (K, m, m).
+    row
+        For the error: an ``S`` that is not positive definite names it.
+    """
+    there = np.flatnonzero(np.isfinite(z).all(axis=-1))
+    if not len(there):
+        return None
+    innovations = difference(z[there], predicted, angles)
+    S = spread + R[there]
+    try:
+        np.linalg.cholesky(S)
+    except np.linalg.LinAlgError as error:
+        raise WildlabError(
+            f"the innovation covariance S of row {row} is not positive definite",
+            "check the covariances of start, motion and measurements",
+            field="S",
+        ) from error
+    nis = innovation_squared(innovations, S)
+    best = int(np.argmin(nis))
+    return Nearest(int(there[best]), innovations[best], S[best], float(nis[best]))
+
+
+def distances(
+    sensor: Sensor, row: int, x: ArrayLike, P: ArrayLike, detections: ArrayLike, R: ArrayLike
+) -> Array:
+    """NIS of K detections (K, m) against a track, NaN where the sensor cannot see it or a detection is NaN.
+
+    The sensor need not be the one the track is filtered with: H 6.3.2 gates by azimuth and elevation what is
+    filtered by pixel.
+
+    Parameters
+    ----------
+    sensor, row
+        The sensor and its row.
+    x, P
+        Predicted state (n,) and covariance (n, n).
+    R
+        (m, m) or (K, m, m).
+    """
+    x, P = np.asarray(x, float), np.asarray(P, float)
+    z = np.asarray(detections, float)
+    expected = sensor.predict(row, x[:2])
+    H = on_state(expected.H_position, len(x))
+    S = np.broadcast_to(H @ P @ H.T + np.asarray(R, float), (*z.shape, z.shape[-1]))
+    nis = np.full(len(z), np.nan)
+    whole = np.isfinite(z).all(axis=-1) & np.isfinite(S).all(axis=(-1, -2)) & np.isfinite(expected.z).all()
+    nis[whole] = innovation_squared(difference(z[whole], expected.z, sensor.angles), S[whole])
+    return nis
+
+
+def nearest_within(nis: ArrayLike, probability: float | None, m: int) -> NDArray[np.int64]:
+    """Index of the smallest NIS (..., K) along the last axis, -1 where none lies within the gate."""
+    d = np.asarray(nis, float)
+    d = np.where(np.isnan(d), np.inf, d)
+    best = np.argmin(d, axis=-1)
+    least = np.take_along_axis(d, best[..., None], axis=-1)[..., 0]
+    limit = np.finfo(float).max if probability is None else gate_threshold(probability, m)
+    return np.asarray(np.where(least <= limit, best, -1))

@@ -1,0 +1,327 @@
+"""A whole flight through a filter: arrays of measurements in, estimates at the requested times out.
+
+The same few arguments for every filter: times, measurements, their covariances, a `Sensor` that knows the
+poses, a motion model, a `Start`. Nothing is kept between calls. The filter steps to every row, also to rows
+without a usable measurement; see `wildlab.tracking.motion` for where that matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.tracking import schmidt
+from wildlab.tracking.association import nearest_detection
+from wildlab.tracking.kalman import correct, predict
+from wildlab.tracking.measurement import Sensor, on_state
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.schmidt import PoseUncertainty
+
+
+class Start(NamedTuple):
+    """What is known before the filter runs.
+
+    Attributes
+    ----------
+    time
+        s; earlier measurements are not used.
+    x, P
+        (n,) and (n, n), in the order of the motion model.
+    row
+        The measurement that ``x`` was made from, which is not used again, nor any before it. -1: none.
+    """
+
+    time: float
+    x: Array
+    P: Array
+    row: int = -1
+
+
+class Track(NamedTuple):
+    """What a filter made of N measurements, asked at M times.
+
+    Attributes
+    ----------
+    times, x, P
+        (M,), (M, n), (M, n, n): estimates with all measurements up to and including that time; NaN before
+        the start.
+    innovation, S, nis
+        (N, m), (N, m, m), (N,): of each row's measurement, whether it passed the gate or not; NaN where
+        there was nothing to compare (no detection, target not in front of the camera, before the start).
+    used
+        (N,) bool: the measurement changed the estimate, or started it. An unused row with a NIS was
+        left out by the gate, one without had nothing usable.
+    chosen
+        (N,) index of the detection that was nearest, -1 where there was none to choose from.
+    limited
+        (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`schmidt.limit_cross`).
+    """
+
+    times: Array
+    x: Array
+    P: Array
+    innovation: Array
+    S: Array
+    nis: Array
+    used: NDArray[np.bool_]
+    chosen: NDArray[np.int64]
+    limited: NDArray[np.bool_]
+
+
+class Inputs(NamedTuple):
+    """Checked measurements: K detections in each of N rows."""
+
+    times: Array  # (N,)
+    z: Array  # (N, K, m)
+    R: Array  # (N, K, m, m)
+    output_times: Array  # (M,)
+    threshold: float  # largest NIS that is let in
+
+
+#: State of a filter: when, estimate, covariance.
+State = tuple[float, Array, Array]
+
+
+def start_from_first(
+    times: ArrayLike,
+    positions: ArrayLike,
+    sd_position: float,
+    sd_velocity: float = 0.0,
+    n: int = 4,
+    **more: float,
+) -> Start:
+    """Start on the first georeferenced position, with zero speed (H 6.2.4, 6.3.3).
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    positions
+        (N, 2) or (N, 3): north, east; the first row without NaN is taken.
+    sd_position, sd_velocity
+        m and m/s, the same north and east.
+    n
+        Number of states: 2, 4 or 6; with six, give ``sd_acceleration`` (m/s^2) too.
+
+    Raises
+    ------
+    WildlabError
+        Without any position.
+    """
+    t, p = np.asarray(times, float), np.asarray(positions, float)[:, :2]
+    there = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(t))
+    if not len(there):
+        raise WildlabError(
+            "no measurement gives a position to start from",
+            "check poses and plane, or give the filter a start of its own",
+            field="positions",
+        )
+    row = int(there[0])
+    sd = np.repeat([sd_position, sd_velocity, more.get("sd_acceleration", 0.0)], 2)[:n]
+    x = np.zeros(n)
+    x[:2] = p[row]
+    return Start(float(t[row]), x, np.diag(sd**2), row)
+
+
+def run_filter(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    sensor: Sensor,
+    motion: Motion,
+    start: Start,
+    *,
+    pose: PoseUncertainty | None = None,
+    gate: float | None = None,
+    output_times: ArrayLike | None = None,
+) -> Track:
+    """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
+
+    H (3.5), (3.7), 6.2, 6.3, 7.4.2.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order. Equal times are two measurements at once, and both are used.
+    measurements
+        (N, m); or (N, K, m) with up to K detections in a frame, NaN where there are fewer: the nearest by
+        NIS is used. Rows of NaN are frames without a detection.
+    R
+        (m, m), (N, m, m) or (N, K, m, m).
+    sensor
+        From `wildlab.tracking.measurement`, with a pose for each row.
+    motion
+        From `wildlab.tracking.motion`.
+    start
+        See `Start`, `start_from_first`.
+    pose
+        Uncertainty of the poses: the Schmidt filter, H (7.32)-(7.38). None: poses are taken as true.
+    gate
+        Probability with which a target's own measurement lies in its validation region, H (3.9); what falls
+        outside is not used. None lets everything in.
+    output_times
+        (M,) s, in order; the measurements' own when not given.
+
+    Raises
+    ------
+    WildlabError
+        Naming the row: times out of order, an ``R`` or an ``S`` that is not positive definite.
+    """
+    given = checked(times, measurements, R, gate, output_times)
+    n = len(start.x)
+    C = np.zeros((n, 6))
+    before: Array | None = None  # the pose covariance that C belongs to
+
+    def step(row: int, state: State, track: Track) -> State:
+        nonlocal C, before
+        then, x, P = state
+        dt = given.times[row] - then
+        F, Q = motion(dt)
+        x, P = predict(x, P, F, Q)
+        if pose is not None:
+            C = F @ C * schmidt.fade(dt, pose.correlation_time)
+        expected = sensor.predict(row, x[:2])
+        P_pose = np.zeros((6, 6)) if pose is None else np.asarray(pose.covariance[row], float)
+        H = on_state(expected.H_position, n)
+        if not (np.isfinite(expected.z).all() and np.isfinite(H).all() and np.isfinite(P_pose).all()):
+            return given.times[row], x, P
+        if pose is None:
+            spread = H @ P @ H.T
+        else:
+            if pose.change == "scaled" and before is not None:
+                C = schmidt.scale_cross(C, before, P_pose)
+            C, track.limited[row] = schmidt.limit_cross(C, P, P_pose)
+            before = P_pose
+            spread = schmidt.spread_of_prediction(P, C, P_pose, H, expected.H_pose)
+        with np.errstate(invalid="ignore"):
+            best = nearest_detection(given.z[row], expected.z, spread, given.R[row], sensor.angles, row)
+        if best is None:
+            return given.times[row], x, P
+        note(track, row, best.innovation, best.S, best.nis, best.detection, best.nis <= given.threshold)
+        if not track.used[row]:
+            return given.times[row], x, P
+        noise = given.R[row, best.detection]
+        if pose is None:
+            done = correct(x, P, best.innovation, H, noise)
+            return given.times[row], done.x, done.P
+        update = schmidt.update_schmidt(x, P, C, P_pose, best.innovation, H, expected.H_pose, noise)
+        C = update.C
+        return given.times[row], update.x, update.P
+
+    return walk(given, start, motion, step)
+
+
+def note(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
+    """Write down what a measurement was judged by."""
+    track.innovation[row], track.S[row], track.nis[row] = innovation, S, nis
+    track.chosen[row], track.used[row] = chosen, used
+
+
+def walk(given: Inputs, start: Start, motion: Motion, step: Callable[[int, State, Track], State]) -> Track:
+    """Take a filter's ``step`` through the rows in order, and predict to the requested times between."""
+    N, _, m = given.z.shape
+    M, n = len(given.output_times), len(start.x)
+    track = Track(
+        given.output_times,
+        np.full((M, n), np.nan),
+        np.full((M, n, n), np.nan),
+        np.full((N, m), np.nan),
+        np.full((N, m, m), np.nan),
+        np.full(N, np.nan),
+        np.zeros(N, bool),
+        np.full(N, -1),
+        np.zeros(N, bool),
+    )
+    state: State = (float(start.time), np.asarray(start.x, float), np.asarray(start.P, float))
+    if start.row >= 0:
+        track.used[start.row] = True
+        track.chosen[start.row] = 0
+    first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
+    out = int(np.searchsorted(given.output_times, start.time, "left"))
+
+    def write_until(time: float, out: int) -> int:
+        while out < M and given.output_times[out] < time:
+            F, Q = motion(given.output_times[out] - state[0])
+            track.x[out], track.P[out] = predict(state[1], state[2], F, Q)
+            out += 1
+        return out
+
+    for row in range(first, N):
+        out = write_until(given.times[row], out)
+        state = step(row, state, track)
+    write_until(np.inf, out)
+    return track
+
+
+def checked(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    gate: float | None,
+    output_times: ArrayLike | None,
+) -> Inputs:
+    """Inputs of a run with all their axes, or a `WildlabError` that names the row."""
+    t, z = np.asarray(times, float), np.asarray(measurements, float)
+    if z.ndim == 2:
+        z = z[:, None, :]
+    if t.ndim != 1 or z.ndim != 3 or len(z) != len(t):
+        raise WildlabError(
+            f"{t.shape} times and {np.shape(measurements)} measurements",
+            "give one row of measurements for each time",
+            field="measurements",
+        )
+    _check_order(t, "times")
+    out = t if output_times is None else np.asarray(output_times, float)
+    _check_order(out, "output_times")
+    N, K, m = z.shape
+    R = np.asarray(R, float)
+    R = R[:, None] if R.ndim == 3 else R
+    if R.shape not in ((m, m), (N, 1, m, m), (N, K, m, m)):
+        raise WildlabError(
+            f"R has the shape {R.shape} for {N} rows of {K} measurements with {m} elements",
+            "give (m, m), (N, m, m) or (N, K, m, m)",
+            field="R",
+        )
+    noise = np.broadcast_to(R, (N, K, m, m))
+    known = np.isfinite(noise).all(axis=(-1, -2)) & np.isfinite(z).all(axis=-1)
+    flat = noise[known]
+    lowest = np.linalg.eigvalsh(flat)
+    bad = (lowest[:, 0] <= 1e-14 * np.abs(lowest[:, -1])) | (
+        np.abs(flat - np.swapaxes(flat, -1, -2)).max(axis=(-1, -2)) > 1e-9 * np.abs(lowest[:, -1])
+    )
+    if bad.any():
+        row = int(np.flatnonzero(known.any(axis=1) & _rows_of(known, bad))[0])
+        raise WildlabError(
+            f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
+            "give every measurement a noise in all its elements",
+            field="R",
+        )
+    usable = np.where(known[..., None], z, np.nan)  # without a covariance a measurement is none
+    threshold = np.inf if gate is None else float(chi2.ppf(gate, m))
+    return Inputs(t, usable, noise, out, threshold)
+
+
+def _rows_of(known: NDArray[np.bool_], bad: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    marked = np.zeros(known.shape, bool)
+    marked[known] = bad
+    return np.asarray(marked.any(axis=1))
+
+
+def _check_order(times: Array, field: str) -> None:
+    lost = np.flatnonzero(~np.isfinite(times))
+    if len(lost):
+        raise WildlabError(f"row {lost[0]} has no time ({times[lost[0]]})", "leave the row out", field=field)
+    back = np.flatnonzero(np.diff(times) < 0)
+    if len(back):
+        row = int(back[0]) + 1
+        raise WildlabError(
+            f"row {row} at {times[row]} s comes after row {row - 1} at {times[row - 1]} s",
+            "sort the rows by time, with all that belongs to them",
+            field=field,
+        )
