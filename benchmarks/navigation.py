@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.timing import best_of
 from wildlab.geometry.frames import matrix_to_quaternion
+from wildlab.geometry.gravity import local_earth
 from wildlab.navigation import mekf, observer, plain, plain_observer
 from wildlab.navigation.aiding import Aiding, positions
-from wildlab.navigation.gravity import local_earth
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.noise import STIM300
 from wildlab.navigation.timeline import Imu
@@ -51,7 +51,7 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     def plain_mekf() -> object:
         ready = mekf.prepare(short, start, STIM300, aiding, few, **options)
         line, measured = ready.line, ready.measured
-        return plain.mekf(line, measured, earth.as_array(), ready.noise, *start[1:], ready.gate, 5.0)
+        return plain.mekf(line, measured, earth.as_array(), *ready[5:10], ready.gate, 5.0)
 
     def plain_observe() -> object:
         ready = observer.prepare(short, start, ORIGIN, [*aiding, second], observer.Gains(), few, 0.1)

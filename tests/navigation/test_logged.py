@@ -15,8 +15,8 @@ from wildlab.geometry.frames import (
     matrix_to_rotation_vector,
     quaternion_to_matrix,
 )  # fmt: skip
+from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import positions, velocities
-from wildlab.navigation.gravity import local_earth
 from wildlab.navigation.mekf import REJECTED, log_likelihood, run_mekf
 from wildlab.navigation.noise import ImuNoise, with_axis_errors
 from wildlab.navigation.observer import field_reference, run_observer

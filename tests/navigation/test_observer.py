@@ -11,9 +11,9 @@ from wildlab.geometry.frames import (
     matrix_to_rotation_vector,
     quaternion_to_matrix,
 )
+from wildlab.geometry.gravity import local_earth, normal_gravity
 from wildlab.navigation import plain_observer
 from wildlab.navigation.aiding import velocities
-from wildlab.navigation.gravity import local_earth, normal_gravity
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.observer import (
     Gains,

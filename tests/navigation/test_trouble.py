@@ -7,7 +7,7 @@ import pytest
 
 from tests.navigation.flights import GRAVITY, LEVERS, NOISE, attitude, begin, fixes, fly, spoil
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
-from wildlab.navigation.gravity import flat_earth
+from wildlab.geometry.gravity import flat_earth
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.timeline import Imu
 from wildlab.navigation.trouble import signs_of_trouble

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import geodetic_to_ecef, matrix_to_quaternion, quaternion_to_matrix
+from wildlab.geometry.gravity import flat_earth, local_earth, normal_gravity
 from wildlab.navigation.aiding import positions, velocities
-from wildlab.navigation.gravity import flat_earth, local_earth, normal_gravity
 from wildlab.navigation.mekf import Start, run_mekf
 from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.observer import earth_axes

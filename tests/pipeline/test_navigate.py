@@ -18,17 +18,6 @@ from wildlab.pipeline.navigate import imu_noise, navigate_mekf, navigate_observe
 from wildlab.simulation.parameters import load_twin, twin_names
 from wildlab.simulation.twins import simulate_twin
 
-#: The figures of the twin's own inertial sensor (H appendix A.5).
-SENSOR = ImuPart(
-    name="ADIS16490",
-    velocity_random_walk_m_s_sqrt_h=0.008,
-    angle_random_walk_deg_sqrt_h=0.09,
-    accelerometer_bias_m_s2=3.5e-5,
-    accelerometer_bias_time_s=300.0,
-    gyro_bias_deg_h=1.8,
-    gyro_bias_time_s=300.0,
-)
-
 
 @pytest.fixture(scope="module")
 def flight() -> Flight:
@@ -40,8 +29,7 @@ def flight() -> Flight:
         if name != "truth"
     }
     early["detections"] = whole.detections[whole.detections["frame_id"].isin(early["frames"]["frame_id"])]
-    manifest = whole.manifest.model_copy(update={"imu": SENSOR})
-    return Flight(manifest, whole.nav, {**early, "truth": whole.truth})
+    return Flight(whole.manifest, whole.nav, {**early, "truth": whole.truth})
 
 
 def errors(flight: Flight, nav: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:

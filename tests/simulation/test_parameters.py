@@ -124,8 +124,8 @@ def test_one_part_can_be_put_in_the_place_of_another(tmp_path):
     ("part", "figures"),
     [
         # H tables A.5 and A.6, typed again; g is 9.80665 m/s^2.
-        ("imu-adis16490", (0.008, 0.09, 3.6e-6 * 9.80665, 1.8, 3.5e-3 * 9.80665, 180.0, 0.254951)),
-        ("imu-stim300", (0.07, 0.15, 50e-6 * 9.80665, 0.3, 0.75e-3 * 9.80665, 10.0, 0.058431)),
+        ("imu-adis16490", (0.008, 0.09, 3.6e-6 * 9.80665, 1.8, 3.5e-3 * 9.80665, 180.0, 0.25, 0.05)),
+        ("imu-stim300", (0.07, 0.15, 50e-6 * 9.80665, 0.3, 0.75e-3 * 9.80665, 10.0, 0.0572958, 0.0114592)),
     ],
 )
 def test_the_manifest_states_the_data_sheet_of_the_sensor(tmp_path, part, figures):
@@ -139,6 +139,7 @@ def test_the_manifest_states_the_data_sheet_of_the_sensor(tmp_path, part, figure
         stated.accelerometer_turn_on_m_s2,
         stated.gyro_turn_on_deg_h,
         stated.misalignment_deg,
+        stated.axis_misalignment_deg,
     ) == pytest.approx(figures, rel=1e-5)
     assert stated.accelerometer_bias_time_s == stated.gyro_bias_time_s == 300.0
     assert manifest.gnss.lever_arm_m == (0.5, 0.0, -0.1)

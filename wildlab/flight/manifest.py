@@ -122,12 +122,16 @@ class GnssPart(Strict):
     """The receiver: `lever_arm_m` from b to its antenna, in b (forward, right, down).
 
     `latency_s`: how long after the instant it is of a fix is stamped. It belongs to the fix, the offset in
-    `[clocks]` to the clock; `wildlab.flight.sync.gnss_times` applies both.
+    `[clocks]` to the clock; `wildlab.flight.sync.gnss_times` applies both. `wander_...`: the part of a
+    position's standard deviation that fixes share for as long as `wander_time_s` (multipath, for instance).
     """
 
     name: str = ""
     lever_arm_m: Vector = (0.0, 0.0, 0.0)
     latency_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    wander_horizontal_m: Spread | None = None
+    wander_vertical_m: Spread | None = None
+    wander_time_s: Spread | None = None
     note: str = ""
 
 
@@ -136,8 +140,9 @@ class ImuPart(Strict):
 
     White noise as random walks; the slow part of a bias as its standard deviation, with the time over which
     it changes. The rest stays as it is from switching on to switching off: `..._turn_on_...` is the standard
-    deviation of the bias found then, `misalignment_deg` how far an axis may point from where it should, and
-    `scale_error_percent` how far a factor may be off.
+    deviation of the bias found then; the others are limits: `misalignment_deg` of how far all axes together
+    are turned about each axis of b, `axis_misalignment_deg` of how far single ones lean on top of that, and
+    `scale_error_percent` of how far a factor is off.
     """
 
     name: str = ""
@@ -150,6 +155,7 @@ class ImuPart(Strict):
     accelerometer_turn_on_m_s2: Spread | None = None
     gyro_turn_on_deg_h: Spread | None = None
     misalignment_deg: Annotated[float, Field(gt=0, le=45)] | None = None
+    axis_misalignment_deg: Annotated[float, Field(gt=0, le=45)] | None = None
     scale_error_percent: Annotated[float, Field(gt=0, le=50)] | None = None
     note: str = ""
 

@@ -19,14 +19,26 @@ from wildlab.navigation.kernels import Integers
 from wildlab.navigation.timeline import Measurements, Timeline
 
 
+class Wander(NamedTuple):
+    """An error that a source's measurements share for a while: of first order, with a standard deviation per
+    axis of n, (3,), and a correlation time, s."""
+
+    sd: Array
+    time: float
+
+
 class Aiding(NamedTuple):
-    """Measurements of one kind from one source: (N,) times, (N, 3) values, variances and lever arms."""
+    """Measurements of one kind from one source: (N,) times, (N, 3) values, variances and lever arms.
+
+    ``wander`` comes on top of the variances, which are of what differs from one measurement to the next.
+    """
 
     kind: int
     times: Array
     value: Array
     variance: Array
     lever: Array
+    wander: Wander | None = None
 
 
 def _aiding(
@@ -60,6 +72,8 @@ def positions(
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
     latency: float = 0.0,
+    wander_sd: ArrayLike = 0.0,
+    wander_time: float = np.inf,
 ) -> Aiding:
     """Positions of a GNSS antenna, H (7.25).
 
@@ -75,9 +89,14 @@ def positions(
         Of the antenna in b, (3,) m.
     latency
         How long before its stamp a fix was valid, s.
+    wander_sd, wander_time
+        Of an error on top of ``sd`` that stays much the same from fix to fix (multipath, for instance):
+        standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates it.
     """
     t = np.asarray(times, float) - latency
-    return _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
+    found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
+    slow = np.array(np.broadcast_to(np.asarray(wander_sd, float), 3))
+    return found._replace(wander=Wander(slow, float(wander_time)) if slow.any() else None)
 
 
 def velocities(
@@ -116,8 +135,13 @@ def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: f
     return _aiding(kernels.HEADING, times, field_b, spread, [declination, 0.0, 0.0], "magnetometer headings")
 
 
-def gather(aiding: Sequence[Aiding], line: Timeline) -> tuple[Measurements, Integers, list[int]]:
-    """Measurements in order of time, the index of the aiding of each, and how many of each lie outside."""
+def gather(
+    aiding: Sequence[Aiding], line: Timeline, first: int = 0
+) -> tuple[Measurements, Integers, list[int]]:
+    """Measurements in order of time, the index of the aiding of each, and how many of each lie outside.
+
+    The states of what wanders follow each other from index ``first`` on, in order of the aiding.
+    """
     low, high = line.times[0], line.times[-1]
     inside = [(source.times >= low) & (source.times <= high) for source in aiding]
     unused = [int(np.sum(~keep)) for keep in inside]
@@ -130,8 +154,10 @@ def gather(aiding: Sequence[Aiding], line: Timeline) -> tuple[Measurements, Inte
 
     kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
     source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
+    wanders = np.array([a.wander is not None for a in aiding] + [False])
+    states = np.where(wanders, first + 3 * (np.cumsum(wanders) - 1), -1).astype(np.int64)
     measured = Measurements(
         np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),
-        joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]),
+        joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]), states[source],
     )  # fmt: skip
     return measured, source, unused

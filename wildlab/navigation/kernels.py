@@ -21,6 +21,7 @@ from wildlab.geometry.frames import Array
 Integers = NDArray[np.int64]
 F = TypeVar("F", bound=Callable[..., Any])
 
+#: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; of positions that wander.
 N_ERRORS = 15
 #: Kinds of measurement.
 POSITION, VELOCITY, HEADING = 0, 1, 2
@@ -36,15 +37,9 @@ def compiled(function: F) -> F:
 def rotation_of(q: Array, R: Array) -> None:
     """H (7.13)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
-    R[0, 0] = w * w + x * x - y * y - z * z
-    R[0, 1] = 2 * (x * y - w * z)
-    R[0, 2] = 2 * (x * z + w * y)
-    R[1, 0] = 2 * (x * y + w * z)
-    R[1, 1] = w * w - x * x + y * y - z * z
-    R[1, 2] = 2 * (y * z - w * x)
-    R[2, 0] = 2 * (x * z - w * y)
-    R[2, 1] = 2 * (y * z + w * x)
-    R[2, 2] = w * w - x * x - y * y + z * z
+    R[0, 0], R[0, 1], R[0, 2] = w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)
+    R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)
+    R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z
 
 
 @compiled
@@ -123,19 +118,32 @@ def integrate(times: Array, f: Array, w: Array, earth: Array, start: Array, out:
 
 @compiled
 def transition_times(
-    A: Array, B: Array, C: Array, E: Array, dt: float, kept_a: float, kept_g: float, M: Array, out: Array
-) -> None:
-    """``out = (Phi M)'`` for the transition matrix whose blocks are given; M (15, 15)."""
+    A: Array, B: Array, C: Array, E: Array, f: Array, w: Array, dt: float, kept_a: float, kept_g: float,
+    M: Array, columns: int, axes: bool, slow: Array, out: Array,
+) -> None:  # fmt: skip
+    """``out = (Phi M)'`` for the first 15 rows of the transition matrix and so many columns of M (n, ...).
+
+    Errors of the axes, where there are any, act as biases of their size times what is measured (f, w).
+    ``slow`` (6, n) is scratch.
+    """
+    for r in range(3):
+        for j in range(columns):
+            slow[r, j], slow[3 + r, j] = M[9 + r, j], M[12 + r, j]
+        if axes:
+            a, g = N_ERRORS + 3 * r, N_ERRORS + 9 + 3 * r
+            for j in range(columns):
+                slow[r, j] += f[0] * M[a, j] + f[1] * M[a + 1, j] + f[2] * M[a + 2, j]
+                slow[3 + r, j] += w[0] * M[g, j] + w[1] * M[g + 1, j] + w[2] * M[g + 2, j]
     for i in range(3):
-        for j in range(N_ERRORS):
+        for j in range(columns):
             dv = (
                 A[i, 0] * M[6, j] + A[i, 1] * M[7, j] + A[i, 2] * M[8, j]
-                + B[i, 0] * M[9, j] + B[i, 1] * M[10, j] + B[i, 2] * M[11, j]
-                + C[i, 0] * M[12, j] + C[i, 1] * M[13, j] + C[i, 2] * M[14, j]
+                + B[i, 0] * slow[0, j] + B[i, 1] * slow[1, j] + B[i, 2] * slow[2, j]
+                + C[i, 0] * slow[3, j] + C[i, 1] * slow[4, j] + C[i, 2] * slow[5, j]
             )  # fmt: skip
             out[j, i] = M[i, j] + dt * (M[3 + i, j] + dv / 2)
             out[j, 3 + i] = M[3 + i, j] + dv
-            out[j, 6 + i] = E[i, 0] * M[6, j] + E[i, 1] * M[7, j] + E[i, 2] * M[8, j] - dt * M[12 + i, j]
+            out[j, 6 + i] = E[i, 0] * M[6, j] + E[i, 1] * M[7, j] + E[i, 2] * M[8, j] - dt * slow[3 + i, j]
             out[j, 9 + i] = kept_a * M[9 + i, j]
             out[j, 12 + i] = kept_g * M[12 + i, j]
 
@@ -162,6 +170,25 @@ def kept_and_driven(dt: float, density: float, time: float) -> tuple[float, floa
 
 
 @compiled
+def carry_extra(x: Array, P: Array, M: Array, dt: float, extra: Array) -> None:
+    """Errors beyond the fifteen over a step: of first order, or constant. M (n, 15) is ``P Phi'``.
+
+    ``extra`` (n - 15, 2) has their densities and times.
+    """
+    for k in range(len(extra)):
+        i, kept = N_ERRORS + k, 1.0
+        if not np.isinf(extra[k, 1]):
+            kept, drive = kept_and_driven(dt, extra[k, 0], extra[k, 1])
+            x[i + 1] *= kept
+            for j in range(N_ERRORS, P.shape[0]):
+                P[i, j] *= kept
+                P[j, i] *= kept
+            P[i, i] += drive
+        for j in range(N_ERRORS):
+            P[i, j] = P[j, i] = kept * M[i, j]
+
+
+@compiled
 def invert(S: Array, m: int, out: Array) -> None:
     """Inverse of a symmetric positive definite matrix of size 1 or 3."""
     if m == 1:
@@ -173,9 +200,7 @@ def invert(S: Array, m: int, out: Array) -> None:
             b, c = (a + 1) % 3, (a + 2) % 3
             out[a, i] = S[j, b] * S[k, c] - S[j, c] * S[k, b]
     determinant = S[0, 0] * out[0, 0] + S[0, 1] * out[1, 0] + S[0, 2] * out[2, 0]
-    for i in range(3):
-        for a in range(3):
-            out[i, a] /= determinant
+    out[:, :] /= determinant
 
 
 @compiled
@@ -220,33 +245,31 @@ def correct(
     K: Array, M: Array, work: Array,
 ) -> None:  # fmt: skip
     """Take in a measurement, Joseph form; the attitude error is then folded into the quaternion."""
-    dx = np.zeros(N_ERRORS)
-    for i in range(N_ERRORS):
+    n = P.shape[0]
+    dx = np.zeros(n)
+    for i in range(n):
         for a in range(m):
             K[i, a] = 0.0
             for b in range(m):
                 K[i, a] += PH[i, b] * S_inverse[b, a]
             dx[i] += K[i, a] * y[a]
     # (I - K H) P (I - K H)' + K R K', the two products one after the other, H P being PH'.
-    for i in range(N_ERRORS):
-        for j in range(N_ERRORS):
+    for i in range(n):
+        for j in range(n):
             M[i, j] = P[i, j]
             for a in range(m):
                 M[i, j] -= K[i, a] * PH[j, a]
-    for i in range(N_ERRORS):
+    for i in range(n):
         for a in range(m):
             PH[i, a] = -K[i, a] * variance[a]
-            for j in range(N_ERRORS):
+            for j in range(n):
                 PH[i, a] += M[i, j] * H[a, j]
-    for i in range(N_ERRORS):
-        for j in range(N_ERRORS):
+    for i in range(n):
+        for j in range(n):
             for a in range(m):
                 M[i, j] -= PH[i, a] * K[j, a]
-    for i in range(3):
-        x[i] += dx[i]
-        x[3 + i] += dx[3 + i]
-        x[10 + i] += dx[9 + i]
-        x[13 + i] += dx[12 + i]
+    x[:6] += dx[:6]
+    x[10:] += dx[9:]
     # Four times the modified Rodrigues parameters, H (7.16), as a quaternion.
     s = (dx[6] * dx[6] + dx[7] * dx[7] + dx[8] * dx[8]) / 16
     turn, q = work[0], work[1]
@@ -258,34 +281,32 @@ def correct(
     x[6:10] = q
     # What is left of the attitude error is now seen from the turned body: I - S(dx / 2) on both sides.
     h0, h1, h2 = dx[6] / 2, dx[7] / 2, dx[8] / 2
-    for j in range(N_ERRORS):
-        a0, a1, a2 = M[6, j], M[7, j], M[8, j]
-        M[6, j] = a0 + h2 * a1 - h1 * a2
-        M[7, j] = a1 + h0 * a2 - h2 * a0
-        M[8, j] = a2 + h1 * a0 - h0 * a1
-    for j in range(N_ERRORS):
-        a0, a1, a2 = M[j, 6], M[j, 7], M[j, 8]
-        M[j, 6] = a0 + h2 * a1 - h1 * a2
-        M[j, 7] = a1 + h0 * a2 - h2 * a0
-        M[j, 8] = a2 + h1 * a0 - h0 * a1
-    for i in range(N_ERRORS):
-        for j in range(N_ERRORS):
-            P[i, j] = (M[i, j] + M[j, i]) / 2
+    for _ in range(2):
+        for j in range(n):
+            a0, a1, a2 = M[6, j], M[7, j], M[8, j]
+            M[6, j] = a0 + h2 * a1 - h1 * a2
+            M[7, j] = a1 + h0 * a2 - h2 * a0
+            M[8, j] = a2 + h1 * a0 - h0 * a1
+        P[:] = M.T
+        M[:] = P
+    P[:] = (M + M.T) / 2
 
 
 @compiled
 def mekf(
     times: Array, f: Array, w: Array, gap: Array, row_of_node: Integers, earth: Array, noise: Array, x: Array,
-    P: Array, node: Integers, kind: Integers, value: Array, variance: Array, lever: Array, gate: Array,
-    patience: float, states: Array, covariances: Array, innovations: Array, spreads: Array, nis: Array,
-    verdicts: Integers,
+    P: Array, axes: bool, extra: Array, node: Integers, kind: Integers, value: Array, variance: Array,
+    lever: Array, wander: Integers, gate: Array, patience: float, states: Array, covariances: Array,
+    innovations: Array, spreads: Array, nis: Array, verdicts: Integers,
 ) -> None:  # fmt: skip
     """The whole filter over a timeline; see `plain.mekf` for the same in short."""
+    n = P.shape[0]
     work, R, R_start, R_mid = np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     A, B, C, E = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     f_mean, w_mean, f_n, y = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    H, S, S_inverse = np.empty((3, 15)), np.empty((3, 3)), np.empty((3, 3))
-    PH, K, M = np.empty((15, 3)), np.empty((15, 3)), np.empty((15, 15))
+    f_felt, w_felt, slow = np.zeros(3), np.zeros(3), np.empty((6, n))
+    H, S, S_inverse = np.empty((3, n)), np.empty((3, 3)), np.empty((3, 3))
+    PH, K, M = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, n))
     rejected_since = np.full(3, np.nan)
     event = 0
     for k in range(len(times)):
@@ -296,16 +317,19 @@ def mekf(
             q_v, q_a = noise[0] * noise[0], noise[1] * noise[1]
             if gap[k] > 0:
                 # Nothing was measured: straight on, with what an airframe may do meanwhile as uncertainty.
-                for i in range(3):
-                    x[i] += dt * x[3 + i]
-                    for j in range(3):
-                        A[i, j] = B[i, j] = C[i, j] = 0.0
-                        E[i, j] = 1.0 if i == j else 0.0
+                f_felt[:], w_felt[:], A[:], B[:], C[:], E[:] = 0.0, 0.0, 0.0, 0.0, 0.0, np.eye(3)
+                x[:3] += dt * x[3:6]
                 q_v, q_a = noise[6] * noise[6] * gap[k], noise[7] * noise[7] * gap[k]
             else:
                 for i in range(3):
                     f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
                     w_mean[i] = (w[k - 1, i] + w[k, i]) / 2
+                    f_felt[i], w_felt[i] = f_mean[i] - x[10 + i], w_mean[i] - x[13 + i]
+                if axes:
+                    for i in range(3):
+                        for j in range(3):
+                            f_mean[i] -= x[16 + 3 * i + j] * f_felt[j]
+                            w_mean[i] -= x[25 + 3 * i + j] * w_felt[j]
                 rotation_of(x[6:10], R_start)
                 exponential(
                     -(w_mean[0] - x[13]) * dt, -(w_mean[1] - x[14]) * dt, -(w_mean[2] - x[15]) * dt, work[0]
@@ -318,26 +342,29 @@ def mekf(
                         A[i, j] = -dt * (f_n[b] * R_start[c, j] - f_n[c] * R_start[b, j])
                         C[i, j] = dt * dt / 2 * (f_n[b] * R_mid[c, j] - f_n[c] * R_mid[b, j])
                         B[i, j] = -dt * R_mid[i, j]
-            for i in range(3):
-                x[10 + i] *= kept_a
-                x[13 + i] *= kept_g
-            transition_times(A, B, C, E, dt, kept_a, kept_g, P, M)
-            transition_times(A, B, C, E, dt, kept_a, kept_g, M, P)
+            x[10:13] *= kept_a
+            x[13:16] *= kept_g
+            transition_times(A, B, C, E, f_felt, w_felt, dt, kept_a, kept_g, P, n, axes, slow, M)
+            transition_times(A, B, C, E, f_felt, w_felt, dt, kept_a, kept_g, M, N_ERRORS, axes, slow, P)
+            carry_extra(x, P, M, dt, extra)
             add_noise(P, dt, q_v, q_a, drive_a, drive_g)
         while event < len(node) and node[event] == k:
             sort = kind[event]
             m = predict_measurement(sort, x, w[k], value[event], lever[event], R, y, H)
+            if wander[event] >= 0:
+                y -= x[1 + wander[event] : 4 + wander[event]]
+                H[:, wander[event] : wander[event] + 3] = np.eye(3)
             growth = 1.0
             while True:
-                for i in range(15):
+                PH[:] = 0.0
+                for i in range(n):
                     for a in range(m):
-                        PH[i, a] = 0.0
-                        for j in range(15):
+                        for j in range(n):
                             PH[i, a] += growth * P[i, j] * H[a, j]
                 for a in range(m):
                     for b in range(m):
                         S[a, b] = variance[event, a] if a == b else 0.0
-                        for j in range(15):
+                        for j in range(n):
                             S[a, b] += H[a, j] * PH[j, b]
                 invert(S, m, S_inverse)
                 square = 0.0
@@ -363,13 +390,10 @@ def mekf(
                     break
                 growth *= 2.0
             if verdicts[event] != REJECTED:
-                if growth > 1.0:
-                    for i in range(15):
-                        for j in range(15):
-                            P[i, j] *= growth
+                P *= growth
                 correct(x, P, H, m, y, variance[event], S_inverse, PH, K, M, work)
             event += 1
         row = row_of_node[k]
         if row >= 0:
-            states[row] = x
-            covariances[row] = P
+            states[row] = x[:16]
+            covariances[row] = P[:N_ERRORS, :N_ERRORS]

@@ -5,6 +5,9 @@ b (``q = q_hat * dq``, H 7.15-7.16), accelerometer bias, gyro bias. What may be 
 (7.26) lost the sign of its attitude block: (7.25), of which it is the derivative, has ``-R S(r)``, and so has
 the filter.
 
+Behind the fifteen come, where asked for, what H leaves out and sensors have: axes that are not where they
+should be (constants), and positions whose error wanders. Both look like motion to a filter of fifteen states.
+
 Everything is computed after the flight, so a latency needs no model: a fix belongs to the time at which it
 was valid.
 """
@@ -16,14 +19,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.gravity import Earth
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather
-from wildlab.navigation.gravity import Earth
 from wildlab.navigation.kernels import Integers
+from wildlab.navigation.noise import AxisErrors
 from wildlab.navigation.noise import ImuNoise as ImuNoise  # part of what a run takes, so also found here
 from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
 
@@ -93,7 +98,11 @@ class Navigation(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """What both the compiled filter and the plain one take."""
+    """What both the compiled filter and the plain one take.
+
+    ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
+    ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
+    """
 
     line: Timeline
     measured: Measurements
@@ -101,12 +110,16 @@ class Prepared(NamedTuple):
     unused: list[int]
     gaps: list[Gap]
     noise: Array
+    state: Array
+    covariance: Array
+    axes: bool
+    extra: Array
     gate: Array
 
 
 def prepare(
     imu: Imu, start: Start, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array, gate: float,
-    max_gap: float, gap_acceleration: float, gap_rate: float,
+    max_gap: float, gap_acceleration: float, gap_rate: float, axes: AxisErrors | None = None,
 ) -> Prepared:  # fmt: skip
     samples = checked_imu(imu)
     if not samples.times[0] <= start.time < samples.times[-1]:
@@ -118,7 +131,10 @@ def prepare(
         )
     others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
     line = lay_out(samples, start.time, others, output_times, max_gap)
-    measured, source, unused = gather(aiding, line)
+    beyond, extra = _extra(aiding, axes)
+    state = np.concatenate([start.state, np.zeros(len(extra))])
+    covariance = block_diag(start.covariance, beyond)
+    measured, source, unused = gather(aiding, line, 15 if axes is None else 33)
     long_run = [
         sd if np.isinf(time) else sd * np.sqrt(2 / time)  # spectral density from the standard deviation
         for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
@@ -126,7 +142,23 @@ def prepare(
     numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], gap_acceleration, gap_rate])
     limits = chi2.isf(gate, [3, 3, 1]) if gate > 0 else np.full(3, np.inf)
     gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start.time]
-    return Prepared(line, measured, source, unused, gaps, numbers, np.asarray(limits, float))
+    return Prepared(
+        line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
+        np.asarray(limits, float),
+    )  # fmt: skip
+
+
+def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Array]:
+    """Covariance at the start (n, n), densities and times (n, 2) of the errors beyond the fifteen."""
+    covariances, processes = [np.empty((0, 0))], [np.empty((0, 2))]
+    if axes is not None:
+        covariances += [axes.covariance()] * 2
+        processes.append(np.tile([0.0, np.inf], (18, 1)))
+    for wander in (a.wander for a in aiding if a.wander is not None):
+        covariances.append(np.diag(wander.sd**2))
+        density = wander.sd * np.sqrt(2 / wander.time)
+        processes.append(np.stack([density, np.full(3, wander.time)], axis=-1))
+    return block_diag(*covariances), np.concatenate(processes)
 
 
 def run_mekf(
@@ -137,6 +169,7 @@ def run_mekf(
     aiding: Sequence[Aiding],
     output_times: ArrayLike | None = None,
     *,
+    axes: AxisErrors | None = None,
     gate: float = 1e-4,
     patience: float = 5.0,
     max_gap: float = 0.1,
@@ -158,6 +191,9 @@ def run_mekf(
     output_times
         (M,) s at which the estimate is wanted, camera stamps for instance; without them, at every inertial
         sample (the covariances of 25 minutes at 250 Hz then take 0.7 GB).
+    axes
+        How far the inertial sensors' axes may be from where they should be. They are then estimated too,
+        which H does not do: in a turn, a wrong axis is a bias that was not there before.
     gate
         Probability with which a good measurement is left out as an outlier, by its NIS. 0 leaves none out.
     patience
@@ -175,7 +211,7 @@ def run_mekf(
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     known = np.isfinite(wanted)
     times, row = np.unique(wanted[known], return_inverse=True)
-    ready = prepare(imu, start, noise, aiding, times, gate, max_gap, gap_acceleration, gap_rate)
+    ready = prepare(imu, start, noise, aiding, times, gate, max_gap, gap_acceleration, gap_rate, axes)
     line, measured = ready.line, ready.measured
     states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
     n = len(measured.node)
@@ -183,8 +219,8 @@ def run_mekf(
     verdict = np.zeros(n, np.int64)
     kernels.mekf(
         line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
-        start.state.astype(float), start.covariance.astype(float), measured.node, measured.kind,
-        measured.value, measured.variance, measured.lever, ready.gate, float(patience), states, covariances,
+        ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind, measured.value,
+        measured.variance, measured.lever, measured.wander, ready.gate, float(patience), states, covariances,
         innovation, S, nis, verdict,
     )  # fmt: skip
     for gap in ready.gaps:

@@ -34,6 +34,52 @@ class ImuNoise(NamedTuple):
     gyro_bias_time: float
 
 
+class AxisErrors(NamedTuple):
+    """How far the axes of a triad are from where they should be: constants of a flight.
+
+    Alike for gyros and accelerometers, whose errors have nothing to do with each other.
+
+    Attributes
+    ----------
+    package
+        Standard deviation of the angle by which all three axes are turned about each axis of b, rad.
+    axis
+        Of the angle by which each axis leans towards each of the other two on top of that, rad.
+    scale
+        Of what the factors are off by, 1.
+    """
+
+    package: float
+    axis: float = 0.0
+    scale: float = 0.0
+
+    def covariance(self) -> Array:
+        """Of a triad's nine errors, row by row: it reads ``(I + E)`` times what there is, (9, 9)."""
+        P = np.diag(np.full(9, self.package**2 + self.axis**2))
+        for i in range(3):
+            P[4 * i, 4 * i] = self.scale**2
+            for j in range(3):
+                if i != j:  # a turn of the whole moves one axis towards the other, and the other away
+                    P[3 * i + j, 3 * j + i] = -(self.package**2)
+        return P
+
+
+def with_turn_on(noise: ImuNoise, accelerometer: float, gyro: float) -> ImuNoise:
+    """Noise whose biases also differ from one switching-on to the next (standard deviations, SI).
+
+    A constant and a process of first order together are taken as one such process, with the variance of
+    both and the spectral density that drives the second: over a flight, a constant that wanders a little.
+    """
+    biases: list[float] = []
+    for sd, time, constant in ((*noise[2:4], accelerometer), (*noise[4:6], gyro)):
+        biases += (
+            (sd, time)
+            if np.isinf(time)
+            else (float(np.hypot(sd, constant)), time * (1 + (constant / sd) ** 2))
+        )
+    return ImuNoise(*noise[:2], *biases)
+
+
 def from_data_sheet(
     *,
     velocity_random_walk: float,

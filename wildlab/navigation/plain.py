@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
@@ -31,17 +32,31 @@ def strapdown_step(x: Array, f: Array, w: Array, dt: float, earth: Array) -> tup
     return after, R_mid, f_n
 
 
-def transition(x: Array, f: Array, w: Array, dt: float, earth: Array, kept: tuple[float, float]) -> Array:
-    """How the errors (15,) before a step become those after it."""
+def along_axes(x: Array, f: Array, w: Array) -> tuple[Array, Array]:
+    """What was measured, less what comes from axes that are not where they should be (x[16:34])."""
+    E = x[16:34].reshape(2, 3, 3)
+    return f - E[0] @ (f - x[10:13]), w - E[1] @ (w - x[13:16])
+
+
+def transition(
+    x: Array, f: Array, w: Array, dt: float, earth: Array, kept: tuple[float, float], axes: bool = False
+) -> Array:
+    """How the errors (15 or more) before a step become those after it."""
+    felt = f - x[10:13], w - x[13:16]
+    if axes:
+        f, w = along_axes(x, f, w)
     _, R_mid, f_n = strapdown_step(x, f, w, dt, earth)
-    Phi = np.eye(15)
+    Phi = np.eye(len(x) - 1)
     Phi[3:6, 6:9] = -dt * skew(f_n) @ rotation(x[6:10]).as_matrix()
     Phi[3:6, 9:12] = -dt * R_mid
     Phi[3:6, 12:15] = dt**2 / 2 * skew(f_n) @ R_mid
     Phi[:3, 3:6] = dt * np.eye(3)
-    Phi[:3, 6:15] = dt / 2 * Phi[3:6, 6:15]
     Phi[6:9, 6:9] = Rotation.from_rotvec(-(w - x[13:16]) * dt).as_matrix()
     Phi[6:9, 12:15] = -dt * np.eye(3)
+    if axes:  # a bias of the size of the error times what is measured
+        for first, bias, of in ((15, 9, felt[0]), (24, 12, felt[1])):
+            Phi[3:9, first : first + 9] = Phi[3:9, bias : bias + 3] @ np.kron(np.eye(3), of)
+    Phi[:3, 6:] = dt / 2 * Phi[3:6, 6:]
     Phi[9:12, 9:12] *= kept[0]
     Phi[12:15, 12:15] *= kept[1]
     return Phi
@@ -77,7 +92,7 @@ def correct(x: Array, P: Array, H: Array, y: Array, R: Array) -> tuple[Array, Ar
     """State and covariance after a measurement, Joseph form."""
     K = np.linalg.solve(H @ P @ H.T + R, H @ P).T
     dx = K @ y
-    kept = np.eye(15) - K @ H
+    kept = np.eye(len(P)) - K @ H
     P = kept @ P @ kept.T + K @ R @ K.T
     after = x.copy()
     after[:6] += dx[:6]
@@ -86,17 +101,18 @@ def correct(x: Array, P: Array, H: Array, y: Array, R: Array) -> tuple[Array, Ar
     turn = np.array([1 - m @ m, *(2 * m)]) / (1 + m @ m)
     q = (rotation(x[6:10]) * rotation(turn)).as_quat(scalar_first=True)
     after[6:10] = q if q @ x[6:10] >= 0 else -q
-    G = np.eye(15)
+    G = np.eye(len(P))
     G[6:9, 6:9] -= skew(dx[6:9] / 2)
     return after, G @ P @ G.T
 
 
 def mekf(
-    line: Timeline, measured: Measurements, earth: Array, noise: Array, x: Array, P: Array, gate: Array,
-    patience: float,
+    line: Timeline, measured: Measurements, earth: Array, noise: Array, x: Array, P: Array, axes: bool,
+    extra: Array, gate: Array, patience: float,
 ) -> tuple[Array, Array, Array, Integers]:  # fmt: skip
-    """States (K, 16) and covariances (K, 15, 15) at the rows of the timeline; NIS and verdicts (E,)."""
-    states, covariances = np.empty((line.rows, 16)), np.empty((line.rows, 15, 15))
+    """States (K, n + 1) and covariances (K, n, n) at the rows of the timeline; NIS and verdicts (E,)."""
+    n = len(P)
+    states, covariances = np.empty((line.rows, n + 1)), np.empty((line.rows, n, n))
     nis, verdicts = np.full(len(measured.node), np.nan), np.zeros(len(measured.node), np.int64)
     rejected_since = np.full(3, np.nan)
     event = 0
@@ -108,22 +124,32 @@ def mekf(
                 kept[i] = np.exp(-dt / time)
                 whole = dt if np.isinf(time) else time / 2 * (1 - kept[i] ** 2)
                 drive[i] = density**2 * whole
+            kept_extra = np.exp(-dt / extra[:, 1])
+            drive_extra = np.where(np.isinf(extra[:, 1]), 0.0, extra[:, 0] ** 2 * extra[:, 1] / 2)
+            drive_extra[np.isfinite(extra[:, 1])] *= (1 - kept_extra**2)[np.isfinite(extra[:, 1])]
             if line.gap[k] > 0:
-                Phi = np.diag([1.0] * 9 + [kept[0]] * 3 + [kept[1]] * 3)
+                Phi = np.diag([1.0] * 9 + [kept[0]] * 3 + [kept[1]] * 3 + [1.0] * len(extra))
                 Phi[:3, 3:6] = dt * np.eye(3)
                 Phi[6:9, 12:15] = -dt * np.eye(3)
                 Q = process_noise(dt, *(noise[6:8] ** 2 * line.gap[k]), *drive)
                 x = np.concatenate([x[:3] + dt * x[3:6], x[3:]])
             else:
                 f, w = line.f[k - 1 : k + 1].mean(axis=0), line.w[k - 1 : k + 1].mean(axis=0)
-                Phi = transition(x, f, w, dt, earth, (kept[0], kept[1]))
+                Phi = transition(x, f, w, dt, earth, (kept[0], kept[1]), axes)
                 Q = process_noise(dt, *(noise[:2] ** 2), *drive)
+                if axes:
+                    f, w = along_axes(x, f, w)
                 x = strapdown_step(x, f, w, dt, earth)[0]
-            x = x * np.concatenate([np.ones(10), np.repeat(kept, 3)])
-            P = Phi @ P @ Phi.T + Q
+            x = x * np.concatenate([np.ones(10), np.repeat(kept, 3), kept_extra])
+            Phi[15:, 15:] = np.diag(kept_extra)
+            P = Phi @ P @ Phi.T + block_diag(Q, np.diag(drive_extra))
         while event < len(measured.node) and measured.node[event] == k:
             kind = measured.kind[event]
             y, H = predict_measurement(kind, x, line.w[k], measured.value[event], measured.lever[event])
+            H = np.hstack([H, np.zeros((len(y), n - 15))])
+            if measured.wander[event] >= 0:
+                first = measured.wander[event]
+                y, H[:, first : first + 3] = y - x[first + 1 : first + 4], np.eye(3)
             R = np.diag(measured.variance[event, : len(y)])
             nis[event] = y @ np.linalg.solve(H @ P @ H.T + R, y)
             verdicts[event] = ACCEPTED

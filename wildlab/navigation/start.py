@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, matrix_to_quaternion
-from wildlab.navigation.gravity import flat_earth
+from wildlab.geometry.gravity import flat_earth
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import Imu, checked_imu

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
+from wildlab.geometry.gravity import Earth
 from wildlab.navigation import kernels
-from wildlab.navigation.gravity import Earth
 from wildlab.navigation.timeline import Gap, Imu, checked_imu, find_gaps
 
 

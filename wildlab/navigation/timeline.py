@@ -55,13 +55,17 @@ class Timeline(NamedTuple):
 
 
 class Measurements(NamedTuple):
-    """Measurements in order of time: the node each belongs to, its kind, value, variance and lever arm."""
+    """Measurements in order of time: the node each belongs to, its kind, value, variance and lever arm.
+
+    ``wander`` (E,) is where the error states of what wanders in it begin, -1 where nothing does.
+    """
 
     node: Integers
     kind: Integers
     value: Array
     variance: Array
     lever: Array
+    wander: Integers
 
 
 def checked_imu(imu: Imu) -> Imu:

@@ -12,10 +12,10 @@ from wildlab.errors import WildlabError
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariance_columns, frame_times, gnss_times
+from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import Aiding, positions, velocities
-from wildlab.navigation.gravity import local_earth
 from wildlab.navigation.mekf import Start, pose_covariance, run_mekf
-from wildlab.navigation.noise import ImuNoise
+from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import baseline_reference, course_reference, run_observer
 from wildlab.navigation.start import start_from_baseline, start_from_course
 from wildlab.navigation.timeline import Imu
@@ -27,6 +27,10 @@ VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"] + [
     f"gyro_{axis}_rad_s" for axis in "xyz"
 ]
+
+
+#: How much wider than the fixes behind it the heading at the start is taken to be.
+LOOSE = 5.0
 
 
 class Navigated(NamedTuple):
@@ -48,6 +52,28 @@ class Navigated(NamedTuple):
     innovations: pd.DataFrame
 
 
+class Tuning(NamedTuple):
+    """Noise that a filter is told of in place of what the flight states.
+
+    Attributes
+    ----------
+    velocity_random_walk
+        Of the accelerometers, m/s/sqrt(s).
+    angle_random_walk_deg
+        Of the gyros, deg/sqrt(s).
+    horizontal, vertical
+        Standard deviations of a GNSS position, per axis, m.
+    """
+
+    velocity_random_walk: float
+    angle_random_walk_deg: float
+    horizontal: float
+    vertical: float
+
+
+PUBLISHED_LIKE = Tuning(0.1, 1.0, 0.2, 0.2)
+
+
 class _Inputs(NamedTuple):
     imu: Imu
     aiding: dict[str, Aiding]
@@ -55,8 +81,14 @@ class _Inputs(NamedTuple):
     start: Start
 
 
-def navigate_mekf(flight: Flight, times: ArrayLike | None = None, *, velocity: bool = True) -> Navigated:
+def navigate_mekf(
+    flight: Flight, times: ArrayLike | None = None, *, velocity: bool = True, tuning: Tuning | None = None
+) -> Navigated:
     """Poses with covariance by the error-state filter of H 7.3.
+
+    Without a tuning the filter is told what the manifest states of the sensors: white noise, biases, axes
+    that are not where they should be (``[imu]``), the part of GNSS errors that wanders (``[gnss]``). Its
+    covariance is then meant to be true of the pose of the IMU; how the airframe gives is not in it.
 
     Parameters
     ----------
@@ -65,21 +97,30 @@ def navigate_mekf(flight: Flight, times: ArrayLike | None = None, *, velocity: b
         any, those of the inertial samples.
     velocity
         Whether to use GNSS velocities where the flight has them; H uses positions only.
+    tuning
+        Noise in place of what the manifest states, for a filter as H has it: fifteen states, white noise, and
+        positions only. ``PUBLISHED_LIKE`` gives standard deviations like those of H 7.5.3 and is what the
+        tracking of H 7.5.3 and 7.5.4 is to be repeated with.
 
     Raises
     ------
     WildlabError
         Where the flight lacks inertial samples, satellite positions, or what is known of their errors.
     """
-    given = _inputs(flight, velocity)
+    noise, axes = imu_noise(flight), axis_errors(flight)
+    if tuning is not None:
+        walks = tuning.velocity_random_walk, float(np.radians(tuning.angle_random_walk_deg))
+        noise, axes = noise._replace(velocity_random_walk=walks[0], angle_random_walk=walks[1]), None
+    given = _inputs(flight, velocity, noise, tuning)
     latitude, _, height = flight.manifest.origin_tuple()
     found = run_mekf(
         given.imu,
         given.start,
-        imu_noise(flight),
+        noise,
         local_earth(latitude, height),
         list(given.aiding.values()),
         _wanted(flight, times),
+        axes=axes,
     )
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
     nav = nav.join(covariance_columns(pose_covariance(found.covariance)))
@@ -119,7 +160,7 @@ def navigate_observer(flight: Flight, times: ArrayLike | None = None, *, velocit
 
 
 def imu_noise(flight: Flight) -> ImuNoise:
-    """How the flight's inertial sensor errs, from ``[imu]`` of the manifest.
+    """How the flight's inertial sensor errs, from ``[imu]`` of the manifest, with its biases at switching on.
 
     Raises
     ------
@@ -146,10 +187,28 @@ def imu_noise(flight: Flight) -> ImuNoise:
             file=flight.folder,
             field=f"imu.{missing[0]}",
         )
-    return ImuNoise(*(float(getattr(stated, name)) * scale for name, scale in figures.items()))
+    noise = ImuNoise(*(float(getattr(stated, name)) * scale for name, scale in figures.items()))
+    gyro = np.radians(stated.gyro_turn_on_deg_h or 0.0) / hour
+    return with_turn_on(noise, stated.accelerometer_turn_on_m_s2 or 0.0, float(gyro))
 
 
-def _inputs(flight: Flight, velocity: bool) -> _Inputs:
+def axis_errors(flight: Flight) -> AxisErrors | None:
+    """How far the inertial sensor's axes may be off, from ``[imu]`` of the manifest, where it says so.
+
+    Stated are limits; anything up to them counts as equally likely.
+    """
+    stated = flight.manifest.imu
+    limits = (
+        np.radians(stated.misalignment_deg or 0.0),
+        np.radians(stated.axis_misalignment_deg or 0.0),
+        (stated.scale_error_percent or 0.0) / 100,
+    )
+    return AxisErrors(*(float(limit / np.sqrt(3)) for limit in limits)) if any(limits) else None
+
+
+def _inputs(
+    flight: Flight, velocity: bool, noise: ImuNoise | None = None, tuning: Tuning | None = None
+) -> _Inputs:
     imu, gnss = flight.table("imu"), flight.table("gnss")
     samples = Imu(
         imu["time_s"].to_numpy(float),
@@ -158,8 +217,14 @@ def _inputs(flight: Flight, velocity: bool) -> _Inputs:
     )
     t, p = gnss_times(flight), gnss[POSITION].to_numpy(float)
     sd = _position_sd(flight, gnss)
+    spread = float(np.sqrt(2) * np.nanmedian(sd))
+    wander, wander_time = _wander(flight)
+    if tuning is not None:
+        velocity, wander = False, np.zeros(3)
+        sd = np.tile([tuning.horizontal, tuning.horizontal, tuning.vertical], (len(t), 1))
+    white = np.sqrt(np.maximum(sd**2 - wander**2, (0.01 * sd) ** 2))
     arms = [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
-    aiding = {"position": positions(t, p, sd, arms[0])}
+    aiding = {"position": positions(t, p, white, arms[0], 0.0, wander, wander_time)}
     two = set(SECOND_COLUMNS) <= set(gnss.columns)
     moving = set(VELOCITY) <= set(gnss.columns)
     v = gnss[VELOCITY].to_numpy(float) if moving else np.gradient(p, t, axis=0)
@@ -167,15 +232,22 @@ def _inputs(flight: Flight, velocity: bool) -> _Inputs:
     if velocity and moving and spread_v is not None:
         aiding["velocity"] = velocities(t, v, spread_v, arms[0])
     gravity = local_earth(flight.manifest.origin_tuple()[0], flight.manifest.origin_tuple()[2]).gravity
+    known: dict[str, float] = {}
+    if noise is not None:  # where nobody says what biases are at switching on, they may be anything usual
+        if flight.manifest.imu.accelerometer_turn_on_m_s2 is not None:
+            known["accelerometer_bias_sd"] = noise.accelerometer_bias_sd
+        if flight.manifest.imu.gyro_turn_on_deg_h is not None:
+            known["gyro_bias_sd"] = noise.gyro_bias_sd
     if two:
         second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
-        aiding["second position"] = positions(t, second, sd, arms[1])
+        aiding["second position"] = positions(t, second, white, arms[1], 0.0, wander, wander_time)
         reference = baseline_reference(t, p, second, *arms)
-        spread = float(np.sqrt(2) * np.nanmedian(sd))
-        start = start_from_baseline(samples, t, p, second, *arms, gravity=gravity, baseline_sd=spread)
+        # The fixes that it starts from are taken in once more: loosely here, so that they count once.
+        known["baseline_sd"] = LOOSE * spread
+        start = start_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)
     else:
         reference = course_reference(t, v)
-        start = start_from_course(samples, t, p, v, gravity=gravity)
+        start = start_from_course(samples, t, p, v, gravity=gravity, **known)
     return _Inputs(samples, aiding, reference, start)
 
 
@@ -197,6 +269,15 @@ def _position_sd(flight: Flight, gnss: pd.DataFrame) -> Array:
             )
         sds.append(np.where(np.isnan(known), np.nanmax(known), known))
     return np.stack([sds[0], sds[0], sds[1]], axis=-1)
+
+
+def _wander(flight: Flight) -> tuple[Array, float]:
+    """The part of a position's deviation that fixes share (3,) m, and for how long, s; from the manifest."""
+    stated = flight.manifest.gnss
+    if stated.wander_time_s is None:
+        return np.zeros(3), np.inf
+    level, vertical = stated.wander_horizontal_m or 0.0, stated.wander_vertical_m or 0.0
+    return np.array([level, level, vertical]), stated.wander_time_s
 
 
 def _velocity_sd(flight: Flight, gnss: pd.DataFrame) -> Array | None:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.gravity import local_earth
 from wildlab.simulation.gnss import antenna_motion, fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
 from wildlab.simulation.parameters import TwinParameters
@@ -80,7 +81,9 @@ def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signa
 def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
     """Readings of the inertial unit over the whole flight."""
     times = ticks(twin.imu.rate.si, twin.flight.duration.si)
-    true = ideal_imu(path, payload, twin.imu.rate.si, len(times), twin.place.gravity.si)
+    # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
+    earth = local_earth(twin.place.latitude.si, twin.place.height.si)
+    true = ideal_imu(path, payload, twin.imu.rate.si, len(times), earth)
     force, rate = read_imu(*true, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
     columns = {"time_s": times}
     columns |= {f"f_{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}

@@ -14,16 +14,20 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
+from wildlab.geometry.gravity import Earth, attraction, flat_earth
 from wildlab.simulation.models import Imu
 from wildlab.simulation.sensors import gauss_markov, rounded
 from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
+
+#: The n of a trajectory, by itself.
+INERTIAL = flat_earth(GRAVITY)
 
 _CHUNK = 16_384  # samples at a time: what the sines of a wander need then fits into the processor's cache
 _ASIDE = 4  # samples on either side of a difference of fourth order with a step of two samples
 
 
 def ideal_imu(
-    path: FlightPath, attitude: Signal, rate: float, count: int, gravity: float = GRAVITY
+    path: FlightPath, attitude: Signal, rate: float, count: int, earth: Earth = INERTIAL
 ) -> tuple[Array, Array]:
     """Specific force and angular rate of a body, as ideal sensors feel them.
 
@@ -39,24 +43,28 @@ def ideal_imu(
         Samples per second, Hz, at least 100.
     count
         N samples, the first at time 0.
+    earth
+        What pulls, and how n turns: by itself n counts as inertial, as it does for the trajectory.
 
     Returns
     -------
     force
         (N, 3) m/s^2, in the body.
     angular_rate
-        (N, 3) rad/s, of the body against n, in the body.
+        (N, 3) rad/s, of the body, in the body.
     """
+    turning = np.array(earth.rate)
     force, spin = np.empty((count, 3)), np.empty((count, 3))
     for first in range(0, count, _CHUNK):
         last = min(first + _CHUNK, count)
         t = np.arange(first - _ASIDE, last + _ASIDE) / rate
         R = attitude(t)
         near, far = _mean_rate(R, 2, rate), _mean_rate(R, 4, rate)
-        spin[first:last] = (4 * near[2:-2] - far) / 3
-        _, _, acceleration = path(t[_ASIDE:-_ASIDE])
-        felt = acceleration - np.array([0.0, 0.0, gravity])
-        force[first:last] = np.einsum("nji,nj->ni", R[_ASIDE:-_ASIDE], felt)
+        position, velocity, acceleration = path(t[_ASIDE:-_ASIDE])
+        to_b = np.swapaxes(R[_ASIDE:-_ASIDE], -1, -2)
+        spin[first:last] = (4 * near[2:-2] - far) / 3 + to_b @ turning
+        felt = acceleration + 2 * np.cross(turning, velocity) - attraction(earth, position)
+        force[first:last] = np.einsum("nij,nj->ni", to_b, felt)
     return force, spin
 
 

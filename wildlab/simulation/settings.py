@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from wildlab.flight.manifest import Manifest, make_manifest
@@ -68,7 +67,6 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
 
 def _imu(imu: Imu) -> dict[str, Any]:
     """The unit's data sheet; a figure that is zero is not stated."""
-    turned = math.hypot(imu.axis_misalignment.number, imu.package_misalignment.number)
     figures = {
         "velocity_random_walk_m_s_sqrt_h": imu.accelerometer_random_walk.number,
         "angle_random_walk_deg_sqrt_h": imu.gyro_random_walk.number,
@@ -78,7 +76,8 @@ def _imu(imu: Imu) -> dict[str, Any]:
         "gyro_bias_time_s": imu.gyro_bias_time.si,
         "accelerometer_turn_on_m_s2": imu.accelerometer_turn_on_bias.si,
         "gyro_turn_on_deg_h": imu.gyro_turn_on_bias.number,
-        "misalignment_deg": turned,
+        "misalignment_deg": imu.package_misalignment.number,
+        "axis_misalignment_deg": imu.axis_misalignment.number,
     }
     return {"name": imu.name.text, **{name: value for name, value in figures.items() if value > 0}}
 
@@ -86,4 +85,10 @@ def _imu(imu: Imu) -> dict[str, Any]:
 def _gnss(gnss: Gnss) -> dict[str, Any]:
     """The receiver with the first antenna; where the second one is stands in the table."""
     arm = (gnss.first_x.si, gnss.first_y.si, gnss.first_z.si)
-    return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si}
+    wander = {
+        "wander_horizontal_m": gnss.horizontal_wander.si,
+        "wander_vertical_m": gnss.vertical_wander.si,
+        "wander_time_s": gnss.wander_time.si,
+    }
+    known = {name: value for name, value in wander.items() if value > 0}
+    return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si, **known}

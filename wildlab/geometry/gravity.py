@@ -79,3 +79,15 @@ def local_earth(latitude: float, height: float = 0.0) -> Earth:
 def flat_earth(gravity: float = 9.81) -> Earth:
     """Frame n as an inertial one with the same gravity everywhere, as in H 7.3.2."""
     return Earth(gravity, 0.0, 0.0, (0.0, 0.0, 0.0))
+
+
+def attraction(earth: Earth, p_n: ArrayLike) -> Array:
+    """Gravity at positions (N, 3) m in n, as (N, 3) m/s^2 in n."""
+    p = np.asarray(p_n, float)
+    down = earth.gravity + earth.gradient * p[..., 2]
+    return np.asarray(
+        down[..., None]
+        * np.stack(
+            [-earth.curvature * p[..., 0], -earth.curvature * p[..., 1], np.ones(p.shape[:-1])], axis=-1
+        )
+    )
