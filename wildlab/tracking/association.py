@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.tracking.measurement import Sensor, difference, on_state
+from wildlab.tracking.measurement import Prediction, difference, on_state
 
 
 class Nearest(NamedTuple):
@@ -68,30 +68,38 @@ def nearest_detection(
 
 
 def distances(
-    sensor: Sensor, row: int, x: ArrayLike, P: ArrayLike, detections: ArrayLike, R: ArrayLike
+    expected: Prediction, angles: tuple[bool, ...], P: ArrayLike, detections: ArrayLike, R: ArrayLike
 ) -> Array:
-    """NIS of K detections (K, m) against a track, NaN where the sensor cannot see it or a detection is NaN.
+    """NIS (..., K) of K detections against a track, or against many at once.
 
-    The sensor need not be the one the track is filtered with: H 6.3.2 gates by azimuth and elevation what is
-    filtered by pixel.
+    What is expected need not come from the sensor that the track is filtered with: H 6.3.2 gates by azimuth
+    and elevation what is filtered by pixel.
 
     Parameters
     ----------
-    sensor, row
-        The sensor and its row.
-    x, P
-        Predicted state (n,) and covariance (n, n).
+    expected
+        Prediction of the sensor at the track's predicted position, (..., m).
+    angles
+        Which elements are angles, see `Sensor`.
+    P
+        (..., n, n) predicted covariance.
+    detections
+        (..., K, m).
     R
-        (m, m) or (K, m, m).
+        (m, m), or anything that fits (..., m, m).
+
+    Returns
+    -------
+    NaN where the sensor cannot see the target or a detection is NaN.
     """
-    x, P = np.asarray(x, float), np.asarray(P, float)
-    z = np.asarray(detections, float)
-    expected = sensor.predict(row, x[:2])
-    H = on_state(expected.H_position, len(x))
-    S = np.broadcast_to(H @ P @ H.T + np.asarray(R, float), (*z.shape, z.shape[-1]))
-    nis = np.full(len(z), np.nan)
-    whole = np.isfinite(z).all(axis=-1) & np.isfinite(S).all(axis=(-1, -2)) & np.isfinite(expected.z).all()
-    nis[whole] = innovation_squared(difference(z[whole], expected.z, sensor.angles), S[whole])
+    z, P = np.asarray(detections, float), np.asarray(P, float)
+    H = on_state(expected.H_position, P.shape[-1])
+    S = H @ P @ np.swapaxes(H, -1, -2) + np.asarray(R, float)
+    gap = difference(z, expected.z[..., None, :], angles)
+    S = np.broadcast_to(S[..., None, :, :], (*gap.shape, gap.shape[-1]))
+    nis = np.full(gap.shape[:-1], np.nan)
+    whole = np.isfinite(gap).all(axis=-1) & np.isfinite(S).all(axis=(-1, -2))
+    nis[whole] = innovation_squared(gap[whole], S[whole])
     return nis
 
 

@@ -13,44 +13,49 @@ Array = NDArray[np.float64]
 class Update(NamedTuple):
     """What a measurement did: new estimate, and what it was judged by."""
 
-    x: Array  # (n,)
-    P: Array  # (n, n)
-    innovation: Array  # (m,)
-    S: Array  # (m, m)
-    gain: Array  # (n, m)
+    x: Array  # (..., n)
+    P: Array  # (..., n, n)
+    innovation: Array  # (..., m)
+    S: Array  # (..., m, m)
+    gain: Array  # (..., n, m)
 
 
 def predict(x: Array, P: Array, F: Array, Q: Array) -> tuple[Array, Array]:
-    """Prior estimate (n,) and covariance (n, n), H (3.5a)-(3.5b)."""
-    prior = F @ P @ F.T + Q
-    return F @ x, (prior + prior.T) / 2
+    """Prior estimate (..., n) and covariance (..., n, n), H (3.5a)-(3.5b); any leading axes."""
+    prior = F @ P @ np.swapaxes(F, -1, -2) + Q
+    return _times(F, x), (prior + np.swapaxes(prior, -1, -2)) / 2
 
 
 def update(x: Array, P: Array, z: Array, H: Array, R: Array) -> Update:
-    """Posterior after a measurement ``z`` (m,) = H x + noise with covariance ``R``.
+    """Posterior after a measurement ``z`` (..., m) = H x + noise with covariance ``R``.
 
     H (3.5c)-(3.5h), Joseph form.
     """
-    return correct(x, P, z - H @ x, H, R)
+    return correct(x, P, z - _times(H, x), H, R)
 
 
 def correct(x: Array, P: Array, innovation: Array, H: Array, R: Array) -> Update:
-    """Posterior of the extended filter, H (3.7d)-(3.7h), Joseph form.
+    """Posterior of the extended filter, H (3.7d)-(3.7h), Joseph form; any leading axes.
 
     Parameters
     ----------
     innovation
-        (m,) measurement minus prediction, angles wrapped.
+        (..., m) measurement minus prediction, angles wrapped.
     H
-        (m, n) derivative of the prediction at ``x``.
+        (..., m, n) derivative of the prediction at ``x``.
     R
-        (m, m).
+        (..., m, m).
     """
-    S = H @ P @ H.T + R
-    gain = np.asarray(np.linalg.solve(S, H @ P).T, float)
-    kept = np.eye(len(x)) - gain @ H
-    posterior = kept @ P @ kept.T + gain @ R @ gain.T
-    return Update(x + gain @ innovation, (posterior + posterior.T) / 2, innovation, S, gain)
+    S = H @ P @ np.swapaxes(H, -1, -2) + R
+    gain = np.asarray(np.swapaxes(np.linalg.solve(S, H @ P), -1, -2), float)
+    kept = np.eye(x.shape[-1]) - gain @ H
+    posterior = kept @ P @ np.swapaxes(kept, -1, -2) + gain @ R @ np.swapaxes(gain, -1, -2)
+    posterior = (posterior + np.swapaxes(posterior, -1, -2)) / 2
+    return Update(x + _times(gain, innovation), posterior, innovation, S, gain)
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    return np.asarray((matrix @ vector[..., None])[..., 0])
 
 
 class Filtered(NamedTuple):

@@ -288,29 +288,25 @@ def checked(
             "give (m, m), (N, m, m) or (N, K, m, m)",
             field="R",
         )
-    noise = np.broadcast_to(R, (N, K, m, m))
-    known = np.isfinite(noise).all(axis=(-1, -2)) & np.isfinite(z).all(axis=-1)
-    flat = noise[known]
+    known = np.isfinite(R).all(axis=(-1, -2))
+    flat = R[known]
     lowest = np.linalg.eigvalsh(flat)
     bad = (lowest[:, 0] <= 1e-14 * np.abs(lowest[:, -1])) | (
         np.abs(flat - np.swapaxes(flat, -1, -2)).max(axis=(-1, -2)) > 1e-9 * np.abs(lowest[:, -1])
     )
     if bad.any():
-        row = int(np.flatnonzero(known.any(axis=1) & _rows_of(known, bad))[0])
+        marked = np.zeros(known.shape, bool)
+        marked[known] = bad
+        row = int(np.flatnonzero(np.broadcast_to(marked, (N, K)).any(axis=1))[0])
         raise WildlabError(
             f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
             "give every measurement a noise in all its elements",
             field="R",
         )
-    usable = np.where(known[..., None], z, np.nan)  # without a covariance a measurement is none
+    # A measurement of which a part is missing is none, and neither is one without a covariance.
+    usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
     threshold = np.inf if gate is None else float(chi2.ppf(gate, m))
-    return Inputs(t, usable, noise, out, threshold)
-
-
-def _rows_of(known: NDArray[np.bool_], bad: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    marked = np.zeros(known.shape, bool)
-    marked[known] = bad
-    return np.asarray(marked.any(axis=1))
+    return Inputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold)
 
 
 def _check_order(times: Array, field: str) -> None:
