@@ -6,7 +6,6 @@ Exit codes: 0 done, 1 the run failed, 2 wrong use or unusable input, 130 broken 
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -19,6 +18,7 @@ import click
 
 from wildlab import __version__
 from wildlab.errors import WildlabError
+from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,7 +74,7 @@ def list_(out: Path | None, as_json: bool) -> None:
 
     standings = [standing(study, _reports(out)) for study in load_studies().values()]
     if as_json:
-        _print_json([as_plain(one) for one in standings])
+        print_json([as_plain(one) for one in standings])
         return
     rows = []
     for one in standings:
@@ -82,7 +82,7 @@ def list_(out: Path | None, as_json: bool) -> None:
         holding = sum(claim.verdict == "holds" for claim in one.claims)
         claims = f"{holding} of {len(one.claims)}" if one.claims else "-"
         rows.append([one.study.name, one.study.kind, one.state, numbers, claims, one.study.title])
-    _print_table(["study", "kind", "state", "reproduced", "claims hold", "question"], rows)
+    print_table(["study", "kind", "state", "reproduced", "claims hold", "question"], rows)
 
 
 @wildlab.command()
@@ -91,27 +91,52 @@ def list_(out: Path | None, as_json: bool) -> None:
     "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
 )
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
-@click.option("--flight", type=FOLDER, help="A flight folder in place of the study's own (one study only).")
-@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="How many at a time.")
 @click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes a study may take.  [default: 30]"
+    "--seeds",
+    type=click.IntRange(1, 1_000_000),
+    help="Over how many simulated flights, in place of the study's own.",
+)
+@click.option("--flight", type=FOLDER, help="A flight folder in place of the study's own (one study only).")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="How many processes at a time, for notebooks and seeds together.",
+)
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Compute the seeds on a dask.distributed cluster; notebooks run here.",
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0, min_open=True),
+    help="Minutes a notebook may take, and each seed.  [default: 30]",
 )
 @click.option("--out", type=FOLDER, help="Where reports go.  [default: reports]")
 def run(
     studies: tuple[str, ...],
     everything: bool,
     seed: int | None,
+    seeds: int | None,
     flight: Path | None,
     jobs: int,
+    scheduler: str | None,
     timeout: float | None,
     out: Path | None,
 ) -> None:
     """Run studies; each leaves a report, and the ledger shows them all.
 
+    What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
+    seeds cost only those that are new. The numbers are the same for any --jobs.
+
     \b
     Examples:
       wildlab run sensitivity consistency-bounds
       wildlab run --all --jobs 4
+      wildlab run static-point --seeds 200 --jobs 4
+      wildlab run static-point --scheduler tcp://127.0.0.1:8786
     """
     from wildlab.reporting.run import run_studies
 
@@ -121,13 +146,15 @@ def run(
         studies,
         everything=everything,
         seed=seed,
+        seeds=seeds,
         flight=flight,
         reports=_reports(out),
         parallel=jobs,
+        scheduler=scheduler,
         timeout_s=None if timeout is None else timeout * 60,
         console=_console(),
     )
-    click.echo(_shown(_reports(out) / "index.html"))
+    click.echo(shown(_reports(out) / "index.html"))
     failed = [outcome.name for outcome in outcomes if outcome.state == "failed"]
     if failed:
         click.echo(f"{len(failed)} of {len(outcomes)} failed: {', '.join(failed)}.", err=True)
@@ -159,7 +186,7 @@ def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float 
         console=_console(),
     )
     if outcome.folder is not None:
-        click.echo(_shown(outcome.folder / "report.html"))
+        click.echo(shown(outcome.folder / "report.html"))
     if outcome.state == "failed":
         sys.exit(1)
 
@@ -182,7 +209,7 @@ def check(flight: Path, as_json: bool) -> None:
     problems = sum(finding.level == "problem" for finding in findings)
     if as_json:
         names = ("level", "table", "field", "sentence", "fix")
-        _print_json(
+        print_json(
             {
                 "findings": [{name: getattr(finding, name) for name in names} for finding in findings],
                 "usable_for": [{"purpose": u.purpose, "usable": u.usable, "why": u.why} for u in uses],
@@ -190,11 +217,11 @@ def check(flight: Path, as_json: bool) -> None:
         )
     else:
         for finding in findings:
-            click.echo(f"{finding.level}: {_stopped(finding.sentence)} {_sentence(finding.fix)}".rstrip())
+            click.echo(f"{finding.level}: {stopped(finding.sentence)} {sentence(finding.fix)}".rstrip())
         warnings = sum(finding.level == "warning" for finding in findings)
-        click.echo(_sentence(f"{_count(problems, 'problem')}, {_count(warnings, 'warning')}"))
+        click.echo(sentence(f"{count(problems, 'problem')}, {count(warnings, 'warning')}"))
         for use in uses:
-            click.echo(f"{use.purpose}: {'yes' if use.usable else 'no'}, {_stopped(use.why)}")
+            click.echo(f"{use.purpose}: {'yes' if use.usable else 'no'}, {stopped(use.why)}")
     if problems:
         sys.exit(2)
 
@@ -214,7 +241,7 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
     from wildlab.flight.recipe import import_flight
 
     import_flight(recipe, source, into, overwrite=overwrite)
-    click.echo(_shown(into))
+    click.echo(shown(into))
 
 
 @wildlab.command()
@@ -233,13 +260,13 @@ def fetch(dataset: str | None, as_json: bool) -> None:
 
     if dataset is not None:
         for path in catalog.fetch(dataset, progress=_tell_download):
-            click.echo(_shown(path))
+            click.echo(shown(path))
         return
     rows = _datasets(catalog)
     if as_json:
-        _print_json(rows)
+        print_json(rows)
     else:
-        _print_table(
+        print_table(
             ["dataset", "here", "licence", "what"],
             [[r["dataset"], "yes" if r["fetched"] else "no", r["licence"], r["title"]] for r in rows],
         )
@@ -261,7 +288,7 @@ def simulate(twin: str, into: Path, seed: int, overwrite: bool) -> None:
     from wildlab.simulation.twins import simulate_twin
 
     save_flight(simulate_twin(twin, seed), into, overwrite=overwrite)
-    click.echo(_shown(into))
+    click.echo(shown(into))
 
 
 @wildlab.command()
@@ -277,7 +304,7 @@ def doctor(as_json: bool) -> None:
 
     findings = examine()
     if as_json:
-        _print_json([{"ok": f.ok, "name": f.name, "found": f.found, "fix": f.fix} for f in findings])
+        print_json([{"ok": f.ok, "name": f.name, "found": f.found, "fix": f.fix} for f in findings])
     else:
         for finding in findings:
             mark = "ok   " if finding.ok else "WRONG"
@@ -319,36 +346,6 @@ def _console() -> Console:
 
     # Progress goes to standard error: standard output is the path of the result.
     return Console(stderr=True)
-
-
-def _shown(path: Path) -> str:
-    """Relative where that is shorter."""
-    path = path.resolve()
-    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
-
-
-def _sentence(clause: str) -> str:
-    """The rooms give clauses, so that they can be joined; a reader gets a capital and a full stop."""
-    return _stopped(clause[:1].upper() + clause[1:])
-
-
-def _stopped(clause: str) -> str:
-    return clause if not clause or clause.endswith((".", "!", "?")) else f"{clause}."
-
-
-def _print_json(content: Any) -> None:
-    click.echo(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
-
-
-def _print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    widths = [max(len(row[column]) for row in [headings, *rows]) for column in range(len(headings))]
-    for index, row in enumerate([headings, *rows]):
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        click.echo(click.style(line, bold=True) if index == 0 else line)
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:

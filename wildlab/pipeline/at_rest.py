@@ -12,6 +12,8 @@ from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.store import Flight
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.judge import errors_of, judge
+from wildlab.pipeline.navigate import navigate_observer
+from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.kalman import Filtered, filter_at_rest
 
 #: Navigation source and camera stamps behind each column of the tables.
@@ -99,6 +101,31 @@ def summarise_at_rest(judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
         ("filter", "lag1_east"): float(autocorrelation(followed.innovation[1:, 1], 1)[1]),
         ("filter", "coverage"): float(table["inside_90"].mean()),
     }
+
+
+def fly(seed: int, *, twin: str, observer_seeds: int) -> dict[tuple[str, str], float]:
+    """One simulated flight, summarised as by `summarise_at_rest`.
+
+    The observer, whose sensors take long to simulate, flies on seeds up to ``observer_seeds`` only.
+
+    Raises
+    ------
+    WildlabError
+        If there is no such twin, or it has not the data for the comparison.
+    """
+    navigated = seed <= observer_seeds
+    flight = simulate_twin(twin, seed, () if navigated else ("imu", "gnss"))
+    if navigated:
+        flight.nav["observer"] = navigate_observer(flight).nav
+    judged = judge_columns(flight, np.random.default_rng(seed))
+    for column, table in judged.items():
+        if not np.isfinite(errors_of(table)).any():
+            raise WildlabError(
+                f"on the flight of seed {seed} no point was found on the ground ({column})",
+                "look at this flight: wildlab simulate",
+                file=twin,
+            )
+    return summarise_at_rest(judged)
 
 
 def check_claims(spread: pd.DataFrame, bound: float) -> dict[str, NDArray[np.bool_]]:

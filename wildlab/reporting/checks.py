@@ -43,8 +43,8 @@ def _plain(value: Any, name: str) -> Any:
     )
 
 
-def check_notebook(notebook: Path, parameters: Sequence[str]) -> None:
-    """Refuse a notebook that would not do as it is told.
+def check_notebook(notebook: Path, parameters: Sequence[str]) -> int:
+    """Refuse a notebook that would not do as it is told; the number of cells of one that will.
 
     Raises
     ------
@@ -73,3 +73,4 @@ def check_notebook(notebook: Path, parameters: Sequence[str]) -> None:
                 f"it has: {', '.join(known)}; add it to its parameters cell, or take it out of studies.toml",
                 file=notebook.name,
             )
+    return len(node.cells)

@@ -23,6 +23,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
+from wildlab.reporting.seeds import SeedWork
 
 #: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
 _LONGEST_SOCKET_FOLDER = 95
@@ -50,6 +51,9 @@ class Job:
     #: What to type to run it again.
     again: str = ""
     timeout_s: float = 1800.0
+    #: How many cells the notebook has, and what is to be computed for each seed before it starts.
+    cells: int = 0
+    seeds: SeedWork | None = None
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,8 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     origin = provenance.collect(
         study=job.name, notebook=Path(job.notebook), flight=flight, parameters=job.parameters, seed=job.seed
     )
+    if job.seeds is not None:
+        origin["seeds"] = job.seeds.provenance()
     write_json(folder / "provenance.json", origin)
     pipe.send(("stage", "notebook"))
     shown = {**given, "flight": _relative(flight, job), "out": ".", "expected_prefix": ""}

@@ -8,16 +8,10 @@ as it was.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import tempfile
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from multiprocessing import connection
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
@@ -26,35 +20,22 @@ from rich.console import Console
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.checks import check_notebook, plain_parameters
-from wildlab.reporting.job import Failure, Job, end_tree, work
+from wildlab.reporting.job import Job
 from wildlab.reporting.ledger import build_ledger
-from wildlab.reporting.outputs import clear, install, leave_failure, log_of, sweep
+from wildlab.reporting.loop import Outcome, run_jobs
 from wildlab.reporting.progress import outcome_line, shown
+from wildlab.reporting.seeds import SeedWork, make_work
 from wildlab.reporting.studies import STANDARD_PARAMETERS, Study, find_study, load_studies
 
 #: The notebook that judges any flight.
 EVALUATION = "georeferencing.ipynb"
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a run ended: ``state`` is "done", "failed" or "skipped"; ``reason`` says why in a sentence."""
-
-    name: str
-    state: str
-    seconds: float
-    reason: str = ""
-    folder: Path | None = None
-
-
-#: Called with (name, "start" | "stage" | "cell" | "end", what).
-Listener = Callable[[str, str, Any], None]
-
-
 def make_job(
     study: Study,
     *,
     seed: int | None = None,
+    seeds: int | None = None,
     flight: Path | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
@@ -66,6 +47,8 @@ def make_job(
 
     Parameters
     ----------
+    seeds
+        Over how many simulated flights, in place of the study's own number; nothing to a study without one.
     flight
         A flight folder to use in place of the study's own.
     name
@@ -76,11 +59,16 @@ def make_job(
     Raises
     ------
     WildlabError
-        As `check_notebook` and `plain_parameters`.
+        As `check_notebook`, `plain_parameters` and `wildlab.reporting.seeds.make_work`.
     """
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
-    check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters])
+    again = again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}")
+    if study.seeds is not None:
+        parameters["seeds"] = study.seeds if seeds is None else seeds
+        again += "" if seeds is None else f" --seeds {seeds}"
+    cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters])
+    seed = study.seed if seed is None else seed
     reports = reports.resolve()
     name = name or study.name
     own = flight is None
@@ -91,15 +79,27 @@ def make_job(
         work=str(reports / f".{name}.{os.getpid()}.part"),
         runtime=str(_socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
         reports=str(reports),
-        seed=study.seed if seed is None else seed,
+        seed=seed,
         flight="" if flight is None else str(flight.resolve()),
         twin=study.twin if own else None,
         dataset=study.dataset if own else None,
         recipe=study.recipe if own else None,
         parameters=parameters,
-        again=again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}"),
+        again=again,
         timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,
+        cells=cells + 1,  # papermill adds one with the parameters
+        seeds=_seed_work(study, name, seed, flight, reports, parameters),
     )
+
+
+def _seed_work(
+    study: Study, name: str, seed: int, flight: Path | None, reports: Path, parameters: dict[str, Any]
+) -> SeedWork | None:
+    """What is to be computed for each seed before the notebook starts; None where nothing is."""
+    twin = study.twin if flight is None else _twin_of(flight)
+    if study.each_seed is None or twin is None:
+        return None
+    return make_work(reports, name, study.each_seed, seed, parameters["seeds"], {**parameters, "twin": twin})
 
 
 def run_studies(
@@ -107,10 +107,12 @@ def run_studies(
     *,
     everything: bool = False,
     seed: int | None = None,
+    seeds: int | None = None,
     flight: Path | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     parallel: int = 1,
+    scheduler: str | None = None,
     timeout_s: float | None = None,
     console: Console | None = None,
 ) -> list[Outcome]:
@@ -121,9 +123,17 @@ def run_studies(
     everything
         Run all studies. One whose public data are not here is skipped, and says so; asked for by name, it
         is an error.
+    seeds
+        Over how many simulated flights, in place of each study's own number.
     flight
         A flight folder for the one study named, in place of its own; its report is then named
         ``<study>-<flight>``.
+    parallel
+        How many processes at a time, for notebooks and seeds together.
+    scheduler
+        Address of a `dask.distributed` scheduler whose workers compute the seeds.
+    timeout_s
+        How long a notebook may take, and each seed.
     console
         Where progress is shown; nowhere if not given.
 
@@ -135,7 +145,8 @@ def run_studies(
     Raises
     ------
     WildlabError
-        Before anything runs, if a study is not known or cannot be run as it is written.
+        Before anything runs, if a study is not known or cannot be run as it is written, or the cluster cannot
+        be used; and if the cluster is lost on the way.
     """
     studies = load_studies(notebooks / "studies.toml")
     chosen = (
@@ -159,6 +170,7 @@ def run_studies(
         job = make_job(
             study,
             seed=seed,
+            seeds=seeds,
             flight=flight,
             reports=reports,
             notebooks=notebooks,
@@ -166,7 +178,20 @@ def run_studies(
             name=report,
         )
         jobs.append(job)
-    return _run(jobs, skipped, studies, reports, parallel, console)
+    notes = _notes(chosen, seeds, scheduler)
+    return _run(jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler)
+
+
+def _notes(chosen: Sequence[Study], seeds: int | None, scheduler: str | None) -> list[str]:
+    """What was asked for and has no effect, in sentences."""
+    notes = []
+    once = ", ".join(study.name for study in chosen if study.seeds is None)
+    if seeds is not None and once:
+        notes.append(f"--seeds has no effect on {once}: not computed over simulated flights.")
+    here = ", ".join(study.name for study in chosen if study.each_seed is None)
+    if scheduler is not None and here:
+        notes.append(f"--scheduler has no effect on {here}: nothing is computed for each seed.")
+    return notes
 
 
 def evaluate_flight(
@@ -211,7 +236,7 @@ def evaluate_flight(
         name=name,
         again=f"wildlab evaluate {folder.name} --source {source}",
     )
-    return _run([job], [], studies, reports, 1, console)[0]
+    return _run([job], [], studies, reports, console)[0]
 
 
 def _run(
@@ -219,14 +244,19 @@ def _run(
     skipped: list[Outcome],
     studies: dict[str, Study],
     reports: Path,
-    parallel: int,
     console: Console | None,
+    *,
+    notes: Sequence[str] = (),
+    parallel: int = 1,
+    scheduler: str | None = None,
 ) -> list[Outcome]:
     if console is not None:
+        for note in notes:
+            console.print(note, highlight=False, soft_wrap=True)
         for outcome in skipped:
             console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
     with shown(console) if console is not None else nullcontext() as listen:
-        outcomes = run_jobs(jobs, parallel=parallel, listen=listen)
+        outcomes = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=listen)
     build_ledger(reports, studies)
     return [*outcomes, *skipped]
 
@@ -235,6 +265,14 @@ def _flight_name(folder: Path) -> str:
     from wildlab.flight.store import load_flight
 
     return str(load_flight(folder).name)
+
+
+def _twin_of(folder: Path) -> str | None:
+    """Name of the twin that a flight folder was simulated from; None for a logged flight."""
+    from wildlab.flight.store import load_flight
+
+    twin = load_flight(folder).manifest.twin
+    return None if twin is None else str(twin.name)
 
 
 def _absent_data(study: Study) -> WildlabError | None:
@@ -249,137 +287,7 @@ def _absent_data(study: Study) -> WildlabError | None:
     return None
 
 
-def run_jobs(jobs: Sequence[Job], *, parallel: int = 1, listen: Listener | None = None) -> list[Outcome]:
-    """Run jobs, ``parallel`` at a time; one that fails does not stop the others.
-
-    Returns
-    -------
-    list of Outcome
-        In the order of ``jobs``.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        After everything started here has been ended and its unfinished files removed.
-    """
-    tell = listen or (lambda *_: None)
-    waiting = list(jobs)
-    running: list[_Running] = []
-    outcomes: dict[str, Outcome] = {}
-    for folder in {Path(job.reports) for job in jobs}:
-        folder.mkdir(parents=True, exist_ok=True)
-        sweep(folder)
-    try:
-        while waiting or running:
-            while waiting and len(running) < max(1, parallel):
-                running.append(_start(waiting.pop(0)))
-                tell(running[-1].job.name, "start", None)
-            connection.wait([one.pipe for one in running], timeout=0.25)
-            for one in list(running):
-                if one.over(tell):
-                    running.remove(one)
-                    outcomes[one.job.name] = _finish(one)
-                    tell(one.job.name, "end", outcomes[one.job.name])
-    finally:
-        for one in running:
-            one.end()
-            clear(one.job)
-    return [outcomes[job.name] for job in jobs]
-
-
-@dataclass
-class _Running:
-    job: Job
-    process: SpawnProcess
-    pipe: connection.Connection
-    started: float
-    began: str
-    cell: int | None = None
-    failure: Failure | None = None
-    done: bool = False
-
-    def over(self, tell: Listener) -> bool:
-        """Read what the process says; True when it is done, failed, gone or out of time."""
-        gone = not self.process.is_alive()
-        try:
-            while not (self.done or self.failure) and self.pipe.poll():
-                message = self.pipe.recv()
-                if message[0] == "done":
-                    self.done = True
-                elif message[0] == "failed":
-                    self.failure = message[1]
-                else:
-                    self.cell = message[1] if message[0] == "cell" else self.cell
-                    tell(self.job.name, message[0], message[1:])
-        except (EOFError, OSError):
-            gone = True
-        if not (self.done or self.failure):
-            if gone:
-                self.process.join(5)
-                self.failure = self._failure(
-                    f"Its process ended without a word (exit code {self.process.exitcode})"
-                )
-            elif time.monotonic() - self.started > self.job.timeout_s:
-                self.failure = self._failure(
-                    f"It was stopped at its time limit of {_duration(self.job.timeout_s)}. "
-                    "If it only needs longer, give it more: `--timeout MINUTES`"
-                )
-        if self.done or self.failure:
-            self.end()
-            return True
-        return False
-
-    def _failure(self, reason: str) -> Failure:
-        return Failure(f"{reason}.", "", log_of(self.job))
-
-    def end(self) -> None:
-        """End the process and all below it. Harmless where it has ended."""
-        if self.done or (self.failure and self.process.is_alive()):
-            self.process.join(3)
-        if self.process.pid is not None and self.process.is_alive():
-            end_tree(self.process.pid)
-        self.process.join()
-        self.pipe.close()
-
-
-def _start(job: Job) -> _Running:
-    clear(job)
-    Path(job.work).mkdir(parents=True)
-    Path(job.runtime).mkdir(parents=True, mode=0o700)
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=work, args=(theirs, job), name=f"wildlab {job.name}")
-    process.start()
-    theirs.close()
-    return _Running(job, process, ours, time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds"))
-
-
-def _finish(one: _Running) -> Outcome:
-    """Move the outputs into place and say how it went."""
-    job, folder, target = one.job, Path(one.job.work), Path(one.job.reports) / one.job.name
-    seconds = round(time.monotonic() - one.started, 1)
-    status: dict[str, Any] = {
-        "study": job.name,
-        "state": "done" if one.done else "failed",
-        "reason": one.failure.reason if one.failure else "",
-        "started": one.began,
-        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
-        "seconds": seconds,
-    }
-    try:
-        if one.failure is not None:
-            leave_failure(job, one.failure, one.cell, status, folder)
-        install(folder, target, status)
-    finally:
-        clear(job)
-    return Outcome(job.name, str(status["state"]), seconds, str(status["reason"]), target)
-
-
 def _socket_folder() -> Path:
     """Where sockets may lie: their paths must be short, and macOS's temporary folder is not."""
     short = Path("/tmp")  # noqa: S108 - a folder of our own is made in it, readable by us alone
     return short if os.access(short, os.W_OK | os.X_OK) else Path(tempfile.gettempdir())
-
-
-def _duration(seconds: float) -> str:
-    return f"{seconds / 60:g} minutes" if seconds >= 120 else f"{seconds:g} seconds"

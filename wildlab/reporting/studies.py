@@ -9,10 +9,13 @@
     twin = "static-antenna"              # flight simulated from data/twins/static-antenna.toml, or ...
     # dataset = "openathena"             # ... imported from a public data set
     # recipe = "openathena.toml"         # ... by data/recipes/openathena.toml
-    seed = 1
-    timeout_minutes = 30
+    seed = 1                             # of the flight that the figures show
+    seeds = 100                          # over how many flights; handed to the notebook as `seeds`
+    each_seed = "static-point"           # computed for each seed before the notebook starts, on many
+                                         # processes: a name in wildlab/pipeline/flown.py
+    timeout_minutes = 30                 # for the notebook, and for each seed
     [static-point.parameters]            # handed to the notebook besides the five every notebook gets
-    seeds = 200
+    observer_seeds = 20
     [static-point.missing]               # published numbers not reproduced yet: subject or name -> reason
     observer = "it follows with the navigation filters"
 """
@@ -29,6 +32,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
+from wildlab.pipeline.flown import FLOWN
 
 #: What the runner gives to every notebook; a study's own parameters may not use these names.
 STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
@@ -49,6 +53,8 @@ class Study(BaseModel):
     dataset: str | None = None
     recipe: str | None = None
     seed: int = Field(default=1, ge=0, lt=2**32)
+    seeds: int | None = Field(default=None, ge=1, le=1_000_000)
+    each_seed: str | None = None
     timeout_minutes: float = Field(default=30.0, gt=0, allow_inf_nan=False)
     parameters: dict[str, Any] = Field(default_factory=dict)
     missing: dict[str, str] = Field(default_factory=dict)
@@ -69,6 +75,13 @@ class Study(BaseModel):
             raise ValueError("a study has either a twin or a recipe")
         if self.dataset and not self.recipe:
             raise ValueError("a data set needs a recipe that imports it")
+        if self.each_seed is not None:
+            if self.seeds is None:
+                raise ValueError("what is computed for each seed needs a number of seeds (seeds = 100)")
+            if self.each_seed not in FLOWN:
+                raise ValueError(f"nothing named {self.each_seed!r} is in wildlab/pipeline/flown.py")
+        if self.seeds is not None and "seeds" in self.parameters:
+            raise ValueError("the number of seeds is given twice")
         taken = sorted(set(self.parameters) & set(STANDARD_PARAMETERS))
         if taken:
             raise ValueError(f"the parameter {taken[0]!r} is set by the runner")
