@@ -186,6 +186,8 @@ def run_filter(
         x, P = predict(x, P, F, Q)
         if pose is not None:
             C = F @ C * schmidt.fade(dt, pose.correlation_time)
+        if not np.isfinite(given.z[row]).all(axis=-1).any():
+            return given.times[row], x, P
         expected = sensor.predict(row, x[:2])
         P_pose = np.zeros((6, 6)) if pose is None else np.asarray(pose.covariance[row], float)
         H = on_state(expected.H_position, n)

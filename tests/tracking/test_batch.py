@@ -1,0 +1,137 @@
+"""The compiled filters of many runs against the readable filter, run by run."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tests.tracking.poses import CAMERA, CROOKED, overflight
+from tests.tracking.test_schmidt import hard_flight, random_pose_covariance
+from wildlab.errors import WildlabError
+from wildlab.tracking import measurement as m
+from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.schmidt import PoseUncertainty
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+N = 40
+
+
+def agree(batch, run, track, but=()):
+    """Row by row, but for those where the one that follows at the same time counts too."""
+    rows = np.setdiff1d(np.arange(len(track.times)), but)
+    shared = {"x": track.x, "P": track.P, "innovation": track.innovation, "nis": track.nis}
+    for name, theirs in shared.items():
+        ours = getattr(batch, name)[run]
+        assert np.allclose(ours[rows], theirs[rows], rtol=1e-9, atol=1e-9, equal_nan=True), name
+    assert np.array_equal(batch.used[run], track.used)
+    assert np.array_equal(batch.limited[run], track.limited)
+
+
+def flight(runs, seed=0):
+    """Pixels, poses and noise of their own for each run, with frames missed and a target out of sight."""
+    rng = np.random.default_rng(seed)
+    times, uv, poses, truth = overflight(N)
+    p_nc = poses.p_nc + rng.normal(0, 1, (runs, N, 3))
+    R_nc = np.tile(poses.R_nc, (runs, 1, 1, 1))
+    R_nc[runs // 2, 5] = R_nc[runs // 2, 5] @ np.diag([1.0, -1.0, -1.0])
+    p_nc[0, 9] = np.nan
+    z = uv + rng.normal(0, 2, (runs, N, 2))
+    z[rng.random((runs, N)) < 0.1, 0] = np.nan
+    z[1, 12] += 300
+    return times, z, m.CameraPoses(p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
+
+
+def one(poses, run):
+    return m.CameraPoses(poses.p_nc[run], poses.R_nc[run], poses.R_bc, poses.lever_arm)
+
+
+@pytest.mark.parametrize("gate", [None, 0.99])
+@pytest.mark.parametrize("runs", [1, 3, 64, 70])
+def test_positions(runs, gate):
+    rng = np.random.default_rng(runs)
+    times = np.cumsum(rng.uniform(0, 2, N))
+    times[7] = times[6]
+    z = np.cumsum(rng.normal(0, 3, (runs, N, 2)), axis=1)
+    z[rng.random((runs, N)) < 0.1] = np.nan
+    A = rng.normal(size=(runs, N, 2, 3))
+    R = A @ np.swapaxes(A, -1, -2) + np.eye(2)
+    R[0, 4] = np.nan
+    start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=0)
+    batch = run_batch(times, z, R, CV, start, gate=gate)
+    for run in range(runs):
+        own = start._replace(x=start.x[run])
+        agree(batch, run, run_filter(times, z[run], R[run], m.positions(), CV, own, gate=gate), but=[6])
+
+
+@pytest.mark.parametrize("gate", [None, 0.99])
+def test_pixels(gate):
+    runs = 67
+    times, z, poses, _ = flight(runs)
+    plane = np.linspace(0, 1, N)
+    start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
+    R = np.diag([4.0, 6.0])
+    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, plane), gate=gate)
+    for run in (0, 1, 33, 63, 64, 66):
+        sensor = m.pixels(CAMERA, one(poses, run), plane)
+        agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate=gate))
+    assert not batch.used[33, 5]
+
+
+@pytest.mark.parametrize("correlation_time", [np.inf, 5.0, 0.0])
+def test_schmidt(correlation_time):
+    runs = 66
+    times, z, poses, _ = flight(runs)
+    rng = np.random.default_rng(1)
+    covariance = np.array([[random_pose_covariance(rng, 0.2) for _ in range(N)] for _ in range(runs)])
+    covariance[3, 20] = np.nan
+    covariance[4, :, 2] = covariance[4, :, :, 2] = 0.0
+    covariance[5] = 0.0
+    start = Start(0.0, np.zeros(4), np.tile(np.diag([25.0, 25, 9, 9]), (runs, 1, 1)))
+    R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
+    pose = PoseUncertainty(covariance, correlation_time)
+    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, 0.0), pose=pose, gate=0.999)
+    for run in (0, 1, 3, 4, 5, 33, 63, 65):
+        own = start._replace(P=start.P[run])
+        track = run_filter(
+            times, z[run], R, m.pixels(CAMERA, one(poses, run), 0.0), CV, own,
+            pose=pose._replace(covariance=covariance[run]), gate=0.999,
+        )  # fmt: skip
+        agree(batch, run, track)
+
+
+def test_schmidt_where_the_cross_covariance_must_be_limited():
+    times, uv, poses, covariances = hard_flight(60)
+    pose = PoseUncertainty(covariances)
+    start = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
+    z = np.stack([uv, uv + 3.0])
+    R = 4.0 * np.eye(2)
+    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, 0.0), pose=pose)
+    for run in range(2):
+        track = run_filter(times, z[run], R, m.pixels(CAMERA, poses, 0.0), CV, start, pose=pose)
+        assert track.limited.any()
+        agree(batch, run, track)
+
+
+def test_bad_input_is_named():
+    times, z, poses, _ = flight(3)
+    start = Start(0.0, np.zeros(4), np.eye(4))
+    R = np.eye(2)
+    with pytest.raises(WildlabError, match=r"give \(runs, times, 2\)|Give \(runs, times, 2\)"):
+        run_batch(times, z[0], R, CV, start)
+    with pytest.raises(WildlabError, match="camera distorts"):
+        run_batch(times, z, R, CV, start, view=View(CROOKED, poses, 0.0))
+    with pytest.raises(WildlabError, match='knows no change="scaled"'):
+        run_batch(
+            times, z, R, CV, start, view=View(CAMERA, poses, 0.0),
+            pose=PoseUncertainty(np.zeros((N, 6, 6)), change="scaled"),
+        )  # fmt: skip
+    with pytest.raises(WildlabError, match="row 3 at"):
+        run_batch(np.where(np.arange(N) == 3, -1.0, times), z, R, CV, start)
+    bad = np.tile(R, (3, N, 1, 1))
+    bad[1, 6] = 0.0
+    with pytest.raises(WildlabError, match="R of row 6 is not a covariance"):
+        run_batch(times, z, bad, CV, start)
+    with pytest.raises(WildlabError, match="innovation covariance S of row 0"):
+        run_batch(times, np.zeros((3, N, 2)), R, CV, start._replace(P=-9 * np.eye(4)))

@@ -1,0 +1,172 @@
+"""Many runs of one flight at once: `wildlab.tracking.run.run_filter` for constant velocity, compiled.
+
+For Monte Carlo studies: B runs share their times and their motion model; measurements, poses and covariances
+may differ from run to run. States are ``[pN, pE, vN, vE]``; measurements are positions, or pixels of a camera
+without distortion. The Schmidt filter is the one with ``change="kept"``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Array
+from wildlab.tracking import schmidt
+from wildlab.tracking.batch_kernels import run_lanes
+from wildlab.tracking.measurement import CameraPoses
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.run import Start, checked
+from wildlab.tracking.schmidt import PoseUncertainty
+
+
+class BatchTracks(NamedTuple):
+    """What the filter made of B runs of N measurements; the estimates after each row.
+
+    NaN before the start. Views of arrays in which the runs come last.
+    """
+
+    times: Array  # (N,)
+    x: Array  # (B, N, 4)
+    P: Array  # (B, N, 4, 4)
+    innovation: Array  # (B, N, 2)
+    nis: Array  # (B, N)
+    used: NDArray[np.bool_]  # (B, N)
+    limited: NDArray[np.bool_]  # (B, N), see `run.Track`
+
+
+class View(NamedTuple):
+    """The camera of all runs: what `wildlab.tracking.measurement.pixels` takes.
+
+    ``poses`` holds arrays for all runs alike, (N, 3) and (N, 3, 3), or for each its own, (B, N, 3) and
+    (B, N, 3, 3); ``R_bc`` may be (3, 3). ``plane_down`` is a scalar or (N,).
+    """
+
+    camera: Camera
+    poses: CameraPoses
+    plane_down: ArrayLike
+
+
+def run_batch(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    motion: Motion,
+    start: Start,
+    *,
+    view: View | None = None,
+    pose: PoseUncertainty | None = None,
+    gate: float | None = None,
+) -> BatchTracks:
+    """Kalman filter on positions; with ``view`` the extended filter on pixels; with ``pose`` Schmidt's.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order.
+    measurements
+        (B, N, 2); rows of NaN are frames without a detection.
+    R
+        (2, 2), (N, 2, 2) or (B, N, 2, 2).
+    motion
+        A model with four states.
+    start
+        ``x`` (4,) or (B, 4), ``P`` (4, 4) or (B, 4, 4); time and row are the same for all.
+    view
+        The camera; None: the measurements are positions.
+    pose
+        Its covariance is (N, 6, 6) or (B, N, 6, 6).
+    gate
+        As in `wildlab.tracking.run.run_filter`.
+
+    Raises
+    ------
+    WildlabError
+        As `run_filter`; and for a camera that distorts, or a pose uncertainty that is to be scaled.
+    """
+    z = np.asarray(measurements, float)
+    R = np.asarray(R, float)
+    if z.ndim != 3 or z.shape[2] != 2:
+        raise WildlabError(
+            f"measurements of the shape {z.shape}", "give (runs, times, 2)", field="measurements"
+        )
+    given = checked(times, np.moveaxis(z, 0, 1), np.moveaxis(R, 0, 1) if R.ndim == 4 else R, gate, None)
+    z = np.ascontiguousarray(np.moveaxis(given.z, 0, 1))
+    B, N = z.shape[:2]
+    first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
+    F, Q, left = np.empty((N, 4, 4)), np.empty((N, 4, 4)), np.ones(N)
+    for row, dt in enumerate(np.diff(given.times[first:], prepend=start.time), first):
+        F[row], Q[row] = motion(float(dt))
+        left[row] = 1.0 if pose is None else schmidt.fade(float(dt), pose.correlation_time)
+
+    P_poses = np.zeros((1, N, 36))
+    if pose is not None:
+        if pose.change != "kept":
+            raise WildlabError(
+                f'the batch filter knows no change="{pose.change}"', 'use "kept", or run_filter', field="pose"
+            )
+        P_poses = _per_run(pose.covariance, 2, N)
+        unknown = ~np.isfinite(P_poses).all(axis=2)
+        z[np.broadcast_to(unknown, (B, N))] = np.nan
+        P_poses[unknown] = 0.0
+    noise = _per_run(R, 2, N)
+    noise[~np.isfinite(noise).all(axis=2)] = [1.0, 0.0, 0.0, 1.0]  # their measurements are NaN by now
+    P0 = np.asarray(start.P, float)
+    estimates = [np.empty((N, *shape, B)) for shape in ((4,), (4, 4), (2,), ())]
+    for a in estimates:
+        a[:first] = np.nan
+    out = (*estimates, np.zeros((N, B), bool), np.zeros((N, B), bool))
+    poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
+    singular = run_lanes(
+        F, Q, left, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
+        np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
+        np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
+        first, given.threshold, view is not None, pose is not None, *out,
+    )  # fmt: skip
+    if singular >= 0:
+        raise WildlabError(
+            f"the innovation covariance S of row {singular} is not positive definite",
+            "check the covariances of start, motion and measurements",
+            field="S",
+        )
+    if start.row >= 0:
+        out[0][start.row] = np.asarray(start.x, float).T.reshape(4, -1)
+        out[1][start.row] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
+        out[4][start.row] = True
+    return BatchTracks(given.times, *(np.moveaxis(a, -1, 0) for a in out))
+
+
+def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
+    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; zeros where there is no camera."""
+    if view is None:
+        return (
+            np.zeros((1, n_rows, 12)), np.zeros((1, n_rows, 9)), np.zeros(3), np.zeros(n_rows), np.zeros(5)
+        )  # fmt: skip
+    camera, poses = view.camera, view.poses
+    if camera.distorts:
+        raise WildlabError(
+            "the camera distorts, and the batch filter knows none that does",
+            "take the distortion out of the pixels first, or use run_filter",
+            field="camera",
+        )
+    p_nc, R_nc = _per_run(poses.p_nc, 1, n_rows), _per_run(poses.R_nc, 2, n_rows)
+    runs = max(len(p_nc), len(R_nc))
+    parts = [np.broadcast_to(a, (runs, *a.shape[1:])) for a in (p_nc, R_nc)]
+    return (
+        np.ascontiguousarray(np.concatenate(parts, axis=2)),
+        _per_run(poses.R_bc, 2, n_rows),
+        np.array(poses.lever_arm, float),
+        np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows)),
+        np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew]),
+    )
+
+
+def _per_run(values: ArrayLike, axes: int, n_rows: int) -> Array:
+    """(1 or B, N, k) from one value of so many axes, one for each row, or one for each run and row."""
+    a = np.asarray(values, float)
+    single = a.shape[a.ndim - axes :]
+    a = np.broadcast_to(a, (1, n_rows, *single)) if a.ndim <= axes + 1 else a
+    return np.array(a, order="C").reshape(len(a), n_rows, -1)
