@@ -12,7 +12,7 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict, update
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, State, Track, checked, note, walk
+from wildlab.tracking.run import Start, State, Track, by_motion, checked, note, walk
 
 
 class Differenced(NamedTuple):
@@ -112,7 +112,7 @@ def run_coloured(
         x_new, P_new = predict(done.x, done.P, model.F, model.Q)
         return given.times[row], x_new + model.T @ y[0], P_new
 
-    return walk(given, start, motion, step)
+    return walk(given, start, by_motion(motion), step)
 
 
 def thin(times: ArrayLike, interval: float, usable: ArrayLike | None = None) -> NDArray[np.bool_]:

@@ -86,6 +86,8 @@ class Inputs(NamedTuple):
 
 #: State of a filter: when, estimate, covariance.
 State = tuple[float, Array, Array]
+#: State and a later time -> estimate and covariance then.
+Ahead = Callable[[State, float], tuple[Array, Array]]
 
 
 def start_from_first(
@@ -216,7 +218,7 @@ def run_filter(
         C = update.C
         return given.times[row], update.x, update.P
 
-    return walk(given, start, motion, step)
+    return walk(given, start, by_motion(motion), step)
 
 
 def note(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
@@ -225,8 +227,17 @@ def note(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen
     track.chosen[row], track.used[row] = chosen, used
 
 
-def walk(given: Inputs, start: Start, motion: Motion, step: Callable[[int, State, Track], State]) -> Track:
-    """Take a filter's ``step`` through the rows in order, and predict to the requested times between."""
+def by_motion(motion: Motion) -> Ahead:
+    """Prediction with a motion model."""
+    return lambda state, time: predict(state[1], state[2], *motion(time - state[0]))
+
+
+def walk(given: Inputs, start: Start, ahead: Ahead, step: Callable[[int, State, Track], State]) -> Track:
+    """Take a filter's ``step`` through the rows in order, and look ``ahead`` to the requested times between.
+
+    ``ahead`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and may
+    leave it at an earlier time.
+    """
     N, _, m = given.z.shape
     M, n = len(given.output_times), len(start.x)
     track = Track(
@@ -249,8 +260,7 @@ def walk(given: Inputs, start: Start, motion: Motion, step: Callable[[int, State
 
     def write_until(time: float, out: int) -> int:
         while out < M and given.output_times[out] < time:
-            F, Q = motion(given.output_times[out] - state[0])
-            track.x[out], track.P[out] = predict(state[1], state[2], F, Q)
+            track.x[out], track.P[out] = ahead(state, float(given.output_times[out]))
             out += 1
         return out
 
