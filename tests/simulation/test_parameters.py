@@ -52,7 +52,7 @@ def test_every_parameter_of_every_twin_is_accounted_for():
         for group, key, parameter in each_parameter(load_twin(name)):
             where = f"{name}: {group}.{key}"
             if parameter.status == "published":
-                assert re.search(r"\bH (\d|table|fig|\()", parameter.source), where
+                assert re.search(r"\b[HF] (\d|table|fig|\()", parameter.source), where
             else:
                 assert len(parameter.reason) > 8, where
 

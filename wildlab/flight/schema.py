@@ -189,6 +189,11 @@ TABLES: dict[str, Table] = {
                 *_position("the detection", required=False, may_be_nan=True),
                 Column("target_id", "text", "", "target it is of, empty = not known", False),
                 Column("plane_down_m", "float", "m", "down coordinate of the ground there", False, True),
+                Column("area_px", "float", "px^2", "area of what is seen of it", False, True),
+                Column("major_px", "float", "px", "longer axis of the ellipse with its moments", False, True),
+                Column("minor_px", "float", "px", "shorter axis of that ellipse", False, True),
+                Column("angle_rad", "float", "rad", "of the longer axis, from u towards v", False, True),
+                Column("touches_border", "float", "1", "1 if the image's edge cuts it, else 0", False, True),
             ),
         ),
         Table(

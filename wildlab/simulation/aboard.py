@@ -37,8 +37,13 @@ def nav_table(motion: Motion) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def autopilot_tables(twin: TwinParameters, true: Motion, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The logged pose with the IMU's misalignment taken out, and left in: same errors, one difference."""
+def autopilot_tables(
+    twin: TwinParameters, true: Motion, seed: int
+) -> tuple[pd.DataFrame, pd.DataFrame | None]:
+    """The logged pose with the IMU's misalignment taken out, and left in: same errors, one difference.
+
+    The second one only where that misalignment is known.
+    """
     a, count, step = twin.autopilot, len(true.times), 1 / twin.autopilot.rate.si
     rng = stream(seed, "autopilot attitude")
     turn = gauss_markov(
@@ -57,6 +62,8 @@ def autopilot_tables(twin: TwinParameters, true: Motion, seed: int) -> tuple[pd.
         true.acceleration,
         turned_by(true.R_nb, turn),
     )
+    if a.imu_roll is None or a.imu_pitch is None or a.imu_yaw is None:
+        return nav_table(logged), None
     # Of a level airframe the IMU reads these angles, so they are its attitude against the airframe.
     imu = euler_to_matrix(a.imu_roll.si, a.imu_pitch.si, a.imu_yaw.si)
     left_in = Motion(logged.times, logged.position, logged.velocity, logged.acceleration, logged.R_nb @ imu)
@@ -69,6 +76,8 @@ def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signa
     The IMU and the antennas are on the payload, the camera is on the airframe. (N,) s -> (N, 3, 3).
     """
     b, rng = twin.boresight, stream(seed, "boresight")
+    if b is None:
+        raise ValueError("this twin carries no payload")
     band = (b.shortest_period.si, b.longest_period.si)
     roll, pitch, yaw = (random_wander(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd))
 
@@ -80,6 +89,8 @@ def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signa
 
 def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
     """Readings of the inertial unit over the whole flight."""
+    if twin.imu is None:
+        raise ValueError("this twin carries no inertial unit")
     times = ticks(twin.imu.rate.si, twin.flight.duration.si)
     # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
     earth = local_earth(twin.place.latitude.si, twin.place.height.si)
@@ -94,6 +105,8 @@ def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int
 def gnss_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
     """Fixes of the two receivers over the whole flight, and the velocity that the first one gives."""
     g = twin.gnss
+    if g is None:
+        raise ValueError("this twin carries no receivers")
     times = ticks(g.rate.si, twin.flight.duration.si)
     motion, rate = move(path, payload, times), angular_rates(payload, times)
     arms = {

@@ -1,4 +1,4 @@
-"""The groups of parameters a twin has: place, flight, targets, and one per sensor."""
+"""The groups of parameters a twin has: place, flight, and one per sensor. Targets: `subjects`."""
 
 from __future__ import annotations
 
@@ -41,7 +41,11 @@ class Place(Strict):
 
 
 class AirframeFlight(Strict):
-    """The airframe, the wind, and how well course and attitude are held; the course itself stands apart."""
+    """The airframe, the wind, and how well course and attitude are held; the course itself stands apart.
+
+    A fixed wing, unless ``kind`` says something else: it banks into turns. A multicopter leans towards where
+    it accelerates, a gondola hangs level; ``airspeed`` is their speed along the course.
+    """
 
     platform: Text
     duration: Duration
@@ -59,6 +63,7 @@ class AirframeFlight(Strict):
     yaw_sd: AngleSpread
     sway_shortest_period: Duration
     sway_longest_period: Duration
+    kind: Annotated[Parameter, word("fixed wing", "multicopter", "gondola")] | None = None
 
     @model_validator(mode="after")
     def _flies(self) -> AirframeFlight:
@@ -98,6 +103,27 @@ class Route(Strict):
     roll_time: Annotated[Parameter, quantity("s", high=20, above=0.2)]
 
 
+class Survey(Strict):
+    """Rows back and forth over one enclosure after the other, and round again (F 5.2)."""
+
+    row_distance: Length
+    turn_time: Annotated[Parameter, quantity("s", high=60, above=0.2)]
+
+
+class Cable(Strict):
+    """What a gondola hangs from: its height over the ground, up and down once in each span of a lap."""
+
+    lowest: Length
+    highest: Length
+    spans: Count
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Cable:
+        if self.lowest.number > self.highest.number:
+            raise ValueError("lowest is above highest; exchange the two")
+        return self
+
+
 class Climb(Strict):
     """One change of altitude during the flight."""
 
@@ -106,75 +132,12 @@ class Climb(Strict):
     duration: Duration
 
 
-class TargetMotion(Strict):
-    """A steady course from where the target is at time 0, and what it strays from it."""
-
-    north: Annotated[Parameter, quantity("m", -1e4, 1e4)]
-    east: Annotated[Parameter, quantity("m", -1e4, 1e4)]
-    speed: Speed
-    course: Angle
-    stray_sd: LengthSpread
-    stray_shortest_period: Duration
-    stray_longest_period: Duration
-
-    @model_validator(mode="after")
-    def _band(self) -> TargetMotion:
-        if self.stray_shortest_period.number > self.stray_longest_period.number:
-            raise ValueError("stray_shortest_period is longer than stray_longest_period; exchange the two")
-        return self
-
-
-class TargetGps(Strict):
-    """The single-frequency receiver that a target carries, whose log counts as the truth about it."""
-
-    rate: Rate
-    horizontal_wander: LengthSpread
-    vertical_wander: LengthSpread
-    wander_time: Duration
-    horizontal_noise: LengthSpread
-    vertical_noise: LengthSpread
-    resolution: LengthSpread
-    ahead: Arm
-
-
-class Target(Strict):
-    """Something that is seen: a point that never moves, or, with a motion and a GPS, a vessel."""
-
-    identifier: Text
-    height: Annotated[Parameter, quantity("m", -1e3, 1e4)]
-    sd: Annotated[Parameter, quantity("m", high=100, above=0)]
-    marked_by: Text
-    observations: Count
-    choice: Annotated[Parameter, word("first", "missed at random")]
-    border: Pixels
-    motion: TargetMotion | None = None
-    gps: TargetGps | None = None
-
-    @model_validator(mode="after")
-    def _logged(self) -> Target:
-        if (self.motion is None) != (self.gps is None):
-            raise ValueError(
-                "a target that moves needs both motion and gps, one that never moves neither; "
-                "add the one or take out the other"
-            )
-        return self
-
-
-class Pair(Strict):
-    """Images in which both targets are marked."""
-
-    both: Annotated[Parameter, quantity("1", 0, 1e6, whole=True)]
-
-
-class Subset(Strict):
-    """Detections in succession that a table of the source has apart."""
-
-    first: Count
-    observations: Count
-
-
 class TwinCamera(Strict):
-    """Intrinsic parameters, frame rate, and what a person does with the images."""
+    """Intrinsic parameters, frame rate, stamps, and what a person does with the images.
+
+    Stamps are synchronised with the other sensors', unless only the computer that stores the images gives
+    them one. ``recording_start``, ``images``: of the recording.
+    """
 
     name: Text
     width: PixelCount
@@ -188,16 +151,33 @@ class TwinCamera(Strict):
     images: Count
     latency: Annotated[Parameter, quantity("ms", 0, 1e4)]
     marking_sd: Pixels
+    k1: Annotated[Parameter, quantity("1", -1, 1)] | None = None
+    stamped_by: Annotated[Parameter, word("synchronisation", "computer")] | None = None
 
 
 class TwinMount(Strict):
-    """The gimbal; misalignment as H prints it (see `geometry.mount.helgesen_misalignment`)."""
+    """The mount; misalignment as H prints it (see `geometry.mount.helgesen_misalignment`).
+
+    Looks down unless it says so. What was not calibrated is there, and nobody knows it.
+    """
 
     pan: Angle
     tilt: Angle
     misalignment_roll: Angle
     misalignment_tilt: Angle
     misalignment_pan: Angle
+    looks: Annotated[Parameter, word("down", "forward")] | None = None
+    calibrated: Annotated[Parameter, word("yes", "no")] | None = None
+
+
+class Gimbal(Strict):
+    """A gimbal whose pan swings from side to side, and what it says about its angles (F 5.4.1)."""
+
+    limit: Annotated[Parameter, quantity("deg", 0, 180)]
+    period: Duration
+    tilt: Angle
+    rate: Rate
+    noise: AngleSpread
 
 
 class OnboardClock(Strict):
@@ -209,7 +189,7 @@ class OnboardClock(Strict):
 
 
 class Autopilot(Strict):
-    """The pose that the autopilot logs."""
+    """The pose that the autopilot logs and, where that was read, how its IMU is turned in the airframe."""
 
     rate: Rate
     roll_sd: AngleSpread
@@ -224,9 +204,15 @@ class Autopilot(Strict):
     position_resolution: LengthSpread
     velocity_sd: Speed
     velocity_correlation_time: Duration
-    imu_roll: Angle
-    imu_pitch: Angle
-    imu_yaw: Angle
+    imu_roll: Angle | None = None
+    imu_pitch: Angle | None = None
+    imu_yaw: Angle | None = None
+
+    @model_validator(mode="after")
+    def _levelled(self) -> Autopilot:
+        if len({angle is None for angle in (self.imu_roll, self.imu_pitch, self.imu_yaw)}) > 1:
+            raise ValueError("imu_roll, imu_pitch and imu_yaw belong together; give all or none")
+        return self
 
 
 class TruePose(Strict):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
@@ -21,21 +21,22 @@ from wildlab.simulation.models import (
     Assumed,
     Autopilot,
     Boresight,
+    Cable,
     Climb,
+    Gimbal,
     Gnss,
     Imu,
     Loiter,
     OnboardClock,
-    Pair,
     Place,
     Route,
-    Subset,
-    Target,
+    Survey,
     TruePose,
     TwinCamera,
     TwinMount,
 )
 from wildlab.simulation.quantities import Parameter
+from wildlab.simulation.subjects import Animals, Enclosure, Pair, Segments, Subset, Target
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"
@@ -52,20 +53,34 @@ class TwinParameters(Strict):
     flight: AirframeFlight
     loiter: Loiter | None = None
     route: Route | None = None
+    survey: Survey | None = None
     climb: Climb | None = None
-    target: Target
+    cable: Cable | None = None
+    target: Target | None = None
     second_target: Target | None = None
     pair: Pair | None = None
     subset: Subset | None = None
+    segments: Segments | None = None
+    enclosures: dict[str, Enclosure] = Field(default_factory=dict)
+    animals: Animals | None = None
     camera: TwinCamera
     mount: TwinMount
-    onboard_clock: OnboardClock
+    gimbal: Gimbal | None = None
+    onboard_clock: OnboardClock | None = None
     autopilot: Autopilot
-    boresight: Boresight
-    imu: Imu
-    gnss: Gnss
+    boresight: Boresight | None = None
+    imu: Imu | None = None
+    gnss: Gnss | None = None
     truth: TruePose
     assumed: Assumed
+
+    @field_validator("enclosures")
+    @classmethod
+    def _safe_enclosures(cls, value: dict[str, Enclosure]) -> dict[str, Enclosure]:
+        for name in value:
+            if not is_safe_name(name):
+                raise ValueError(f"{name!r:.80} cannot name an enclosure; use letters, digits, - and _ only")
+        return value
 
     @field_validator("name")
     @classmethod
@@ -78,18 +93,36 @@ class TwinParameters(Strict):
 
     @model_validator(mode="after")
     def _one_course(self) -> TwinParameters:
-        if (self.loiter is None) == (self.route is None):
-            raise ValueError("a twin flies one course; describe either loiter or route")
-        if self.loiter is not None and self.target.motion is not None:
+        courses = {"loiter": self.loiter, "route": self.route, "survey": self.survey}
+        if len([name for name, course in courses.items() if course is not None]) != 1:
+            raise ValueError("a twin flies one course; describe one of loiter, route and survey")
+        if self.loiter is not None and (self.target is None or self.target.motion is not None):
             raise ValueError("a loiter stands beside a target that never moves; describe a route")
-        if self.loiter is not None and self.climb is not None:
-            raise ValueError("a loiter is flown at one altitude; describe a route, or take out climb")
+        if self.route is None and (self.climb is not None or self.cable is not None):
+            raise ValueError(
+                "only a route changes its altitude; describe a route, or take out climb and cable"
+            )
+        if self.climb is not None and self.cable is not None:
+            raise ValueError("a cable has its own heights; take out climb or cable")
+        if self.survey is not None and not self.enclosures:
+            raise ValueError("a survey goes over enclosures, and there are none; add enclosures")
         return self
 
     @property
     def targets(self) -> list[Target]:
-        """All targets, in their order."""
-        return [self.target] if self.second_target is None else [self.target, self.second_target]
+        """All targets with a description of their own, in their order; animals are in `animals.herd`."""
+        return [target for target in (self.target, self.second_target) if target is not None]
+
+    @model_validator(mode="after")
+    def _one_kind_of_target(self) -> TwinParameters:
+        if (self.target is None) == (self.animals is None):
+            raise ValueError("a twin looks for targets or for animals; describe either target or animals")
+        if self.animals is not None and not self.enclosures:
+            raise ValueError("animals live in enclosures, and there are none; add enclosures")
+        others = (self.second_target, self.pair, self.subset, self.segments)
+        if self.target is None and any(part is not None for part in others):
+            raise ValueError("second_target, pair, subset and segments go with a target; add target")
+        return self
 
     @model_validator(mode="after")
     def _apart(self) -> TwinParameters:
@@ -106,6 +139,31 @@ class TwinParameters(Strict):
                 f"the subset ends behind the last of {wanted} detections; lower subset.first or "
                 "subset.observations"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _partly_in_view(self) -> TwinParameters:
+        outlined = self.target is not None and self.target.outline is not None
+        if self.pair is not None and any(target.outline is not None for target in self.targets):
+            raise ValueError("of two targets none can have an outline; take out the outline")
+        if (self.segments is not None) != outlined:
+            raise ValueError("a target with an outline needs segments, any other none; add or take out one")
+        if self.segments and self.target and self.segments.images.number < self.target.observations.number:
+            raise ValueError(
+                "there are fewer images in the segments than observations of the target; "
+                "lower target.observations"
+            )
+        if outlined and self.camera.k1 is not None:
+            raise ValueError("an outline stays straight only in a camera without k1; take out camera.k1")
+        return self
+
+    @model_validator(mode="after")
+    def _sensors(self) -> TwinParameters:
+        if len({part is None for part in (self.imu, self.gnss, self.boresight)}) > 1:
+            raise ValueError("imu, gnss and boresight describe one payload; give all or none")
+        by_computer = self.camera.stamped_by is not None and self.camera.stamped_by.text == "computer"
+        if by_computer and self.onboard_clock is None:
+            raise ValueError("the computer stamps the images, and its clock is missing; add onboard_clock")
         return self
 
     @model_validator(mode="after")
@@ -181,6 +239,9 @@ def each_parameter(twin: TwinParameters) -> Iterator[tuple[str, str, Parameter]]
         part = getattr(twin, group)
         if isinstance(part, Strict):
             yield from _each(group, part)
+        elif isinstance(part, dict):
+            for name, content in part.items():
+                yield from _each(f"{group}.{name}", content)
 
 
 def _each(group: str, part: Strict) -> Iterator[tuple[str, str, Parameter]]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.trajectory import FlightPath, Wander, no_wander
+from wildlab.simulation.trajectory import FlightPath, Signal, Wander, no_wander
 
 Shape = Literal["eight", "racetrack"]
 
@@ -147,8 +147,7 @@ def fly(
     over = np.asarray(drift, float)
     passed = lap_times(points, airspeed, np.asarray(wind, float) - over)
     interval = roll_time / _RISE
-    count = int(np.ceil(duration / interval)) + 6 * (_DEGREE + 1)
-    knots = interval * (np.arange(count) - 3 * (_DEGREE + 1))
+    knots = _knots(duration, interval)
     lap = np.mod(knots + start * passed[-1], passed[-1])
     profile = np.asarray(altitude, float)
     rough = np.stack(
@@ -159,9 +158,7 @@ def fly(
         ],
         axis=-1,
     )
-    # Control points at the middles of their basis functions: straight lines stay what they are.
-    support = interval * (np.arange(count + _DEGREE + 1) - (_DEGREE + 1) / 2) + knots[0]
-    spline = BSpline(support, rough, _DEGREE, extrapolate=False)
+    spline = _smoothed(knots, rough, interval)
     parts = (spline, spline.derivative(1), spline.derivative(2))
     off = (*(track_wander or (no_wander(), no_wander())), altitude_wander or no_wander())
     signs = (1.0, 1.0, -1.0)
@@ -176,3 +173,41 @@ def fly(
         return p, v, a
 
     return path
+
+
+def headings(
+    course: ArrayLike,
+    airspeed: float,
+    duration: float,
+    *,
+    wind: ArrayLike = (0.0, 0.0),
+    start: float = 0.0,
+    roll_time: float = 2.0,
+) -> Signal:
+    """Direction of the leg that is flown, turned round at corners in the time it takes: (N,) s -> (N,) rad.
+
+    For what can turn on the spot: unlike the direction of the velocity it is known where a course reverses.
+    Parameters as for :func:`fly`; the wind is that against the course, should it drift.
+    """
+    points = np.asarray(course, float)
+    passed = lap_times(points, airspeed, wind)
+    interval = roll_time / _RISE
+    knots = _knots(duration, interval)
+    lap = np.mod(knots + start * passed[-1], passed[-1])
+    legs = np.diff(points, axis=0)
+    leg = np.clip(np.searchsorted(passed, lap, side="right") - 1, 0, len(legs) - 1)
+    spline = _smoothed(knots, np.unwrap(np.arctan2(legs[leg, 1], legs[leg, 0])), interval)
+    return lambda times: np.asarray(spline(np.asarray(times, float)))
+
+
+def _knots(duration: float, interval: float) -> Array:
+    """Times of the control points, s: from some before 0 to some after the duration."""
+    count = int(np.ceil(duration / interval)) + 6 * (_DEGREE + 1)
+    return np.asarray(interval * (np.arange(count) - 3 * (_DEGREE + 1)))
+
+
+def _smoothed(knots: Array, rough: Array, interval: float) -> BSpline:
+    """The spline with these control points, at the middles of its basis functions: lines stay lines."""
+    count = len(knots)
+    support = interval * (np.arange(count + _DEGREE + 1) - (_DEGREE + 1) / 2) + knots[0]
+    return BSpline(support, rough, _DEGREE, extrapolate=False)

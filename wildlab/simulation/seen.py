@@ -1,25 +1,21 @@
-"""What the camera takes and what is found in its images: frames and detections."""
+"""What the camera takes and what is found in its images: frames, and detections of targets seen as points."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import Manifest
 from wildlab.geometry.camera import in_image
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import camera_pose
-from wildlab.simulation.models import Target
+from wildlab.simulation.animals_seen import animal_detections
 from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.partly_seen import seen_in_part
 from wildlab.simulation.sensors import computer_stamps, stream
+from wildlab.simulation.subjects import Target
 from wildlab.simulation.targets import target_path
 from wildlab.simulation.trajectory import Motion
-
-#: Numbers of images.
-Numbers = NDArray[np.intp]
+from wildlab.simulation.view import Numbers, View, marks, numbered
 
 #: Column of the frames that holds the on-board computer's stamps.
 ONBOARD_STAMP = "time_onboard_s"
@@ -33,67 +29,62 @@ def exposure_times(twin: TwinParameters) -> Array:
     return np.asarray(camera.recording_start.si + np.arange(int(camera.images.number)) / camera.frame_rate.si)
 
 
-def frames_table(twin: TwinParameters, exposures: Array, seed: int) -> pd.DataFrame:
-    """Images with the camera's synchronised stamps and the on-board computer's."""
-    clock = twin.onboard_clock
-    stamps = exposures + twin.camera.latency.si
-    return pd.DataFrame(
-        {
-            "frame_id": [f"f{number:06d}" for number in range(1, len(exposures) + 1)],
-            "time_s": stamps,
-            ONBOARD_STAMP: computer_stamps(
-                stamps,
-                clock.offset.si,
-                clock.drift.si,
-                clock.latency.si,
-                stream(seed, "on-board clock"),
-            ),
-        }
-    )
-
-
-def detections_table(
-    twin: TwinParameters, manifest: Manifest, true: Motion, frames: pd.DataFrame, seed: int
-) -> pd.DataFrame:
-    """Targets as they are marked in the images, in the order of the images.
+def frames_and_detections(twin: TwinParameters, true: Motion, seed: int) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The images and what is found in them, in the order of the images.
 
     Parameters
     ----------
     true
-        Motion of the airframe at the exposures of ``frames``.
+        Motion of the airframe at the exposures.
 
     Raises
     ------
     WildlabError
         Where a target is not in view often enough.
     """
-    pixels = [_pixels(manifest, target, true, seed) for target in twin.targets]
-    camera = manifest.geometry_camera()
-    views = [_in_view(twin, manifest, target, uv) for target, uv in zip(twin.targets, pixels, strict=True)]
+    frames = frames_table(twin, true.times, seed)
+    view = View(twin, true)
+    if twin.animals is not None:
+        return frames, animal_detections(twin, twin.animals, view, frames, seed)
+    if twin.target is not None and twin.target.outline is not None:
+        return seen_in_part(twin, twin.target, view, frames, seed)
+    detections = detections_table(twin, view, frames, seed)
+    return with_subset(twin, frames, detections), detections
+
+
+def frames_table(twin: TwinParameters, exposures: Array, seed: int) -> pd.DataFrame:
+    """Images with the camera's synchronised stamps and the on-board computer's, where there are both."""
+    clock, camera = twin.onboard_clock, twin.camera
+    stamps = exposures + camera.latency.si
+    frames = pd.DataFrame({"frame_id": [f"f{number:06d}" for number in range(1, len(exposures) + 1)]})
+    if clock is None:
+        return frames.assign(time_s=stamps)
+    rng = stream(seed, "on-board clock")
+    onboard = computer_stamps(stamps, clock.offset.si, clock.drift.si, clock.latency.si, rng)
+    if camera.stamped_by is not None and camera.stamped_by.text == "computer":
+        return frames.assign(time_s=onboard)
+    return frames.assign(time_s=stamps, **{ONBOARD_STAMP: onboard})
+
+
+def detections_table(twin: TwinParameters, view: View, frames: pd.DataFrame, seed: int) -> pd.DataFrame:
+    """Targets as they are marked in the images, in the order of the images.
+
+    Raises
+    ------
+    WildlabError
+        Where a target is not in view often enough.
+    """
+    pixels = [view.pixels(target_path(target, seed)(view.times)) for target in twin.targets]
+    views = [_in_view(twin, view, target, uv) for target, uv in zip(twin.targets, pixels, strict=True)]
     tables = []
     for which, chosen in enumerate(_chosen(twin, views, seed)):
         target = twin.targets[which]
         rng = stream(seed, "marking" if which == 0 else f"marking of {target.identifier.text}")
-        marked = pixels[which][chosen] + twin.camera.marking_sd.si * rng.standard_normal((len(chosen), 2))
-        # Nobody marks outside of the image.
-        marked = np.clip(marked, 0.0, [camera.width, camera.height])
+        marked = view.marked(pixels[which][chosen], rng)
         tables.append(
-            pd.DataFrame(
-                {
-                    "detection_id": "",
-                    "frame_id": frames["frame_id"].to_numpy()[chosen],
-                    "source": target.marked_by.text,
-                    "kind": "pixel",
-                    "u_px": marked[:, 0],
-                    "v_px": marked[:, 1],
-                    "target_id": target.identifier.text,
-                    "plane_down_m": -target.height.si,
-                }
-            )
+            marks(frames, chosen, marked, target.marked_by.text, target.identifier.text, -target.height.si)
         )
-    together = pd.concat(tables).sort_values("frame_id", kind="stable", ignore_index=True)
-    together["detection_id"] = [f"d{number:06d}" for number in range(1, len(together) + 1)]
-    return together
+    return numbered(tables)
 
 
 def with_subset(twin: TwinParameters, frames: pd.DataFrame, detections: pd.DataFrame) -> pd.DataFrame:
@@ -107,15 +98,9 @@ def with_subset(twin: TwinParameters, frames: pd.DataFrame, detections: pd.DataF
     return frames.assign(group=np.where(inside, SUBSET, "").astype(object))
 
 
-def _pixels(manifest: Manifest, target: Target, true: Motion, seed: int) -> Array:
-    """Where the target is in each image, (N, 2) px; NaN behind the camera."""
-    p_nc, R_nc = camera_pose(manifest.geometry_mount(), true.position, true.R_nb)
-    return ground_to_pixel(manifest.geometry_camera(), target_path(target, seed)(true.times), p_nc, R_nc)
-
-
-def _in_view(twin: TwinParameters, manifest: Manifest, target: Target, uv: Array) -> Numbers:
+def _in_view(twin: TwinParameters, view: View, target: Target, uv: Array) -> Numbers:
     """Numbers of the images that show the target, (K,)."""
-    seen = np.flatnonzero(in_image(manifest.geometry_camera(), uv, target.border.si))
+    seen = np.flatnonzero(in_image(view.camera, uv, target.border.si))
     wanted = int(target.observations.number)
     if len(seen) < wanted:
         group = "target" if target is twin.target else "second_target"
@@ -133,7 +118,7 @@ def _chosen(twin: TwinParameters, views: list[Numbers], seed: int) -> list[Numbe
     wanted = [int(target.observations.number) for target in twin.targets]
     if twin.pair is not None:
         return _pair_chosen(views, wanted, int(twin.pair.both.number), stream(seed, "misses"))
-    if twin.target.choice.text == "first":
+    if twin.targets[0].choice.text == "first":
         return [views[0][: wanted[0]]]
     return [np.sort(stream(seed, "misses").choice(views[0], wanted[0], replace=False))]
 

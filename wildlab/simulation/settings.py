@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 from wildlab.flight.manifest import Manifest, make_manifest
-from wildlab.geometry.mount import helgesen_misalignment
-from wildlab.simulation.models import Gnss, Imu
+from wildlab.geometry.mount import Mount, helgesen_misalignment
+from wildlab.simulation.models import Gnss, Imu, TwinMount
 from wildlab.simulation.parameters import TwinParameters
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
     """What `flight.toml` of the twin says; its uncertainties are what one would assume, not the truth."""
     c, m, assumed = twin.camera, twin.mount, twin.assumed
-    misalignment = helgesen_misalignment(
-        m.misalignment_roll.number, m.misalignment_tilt.number, m.misalignment_pan.number
-    )
+    calibrated = m.calibrated is None or m.calibrated.text == "yes"
+    misalignment = _misalignment(m) if calibrated else (0.0, 0.0, 0.0)
     return make_manifest(
         {
             "name": f"{twin.name}-{seed}",
@@ -36,19 +37,20 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
                 "fy_px": c.fy.number,
                 "cx_px": c.cx.number,
                 "cy_px": c.cy.number,
+                "k1": 0.0 if c.k1 is None else c.k1.number,
             },
             "mount": {
-                "looks": "down",
+                "looks": "down" if m.looks is None else m.looks.text,
                 "pan_deg": m.pan.number,
                 "tilt_deg": m.tilt.number,
                 "misalignment_roll_deg": misalignment[0],
                 "misalignment_tilt_deg": misalignment[1],
                 "misalignment_pan_deg": misalignment[2],
             },
-            "imu": _imu(twin.imu),
-            "gnss": _gnss(twin.gnss),
+            "imu": {} if twin.imu is None else _imu(twin.imu),
+            "gnss": {} if twin.gnss is None else _gnss(twin.gnss),
             "time": {"kind": "utc", "epoch": twin.place.epoch.text},
-            "vertical": {"reference": "ellipsoid", "note": "the origin of n lies at sea level"},
+            "vertical": {"reference": "ellipsoid", "note": "the ground or the sea lies at the origin of n"},
             "uncertainty": {
                 "pixel_px": assumed.pixel.number,
                 "position_horizontal_m": assumed.horizontal.number,
@@ -62,6 +64,20 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
             "scoring": {"rule": "labelled"},
             "twin": {"name": twin.name, "seed": seed},
         }
+    )
+
+
+def true_mount(twin: TwinParameters) -> Mount:
+    """How the camera really sits: with its misalignment, whether somebody calibrated it or not."""
+    stated = twin_manifest(twin, 0).geometry_mount()
+    roll, tilt, pan = (math.radians(angle) for angle in _misalignment(twin.mount))
+    return replace(stated, misalignment=(roll, tilt, pan))
+
+
+def _misalignment(mount: TwinMount) -> tuple[float, float, float]:
+    """Degrees, in the sense of the manifest."""
+    return helgesen_misalignment(
+        mount.misalignment_roll.number, mount.misalignment_tilt.number, mount.misalignment_pan.number
     )
 
 

@@ -7,8 +7,8 @@ import pandas as pd
 
 from wildlab.geometry.frames import Array
 from wildlab.simulation.gnss import fixes
-from wildlab.simulation.models import Target
 from wildlab.simulation.sensors import rounded, stream
+from wildlab.simulation.subjects import Target
 from wildlab.simulation.trajectory import Signal, random_wander
 
 
@@ -32,6 +32,25 @@ def target_path(target: Target, seed: int) -> Signal:
         return p
 
     return path
+
+
+def target_outline(target: Target, seed: int) -> Signal:
+    """Corners of a target's outline in n: times (N,) s -> (N, 4, 3) m, the bow along its mean course.
+
+    Raises
+    ------
+    ValueError
+        Where it has none.
+    """
+    outline, motion = target.outline, target.motion
+    if outline is None or motion is None:
+        raise ValueError("this target has no outline")
+    cos, sin = np.cos(motion.course.si), np.sin(motion.course.si)
+    half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [outline.length.si / 2, outline.beam.si / 2]
+    corners = np.zeros((4, 3))
+    corners[:, :2] = half @ np.array([[cos, sin], [-sin, cos]])
+    path = target_path(target, seed)
+    return lambda times: np.asarray(path(times)[:, None] + corners)
 
 
 def truth_table(target: Target, duration: float, seed: int) -> pd.DataFrame:

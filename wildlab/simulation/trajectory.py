@@ -263,6 +263,46 @@ def attitude_of(
     return attitude
 
 
+def leaning_attitude(
+    path: FlightPath,
+    heading: Signal,
+    *,
+    trim_pitch: float = 0.0,
+    gravity: float = GRAVITY,
+    sway: tuple[Wander, Wander, Wander] | None = None,
+) -> Signal:
+    """Attitude of what leans no more than its own acceleration asks for, whichever way its nose points.
+
+    A multicopter's thrust points along its specific force, so it leans forward to go faster and sideways to
+    turn. With an infinite ``gravity`` it does not lean: a gondola that hangs, and only sways.
+
+    Parameters
+    ----------
+    heading
+        Where the nose points, times (N,) s -> (N,) rad.
+    trim_pitch
+        Pitch in steady motion, rad: below zero for a multicopter that leans against the air.
+    sway
+        As for :func:`attitude_of`.
+
+    Returns a function (N,) s -> ``R_nb`` (N, 3, 3).
+    """
+
+    def attitude(times: Array) -> Array:
+        t = np.asarray(times, float)
+        _, _, a = path(t)
+        z = np.array([0.0, 0.0, 1.0]) - a / gravity
+        z /= np.linalg.norm(z, axis=-1, keepdims=True)
+        nose = heading(t)
+        ahead = np.stack([np.cos(nose), np.sin(nose), np.zeros(len(t))], axis=-1)
+        y = np.cross(z, ahead)
+        y /= np.linalg.norm(y, axis=-1, keepdims=True)
+        R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
+        return np.asarray(R if sway is None else R @ euler_to_matrix(*(part(t) for part in sway)))
+
+    return attitude
+
+
 def move(path: FlightPath, attitude: Signal, times: ArrayLike) -> Motion:
     """The motion at given times, (N,) s."""
     t = np.asarray(times, float)

@@ -22,9 +22,11 @@ from wildlab.simulation.aboard import (
     payload_attitude,
     ticks,
 )
+from wildlab.simulation.animals import animals_truth
 from wildlab.simulation.courses import trajectory
+from wildlab.simulation.gimbal import gimbal_table
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.seen import detections_table, exposure_times, frames_table, with_subset
+from wildlab.simulation.seen import exposure_times, frames_and_detections
 from wildlab.simulation.sensors import stream
 from wildlab.simulation.settings import twin_manifest
 from wildlab.simulation.targets import truth_table
@@ -44,7 +46,8 @@ def simulate_twin(name_or_path: str | Path, seed: int, without: Collection[str] 
     """A twin as a flight in memory. The same seed gives the same flight, to the last bit.
 
     The nav source ``truth`` is the pose of the airframe with the camera, ``truth-payload`` that of the
-    payload with the IMU and the antennas, which is what a navigation system with these sensors can know.
+    payload with the IMU and the antennas, which is what a navigation system with these sensors can know. A
+    twin without such a payload has neither that nor the tables ``imu`` and ``gnss``.
 
     Parameters
     ----------
@@ -76,31 +79,29 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
         )
     seed = int(seed)
     path, attitude = trajectory(twin, stream(seed, "trajectory"))
-    payload = payload_attitude(twin, attitude, seed)
-    manifest = twin_manifest(twin, seed)
-
     duration = twin.flight.duration.si
     calibrated, uncalibrated = autopilot_tables(
         twin, move(path, attitude, ticks(twin.autopilot.rate.si, duration)), seed
     )
+    nav = {AUTOPILOT: calibrated}
+    if uncalibrated is not None:
+        nav[UNCALIBRATED] = uncalibrated
     known = ticks(twin.truth.rate.si, duration)
-    nav = {
-        AUTOPILOT: calibrated,
-        UNCALIBRATED: uncalibrated,
-        TRUTH: nav_table(move(path, attitude, known)),
-        PAYLOAD_TRUTH: nav_table(move(path, payload, known)),
-    }
-    exposures = exposure_times(twin)
-    frames = frames_table(twin, exposures, seed)
-    detections = detections_table(twin, manifest, move(path, attitude, exposures), frames, seed)
-    truth = [truth_table(target, duration, seed) for target in twin.targets]
-    tables = {
-        "frames": with_subset(twin, frames, detections),
-        "detections": detections,
-        "truth": pd.concat(truth, ignore_index=True),
-    }
-    if "imu" not in without:
-        tables["imu"] = imu_table(twin, path, payload, seed)
-    if "gnss" not in without:
-        tables["gnss"] = gnss_table(twin, path, payload, seed)
-    return Flight(manifest, nav, tables)
+    nav[TRUTH] = nav_table(move(path, attitude, known))
+    frames, detections = frames_and_detections(twin, move(path, attitude, exposure_times(twin)), seed)
+    if twin.animals is not None:
+        truth = animals_truth(twin, twin.animals, seed)
+    else:
+        logs = [truth_table(target, duration, seed) for target in twin.targets]
+        truth = pd.concat(logs, ignore_index=True)
+    tables = {"frames": frames, "detections": detections, "truth": truth}
+    if twin.gimbal is not None:
+        tables["gimbal"] = gimbal_table(twin.gimbal, duration, seed)
+    if twin.boresight is not None:
+        payload = payload_attitude(twin, attitude, seed)
+        nav[PAYLOAD_TRUTH] = nav_table(move(path, payload, known))
+        if twin.imu is not None and "imu" not in without:
+            tables["imu"] = imu_table(twin, path, payload, seed)
+        if twin.gnss is not None and "gnss" not in without:
+            tables["gnss"] = gnss_table(twin, path, payload, seed)
+    return Flight(twin_manifest(twin, seed), nav, tables)
