@@ -136,3 +136,74 @@ def test_a_flight_named_like_a_study_would_replace_its_report(
         evaluate_flight(
             tmp_path / "flight", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out"
         )
+
+
+def several(folder: Path, **more: str) -> Path:
+    show = (
+        'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'
+        "names = [load_flight(one).name for one in (flight, *others)]\n"
+        'report.metric("flights", "-".join(names), len(names), "")\nreport.save()'
+    )
+    write(folder, "several.ipynb", notebook(OPEN, show, more="others = []"))
+    write(folder, "alone.ipynb", notebook(OPEN, show))
+    text = f'[s]\ntitle = "S"\nnotebook = "{more.get("notebook", "several.ipynb")}"\n'
+    text += 'dataset = "autoferry"\nrecipe = "autoferry-2.toml"\n'
+    text += f'beside = ["{more.get("beside", "autoferry-17.toml")}"]\n'
+    (folder / "studies.toml").write_text(text)
+    return folder
+
+
+def test_a_study_may_have_several_flights_of_a_data_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_data: Callable[..., Path]
+) -> None:
+    source = shared_data("tracking", "autoferry")
+    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: True)
+    monkeypatch.setattr("wildlab.flight.catalog.dataset_folder", lambda name: source)
+    one = flights.dataset_flight("autoferry", "autoferry-2.toml", tmp_path)
+    two = flights.dataset_flight("autoferry", "autoferry-17.toml", tmp_path)
+    assert [load_flight(folder).name for folder in (one, two)] == ["autoferry-2", "autoferry-17"]
+    assert one.is_dir() and two.is_dir() and one != two
+
+
+def test_a_notebook_must_know_the_flights_beside_the_first(tmp_path: Path) -> None:
+    from wildlab.reporting.run import make_job
+    from wildlab.reporting.studies import load_studies
+
+    folder = several(tmp_path / "a")
+    job = make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
+    assert (job.recipe, job.beside) == ("autoferry-2.toml", ("autoferry-17.toml",))
+    folder = several(tmp_path / "b", notebook="alone.ipynb")
+    with pytest.raises(WildlabError, match="the notebook has no parameter 'others'"):
+        make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
+    folder = several(tmp_path / "c", beside="../elsewhere.toml")
+    with pytest.raises(WildlabError, match="leaves its folder"):
+        load_studies(folder / "studies.toml")
+
+
+def test_a_flight_of_the_readers_own_stands_alone(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    from wildlab.reporting.run import make_job
+    from wildlab.reporting.studies import load_studies
+
+    save_flight(make_flight(), tmp_path / "flight")
+    folder = several(tmp_path / "a")
+    study = load_studies(folder / "studies.toml")["s"]
+    job = make_job(study, notebooks=folder, reports=tmp_path, flight=tmp_path / "flight")
+    assert (job.recipe, job.beside) == (None, ())
+
+
+def test_provenance_names_every_flight(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    from wildlab.reporting import provenance
+
+    for name in ("first", "second"):
+        save_flight(make_flight(name=name), tmp_path / name)
+    book = write(tmp_path, "n.ipynb", notebook(OPEN))
+    origin = provenance.collect(
+        study="s",
+        notebook=book,
+        flight=tmp_path / "first",
+        parameters={},
+        seed=1,
+        others=[tmp_path / "second"],
+    )
+    assert [one["name"] for one in origin["others"]] == ["second"]
+    assert "flight first:" in provenance.footer(origin) and "flight second:" in provenance.footer(origin)

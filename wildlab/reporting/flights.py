@@ -51,7 +51,7 @@ def dataset_flight(dataset: str | None, recipe: str, reports: Path) -> Path:
     def build(folder: Path) -> Any:
         return import_flight(recipe_path, source, folder, overwrite=False)
 
-    return _kept(reports, dataset or recipe_path.stem, key, build)
+    return _kept(reports, recipe_path.stem, key, build)
 
 
 def dataset_source(dataset: str) -> Path:

@@ -47,6 +47,8 @@ class Job:
     twin: str | None = None
     dataset: str | None = None
     recipe: str | None = None
+    #: Recipes of further flights of the data set.
+    beside: tuple[str, ...] = ()
     parameters: dict[str, Any] = field(default_factory=dict)
     #: What to type to run it again.
     again: str = ""
@@ -134,20 +136,29 @@ def _keep_to_ourselves(job: Job) -> None:
 def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting import html, metrics, privacy, provenance
     from wildlab.reporting.files import write_atomic, write_json
+    from wildlab.reporting.studies import OTHERS
 
     started = time.monotonic()
     folder = Path(job.work)
     pipe.send(("stage", "flight"))
-    flight = _flight(job)
+    flight, others = _flight(job), _others(job)
     given: dict[str, Any] = {**job.parameters, "study": job.name, "seed": job.seed}
     origin = provenance.collect(
-        study=job.name, notebook=Path(job.notebook), flight=flight, parameters=job.parameters, seed=job.seed
+        study=job.name,
+        notebook=Path(job.notebook),
+        flight=flight,
+        parameters=job.parameters,
+        seed=job.seed,
+        others=others,
     )
     if job.seeds is not None:
         origin["seeds"] = job.seeds.provenance()
     write_json(folder / "provenance.json", origin)
     pipe.send(("stage", "notebook"))
     shown = {**given, "flight": _relative(flight, job), "out": ".", "expected_prefix": ""}
+    if others:
+        given[OTHERS] = [str(other) for other in others]
+        shown[OTHERS] = [_relative(other, job) for other in others]
     executed = folder / "notebook.ipynb"
     try:
         _papermill(
@@ -182,6 +193,13 @@ def _flight(job: Job) -> Path | None:
     if job.recipe:
         return dataset_flight(job.dataset, job.recipe, Path(job.reports))
     return None
+
+
+def _others(job: Job) -> list[Path]:
+    """The further flights of a study."""
+    from wildlab.reporting.flights import dataset_flight
+
+    return [dataset_flight(job.dataset, recipe, Path(job.reports)) for recipe in job.beside]
 
 
 def _relative(flight: Path | None, job: Job) -> str:

@@ -7,6 +7,7 @@ import platform
 import shutil
 import subprocess
 import tomllib
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -61,7 +62,13 @@ def git_state(root: Path = ROOT) -> dict[str, Any]:
 
 
 def collect(
-    *, study: str, notebook: Path, flight: Path | None, parameters: dict[str, Any], seed: int
+    *,
+    study: str,
+    notebook: Path,
+    flight: Path | None,
+    parameters: dict[str, Any],
+    seed: int,
+    others: Sequence[Path] = (),
 ) -> dict[str, Any]:
     """Everything ``provenance.json`` says.
 
@@ -72,7 +79,10 @@ def collect(
         get in: never the origin.
     parameters
         The study's own parameters, without folders.
+    others
+        Folders of further flights, of which the same gets in.
     """
+    further = {"others": [_flight(other) for other in others]} if others else {}
     return {
         "study": study,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -80,6 +90,7 @@ def collect(
         "lock": {"file": LOCK.name, "sha256": sha256(LOCK) if LOCK.is_file() else None},
         "notebook": {"file": notebook.name, "sha256": sha256(notebook)},
         "flight": _flight(flight) if flight is not None else None,
+        **further,
         "parameters": parameters,
         "seed": seed,
         "python": platform.python_version(),
@@ -121,12 +132,10 @@ def footer(
     else:
         code = f"wildlab {escape(wildlab['version'])} ({escape(wildlab['note'])})"
     parts = [code]
-    if provenance["flight"]:
-        files = provenance["flight"]["files"]
+    for one in [provenance["flight"], *provenance.get("others", ())] if provenance["flight"] else ():
+        files = one["files"]
         hashes = ", ".join(f"{escape(name)} <code>{digest[:8]}</code>" for name, digest in files.items())
-        parts.append(
-            f"flight {escape(provenance['flight']['name'])}: {hashes}" if files else "flight without files"
-        )
+        parts.append(f"flight {escape(one['name'])}: {hashes}" if files else "flight without files")
     lock = provenance["lock"]["sha256"]
     parts.append(f"lock <code>{lock[:8]}</code>" if lock else "no lock file")
     parts.append(f"notebook <code>{provenance['notebook']['sha256'][:8]}</code>")

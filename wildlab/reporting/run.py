@@ -25,7 +25,7 @@ from wildlab.reporting.ledger import build_ledger
 from wildlab.reporting.loop import Outcome, run_jobs
 from wildlab.reporting.progress import outcome_line, shown
 from wildlab.reporting.seeds import SeedWork, make_work
-from wildlab.reporting.studies import STANDARD_PARAMETERS, Study, find_study, load_studies
+from wildlab.reporting.studies import OTHERS, STANDARD_PARAMETERS, Study, find_study, load_studies
 
 #: The notebook that judges any flight.
 EVALUATION = "georeferencing.ipynb"
@@ -67,7 +67,8 @@ def make_job(
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
         again += "" if seeds is None else f" --seeds {seeds}"
-    cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters])
+    others = [OTHERS] if study.beside else []
+    cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])
     seed = study.seed if seed is None else seed
     reports = reports.resolve()
     name = name or study.name
@@ -84,6 +85,7 @@ def make_job(
         twin=study.twin if own else None,
         dataset=study.dataset if own else None,
         recipe=study.recipe if own else None,
+        beside=tuple(study.beside) if own else (),
         parameters=parameters,
         again=again,
         timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,

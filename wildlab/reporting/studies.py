@@ -9,6 +9,7 @@
     twin = "static-antenna"              # flight simulated from data/twins/static-antenna.toml, or ...
     # dataset = "openathena"             # ... imported from a public data set
     # recipe = "openathena.toml"         # ... by data/recipes/openathena.toml
+    # beside = ["second.toml"]           # further flights of the data set; the notebook gets them as `others`
     seed = 1                             # of the flight that the figures show
     seeds = 100                          # over how many flights; handed to the notebook as `seeds`
     each_seed = "static-point"           # computed for each seed before the notebook starts, on many
@@ -37,6 +38,9 @@ from wildlab.pipeline.flown import FLOWN
 #: What the runner gives to every notebook; a study's own parameters may not use these names.
 STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
 
+#: What a study with further flights gets besides: a list of their folders, in the order of `beside`.
+OTHERS = "others"
+
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
 
 
@@ -52,6 +56,7 @@ class Study(BaseModel):
     twin: str | None = None
     dataset: str | None = None
     recipe: str | None = None
+    beside: list[str] = Field(default_factory=list)
     seed: int = Field(default=1, ge=0, lt=2**32)
     seeds: int | None = Field(default=None, ge=1, le=1_000_000)
     each_seed: str | None = None
@@ -68,7 +73,7 @@ class Study(BaseModel):
     def _consistent(self) -> Study:
         if not _NAME.fullmatch(self.name):
             raise ValueError("a study's name is made of a-z, 0-9 and hyphens")
-        for file in (self.notebook, self.recipe):
+        for file in (self.notebook, self.recipe, *self.beside):
             if file is not None and (PurePosixPath(file).is_absolute() or ".." in PurePosixPath(file).parts):
                 raise ValueError(f"the path {file!r} leaves its folder")
         if self.twin and (self.dataset or self.recipe):
@@ -82,7 +87,9 @@ class Study(BaseModel):
                 raise ValueError(f"nothing named {self.each_seed!r} is in wildlab/pipeline/flown.py")
         if self.seeds is not None and "seeds" in self.parameters:
             raise ValueError("the number of seeds is given twice")
-        taken = sorted(set(self.parameters) & set(STANDARD_PARAMETERS))
+        if self.beside and not self.recipe:
+            raise ValueError("flights beside the first need a recipe of the first")
+        taken = sorted(set(self.parameters) & {*STANDARD_PARAMETERS, OTHERS})
         if taken:
             raise ValueError(f"the parameter {taken[0]!r} is set by the runner")
         return self
