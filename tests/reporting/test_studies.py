@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import pytest
 
 from wildlab.flight.recipe import import_flight
-from wildlab.paths import DATA, NOTEBOOKS
+from wildlab.paths import DATA
 from wildlab.reporting.run import evaluate_flight, run_studies
 
 pytestmark = pytest.mark.slow
@@ -66,13 +65,8 @@ def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> Non
     assert faults(folder / "report.html") == []
 
 
-def test_static_point_over_a_few_flights(reports: Path, tmp_path: Path, faults: Faults) -> None:
-    notebooks = tmp_path / "notebooks"
-    shutil.copytree(NOTEBOOKS, notebooks)
-    studies = (notebooks / "studies.toml").read_text(encoding="utf-8")
-    assert "seeds = 100" in studies
-    (notebooks / "studies.toml").write_text(studies.replace("seeds = 100", "seeds = 4"), encoding="utf-8")
-    folder = run("static-point", reports, notebooks=notebooks)
+def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
+    folder = run("static-point", reports, seeds=4, parallel=2)
     found = values(folder)
     for column in (
         "observer",
@@ -86,6 +80,7 @@ def test_static_point_over_a_few_flights(reports: Path, tmp_path: Path, faults: 
             assert metric["published"] is not None
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 6)
+    assert json.loads((folder / "provenance.json").read_text())["seeds"]["seeds"] == [1, 2, 3]
     for figure in ("02", "03a", "03b", "04a", "04b", "05a", "05b", "06", "07"):
         assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
         assert (folder / "figures" / f"fig-5-{figure}.png").is_file()

@@ -81,7 +81,7 @@ class Cluster:
         )
         self._under_way[future] = (work, seed)
         if self._over is None:
-            self._over = as_completed([future], with_results=True, raise_errors=False)
+            self._over = as_completed([future], loop=self._client.loop, with_results=True, raise_errors=False)
         else:
             self._over.add(future)
 

@@ -98,10 +98,13 @@ def _seed_work(
     study: Study, name: str, seed: int, flight: Path | None, reports: Path, parameters: dict[str, Any]
 ) -> SeedWork | None:
     """What is to be computed for each seed before the notebook starts; None where nothing is."""
-    twin = study.twin if flight is None else _twin_of(flight)
-    if study.each_seed is None or twin is None:
+    if study.each_seed is None:
         return None
-    return make_work(reports, name, study.each_seed, seed, parameters["seeds"], {**parameters, "twin": twin})
+    twin = study.twin if flight is None else _twin_of(flight)
+    if flight is not None and twin is None:
+        return None  # a logged flight is the only one of its kind
+    given = {**parameters, "twin": twin}
+    return make_work(reports, name, study.each_seed, seed, parameters["seeds"], given)
 
 
 def run_studies(

@@ -218,7 +218,7 @@ def _compute(work: SeedWork, missing: Sequence[int]) -> None:
             failures += [(result.seed, result.failure.reason) for result in results if result.failure]
     print(f"\r{work.study}: {len(missing) - len(failures)} of {len(missing)} seeds", flush=True)
     if failures:
-        raise RunFailed(failed_seeds(failures), f"the other {len(missing) - len(failures)} are kept")
+        raise RunFailed(failed_seeds(failures), "mend that; the seeds that are finished are kept")
 
 
 def failed_seeds(failures: Sequence[tuple[int, str]]) -> str:
