@@ -24,16 +24,11 @@ def data(n=40, longest=0.9, seed=0):
     return np.cumsum(rng.uniform(0.02, longest, n)), np.cumsum(rng.normal(0, 1.5, (n, 2)), axis=0)
 
 
-def augmented(times, z, motion, start, F_c, R_first):
-    """Target and noise in one state, measured without any noise of its own; starts before the first row.
-
-    A prior of the position so wide that the first measurement makes it is what a start on it means.
-    """
-    n = len(start.x)
-    wide = start.P.copy()
-    wide[:2, :2] = 1e7 * np.eye(2)
-    P = np.block([[wide, np.zeros((n, 2))], [np.zeros((2, n)), R_first]])
-    x, H = np.zeros(n + 2), np.hstack([np.eye(2, n), np.eye(2)])
+def augmented(times, z, motion, prior, F_c):
+    """Target and noise in one state, measured without any noise; ``prior`` is for the first row."""
+    n = len(prior.x)
+    P = np.block([[prior.P, np.zeros((n, 2))], [np.zeros((2, n)), R_W]])
+    x, H = np.concatenate([prior.x, np.zeros(2)]), np.hstack([np.eye(2, n), np.eye(2)])
     for k, one in enumerate(z):
         if k:
             F, Q = np.eye(n + 2), np.zeros((n + 2, n + 2))
@@ -50,17 +45,17 @@ def augmented(times, z, motion, start, F_c, R_first):
 @pytest.mark.parametrize("F_c", [np.eye(2), SLOW], ids=["constant", "fading"])
 @pytest.mark.parametrize(("motion", "n"), [(CV, 4), (SINGER, 6)], ids=["constant velocity", "singer"])
 def test_differencing_is_the_augmented_filter(motion, n, F_c):
-    """With the first measurement's noise at R_w, the start on it is the augmented filter's posterior."""
+    """Exactly: once the target is known, the noise is the rest of the measurement.
+
+    Both use the first measurement with noise R_w; the differences begin at the second.
+    """
     times, z = data()
-    start = start_from_first(times, z, 1.0, 3.0, n=n, sd_acceleration=0.5)
-    P = start.P.copy()
-    P[:2, :2] = R_W
-    start = start._replace(P=P)
-    track = run_coloured(times, z, R_W, motion, start, F_c=F_c)
+    prior = Start(times[0], np.ones(n), np.diag([30.0, 20, 9, 4, 0.3, 0.2])[:n, :n])
+    track = run_coloured(times, z, R_W, motion, prior, F_c=F_c)
     assert track.used.all()
-    for row, (x, P) in enumerate(augmented(times, z, motion, start, F_c, R_W)):
-        assert np.allclose(track.x[row], x, rtol=1e-4, atol=1e-4)
-        assert np.allclose(track.P[row], P, rtol=1e-4, atol=1e-4)
+    for row, (x, P) in enumerate(augmented(times, z, motion, prior, F_c)):
+        assert np.allclose(track.x[row], x, rtol=1e-8, atol=1e-8)
+        assert np.allclose(track.P[row], P, rtol=1e-8, atol=1e-8)
 
 
 def test_the_model_is_the_print():

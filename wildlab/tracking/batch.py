@@ -2,7 +2,7 @@
 
 For Monte Carlo studies: B runs share their times and their motion model; measurements, poses and covariances
 may differ from run to run. States are ``[pN, pE, vN, vE]``; measurements are positions, or pixels of a camera
-without distortion. The Schmidt filter is the one with ``change="kept"``.
+without distortion.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def run_batch(
     Raises
     ------
     WildlabError
-        As `run_filter`; and for a camera that distorts, or a pose uncertainty that is to be scaled.
+        As `run_filter`; and for a camera that distorts.
     """
     z = np.asarray(measurements, float)
     R = np.asarray(R, float)
@@ -102,13 +102,11 @@ def run_batch(
         F[row], Q[row] = motion(float(dt))
         left[row] = 1.0 if pose is None else schmidt.fade(float(dt), pose.correlation_time)
 
-    P_poses = np.zeros((1, N, 36))
+    P_poses = phis = np.zeros((1, N, 36))
     if pose is not None:
-        if pose.change != "kept":
-            raise WildlabError(
-                f'the batch filter knows no change="{pose.change}"', 'use "kept", or run_filter', field="pose"
-            )
         P_poses = _per_run(pose.covariance, 2, N)
+        each = [schmidt.transitions_of_pose(one.reshape(N, 6, 6), pose.change) for one in P_poses]
+        phis = np.array(each).reshape(len(P_poses), N, 36)
         unknown = ~np.isfinite(P_poses).all(axis=2)
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -121,7 +119,7 @@ def run_batch(
     out = (*estimates, np.zeros((N, B), bool), np.zeros((N, B), bool))
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
     singular = run_lanes(
-        F, Q, left, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
+        F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
         np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
         np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
         first, given.threshold, view is not None, pose is not None, *out,

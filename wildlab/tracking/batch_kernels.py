@@ -51,15 +51,21 @@ def predict_lanes(x: Array, P: Array, F: Array, Q: Array, y: Array, M: Array) ->
 
 
 @compiled
-def carry_cross(C: Array, F: Array, left: float, M: Array) -> None:
-    """``F C`` times what is left of the correlation; C (4, 6, L)."""
+def carry_cross(C: Array, F: Array, left: float, phi: Array, M: Array) -> None:
+    """``F C Phi'`` times what is left of the correlation; C (4, 6, L), phi (36, L)."""
     for i in range(4):
         for a in range(6):
             for r in range(LANES):
                 M[i, a, r] = left * (
                     F[i, 0] * C[0, a, r] + F[i, 1] * C[1, a, r] + F[i, 2] * C[2, a, r] + F[i, 3] * C[3, a, r]
                 )
-    C[:] = M
+    for i in range(4):
+        for a in range(6):
+            for r in range(LANES):
+                C[i, a, r] = 0.0
+            for b in range(6):
+                for r in range(LANES):
+                    C[i, a, r] += M[i, b, r] * phi[6 * a + b, r]
 
 
 @compiled
@@ -293,15 +299,16 @@ def load(source: Array, row: int, first: int, target: Array) -> None:
 
 @compiled
 def run_lanes(
-    F: Array, Q: Array, left: Array, z: Array, R: Array, poses: Array, R_bc: Array, P_poses: Array,
-    lever: Array, planes: Array, A: Array, x0: Array, P0: Array, start: int, threshold: float,
+    F: Array, Q: Array, left: Array, phis: Array, z: Array, R: Array, poses: Array, R_bc: Array,
+    P_poses: Array, lever: Array, planes: Array, A: Array, x0: Array, P0: Array, start: int, threshold: float,
     with_camera: bool, with_pose: bool,
     out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
 ) -> int:  # fmt: skip
     """All runs through rows ``start`` to N; the row of a singular S, or -1.
 
-    F, Q (N, 4, 4) and left (N,) of the step to each row; z (B, N, 2); R (1 or B, N, 4); poses, R_bc, P_poses
-    (1 or B, N, 12, 9, 36); planes (N,); x0 (B, 4); P0 (1 or B, 4, 4); outputs with the runs last.
+    F, Q (N, 4, 4), left (N,) and phis (1 or B, N, 36) of the step to each row; z (B, N, 2); R (1 or B, N, 4);
+    poses, R_bc, P_poses (1 or B, N, 12, 9, 36); planes (N,); x0 (B, 4); P0 (1 or B, 4, 4);
+    outputs with the runs last.
     """
     n_runs, n_rows = z.shape[:2]
     x, P, C = np.empty((4, LANES)), np.empty((4, 4, LANES)), np.zeros((4, 6, LANES))
@@ -311,6 +318,7 @@ def run_lanes(
     seen, v, noise = np.empty((2, LANES)), np.empty((2, LANES)), np.empty((4, LANES))
     H, H_pose = np.zeros((2, 2, LANES)), np.zeros((2, 6, LANES))
     pose, turn, P_pose = np.zeros((12, LANES)), np.zeros((9, LANES)), np.zeros((36, LANES))
+    phi = np.empty((36, LANES))
     ok, nis, offered, singular = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.zeros(LANES, np.bool_)
     R_now, pose_now = noise.reshape(2, 2, LANES), P_pose.reshape(6, 6, LANES)
     for first in range(0, n_runs, LANES):
@@ -335,7 +343,8 @@ def run_lanes(
                         v[i, r] = seen[i, r] - x[i, r] if there else 0.0
                         H[i, i, r] = 1.0
             if with_pose:
-                carry_cross(C, F[row], left[row], N)
+                load(phis, row, first, phi)
+                carry_cross(C, F[row], left[row], phi, N)
                 load(P_poses, row, first, P_pose)
                 limit_lanes(C, P, pose_now, L, N, M, nis)
                 for r in range(width):

@@ -178,30 +178,28 @@ def run_filter(
     given = checked(times, measurements, R, gate, output_times)
     n = len(start.x)
     C = np.zeros((n, 6))
-    before: Array | None = None  # the pose covariance that C belongs to
+    covariances = np.zeros((len(given.times), 6, 6)) if pose is None else np.asarray(pose.covariance, float)
+    transitions = None if pose is None else schmidt.transitions_of_pose(covariances, pose.change)
 
     def step(row: int, state: State, track: Track) -> State:
-        nonlocal C, before
+        nonlocal C
         then, x, P = state
         dt = given.times[row] - then
         F, Q = motion(dt)
         x, P = predict(x, P, F, Q)
-        if pose is not None:
-            C = F @ C * schmidt.fade(dt, pose.correlation_time)
+        if pose is not None and transitions is not None:
+            C = F @ C @ transitions[row].T * schmidt.fade(dt, pose.correlation_time)
         if not np.isfinite(given.z[row]).all(axis=-1).any():
             return given.times[row], x, P
         expected = sensor.predict(row, x[:2])
-        P_pose = np.zeros((6, 6)) if pose is None else np.asarray(pose.covariance[row], float)
+        P_pose = covariances[row]
         H = on_state(expected.H_position, n)
         if not (np.isfinite(expected.z).all() and np.isfinite(H).all() and np.isfinite(P_pose).all()):
             return given.times[row], x, P
         if pose is None:
             spread = H @ P @ H.T
         else:
-            if pose.change == "scaled" and before is not None:
-                C = schmidt.scale_cross(C, before, P_pose)
             C, track.limited[row] = schmidt.limit_cross(C, P, P_pose)
-            before = P_pose
             spread = schmidt.spread_of_prediction(P, C, P_pose, H, expected.H_pose)
         with np.errstate(invalid="ignore"):
             best = nearest_detection(given.z[row], expected.z, spread, given.R[row], sensor.angles, row)

@@ -4,22 +4,25 @@ Beside the target's covariance ``P`` (n, n) the filter keeps its cross-covarianc
 of the pose, whose own covariance ``P^o`` (6, 6) comes anew from the navigation filter at every frame.
 
 With ``F^o = I`` H (7.32) keeps ``C`` from frame to frame while ``P^o`` changes. Where ``P^o`` grows that is
-the model of an error with a random walk, and sound. Where it shrinks, ``[P C; C' P^o]`` may stop being a
-covariance: the pose's error would be more closely tied to the target's than it is to itself, and ``P`` can
-turn negative. Two ways lead from one frame to the next:
+the model of an error with a random walk, and sound. Where it shrinks, ``[P C; C' P^o]`` stops being a
+covariance as soon as the target is known about as well as the pose lets it be, which is soon: ``S`` and ``P``
+turn negative within a few frames. So ``C -> C Phi'``, with ``Phi`` from ``P^o_old`` and ``P^o_new`` in their
+common axes, in which the one is ``1`` and the other ``lambda``:
 
-``"kept"``
-    The thesis's: ``C`` stays, the error is a constant bias.
-``"scaled"``
-    The error keeps its value counted in standard deviations: ``C -> C Phi'`` with
-    ``Phi = (P^o_new P^o_old^-1)^(1/2)``, for which ``Phi P^o_old Phi' = P^o_new``. The joint covariance is
-    carried by a congruence and stays a covariance; a ``P^o`` that returns to what it was brings ``C`` back,
-    and an unchanged one leaves it alone. It does not depend on the units of the pose's errors.
+``"bias"``
+    ``Phi = (P^o_new P^o_old^-1)^(1/2)``, in its axes ``lambda^(1/2)``. The thesis's constant bias: the error
+    keeps its value, counted in standard deviations, when the navigation filter thinks anew of its size.
+``"navigated"``
+    ``min(1, lambda)`` in its axes. Growth is a random walk, with ``C`` kept as in (7.32); shrinkage is what
+    an optimal navigation filter does with a measurement, after which the part of its error that is gone has
+    nothing to do with what is left. Every rise and fall of ``P^o`` makes the error a little newer.
 
-After either, `limit_cross` brings every canonical correlation of target and pose above one down to one, which
-is the condition for ``[P C; C' P^o]`` to be a covariance, and leaves ``C`` untouched where there is none. It
-is this that keeps the filter sound for any sequence of ``P^o``: the Joseph form (7.37) takes a joint
-covariance to a joint covariance whatever the gain, and adds ``K R K'``, so ``P`` stays positive definite.
+Either leaves ``C`` alone while ``P^o`` does, as the thesis has it, and neither depends on the units of the
+pose's errors. Both guarantee a joint covariance: ``P^o_new - Phi P^o_old Phi'`` is zero in the first and
+``lambda - min(1, lambda)^2 >= 0`` in the second, so what becomes of the joint covariance is a congruence plus
+a covariance; and the Joseph form (7.37) takes a joint covariance to a joint covariance whatever the gain, and
+adds ``K R K'``, so ``P`` stays positive definite. `limit_cross` guards against what rounding, or a ``P^o``
+without variance in some direction, could still do.
 
 Beyond the thesis, the bias may fade: ``C`` is multiplied by ``exp(-dt / correlation_time)``, as for a
 first-order process whose variance is kept at ``P^o``. Infinity is the thesis's constant bias; zero forgets
@@ -28,13 +31,14 @@ first-order process whose variance is kept at ``P^o``. Infinity is the thesis's 
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from wildlab.geometry.frames import Array
 
-Change = Literal["kept", "scaled"]
+Change = Literal["bias", "navigated"]
 
 #: Variances below this share of the largest, in units in which all are one, count as zero: rounding.
 NEGLIGIBLE = 1e-12
@@ -52,12 +56,12 @@ class PoseUncertainty(NamedTuple):
     correlation_time
         s over which the pose's error fades; infinity is H's constant bias, zero H (7.40)-(7.41).
     change
-        What becomes of ``C`` when the covariance changes, see the module.
+        What the pose's error does when its covariance changes, see the module.
     """
 
     covariance: Array
     correlation_time: float = np.inf
-    change: Change = "kept"
+    change: Change = "bias"
 
 
 class SchmidtUpdate(NamedTuple):
@@ -121,12 +125,23 @@ def _root(covariance: Array) -> tuple[Array, Array]:
     return sd[:, None] * vectors * lengths, (vectors / lengths).T * inverse
 
 
-def scale_cross(C: Array, before: Array, after: Array) -> Array:
-    """``C Phi'`` with ``Phi = (after before^-1)^(1/2)`` for covariances (6, 6) of the pose."""
+def transition_of_pose(before: Array, after: Array, change: Change) -> Array:
+    """``Phi`` (6, 6), see the module, from the pose's covariance before to that after."""
     root, inverse = _root(before)
-    values, vectors = np.linalg.eigh(inverse @ after @ inverse.T)
-    grown = (vectors * np.sqrt(np.maximum(values, 0))) @ vectors.T
-    return np.asarray(C @ (root @ grown @ inverse).T)
+    values, axes = np.linalg.eigh(inverse @ after @ inverse.T)
+    values = np.maximum(values, 0)
+    kept = np.sqrt(values) if change == "bias" else np.minimum(values, 1)
+    return np.asarray(root @ (axes * kept) @ axes.T @ inverse)
+
+
+def transitions_of_pose(covariances: Array, change: Change) -> Array:
+    """``Phi`` (N, 6, 6) from each row's predecessor to it; rows of NaN are passed over, with the identity."""
+    phi = np.tile(np.eye(6), (len(covariances), 1, 1))
+    known = np.flatnonzero(np.isfinite(covariances).all(axis=(1, 2)))
+    for before, after in pairwise(known):
+        if not np.array_equal(covariances[before], covariances[after]):
+            phi[after] = transition_of_pose(covariances[before], covariances[after], change)
+    return phi
 
 
 def limit_cross(C: Array, P: Array, P_pose: Array) -> tuple[Array, bool]:
