@@ -317,7 +317,7 @@ def cases() -> pd.DataFrame:
         ("lidar", "c", "coloured", nan, nan, nan, nan, nan, nan, 0),
     ]
     found = pd.DataFrame(rows, columns=columns)
-    found["lag1_autocorrelation"] = nan
+    found["lag1_autocorrelation"], found["kind"] = nan, "position"
     return found.rename(columns={axis: f"lag1_autocorrelation_{axis}" for axis in ("north", "east")})
 
 

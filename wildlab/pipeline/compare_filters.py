@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 IDEAL = 2.0
 #: How much larger the error of a filter may be that is to count as better for its consistency.
 PRICE = 1.1
+#: Elements of a measurement, by kind.
+ELEMENTS = {"position": 2, "bearing": 1}
 WHITES = tuple(WHITE.values())
 _LAG1 = ["lag1_autocorrelation_north", "lag1_autocorrelation_east", "lag1_autocorrelation"]
 
@@ -97,8 +99,7 @@ def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[
     both = beside_white(table, keys)
     differenced, considered = both[both["filter"] == "coloured"], both[both["filter"] == "schmidt"]
     white = table[table["filter"].isin(WHITES) & np.isfinite(table["anees"])]
-    m = np.where(np.isfinite(white["lag1_autocorrelation"]), 1, 2)
-    single = np.array([chi_square_interval(int(dof)) for dof in m]).reshape(-1, 2)
+    single = np.array([chi_square_interval(ELEMENTS[kind]) for kind in white["kind"]]).reshape(-1, 2)
     correlated = differenced.dropna(subset=_LAG1[:2])
     checks = {
         "white-noise-overconfident": white["anees"] > white["nees_high"],
