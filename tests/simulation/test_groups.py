@@ -1,0 +1,135 @@
+"""Groups of parameters that do not go together are named; ship and animals have the printed numbers."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.simulation.test_parameters import LOITER, complete
+from wildlab.errors import WildlabError
+from wildlab.simulation.parameters import each_parameter, load_twin
+
+OWN = 'value = {value}\nunit = "{unit}"\nstatus = "chosen"\nreason = "for this test"\n'
+
+
+def own(key: str, value: object, unit: str = "") -> str:
+    shown = f'"{value}"' if isinstance(value, str) else value
+    return f"\n[{key}]\n" + OWN.format(value=shown, unit=unit)
+
+
+def without(text: str, group: str) -> str:
+    """The text without the parameters of a group."""
+    return "".join(part for part in re.split(r"(?m)^(?=\[)", text) if not part.startswith(f"[{group}."))
+
+
+CABLE = own("cable.lowest", 9.0, "m") + own("cable.highest", 20.0, "m") + own("cable.spans", 3, "1")
+CLIMB = own("climb.altitude", 9.0, "m") + own("climb.start", 1.0, "s") + own("climb.duration", 3.0, "s")
+SEGMENTS = own("segments.count", 5, "1") + own("segments.images", 441, "1")
+HULL = own("target.outline.length", 9.0, "m") + own("target.outline.beam", 2.0, "m")
+
+
+@pytest.mark.parametrize(
+    ("twin", "leave_out", "add", "found"),
+    [
+        ("static-antenna", (), CLIMB, "only a route changes its altitude"),
+        ("gondola", (), CLIMB, "a cable has its own heights. Take out"),
+        ("uav-search", ("enclosures",), "", "a survey goes over enclosures, and there are none"),
+        ("gondola", ("enclosures",), "", "animals live in enclosures, and there are none"),
+        ("gondola", ("animals",), "", "a twin looks for targets or for animals. Describe either"),
+        ("gondola", (), SEGMENTS, "second_target, pair, subset and segments go with a target"),
+        ("large-ship", ("segments",), "", "a target with an outline needs segments"),
+        ("slow-vessel", ("subset",), SEGMENTS, "a target with an outline needs segments, any other none"),
+        ("slow-vessel", (), HULL, "what has an outline is marked where most of it shows"),
+        ("large-ship", ("target.motion", "target.gps"), "", "an outline needs a motion"),
+        (
+            "large-ship",
+            (),
+            own("camera.k1", 0.1, "1"),
+            "an outline stays straight only in a camera without k1",
+        ),
+        ("large-ship", ("onboard_clock",), "", "its clock is missing. Add onboard_clock"),
+        ("slow-vessel", ("boresight",), "", "imu, gnss and boresight describe one payload. Give all or none"),
+        ("large-ship", (), own("autopilot.imu_roll", 1.0, "deg"), "imu_roll, imu_pitch and imu_yaw belong"),
+        ("large-ship", (), own("flight.kind", "balloon"), "'balloon' is not known. Use one of fixed wing"),
+    ],
+)
+def test_twins_whose_groups_do_not_go_together_are_named(tmp_path, twin, leave_out, add, found):
+    text = complete(twin)
+    for group in leave_out:
+        assert f"[{group}." in text
+        text = without(text, group)
+    path = tmp_path / "twin.toml"
+    path.write_text(text + add, encoding="utf-8")
+    with pytest.raises(WildlabError, match=found):
+        load_twin(path)
+
+
+@pytest.mark.parametrize(
+    ("twin", "old", "new", "found"),
+    [
+        ("gondola", "[cable.lowest]\nvalue = 3.0", "[cable.lowest]\nvalue = 30.0", "lowest is above highest"),
+        ("gondola", "[enclosures.lake.length]\nvalue = 280.0", "[enclosures.lake.length]\nvalue = 80.0",
+         r"enclosures\.lake: the width is more than the length"),
+        ("gondola", "[enclosures.lake.", '[enclosures."the lake".', "'the lake' cannot name an enclosure"),
+        ("large-ship", "value = 441\n", "value = 400\n", "fewer images in the segments than observations"),
+    ],
+)  # fmt: skip
+def test_searchers_and_ships_that_make_no_sense_are_named(tmp_path, twin, old, new, found):
+    text = complete(twin)
+    assert old in text
+    path = tmp_path / "twin.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(WildlabError, match=found):
+        load_twin(path)
+
+
+def test_the_same_pair_of_targets_cannot_have_an_outline(tmp_path):
+    text = complete("crossing-vessels").replace("missed at random", "largest")
+    path = tmp_path / "twin.toml"
+    path.write_text(text + HULL + HULL.replace("[target", "[second_target"), encoding="utf-8")
+    with pytest.raises(WildlabError, match="of two targets none can have an outline"):
+        load_twin(path)
+
+
+def test_a_loiter_is_about_a_target_that_stays(tmp_path):
+    text = without(complete("slow-vessel"), "route") + LOITER
+    path = tmp_path / "twin.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(WildlabError, match="a loiter stands beside a target that never moves"):
+        load_twin(path)
+
+
+def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses():
+    """Typed a second time, from H 4.4.1 and 6.4.1, and F 7.1, 7.3, 7.5 and 8.2."""
+
+    def published(name: str) -> dict[str, object]:
+        return {
+            f"{group}.{key}": p.value
+            for group, key, p in each_parameter(load_twin(name))
+            if p.status == "published" and not isinstance(p.value, str)
+        }
+
+    assert published("large-ship") == {
+        "flight.altitude": 100,
+        "target.observations": 438,
+        "target.outline.length": 70,
+        "target.motion.speed": 0,
+        "segments.count": 5,
+        "segments.images": 441,
+        "camera.frame_rate": 10,
+        "autopilot.rate": 10,
+    }
+    camera = {
+        "camera.fx": 1267,
+        "camera.fy": 1117,
+        "camera.cx": 356.0,
+        "camera.cy": 216.6,
+        "camera.k1": 0.446,
+    }
+    fields = ("plain", "ridge", "meadow", "lake", "wood")
+    animals = {f"enclosures.{name}.animals": 5 for name in fields}
+    gondola = {"flight.duration": 1800, "flight.airspeed": 1.5, "cable.lowest": 3, "cable.highest": 20}
+    assert published("gondola") == camera | animals | gondola
+    search = {"flight.altitude": 60, "survey.row_distance": 25}
+    assert published("uav-search") == camera | animals | search

@@ -1,0 +1,262 @@
+"""What searches for animals: rows over enclosures, a gondola on its cable, a gimbal that swings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.simulation.test_twins import with_values
+from wildlab.errors import WildlabError
+from wildlab.flight.check import check_flight
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.flight.sync import frame_times, gimbal_angles, poses_at
+from wildlab.geometry.frames import matrix_to_euler
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.simulation.animals import herd
+from wildlab.simulation.courses import trajectory
+from wildlab.simulation.gimbal import gimbal_angles as true_angles
+from wildlab.simulation.imu import ideal_imu
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.routes import headings
+from wildlab.simulation.settings import true_mount
+from wildlab.simulation.surveys import rows, survey_course
+from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+from wildlab.simulation.twins import simulate, simulate_twin
+
+NAMES = ["uav-search", "uav-search-low", "uav-tracking", "gondola"]
+#: Published in F 7.5: altitude and distance between rows, m.
+PATTERNS = {"uav-search": (60, 25), "uav-search-low": (30, 10), "uav-tracking": (50, None)}
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def named(request):
+    return request.param, load_twin(request.param), simulate_twin(request.param, 2)
+
+
+def calm(twin):
+    """The twin without control errors and sway."""
+    spreads = ("track_sd", "altitude_sd", "roll_sd", "pitch_sd", "yaw_sd")
+    return with_values(twin, **{f"flight__{name}": 0.0 for name in spreads})
+
+
+@pytest.mark.parametrize("name", ["uav-search-low", "gondola"])
+def test_velocity_and_acceleration_are_the_derivatives_of_position(name):
+    path, _ = trajectory(load_twin(name), np.random.default_rng(1))
+    t, h = np.linspace(0, 1700, 6000), 1e-3
+    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
+    _, v, a = path(t)
+    # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4); rounding of 500 m
+    # over 2 h is some 1e-10.
+    assert np.abs((p1 - p0) / (2 * h) - v).max() < 2e-6
+    assert np.abs((v1 - v0) / (2 * h) - a).max() < 2e-6
+    assert np.abs(a).max() < 3.0
+
+
+@pytest.mark.parametrize("name", ["uav-search", "uav-search-low", "gondola"])
+def test_angular_rate_is_the_derivative_of_attitude(name):
+    _, attitude = trajectory(load_twin(name), np.random.default_rng(1))
+    t, h = np.linspace(5, 1700, 6000), 1e-3
+    rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
+    assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
+    assert np.degrees(np.abs(rate)).max() < 120  # turning round where a course reverses
+
+
+def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
+    """Rate and force as the inertial unit would feel them, for four minutes: two rows and their turns."""
+    twin = load_twin("uav-search-low")
+    path, attitude = trajectory(twin, np.random.default_rng(1))
+    rate, count = 250.0, 60_001
+    force, spin = ideal_imu(path, attitude, rate, count)
+    h = 1 / rate
+    turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
+    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
+    down = np.array([0.0, 0.0, 9.81])
+    before = R.apply(force[0]) + down
+    for i in range(count - 1):
+        R = R * turns[i]
+        after = R.apply(force[i + 1]) + down
+        a = (before + after) / 2
+        p += h * v + h**2 / 2 * a
+        v += h * a
+        before = after
+    assert np.degrees((R.inv() * Rotation.from_matrix(end.R_nb[0])).magnitude()) < 2e-3
+    assert np.linalg.norm(v - end.velocity[0]) < 0.03
+    assert np.linalg.norm(p - end.position[0]) < 2.0
+
+
+def test_a_multicopter_leans_just_as_its_thrust_must():
+    twin = with_values(calm(load_twin("uav-search")), flight__trim_pitch=0.0)
+    path, attitude = trajectory(twin, np.random.default_rng(1))
+    motion = move(path, attitude, np.linspace(0, 2000, 5000))
+    force = specific_forces(motion, twin.place.gravity.si)
+    assert np.abs(force[:, :2]).max() < 1e-9  # all of it along z of the body
+    lean = np.degrees(np.arccos(motion.R_nb[:, 2, 2]))
+    # A reversal at 5 m/s within the turning time of 4 s: twice the speed times the peak of a B-spline of
+    # degree six, 0.511 per interval, of which 2.1 are a turning time.
+    steepest = np.degrees(np.arctan(2 * 5.0 * 0.5110 * 2.1 / 4.0 / twin.place.gravity.si))
+    assert 0.9 * steepest < lean.max() < steepest
+    assert np.median(lean) < 0.01
+    # In steady flight it has its trim, nose down.
+    path, attitude = trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
+    angles = np.degrees(matrix_to_euler(attitude(np.linspace(0, 2000, 5000))))
+    assert np.median(angles[:, 1]) == pytest.approx(-4.0, abs=0.01)
+
+
+def test_a_gondola_hangs_level_and_goes_round_clockwise_at_its_speed():
+    twin = calm(load_twin("gondola"))
+    path, attitude = trajectory(twin, np.random.default_rng(1))
+    t = np.arange(0, 1800, 0.5)
+    p, v, _ = path(t)
+    assert np.hypot(v[:, 0], v[:, 1]) == pytest.approx(1.5, abs=0.01)
+    assert -p[:, 2].max() == pytest.approx(3.0, abs=0.2)
+    assert -p[:, 2].min() == pytest.approx(20.0, abs=0.2)
+    roll, pitch, yaw = matrix_to_euler(attitude(t)).T
+    assert np.abs(roll).max() < 1e-12
+    assert np.abs(pitch).max() < 1e-12
+    course = np.arctan2(v[:, 1], v[:, 0])
+    assert np.degrees(np.abs(np.angle(np.exp(1j * (yaw - course)))).max()) < 1.0
+    turned = np.unwrap(yaw)
+    assert turned[-1] - turned[0] == pytest.approx(2 * np.pi, abs=0.1)  # once round, to the right
+    assert np.linalg.norm(p[-1, :2] - p[0, :2]) < 50  # about thirty minutes for a lap
+
+
+@pytest.mark.parametrize("distance", [7.0, 10.0, 25.0, 400.0])
+def test_no_point_within_a_fence_is_further_from_a_row_than_half_their_distance(distance):
+    for enclosure in load_twin("uav-search").enclosures.values():
+        ends = rows(enclosure, distance).reshape(-1, 2, 2)
+        along = np.diff(ends, axis=1)[:, 0]
+        assert np.linalg.norm(along, axis=1) == pytest.approx(enclosure.length.number)
+        assert (np.sum(along[1:] * along[:-1], axis=1) < 0).all()  # to and fro
+        side = along[0, ::-1] * [-1, 1] / np.linalg.norm(along[0])
+        across = np.sort((ends[:, 0] - [enclosure.north.number, enclosure.east.number]) @ side)
+        assert (np.diff(across) <= distance + 1e-9).all()
+        half = enclosure.width.number / 2
+        assert across[0] + half <= distance / 2 + 1e-9
+        assert half - across[-1] <= distance / 2 + 1e-9
+
+
+def test_a_survey_visits_every_row_once_and_comes_back():
+    enclosures = list(load_twin("uav-search").enclosures.values())
+    course = survey_course(enclosures, 25.0)
+    assert course[0] == pytest.approx(course[-1])
+    wanted = np.concatenate([rows(enclosure, 25.0) for enclosure in enclosures])
+    assert np.array_equal(np.unique(course.round(6), axis=0), np.unique(wanted.round(6), axis=0))
+    step = np.linalg.norm(np.diff(course, axis=0), axis=1)
+    lengths = sorted(enclosure.length.number for enclosure in enclosures)
+    flown = step[np.isclose(step[:, None], lengths).any(axis=1)]
+    assert len(flown) == len(wanted) // 2
+
+
+def test_heading_is_that_of_the_leg_and_turns_at_corners():
+    square = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0], [0.0, 0.0]])
+    heading = headings(square, 5.0, 200.0, roll_time=2.0)
+    turned = np.degrees(heading([10.0, 30.0, 50.0, 70.0, 90.0, 170.0]) - heading([10.0]))
+    assert turned == pytest.approx([0, 90, 180, 270, 360, 720], abs=1e-6)
+    assert np.sin(heading([10.0])) == pytest.approx(0.0, abs=1e-9)
+    t = np.linspace(15, 25, 200)
+    assert (np.diff(heading(t)) >= -1e-12).all()  # round the corner without overshoot
+    tenths = np.interp(np.radians([9, 81]), heading(t) - heading([10.0]), t)
+    assert np.diff(tenths) == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "pattern"), PATTERNS.items())
+def test_altitude_and_rows_are_those_printed(name, pattern):
+    twin = load_twin(name)
+    path, _ = trajectory(twin, np.random.default_rng(2))
+    p, v, _ = path(np.arange(0, twin.flight.duration.si, 1.0))
+    assert -p[:, 2].mean() == pytest.approx(pattern[0], abs=0.5)
+    assert np.hypot(v[:, 0], v[:, 1]).max() < 1.3 * twin.flight.airspeed.number
+    if pattern[1] is not None:
+        assert twin.survey.row_distance.number == pattern[1]
+        assert twin.survey.row_distance.status == "published"
+
+
+def test_a_gimbal_swings_evenly_between_its_limits():
+    gimbal = load_twin("gondola").gimbal
+    t = np.arange(0, 60, 0.001)
+    pan, tilt = true_angles(gimbal, t)
+    assert np.degrees([pan.min(), pan.max()]) == pytest.approx([-60, 60], abs=0.01)
+    assert tilt == pytest.approx(0.0)
+    pace = np.abs(np.diff(np.degrees(pan))) / 0.001
+    assert np.median(pace) == pytest.approx(4 * 60 / 6, rel=0.2)  # there and back twice the swing in a period
+    assert np.abs(np.diff(pace)).max() < 1.0  # and no jolt
+
+
+def test_pan_of_a_gimbal_hung_by_its_back_rolls_the_camera():
+    """Level and northbound: straight down at zero, east with the right side's pan, image top ahead."""
+    mount = true_mount(load_twin("gondola"))
+    _, R = camera_pose(mount, np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1)), [0.0, 0.5, -0.5], np.zeros(3))
+    lens = R[:, :, 2]
+    expected = np.array([[0, 0, 1], [0, np.sin(0.5), np.cos(0.5)], [0, -np.sin(0.5), np.cos(0.5)]])
+    assert lens == pytest.approx(expected)
+    assert -R[:, :, 1] == pytest.approx(np.tile([1.0, 0, 0], (3, 1)))
+    yawing = true_mount(load_twin("uav-search"))
+    tilt = np.full(2, np.radians(-60.0))
+    _, R = camera_pose(yawing, np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), [0.0, np.pi / 4], tilt)
+    half, up = np.cos(np.radians(60)), np.sin(np.radians(60))
+    assert R[:, :, 2] == pytest.approx(np.array([[half, 0, up], [half / 2**0.5, half / 2**0.5, up]]))
+
+
+def test_marks_are_on_the_animals_through_pose_and_gimbal(named):
+    """But for what the gimbal's log rounds off where it turns, some hundredths of a degree."""
+    _, twin, _ = named
+    exact = with_values(twin, camera__marking_sd=0.0, gimbal__noise=0.0)
+    flight = simulate(exact, 2)
+    row = flight.frames.set_index("frame_id").index.get_indexer(flight.detections["frame_id"])
+    times = frame_times(flight)
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], times[row])
+    pan, tilt = (angle[row] for angle in gimbal_angles(flight))
+    pose = camera_pose(flight.manifest.geometry_mount(), p_nb, R_nb, pan, tilt)
+    uv = flight.detections[["u_px", "v_px"]].to_numpy()
+    ground = pixel_to_plane(flight.manifest.geometry_camera(), uv, *pose, -0.7)
+    walks = herd(twin, 2)
+    at = np.concatenate(
+        [walks[animal](times[[i]]) for animal, i in zip(flight.detections["target_id"], row, strict=True)]
+    )
+    off = np.linalg.norm(ground - at, axis=1)
+    assert np.median(off) < 0.01
+    assert off.max() < 0.002 * np.linalg.norm(at - p_nb, axis=1).max()
+    # A mount without the gimbal would miss by metres.
+    wrong = pixel_to_plane(
+        flight.manifest.geometry_camera(), uv, *camera_pose(Mount("down"), p_nb, R_nb), -0.7
+    )
+    assert np.nanmedian(np.linalg.norm(wrong - at, axis=1)) > 1.0
+    assert (flight.detections["plane_down_m"] == 0.0).all()
+
+
+def test_tables_are_whole_and_check_finds_nothing_wrong(named, tmp_path):
+    name, _, flight = named
+    assert set(flight.tables) == {"frames", "detections", "truth", "gimbal"}
+    assert list(flight.nav) == ["autopilot", "truth"]
+    assert flight.truth["target_id"].nunique() == 25
+    assert flight.detections["target_id"].nunique() > 5
+    assert flight.detections["detection_id"].is_unique
+    assert flight.detections["frame_id"].is_monotonic_increasing
+    assert flight.detections["u_px"].between(0, 720).all()
+    assert flight.detections["v_px"].between(0, 480).all()
+    assert flight.manifest.geometry_camera().distortion == (0.446, 0, 0, 0, 0)
+    save_flight(flight, tmp_path / name)
+    loaded = load_flight(tmp_path / name)
+    assert [f.sentence for f in check_flight(loaded) if f.level != "note"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*NAMES, "large-ship"])
+def test_same_seed_same_bytes(name, tmp_path):
+    for folder in ("a", "b"):
+        save_flight(simulate_twin(name, 4), tmp_path / folder)
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert len(files) == (6 if name == "large-ship" else 7)
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 40e6
+
+
+def test_no_animal_in_view_is_said():
+    twin = load_twin("gondola")
+    away = with_values(twin, camera__images=1, camera__recording_start=1799.0)
+    with pytest.raises(WildlabError, match="animals: no animal comes into view"):
+        simulate(away, 1)
