@@ -136,6 +136,22 @@ def test_the_cross_covariance_is_limited_alike():
     assert 5 < changed < 50
 
 
+def test_only_the_rows_asked_for_are_kept():
+    times, z, poses, _ = flight(66)
+    start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
+    arguments = dict(view=View(CAMERA, poses, 0.0), gate=0.99)
+    full = run_batch(times, z, np.eye(2), CV, start, **arguments)
+    rows = [0, 1, 17, N - 1]
+    some = run_batch(times, z, np.eye(2), CV, start, rows=rows, **arguments)
+    assert np.array_equal(some.times, times[rows])
+    assert np.array_equal(some.x, full.x[:, rows], equal_nan=True)
+    assert np.array_equal(some.P, full.P[:, rows], equal_nan=True)
+    assert np.isnan(some.x[:, 0]).all()
+    assert np.array_equal(some.x[:, 1], np.ones((66, 4)))
+    for ours, theirs in zip(some[3:], full[3:], strict=True):
+        assert np.array_equal(ours, theirs, equal_nan=ours.dtype == float)
+
+
 def test_bad_input_is_named():
     times, z, poses, _ = flight(3)
     start = Start(0.0, np.zeros(4), np.eye(4))

@@ -24,14 +24,14 @@ from wildlab.tracking.schmidt import PoseUncertainty
 
 
 class BatchTracks(NamedTuple):
-    """What the filter made of B runs of N measurements; the estimates after each row.
+    """What the filter made of B runs of N measurements; the estimates after each of M rows.
 
     NaN before the start. Views of arrays in which the runs come last.
     """
 
-    times: Array  # (N,)
-    x: Array  # (B, N, 4)
-    P: Array  # (B, N, 4, 4)
+    times: Array  # (M,)
+    x: Array  # (B, M, 4)
+    P: Array  # (B, M, 4, 4)
     innovation: Array  # (B, N, 2)
     nis: Array  # (B, N)
     used: NDArray[np.bool_]  # (B, N)
@@ -60,6 +60,7 @@ def run_batch(
     view: View | None = None,
     pose: PoseUncertainty | None = None,
     gate: float | None = None,
+    rows: ArrayLike | None = None,
 ) -> BatchTracks:
     """Kalman filter on positions; with ``view`` the extended filter on pixels; with ``pose`` Schmidt's.
 
@@ -81,6 +82,9 @@ def run_batch(
         Its covariance is (N, 6, 6) or (B, N, 6, 6).
     gate
         As in `wildlab.tracking.run.run_filter`.
+    rows
+        (M,) the rows after which estimates are kept; all when not given. Long flights of many runs fill the
+        memory with covariances, and writing them takes as long as computing them.
 
     Raises
     ------
@@ -113,16 +117,22 @@ def run_batch(
     noise = _per_run(R, 2, N)
     noise[~np.isfinite(noise).all(axis=2)] = [1.0, 0.0, 0.0, 1.0]  # their measurements are NaN by now
     P0 = np.asarray(start.P, float)
-    estimates = [np.empty((N, *shape, B)) for shape in ((4,), (4, 4), (2,), ())]
+    kept = np.arange(N) if rows is None else np.asarray(rows, np.int64)
+    slots = np.full(N, -1)
+    slots[kept] = np.arange(len(kept))
+    estimates = [np.empty((len(kept), *shape, B)) for shape in ((4,), (4, 4))]
+    judged = [np.empty((N, *shape, B)) for shape in ((2,), ())]
     for a in estimates:
+        a[kept < first] = np.nan
+    for a in judged:
         a[:first] = np.nan
-    out = (*estimates, np.zeros((N, B), bool), np.zeros((N, B), bool))
+    out = (*estimates, *judged, np.zeros((N, B), bool), np.zeros((N, B), bool))
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
     singular = run_lanes(
         F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
         np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
         np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
-        first, given.threshold, view is not None, pose is not None, *out,
+        first, given.threshold, view is not None, pose is not None, slots, *out,
     )  # fmt: skip
     if singular >= 0:
         raise WildlabError(
@@ -131,10 +141,11 @@ def run_batch(
             field="S",
         )
     if start.row >= 0:
-        out[0][start.row] = np.asarray(start.x, float).T.reshape(4, -1)
-        out[1][start.row] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
+        if slots[start.row] >= 0:
+            out[0][slots[start.row]] = np.asarray(start.x, float).T.reshape(4, -1)
+            out[1][slots[start.row]] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
         out[4][start.row] = True
-    return BatchTracks(given.times, *(np.moveaxis(a, -1, 0) for a in out))
+    return BatchTracks(given.times[kept], *(np.moveaxis(a, -1, 0) for a in out))
 
 
 def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:

@@ -21,6 +21,7 @@ from wildlab.tracking.schmidt import LARGEST_CORRELATION, NEGLIGIBLE
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 LANES = 64
 
@@ -301,14 +302,14 @@ def load(source: Array, row: int, first: int, target: Array) -> None:
 def run_lanes(
     F: Array, Q: Array, left: Array, phis: Array, z: Array, R: Array, poses: Array, R_bc: Array,
     P_poses: Array, lever: Array, planes: Array, A: Array, x0: Array, P0: Array, start: int, threshold: float,
-    with_camera: bool, with_pose: bool,
+    with_camera: bool, with_pose: bool, slots: Integers,
     out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
 ) -> int:  # fmt: skip
     """All runs through rows ``start`` to N; the row of a singular S, or -1.
 
     F, Q (N, 4, 4), left (N,) and phis (1 or B, N, 36) of the step to each row; z (B, N, 2); R (1 or B, N, 4);
     poses, R_bc, P_poses (1 or B, N, 12, 9, 36); planes (N,); x0 (B, 4); P0 (1 or B, 4, 4);
-    outputs with the runs last.
+    outputs with the runs last, x and P of each row at its place in ``slots`` (N,), nowhere where that is -1.
     """
     n_runs, n_rows = z.shape[:2]
     x, P, C = np.empty((4, LANES)), np.empty((4, 4, LANES)), np.zeros((4, 6, LANES))
@@ -367,10 +368,12 @@ def run_lanes(
                 out_nis[row, run] = nis[r] if offered[r] > 0 else np.nan
                 for i in range(2):
                     out_v[row, i, run] = v[i, r] if offered[r] > 0 else np.nan
-            for i in range(4):
-                for r in range(width):
-                    out_x[row, i, first + r] = x[i, r]
-                for j in range(4):
+            slot = slots[row]
+            if slot >= 0:
+                for i in range(4):
                     for r in range(width):
-                        out_P[row, i, j, first + r] = P[i, j, r]
+                        out_x[slot, i, first + r] = x[i, r]
+                    for j in range(4):
+                        for r in range(width):
+                            out_P[slot, i, j, first + r] = P[i, j, r]
     return -1
