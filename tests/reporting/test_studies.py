@@ -121,6 +121,24 @@ def test_a_flight_with_labelled_markers_is_evaluated(
     assert faults(outcome.folder / "report.html") == []
 
 
+def test_sensors_of_a_ferry_judged_on_one_scenario(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("tracking", "autoferry")
+    import_flight(DATA / "recipes" / "autoferry-17.toml", raw, tmp_path / "flight")
+    folder = run("autoferry", reports, flight=tmp_path / "flight")
+    found = values(folder)
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert len(content["claims"]) == 7
+    names = {name for name, subject in found if subject == "radar/havfruen/scenario-17/coloured"}
+    assert {"rmse", "anees", "anis", "lag1_autocorrelation_north", "fraction_nees_inside"} <= names
+    assert "lag1_autocorrelation" in {
+        name for name, subject in found if subject == "eo/jet-boat/scenario-17/ekf"
+    }
+    assert (folder / "figures" / "map-scenario-17.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
     page = reports / "index.html"
     assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
+from wildlab.pipeline.compare_filters import IDEAL, WHITES
 from wildlab.pipeline.follow_sensors import Followed
 from wildlab.reporting.figures import (
     BLUE,
@@ -23,7 +25,7 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.sensor_tracks import FILTER_WORDS, SENSOR_WORDS, WITH_ITS_BOAT_M, cautious_number
+from wildlab.reporting.sensor_tracks import FILTER_WORDS, SENSOR_WORDS, WITH_ITS_BOAT_M, signed
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
@@ -46,7 +48,7 @@ def map_shown(case: str, flight: Flight, followed: Sequence[Followed], tracks: p
     counts = ", ".join(f"{int(true.sum())} of {len(true)} by {kind}" for kind, true in stay.items())
     words = case.replace("-", " ").capitalize()
     return (
-        track_map(flight, followed, f"{words}: stay with their boat {counts}"),
+        track_map(flight, followed, f"{words}: tracks that stay with their boat\n{counts}"),
         f"map-{case}",
         f"Map of {case}: the ways of the boats and the platform, and the track of each boat by each sensor. "
         f"Tracks that stay with their boat: {counts}.",
@@ -62,10 +64,9 @@ def nees_shown(sensor: str, followed: Sequence[Followed], tracks: pd.DataFrame) 
     share = tracks.set_index("filter")["fraction_nees_inside"]
     inside = ", ".join(f"{FILTER_WORDS[one.filter]} {100 * share[one.filter]:.0f} %" for one in followed)
     words = SENSOR_WORDS.get(sensor, sensor)
+    best = " and ".join(FILTER_WORDS[str(name)] for name in share.index[share == share.max()])
     return (
-        nees_chart(
-            followed, f"{words.capitalize()}: most often inside is {FILTER_WORDS[str(share.idxmax())]}"
-        ),
+        nees_chart(followed, f"{words.capitalize()}: most often inside is {best}"),
         f"nees-{sensor}",
         f"NEES over time by {words} on a logarithmic axis. Time inside the 95 percent band: {inside}.",
         f"Inside the band: {inside}. Counterpart of H figures 7.6 and 7.21.",
@@ -78,7 +79,7 @@ def innovations_shown(sensor: str, followed: Sequence[Followed], tracks: pd.Data
     axes = tracks.set_index("filter")[["lag1_autocorrelation_north", "lag1_autocorrelation_east"]]
     far = {one.filter: max(axes.loc[one.filter], key=abs) for one in pair}
     words = SENSOR_WORDS.get(sensor, sensor)
-    before, after = (cautious_number(far[name]) for name in ("kf", "coloured"))
+    before, after = (signed(far[name]) for name in ("kf", "coloured"))
     title = f"{words.capitalize()}: {before} at lag one, differenced {after}"
     return (
         innovations_chart(pair, title),
@@ -87,6 +88,52 @@ def innovations_shown(sensor: str, followed: Sequence[Followed], tracks: pd.Data
         "lags, with the band of white noise.",
         "In the title: the axis with the larger value at lag one. Grey: where white noise stays with 95 %. "
         "Counterpart of H figures 7.7 and 7.12.",
+    )
+
+
+def mean_nees_shown(tracks: pd.DataFrame) -> Shown:
+    """The mean NEES of every track by sensor and filter, with what is ideal."""
+    fig, ax = new_figure(5.8, 3.8)
+    known = tracks[np.isfinite(tracks["anees"])]
+    ends, place = [], 0
+    for sensor, group in known.groupby("sensor", sort=False):
+        left = place
+        for name, rows in group.groupby("filter", sort=False):
+            spread = np.linspace(-0.22, 0.22, len(rows)) if len(rows) > 1 else np.zeros(1)
+            ax.plot(place + spread, rows["anees"], ".", color=colour(str(name)), ms=7)
+            ax.plot([place - 0.3, place + 0.3], [rows["anees"].median()] * 2, color=colour(str(name)), lw=2)
+            place += 1
+        ends.append(((left + place - 1) / 2, SENSOR_WORDS.get(str(sensor), str(sensor)).replace(" ", "\n")))
+        place += 1
+    ax.axhline(IDEAL, color="black", lw=1)
+    ax.annotate(
+        "2, ideal",
+        (1.0, IDEAL),
+        (-2, 3),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
+    )
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.set_xticks([x for x, _ in ends], [label for _, label in ends])
+    ax.grid(axis="x", visible=False)
+    ax.set_ylabel("mean NEES of a track")
+    for words in dict.fromkeys(FILTER_WORDS.values()):
+        name = next(key for key, value in FILTER_WORDS.items() if value == words)
+        ax.plot([], [], ".", color=colour(name), ms=9, label=words)
+    fig.legend(loc="outside lower center", ncols=4)
+    white = known[known["filter"].isin(WHITES)]
+    over = int((white["anees"] > white["nees_high"]).sum())
+    ax.set_title(f"With white noise, {over} of {len(white)} tracks are overconfident")
+    return (
+        fig,
+        "mean-nees",
+        "Mean NEES of every track on a logarithmic axis by sensor and filter, beside the ideal of two; with "
+        f"white noise assumed {over} of {len(white)} lie above their 95 percent interval.",
+        "One dot for each boat and scenario, a bar for their median. White noise: blue for positions, "
+        "vermillion for bearings.",
     )
 
 
@@ -114,8 +161,10 @@ def track_map(flight: Flight, followed: Sequence[Followed], title: str) -> Figur
             )
             labelled.add(label)
     for east, north, name in ends:
-        ax.plot(east, north, "o", color=GREY if name == "own ship" else "black", ms=5, zorder=4)
-        ax.annotate(name, (east, north), (6, 5), textcoords="offset points", fontsize=9.5, zorder=5)
+        own = name == "own ship"
+        ax.plot(east, north, "o", color=GREY if own else "black", ms=5, zorder=4)
+        place = (6, -14) if own else (6, 5)
+        ax.annotate(name, (east, north), place, textcoords="offset points", fontsize=9.5, zorder=5)
     for limit, column in ((ax.set_xlim, "east_m"), (ax.set_ylim, "north_m")):
         values = np.concatenate([truth[column].to_numpy(), nav[column].to_numpy()])
         limit(values.min() - MARGIN_M, values.max() + MARGIN_M)
@@ -133,7 +182,8 @@ def nees_chart(followed: Sequence[Followed], title: str) -> Figure:
     log_band(ax, *chi_square_interval(2))
     values = np.concatenate([one.nees[np.isfinite(one.nees)] for one in followed])
     if len(values):
-        ax.set_ylim(max(1e-3, 0.5 * values.min()), 2 * max(values.max(), 10.0))
+        # Down to below the band, whose name stands under it.
+        ax.set_ylim(np.clip(0.5 * values.min(), 1e-3, 0.02), 2 * max(values.max(), 10.0))
     ax.set(title=title, xlabel="time (s)", ylabel="NEES of the position")
     fig.legend(loc="outside lower center", ncols=4)
     return fig

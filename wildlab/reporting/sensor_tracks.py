@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
 
 from wildlab.flight.store import Flight
-from wildlab.pipeline.compare_filters import WHITES, beside_white, check_claims
+from wildlab.pipeline.compare_filters import PRICE, WHITES, beside_white, check_claims
 from wildlab.pipeline.follow_sensors import ACCELERATION_DENSITY, COLUMNS, PATIENCE_S
 from wildlab.pipeline.sensor_tuning import REACH, Tuning
 from wildlab.reporting.report import Report
@@ -29,28 +29,14 @@ WITH_ITS_BOAT_M = 15.0
 
 TUNING_COLUMNS = {
     "sensor": "sensor",
-    "offset": "clock (s)",
-    "interval": "95 % interval",
+    "offset": "add to stamps (s)",
     "sd": "error, SD",
-    "unit": "",
     "share": "lasting share",
     "time": "lasts (s)",
-    "position": "position (m)",
-    "clock": "clock, SD (s)",
-    "yaw": "heading (°)",
+    "causes": "the lasting part is put down to",
     "thinned": "thinned to one in (s)",
-    "n": "detections",
 }
-TUNING_DIGITS = {
-    "offset": 2,
-    "sd": 1,
-    "share": 2,
-    "time": 1,
-    "position": 1,
-    "clock": 1,
-    "yaw": 1,
-    "thinned": 1,
-}
+TUNING_DIGITS = {"share": 2, "time": 1, "thinned": 1}
 TRACK_COLUMNS = {
     "target": "boat",
     "scenario": "scenario",
@@ -109,20 +95,21 @@ def record_tunings(report: Report, tunings: Mapping[str, Tuning]) -> pd.DataFram
         )
         report.metric("error_sd", sensor, scale * one.sd, unit, n=one.n)
         report.metric("error_correlation_time", sensor, one.correlation_time_s, "s", n=one.n)
+        low, high = (signed(end, 1) for end in (one.offset_low_s, one.offset_high_s))
+        causes = {
+            f"position {one.position_sd_m:.1f} m": one.position_sd_m > 0.05,
+            f"clock {one.clock_sd_s:.1f} s": one.clock_sd_s > 0.05,
+            f"heading {np.degrees(one.yaw_sd_rad):.1f}°": np.degrees(one.yaw_sd_rad) > 0.05,
+        }
         rows.append(
             {
                 "sensor": SENSOR_WORDS.get(sensor, sensor),
-                "offset": one.offset_s,
-                "interval": f"{one.offset_low_s:.1f} to {one.offset_high_s:.1f}".replace("-", "−"),
-                "sd": scale * one.sd,
-                "unit": "°" if angle else "m",
+                "offset": f"{signed(one.offset_s)} ({low} to {high})",
+                "sd": f"{scale * one.sd:.1f}{'°' if angle else ' m'}",
                 "share": one.share,
                 "time": one.correlation_time_s,
-                "position": one.position_sd_m,
-                "clock": one.clock_sd_s,
-                "yaw": np.degrees(one.yaw_sd_rad),
+                "causes": ", ".join(words for words, there in causes.items() if there),
                 "thinned": max(one.thinning_s, one.interval_s),
-                "n": one.n,
             }
         )
     return pd.DataFrame(rows)
@@ -184,7 +171,8 @@ OVERVIEW_DIGITS = {"rmse": 1, "anees": 1, "inside": 0, "anis": 2}
 
 
 def gains_table(found: pd.DataFrame) -> pd.DataFrame:
-    """What `wildlab.pipeline.compare_filters.gains` gives, in words."""
+    """What `wildlab.pipeline.compare_filters.gains` gives, in words, sensor by sensor."""
+    found = found.sort_values("sensor", key=lambda names: names.map(list(SENSOR_WORDS).index), kind="stable")
     return found.assign(
         sensor=found["sensor"].map(SENSOR_WORDS),
         scenario=found["case"].str.removeprefix("scenario-"),
@@ -215,19 +203,50 @@ def summary_sentences(
     looking = [sensor for sensor in error.index if kinds[sensor] == "bearing"]
     sentences = []
     if ranging:
-        places = " and ".join(f"the {SENSOR_WORDS[one]} {error[one]:.0f} metres" for one in ranging)
-        sentences.append(f"Typically, a boat is placed wrong by {places}.")
+        places = " and ".join(f"{error[one]:.0f} metres with the {SENSOR_WORDS[one]}" for one in ranging)
+        sentences.append(f"Typically, a boat's track is off by {places}.")
     if looking:
-        places = " and ".join(f"the {SENSOR_WORDS[one]}'s by {error[one]:.0f} metres" for one in looking)
-        sentences.append(f"Tracks from directions alone, out of a ship as slow as this, are wrong: {places}.")
+        places = " and ".join(f"{error[one]:.0f} metres with the {SENSOR_WORDS[one]}" for one in looking)
+        sentences.append(
+            f"Cameras tell directions only, and from a ship as slow as this one that means {places}."
+        )
     last = f"In {over} of {len(white)} tracks the simple filter was surer of itself than it should have been"
     if ranging:
         where = " and ".join(
             f"{int(gained[one].sum())} of {len(gained[one])} scenarios with the {SENSOR_WORDS[one]}"
             for one in ranging
         )
-        last += f"; one that knows that errors last was more honest, and hardly less accurate, in {where}"
+        last += f"; one of the others was more honest, and at most a tenth less accurate, in {where}"
     return [*sentences, f"{last}."]
+
+
+def alone_words(both: pd.DataFrame, sensors: Iterable[str]) -> str:
+    """In how many cases each filter, were it the only choice, is more consistent at the price allowed.
+
+    ``both`` is what `wildlab.pipeline.compare_filters.beside_white` gives.
+    """
+    words = []
+    for sensor in sensors:
+        rows = both[both["sensor"] == sensor]
+        better = rows["nearer"] & (rows["rmse_ratio"] <= PRICE)
+        counts = better.groupby(rows["filter"], sort=False).agg(["sum", "count"])
+        parts = [
+            f"{FILTER_WORDS[str(name)]} {row['sum']} of {row['count']}" for name, row in counts.iterrows()
+        ]
+        words.append(f"{SENSOR_WORDS[sensor]}: {', '.join(parts)}")
+    return "; ".join(words)
+
+
+def strays(tracks: pd.DataFrame) -> str:
+    """The tracks by position that do not stay with their boat, in a sentence; empty where all do."""
+    white = tracks[tracks["filter"].isin(WHITES) & (tracks["kind"] == "position")]
+    lost = white[white["rmse"] > WITH_ITS_BOAT_M]
+    named = [
+        f"{row['target']} by {SENSOR_WORDS[row['sensor']]} in {str(row['case']).replace('-', ' ')} "
+        f"({row['rmse']:.0f} m, {100 * row['share_followed']:.0f} % of the time)"
+        for _, row in lost.iterrows()
+    ]
+    return f"Tracks by position, white noise assumed, that do not stay: {'; '.join(named)}." if named else ""
 
 
 def remarks(tracks: pd.DataFrame) -> list[str]:
@@ -256,9 +275,9 @@ def remarks(tracks: pd.DataFrame) -> list[str]:
     ]
 
 
-def cautious_number(value: float) -> str:
-    """Two decimals with a true minus."""
-    return f"{value:.2f}".replace("-", "−")
+def signed(value: float, decimals: int = 2) -> str:
+    """With a true minus."""
+    return f"{value:.{decimals}f}".replace("-", "−")
 
 
 def method_text(first: str) -> str:
