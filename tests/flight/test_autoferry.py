@@ -241,3 +241,37 @@ def test_the_catalogue_has_the_files_as_published(shared_data: Callable[..., Pat
     for one in files:
         assert sha256_of(root / one.path) == one.sha256
         assert one.url.endswith(one.path)
+
+
+RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('file = "scenario2/scenario2_detections.json"', 'file = "../frames.json"', "leaves its folder"),
+        ("[logs.lidar]", '[logs."a/b"]', "'a/b' cannot name a table"),
+        (
+            "[logs.lidar]",
+            '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]',
+            "'lidar' names a table and a log",
+        ),
+        ('format = "autoferry"', 'format = "other"', "'other' does not fit"),
+        ('part = "lidar"', 'part = "sonar"', "'sonar' does not fit"),
+        ('sensor = "sensor"\n', "", "there are images, and no camera"),
+        (
+            'azimuth = { column = "bearing", unit = "rad" }',
+            'azimuth = { column = "bearing", unit = "rad" }\nrange = { value = 9.0, unit = "m" }',
+            "or azimuth, elevation and range",
+        ),
+        ('sensor = "sensor"\n', 'sensor = "sonar"\n', "sonar (in [frames.sensor])"),
+    ],
+)
+def test_what_a_recipe_may_not_say_of_logs(tmp_path: Path, old: str, new: str, problem: str):
+    assert old in RECIPE
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text(RECIPE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(WildlabError) as caught:
+        import_flight(recipe, small(tmp_path), tmp_path / "flight")
+    assert problem in str(caught.value)
+    assert not (tmp_path / "flight").exists()

@@ -180,6 +180,21 @@ def test_a_notebook_must_know_the_flights_beside_the_first(tmp_path: Path) -> No
         load_studies(folder / "studies.toml")
 
 
+@pytest.mark.parametrize(
+    ("entry", "problem"),
+    [
+        ('beside = ["second.toml"]', "flights beside the first need a recipe of the first"),
+        ("[s.parameters]\nothers = []", "the parameter 'others' is set by the runner"),
+    ],
+)
+def test_flights_beside_the_first_belong_to_a_recipe(tmp_path: Path, entry: str, problem: str) -> None:
+    from wildlab.reporting.studies import load_studies
+
+    (tmp_path / "studies.toml").write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
+    with pytest.raises(WildlabError, match=problem):
+        load_studies(tmp_path / "studies.toml")
+
+
 def test_a_flight_of_the_readers_own_stands_alone(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
     from wildlab.reporting.run import make_job
     from wildlab.reporting.studies import load_studies
