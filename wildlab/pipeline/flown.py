@@ -44,6 +44,7 @@ class Flown(NamedTuple):
 #: The only functions that a study can name.
 FLOWN: dict[str, Flown] = {
     "static-point": Flown("wildlab.pipeline.at_rest:fly", ("twin", "observer_seeds")),
+    "navigation": Flown("wildlab.pipeline.navigation_errors:fly", ("twin",)),
 }
 
 #: A change in any of these rooms can change a number.

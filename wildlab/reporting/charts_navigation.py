@@ -1,0 +1,195 @@
+"""Charts of navigation: errors within their bounds, deviations, biases, and how far to believe a filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.reporting.figures import BLUE, GREEN, GREY, PURPLE, VERMILLION, colour, log_band, new_figure
+
+Array = NDArray[np.float64]
+
+#: Points of a line beyond which a figure only grows: more than a screen has columns.
+MOST_POINTS = 3000
+LINES = (BLUE, VERMILLION, PURPLE)
+
+
+def error_bands(
+    times: ArrayLike,
+    errors: Mapping[str, ArrayLike],
+    bounds: Mapping[str, ArrayLike],
+    labels: Sequence[str],
+    title: str,
+    largest: float | None = None,
+) -> Figure:
+    """Errors over time, one strip for each axis and one line for each source, within two standard deviations.
+
+    Parameters
+    ----------
+    times
+        (K,) s.
+    errors
+        (K, 3) by source, in the unit that the labels say.
+    bounds
+        (K, 3) standard deviations by source, for those that state them.
+    labels
+        Of the three strips, with units.
+    largest
+        What the strips reach at most, where single errors (the start) would squeeze the rest.
+    """
+    fig, axes = new_figure(5.9, 4.9, rows=3, sharex=True)
+    t = np.asarray(times, float)
+    keep = _thinned(len(t))
+    for i, (ax, label) in enumerate(zip(axes, labels, strict=True)):
+        reach = 0.0
+        for name, stated in bounds.items():
+            two = 2 * np.asarray(stated, float)[keep, i]
+            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.25, lw=0, label=f"{name}, 2 SD")
+            reach = max(reach, float(np.nanmax(two, initial=0.0)))
+        for name, error in errors.items():
+            e = np.asarray(error, float)[keep, i]
+            ax.plot(t[keep], e, lw=0.9, color=_ink(name), label=name)
+            reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
+        ax.axhline(0, color=GREY, lw=0.6)
+        if reach > 0:
+            ax.set_ylim(*(np.array([-1.05, 1.05]) * min(reach, largest or reach)))
+        ax.set_ylabel(label)
+    return _finished(fig, axes, title)
+
+
+def deviation_chart(
+    times: ArrayLike, sd: ArrayLike, printed: Sequence[float] | None, units: Sequence[str], title: str
+) -> Figure:
+    """Standard deviations that a filter states over time: position above, attitude below, with log axes.
+
+    Parameters
+    ----------
+    sd
+        (K, 6): north, east, down, roll, pitch, yaw, in the units given (one for each strip).
+    printed
+        Six published means, drawn as broken lines; None where there are none.
+    """
+    fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
+    t, values = np.asarray(times, float), np.asarray(sd, float)
+    keep = _thinned(len(t))
+    for ax, first, names, unit in zip(
+        axes, (0, 3), (("north", "east", "down"), ("roll", "pitch", "yaw")), units, strict=True
+    ):
+        for i, (name, color) in enumerate(zip(names, LINES, strict=True)):
+            ax.plot(t[keep], values[keep, first + i], color=color, lw=1.2, label=name)
+            if printed is not None:
+                ax.axhline(printed[first + i], color=color, lw=1.0, ls=(0, (4, 3)), alpha=0.8)
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
+        ax.set_ylabel(f"SD ({unit})")
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8.5)
+    axes[0].set_title(title, pad=26)
+    axes[-1].set_xlabel("time (s)")
+    return fig
+
+
+def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -> Figure:
+    """Biases (K, 6) that a filter estimates, accelerometers (mm/s^2) and gyros (deg/h), within two
+    standard deviations."""
+    fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
+    t = np.asarray(times, float)
+    keep = _thinned(len(t))
+    scales = (1e3, np.degrees(3600.0))
+    for ax, first, scale, label in zip(
+        axes, (0, 3), scales, ("accelerometers (mm/s²)", "gyros (°/h)"), strict=True
+    ):
+        reach = 0.0
+        for i, (name, color) in enumerate(zip(("forward", "right", "down"), LINES, strict=True)):
+            b, s = (scale * np.asarray(a, float)[keep, first + i] for a in (biases, sd))
+            ax.plot(t[keep], b, color=color, lw=1.1, label=name)
+            ax.fill_between(t[keep], b - 2 * s, b + 2 * s, color=color, alpha=0.15, lw=0)
+            late = slice(len(b) // 10, None)
+            reach = max(reach, float(np.nanmax(np.abs(b[late]) + 2 * s[late], initial=0.0)))
+        ax.set_ylim(-1.1 * reach, 1.1 * reach)
+        ax.set_ylabel(label)
+    return _finished(fig, axes, title)
+
+
+def squares_chart(
+    series: Mapping[str, tuple[ArrayLike, ArrayLike]], dof: int, what: str, title: str
+) -> Figure:
+    """NIS or NEES over time on log axes, a strip for each series, with the 95 % band of single values.
+
+    ``series`` has times and values by name.
+    """
+    fig, axes = new_figure(5.9, 1.6 * len(series) + 0.4, rows=len(series), sharex=True, squeeze=False)
+    low, high = chi_square_interval(dof)
+    for ax, (name, (times, values)) in zip(axes[:, 0], series.items(), strict=True):
+        t, v = np.asarray(times, float), np.asarray(values, float)
+        keep = _thinned(len(t))
+        ax.plot(t[keep], v[keep], ".", ms=2, color=BLUE, alpha=0.5, mec="none", rasterized=True)
+        log_band(ax, low, high)
+        ax.set_ylim(
+            min(low / 3, float(np.nanquantile(v, 0.005))), max(high * 3, float(np.nanquantile(v, 0.999)))
+        )
+        ax.set_ylabel(f"{what}\n{_short(name)}")
+    axes[0, 0].set_title(title)
+    axes[-1, 0].set_xlabel("time (s)")
+    return fig
+
+
+def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) -> Figure:
+    """Speed over ground by source: times (s) and velocities (N, 3)."""
+    fig, ax = new_figure(5.9, 3.0)
+    for name, (times, velocity) in sources.items():
+        speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
+        keep = _thinned(len(speed))
+        ax.plot(np.asarray(times, float)[keep], speed[keep], lw=1.0, color=_ink(name), label=name)
+    ax.set_ylim(0, None)
+    ax.set_ylabel("speed over ground (m/s)")
+    return _finished(fig, [ax], title)
+
+
+def correlation_strips(series: Mapping[str, ArrayLike], bounds: Mapping[str, float], title: str) -> Figure:
+    """Autocorrelations (elements, lags + 1) of innovations, a strip for each source, with the white band."""
+    fig, axes = new_figure(5.9, 1.5 * len(series) + 0.4, rows=len(series), sharex=True, squeeze=False)
+    for ax, (name, rows) in zip(axes[:, 0], series.items(), strict=True):
+        ax.axhspan(-bounds[name], bounds[name], color=GREEN, alpha=0.2, lw=0)
+        for row, color, axis in zip(np.asarray(rows, float), LINES, ("north", "east", "down"), strict=False):
+            ax.plot(np.arange(1, len(row)), row[1:], color=color, lw=1.1, label=axis)
+        top = max(0.2, 1.1 * float(np.nanmax(np.abs(np.asarray(rows, float)[:, 1:]))))
+        ax.set_ylim(-top, top)
+        ax.set_ylabel(_short(name))
+    axes[-1, 0].set_xlabel("lag (measurements)")
+    return _finished(fig, axes[:, 0], title, xlabel=None)
+
+
+def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
+    """Times and velocities (N, 3) of a nav table, for `speed_chart`."""
+    return nav["time_s"].to_numpy(float), nav[["v_north_m_s", "v_east_m_s", "v_down_m_s"]].to_numpy(float)
+
+
+def _short(source: str) -> str:
+    return source.replace("second position", "2nd antenna")
+
+
+def _ink(name: str) -> str:
+    return BLUE if name == "mekf" else colour(name)
+
+
+def _thinned(count: int) -> slice:
+    return slice(None, None, max(1, -(-count // MOST_POINTS)))
+
+
+def _finished(fig: Figure, axes: Sequence[Axes], title: str, xlabel: str | None = "time (s)") -> Figure:
+    handles = axes[0].get_legend_handles_labels()
+    if len(handles[0]) > 1:
+        fig.legend(*handles, loc="outside lower right", ncols=len(handles[0]))
+    axes[0].set_title(title)
+    if xlabel:
+        axes[-1].set_xlabel(xlabel)
+    return fig

@@ -1,0 +1,245 @@
+"""Parts of a report on navigation: what flights with and without truth have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.pipeline.navigation_errors import (
+    AXES,
+    PLACES,
+    Studied,
+    against_autopilot,
+    normalised_innovations,
+    shares_within,
+    summarise,
+    summarise_innovations,
+)
+from wildlab.reporting.charts import poses_between, strips
+from wildlab.reporting.charts_navigation import (
+    bias_chart,
+    correlation_strips,
+    deviation_chart,
+    error_bands,
+    speed_chart,
+    squares_chart,
+    velocities_of,
+)
+from wildlab.reporting.report import Report
+
+WORDS = {
+    "mekf": "MEKF, noise as stated",
+    "observer": "Nonlinear observer",
+    "autopilot": "Autopilot",
+    "mekf-published-like": "MEKF, tuned like H 7.5.3",
+    "mekf-published-like-turning": "MEKF, tuned like H 7.5.4",
+}
+CONVENTION = (
+    "Position and velocity in n (m, m/s), attitude as four times the modified Rodrigues parameters of dq in "
+    "q_true = q_hat dq, in b (rad); truth minus estimate."
+)
+_TURNS = [f"{axis} (°)" for axis in AXES]
+_SPEEDS = [f"{place} (m/s)" for place in PLACES]
+
+
+def has_truth(studied: Studied) -> bool:
+    """Whether it was judged by the truth, rather than by another estimate."""
+    return studied.reference == "truth-payload"
+
+
+def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
+    """RMS errors and stated deviations of filter, observer and autopilot, a row for each and each part."""
+    return pd.DataFrame(
+        [
+            {"who": WORDS[who], "part": part, **summarise(studied.judged[who], begin, end)}
+            for part, begin, end in parts
+            for who in ("mekf", "observer", "autopilot")
+            if who in studied.judged
+        ]
+    )
+
+
+def show_flight(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
+    """Attitude, velocity and speed by each source between two times, s; counterpart of H 7.<figures>."""
+    nav = {name: studied.found[name].nav for name in ("mekf", "observer")}
+    reference = studied.flight.nav[studied.reference]
+    nav["truth" if has_truth(studied) else "onboard"] = reference.iloc[:: max(1, len(reference) // 3000)]
+    if has_truth(studied):
+        nav["autopilot"] = studied.flight.nav["autopilot"]
+    moving = {name: table for name, table in nav.items() if "v_north_m_s" in table}
+    attitude, _ = poses_between(
+        {name: t.reindex(columns=nav["mekf"].columns) for name, t in nav.items()}, *window
+    )
+    _, velocity = poses_between(moving, *window)
+    report.figure(
+        strips(attitude, "Attitude"),
+        name=f"fig-7-{figures}",
+        alt=f"Roll, pitch and yaw over time by {', '.join(nav)}.",
+        caption=f"Roll, pitch and yaw, {window[0]:.0f} to {window[1]:.0f} s. Counterpart of H figures 5.3a "
+        f"and 7.{figures}.",
+    )
+    report.figure(
+        strips(velocity, "Velocity over ground"),
+        name=f"fig-7-{figures + 1}",
+        alt=f"Velocity north, east and down over time by {', '.join(moving)}.",
+        caption=f"Velocity over the same time. Counterpart of H figures 5.3b and 7.{figures + 1}.",
+    )
+    speeds = {name: velocities_of(table[table["time_s"].between(*window)]) for name, table in moving.items()}
+    size = np.linalg.norm(speeds["mekf"][1], axis=1)
+    report.figure(
+        speed_chart(speeds, f"Speed over ground, {size.min():.0f} to {size.max():.0f} m/s"),
+        name=f"fig-7-{figures + 4}",
+        alt=f"Speed over ground over time by {', '.join(moving)}.",
+        caption=f"Total speed. Counterpart of H figure 7.{figures + 4}.",
+    )
+
+
+def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
+    """Attitude and velocity against the reference, with the bounds that the filter states of itself."""
+    late = (studied.times >= window[0]) & (studied.times < window[1])
+    of = {who: studied.judged[who] for who in ("mekf", "observer")}
+    whom = "the truth" if has_truth(studied) else "the one found on board"
+    turns = {who: np.degrees(e.error[late, 6:]) for who, e in of.items()}
+    report.figure(
+        error_bands(
+            studied.times[late],
+            turns,
+            {"mekf": np.degrees(of["mekf"].sd[late, 6:])},
+            _TURNS,
+            f"Attitude against {whom}",
+            largest=3 * float(np.nanquantile(np.abs(turns["observer"]), 0.95)),
+        ),
+        name="attitude-errors",
+        alt="Differences of roll, pitch and yaw over time by filter and observer, with two deviations.",
+        caption="Rotation from the estimate to the reference about the axes of the body; shaded: two "
+        f"deviations. Counterpart of H figure 7.{figures + 2}, with {whom} in place of the autopilot.",
+    )
+    if np.isfinite(of["mekf"].error[late, 3:6]).any():
+        report.figure(
+            error_bands(
+                studied.times[late],
+                {who: e.error[late, 3:6] for who, e in of.items()},
+                {"mekf": of["mekf"].sd[late, 3:6]},
+                _SPEEDS,
+                f"Velocity against {whom}",
+            ),
+            name="velocity-errors",
+            alt="Differences of velocity over time by filter and observer, and two standard deviations.",
+            caption=f"Counterpart of H figure 7.{figures + 3}, with {whom} in place of the autopilot.",
+        )
+
+
+def show_against_autopilot(report: Report, studied: Studied, tuned: str, begin: float, figures: int) -> None:
+    """The filter with deviations like the printed ones, against the autopilot as in H."""
+    difference = against_autopilot(studied, tuned)
+    late = studied.times >= begin
+    share = {name: 100 * value for name, value in shares_within(difference, begin).items()}
+    for part, scale, labels, offset, title in (
+        (slice(6, 9), np.degrees(1.0), _TURNS, 2, f"Roll: {share['inside_roll']:.0f} % within two SD"),
+        (slice(3, 6), 1.0, _SPEEDS, 3, f"Velocity: {share['inside_velocity']:.0f} % within two SD"),
+    ):
+        report.figure(
+            error_bands(
+                studied.times[late],
+                {"mekf": scale * difference.error[late, part]},
+                {"mekf": scale * difference.sd[late, part]},
+                labels,
+                title,
+            ),
+            name=f"fig-7-{figures + offset}",
+            alt="Differences between filter and autopilot over time, with two deviations of the filter.",
+            caption=f"{WORDS[tuned]}, with the autopilot as reference. Counterpart of H figure "
+            f"7.{figures + offset}.",
+        )
+
+
+def show_states(report: Report, studied: Studied, printed: Sequence[float] | None) -> None:
+    """Deviations and biases that the filter states; ``printed`` are six published means, m and degrees."""
+    sd = studied.judged["mekf"].sd
+    both = np.hstack([sd[:, :3], np.degrees(sd[:, 6:])])
+    report.figure(
+        deviation_chart(studied.times, both, printed, ("m", "°"), "What the filter states of itself"),
+        name="deviations",
+        alt="Standard deviations of position and attitude that the filter states, over time on log axes.",
+        caption="Standard deviations over time"
+        + ("; broken: the means that H prints of its own." if printed is not None else "."),
+    )
+    biases = studied.found["mekf"].biases
+    columns = [str(name) for name in biases if not str(name).startswith("sd_") and name != "time_s"]
+    report.figure(
+        bias_chart(
+            biases["time_s"],
+            biases[columns],
+            biases[[f"sd_{c}" for c in columns]],
+            "Biases that the filter finds",
+        ),
+        name="biases",
+        alt="Biases of the three accelerometers and gyros over time, each with two deviations.",
+        caption="Biases along the axes of the body, with two standard deviations.",
+    )
+
+
+def show_innovations(report: Report, studied: Studied, window: tuple[float, float]) -> None:
+    """NIS and autocorrelation of the filter's innovations, in figures and in a table."""
+    found = studied.found["mekf"]
+    raw = found.innovations[found.innovations["time_s"].between(*window)]
+    split = {str(name): part for name, part in raw.groupby("source", sort=False)}
+    report.figure(
+        squares_chart(
+            {name: (part["time_s"], part["nis"]) for name, part in split.items()},
+            3,
+            "NIS",
+            "Do measurements fit what the filter expects?",
+        ),
+        name="nis",
+        alt="Normalised innovation squared over time for each source on a log axis, with its 95 % band.",
+        caption="Normalised innovation squared of the filter; three degrees of freedom.",
+    )
+    white = {name: innovation_whiteness(normalised_innovations(part), 40) for name, part in split.items()}
+    report.figure(
+        correlation_strips(
+            {name: w.autocorrelation for name, w in white.items()},
+            {name: w.bound for name, w in white.items()},
+            "Do innovations that follow each other agree?",
+        ),
+        name="autocorrelation",
+        alt="Autocorrelation of the innovations of each source by lag, with the band of white noise.",
+        caption="Autocorrelation of the innovations in units of what the filter expects; green: where white "
+        "noise stays with 95 %.",
+    )
+    table = summarise_innovations(found._replace(innovations=raw))
+    report.table(
+        table.assign(inside=100 * table["inside"], left_out=100 * table["left_out"]),
+        columns={
+            "source": "GNSS",
+            "n": "measurements",
+            "nis": "mean NIS",
+            "dof": "ideal",
+            "inside": "within 95 % band (%)",
+            "left_out": "left out (%)",
+            "lag1": "correlation at lag 1",
+            "bound": "white below",
+        },
+        digits={"nis": 2, "inside": 1, "left_out": 1, "lag1": 3, "bound": 3},
+        caption="Innovations of the filter.",
+    )
+
+
+def show_nees(report: Report, studied: Studied, begin: float) -> None:
+    """NEES of the filter over time, where there is a truth."""
+    late = studied.times >= begin
+    report.figure(
+        squares_chart(
+            {name: (studied.times[late], v[late]) for name, v in studied.judged["mekf"].nees.items()},
+            3,
+            "NEES",
+            "Are the errors as large as the filter says?",
+        ),
+        name="nees",
+        alt="NEES of position, velocity and attitude over time on log axes, with 95 % bands.",
+        caption=f"NEES, three degrees of freedom each. {CONVENTION} An error that stays for the whole flight "
+        "keeps it on one side.",
+    )
