@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.simulation.sines import sum_of_sines
 
 #: Times (N,) in s -> position, velocity, acceleration in n, (N, 3) each, in m, m/s, m/s^2.
 FlightPath = Callable[[Array], tuple[Array, Array, Array]]
@@ -60,9 +61,9 @@ class Wander:
 
     def __call__(self, times: ArrayLike, derivative: int = 0) -> Array:
         """The signal or one of its derivatives with respect to time. (N,) s -> (N,)."""
-        angle = np.multiply.outer(np.asarray(times, float), self.frequencies) + self.phases
         strength = self.amplitudes * self.frequencies**derivative
-        return np.asarray(np.sin(angle + derivative * np.pi / 2) @ strength)
+        phases = self.phases + derivative * np.pi / 2
+        return sum_of_sines(np.asarray(times, float), strength, self.frequencies, phases)
 
 
 def no_wander() -> Wander:
