@@ -1,0 +1,305 @@
+"""One target of a flight through the tracking filters of H 6 and 7, and the tracks beside the truth.
+
+A `Sighting` holds what one camera saw of one target, with the poses of one navigation source: the filters see
+the same detections, and a comparison of sources is a comparison of sightings.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.flight.store import Flight
+from wildlab.flight.sync import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.georeference import pixel_to_plane
+from wildlab.geometry.mount import camera_pose, camera_rotation
+from wildlab.pipeline.georeference import observe
+from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.measurement import CameraPoses, Sensor, pixels
+from wildlab.tracking.motion import Motion, constant_velocity
+from wildlab.tracking.run import Start, Track, start_from_first
+from wildlab.tracking.schmidt import Change, PoseUncertainty
+
+Array = NDArray[np.float64]
+
+#: The velocity of the truth is taken over this time, as a single-frequency receiver's course means little from
+#: one fix to the next.
+TRUTH_VELOCITY_OVER_S = 10.0
+
+
+class Sighting(NamedTuple):
+    """N frames of one camera, from the first to the last that shows the target.
+
+    Frames without a detection, or without a pose, have NaN; they are there because the process noise of H
+    (6.2) depends on how time is cut, and the thesis cut it by images.
+
+    Attributes
+    ----------
+    times
+        (N,) s, in order.
+    uv
+        (N, 2) pixels.
+    positions
+        (N, 2) the same on the ground: north and east, m.
+    camera, poses, plane_down
+        What `wildlab.tracking.measurement.pixels` takes; ``plane_down`` (N,) is filled in between detections.
+    pose_covariance
+        (N, 6, 6) where the source states one: position in n, attitude in b.
+    truth
+        (N, 4) north, east, and velocity; NaN where it is not known.
+    """
+
+    times: Array
+    uv: Array
+    positions: Array
+    camera: Camera
+    poses: CameraPoses
+    plane_down: Array
+    pose_covariance: Array | None
+    truth: Array
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(N,) whether the frame has a detection that lies on the ground."""
+        return np.asarray(np.isfinite(self.positions).all(axis=1))
+
+    @property
+    def sensor(self) -> Sensor:
+        """For the readable filters of `wildlab.tracking.run`."""
+        return pixels(self.camera, self.poses, self.plane_down)
+
+
+class CvTuning(NamedTuple):
+    """How H tunes a filter with constant velocity: standard deviations, per axis.
+
+    ``acceleration`` m/s^2 (H 6.2), ``position_0`` m and ``velocity_0`` m/s at the start, ``measurement`` in
+    metres on the ground, ``pixel`` in pixels.
+    """
+
+    acceleration: float
+    position_0: float
+    velocity_0: float
+    measurement: float
+    pixel: float
+
+    @property
+    def motion(self) -> Motion:
+        """The motion model, H (6.1)-(6.2)."""
+        return partial(constant_velocity, sd_acceleration=self.acceleration)
+
+
+def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting:
+    """What the camera saw of a target, with the poses of a ``nav`` source.
+
+    Parameters
+    ----------
+    target
+        May be left out where the detections name one only.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such target or several to choose from, or none of its detections has a pose.
+    """
+    seen = observe(flight, source)
+    names = sorted(set(seen.table["target_id"]))
+    if target is None and len(names) != 1:
+        raise WildlabError(
+            f"the detections name {len(names)} targets", f"choose one of {', '.join(names)}", field="target"
+        )
+    name = names[0] if target is None else target
+    if name not in names:
+        raise WildlabError(
+            f"no detection names the target {name!r}", f"choose one of {', '.join(names)}", field="target"
+        )
+    seen = seen.take((seen.table["target_id"] == name).to_numpy())
+    frames = flight.table("frames")
+    stamps = frame_times(flight)
+    order = np.argsort(stamps, kind="stable")
+    place = np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    row = place[pd.Index(frames["frame_id"]).get_indexer(pd.Index(seen.table["frame_id"]))]
+    first, last = int(row.min()), int(row.max()) + 1
+    times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
+    p_nb, R_nb, covariance = poses_at(flight.pose_source(source)[1], times, ids)
+    pan, tilt = (angle[order][first:last] for angle in gimbal_angles(flight))
+    mount = flight.manifest.geometry_mount()
+    p_nc, R_nc = camera_pose(mount, p_nb, R_nb, pan, tilt)
+    uv = np.full((len(times), 2), np.nan)
+    uv[row - first] = seen.uv
+    plane = np.full(len(times), np.nan)
+    plane[row - first] = seen.plane_down
+    known = np.isfinite(plane)
+    if not known.any():
+        raise WildlabError(
+            "how high the target lies is not known", "give plane_down_m", field="detections.plane_down_m"
+        )
+    plane = np.interp(times, times[known], plane[known])
+    camera = flight.manifest.geometry_camera()
+    positions = pixel_to_plane(camera, uv, p_nc, R_nc, plane)[:, :2]
+    if not np.isfinite(positions).any():
+        raise WildlabError(
+            "none of the detections lies on the ground", "does the source cover the flight?", field="nav"
+        )
+    return Sighting(
+        times,
+        uv,
+        positions,
+        camera,
+        CameraPoses(p_nc, R_nc, camera_rotation(mount, pan, tilt), mount.lever_arm),
+        plane,
+        covariance,
+        truth_states(flight, name, times),
+    )
+
+
+def truth_states(flight: Flight, target: str, times: ArrayLike) -> Array:
+    """(N, 4) north, east and velocity of a target as its own log has them; NaN where it has not."""
+    at = np.asarray(times, float)
+    if flight.truth is None:
+        return np.full((len(at), 4), np.nan)
+    rows = flight.truth[flight.truth["target_id"] == target]
+    if rows.empty:
+        return np.full((len(at), 4), np.nan)
+    offset, half = flight.manifest.clocks.truth_offset_s, TRUTH_VELOCITY_OVER_S / 2
+
+    def where(t: Array) -> Array:
+        return np.asarray(truth_at(rows, t, offset_s=offset)[1][0, :, :2])
+
+    return np.hstack([where(at), (where(at + half) - where(at - half)) / (2 * half)])
+
+
+def start(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
+    """On the first georeferenced detection, with zero speed (H 6.2.4, 6.3.3); see `start_from_first`."""
+    return start_from_first(seen.times, seen.positions, tuning.position_0, tuning.velocity_0, n, **more)
+
+
+def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
+    """The Kalman filter on georeferenced detections, H 6.2."""
+    R = np.eye(2) * tuning.measurement**2
+    return _compiled(seen, seen.positions, R, tuning, None, None)
+
+
+def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:
+    """The extended Kalman filter on pixels, H 6.3; poses are taken as true."""
+    view = View(seen.camera, seen.poses, seen.plane_down)
+    return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
+
+
+def follow_schmidt(
+    seen: Sighting,
+    tuning: CvTuning,
+    covariance: ArrayLike | None = None,
+    correlation_time: float = np.inf,
+    change: Change = "bias",
+) -> Track:
+    """The Schmidt-Kalman filter on pixels, H 7.4.
+
+    Parameters
+    ----------
+    covariance
+        (N, 6, 6) of the poses in place of that which the source states.
+    correlation_time, change
+        See `wildlab.tracking.schmidt.PoseUncertainty`.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no covariance of the poses.
+    """
+    own = seen.pose_covariance if covariance is None else np.asarray(covariance, float)
+    if own is None:
+        raise WildlabError(
+            "the poses have no covariance", "use those of the MEKF: navigate_mekf(flight)", field="nav"
+        )
+    view = View(seen.camera, seen.poses, seen.plane_down)
+    pose = PoseUncertainty(own, correlation_time, change)
+    return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
+
+
+def _compiled(
+    seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
+) -> Track:
+    """One run of the compiled filters, which a test holds against the readable ones."""
+    found = run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
+    n = len(seen.times)
+    S = np.full((n, 2, 2), np.nan)  # the compiled filters give the NIS in its place
+    chosen = np.where(np.isfinite(found.nis[0]), 0, -1).astype(np.int64)
+    return Track(
+        seen.times,
+        found.x[0],
+        found.P[0],
+        found.innovation[0],
+        S,
+        found.nis[0],
+        found.used[0],
+        chosen,
+        found.limited[0],
+    )
+
+
+class Judged(NamedTuple):
+    """A track beside the truth: NEES of the position at every frame, NIS at every detection, and numbers.
+
+    ``numbers`` by name: ``mean_north``, ``mean_east``, ``mae``, ``rmse`` (m; truth minus estimate),
+    ``rmse_speed`` (m/s), ``rmse_course`` (rad), ``nees`` and ``nis`` (means), ``fraction_nees_inside``,
+    ``fraction_nis_inside`` (of the 95 % bounds of one run), ``lag1_autocorrelation_north``, ``..._east`` (of
+    the innovations; ``..._u``, ``..._v`` in pixels).
+    """
+
+    nees: Array
+    nis: Array
+    numbers: dict[str, float]
+
+
+def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", "east")) -> Judged:
+    """Compare a track with the truth at every frame since its start, as the thesis does.
+
+    The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
+    error counts as the filter's.
+
+    Parameters
+    ----------
+    axes
+        What the innovation's two elements are called.
+    """
+    state = track.x[:, :4]
+    errors = track_errors(seen.truth, state)
+    values = position_nees(seen.truth - state, track.P[:, :4, :4])
+    summary = summarise_track(errors)
+    bounds = chi_square_interval(2)
+    numbers = {
+        "mean_north": summary.mean_north,
+        "mean_east": summary.mean_east,
+        "mae": summary.mae,
+        "rmse": summary.rmse,
+        "rmse_speed": summary.rmse_speed,
+        "rmse_course": summary.rmse_course,
+        "nees": float(np.nanmean(values)),
+        "nis": float(np.nanmean(track.nis)),
+        "fraction_nees_inside": share_inside(values, bounds),
+        "fraction_nis_inside": share_inside(track.nis, bounds),
+    }
+    innovation = track.innovation[np.isfinite(track.innovation).all(axis=1)]
+    for i, axis in enumerate(axes):
+        numbers[f"lag1_autocorrelation_{axis}"] = float(autocorrelation(innovation[:, i], 1)[1])
+    return Judged(values, track.nis, numbers)
+
+
+def judge_measurements(seen: Sighting) -> dict[str, float]:
+    """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m."""
+    e = (seen.truth[:, :2] - seen.positions)[seen.seen]
+    return {
+        "mean_north": float(np.nanmean(e[:, 0])),
+        "mean_east": float(np.nanmean(e[:, 1])),
+        "mae_georeferenced": float(np.nanmean(np.hypot(*e.T))),
+    }
