@@ -31,8 +31,8 @@ from wildlab.tracking.schmidt import Change, PoseUncertainty
 
 Array = NDArray[np.float64]
 
-#: The velocity of the truth is taken over this time, as a single-frequency receiver's course means little from
-#: one fix to the next.
+#: The velocity of the truth is taken over this time: from one fix of a single-frequency receiver to the next,
+#: a course means little.
 TRUTH_VELOCITY_OVER_S = 10.0
 
 
