@@ -240,8 +240,8 @@ def table(followed: list[Followed]) -> pd.DataFrame:
     """One row for each track, its columns those of `COLUMNS` and:
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, looks with a track and
-    truth; ``nees_low`` and ``nees_high``, the 95 % interval of the mean NEES of a consistent filter, for as many
-    values as the correlated ones are worth; ``nis_low`` and ``nis_high`` likewise. ``anees`` is of the
+    truth; ``nees_low`` and ``nees_high``, the 95 % interval of the mean NEES of a consistent filter, for as
+    many values as the correlated ones are worth; ``nis_low`` and ``nis_high`` likewise. ``anees`` is of the
     position, 2 is right; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
     a measurement. ``share_followed``: of the looks with truth, those that have a track.
     """
