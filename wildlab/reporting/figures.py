@@ -47,6 +47,8 @@ COLOURS = {
     "coloured": PURPLE,
     "ukf": SKY,
     "imm": ORANGE,
+    "cv": BLUE,
+    "singer": ORANGE,
     # poses a position was computed from
     "logged-pose": BLUE,
     "calibrated-pose": VERMILLION,
