@@ -31,7 +31,9 @@ Motion = Callable[[float], tuple[Array, Array]]
 
 def _both(axis: Array) -> Array:
     """North and east move alike and independently."""
-    return np.asarray(np.kron(axis, np.eye(2)), float)
+    both = np.zeros((2 * len(axis), 2 * len(axis)))
+    both[::2, ::2] = both[1::2, 1::2] = axis
+    return both
 
 
 def rest(dt: float) -> tuple[Array, Array]:
