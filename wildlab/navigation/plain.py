@@ -124,9 +124,11 @@ def mekf(
                 kept[i] = np.exp(-dt / time)
                 whole = dt if np.isinf(time) else time / 2 * (1 - kept[i] ** 2)
                 drive[i] = density**2 * whole
-            kept_extra = np.exp(-dt / extra[:, 1])
-            drive_extra = np.where(np.isinf(extra[:, 1]), 0.0, extra[:, 0] ** 2 * extra[:, 1] / 2)
-            drive_extra[np.isfinite(extra[:, 1])] *= (1 - kept_extra**2)[np.isfinite(extra[:, 1])]
+            kept_extra, drive_extra = np.exp(-dt / extra[:, 1]), np.zeros(len(extra))
+            wanders = np.isfinite(extra[:, 1])
+            drive_extra[wanders] = (
+                extra[wanders, 0] ** 2 * extra[wanders, 1] / 2 * (1 - kept_extra[wanders] ** 2)
+            )
             if line.gap[k] > 0:
                 Phi = np.diag([1.0] * 9 + [kept[0]] * 3 + [kept[1]] * 3 + [1.0] * len(extra))
                 Phi[:3, 3:6] = dt * np.eye(3)

@@ -1,0 +1,147 @@
+"""The MEKF's states beyond the fifteen of H: axes that are not where they should be, fixes that wander."""
+
+import numpy as np
+import pytest
+
+from tests.navigation.flights import GNSS_SD, GRAVITY, LEVERS, NOISE, begin, fixes, fly, moved, spoil
+from tests.navigation.test_mekf import (
+    EARTH,
+    between,
+    differences,
+    errors_of,
+    nees_of,
+    shifted,
+    some_state,
+    spoilt,
+)
+from wildlab.geometry.frames import rotation_vector_to_matrix
+from wildlab.geometry.gravity import flat_earth, local_earth
+from wildlab.navigation import plain
+from wildlab.navigation.aiding import positions, velocities
+from wildlab.navigation.mekf import prepare, run_mekf
+from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
+from wildlab.navigation.timeline import Imu
+from wildlab.simulation.imu import misaligned_triad
+from wildlab.simulation.sensors import gauss_markov
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return fly()
+
+
+def test_compiled_and_plain_agree_on_axes_and_wander(flight):
+    """With every state beyond the fifteen, a gap, and one antenna of two whose error wanders."""
+    imu, start, antennas, _ = spoilt(flight, 0, every=50)
+    keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
+    imu = Imu(*(part[keep] for part in imu))
+    wandering = positions(
+        antennas[1].times, antennas[1].value, GNSS_SD, LEVERS[1], 0.0, [0.1, 0.2, 0.3], 15.0
+    )
+    aiding = [antennas[0], wandering, velocities(np.arange(1.0, 29), moved(np.arange(1.0, 29))[0], 0.5)]
+    axes, earth = AxisErrors(0.01, 0.003, 0.005), local_earth(0.9, 100.0)
+    wanted = np.arange(0.5, 29.5, 1.0)
+    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, axes=axes)
+    options = {"gate": 1e-4, "max_gap": 0.1, "gap_acceleration": 5.0, "gap_rate": 0.5}
+    ready = prepare(imu, start, NOISE, aiding, wanted, **options, axes=axes)
+    assert ready.covariance.shape == (15 + 18 + 3, 15 + 18 + 3)
+    states, covariances, nis, verdicts = plain.mekf(
+        ready.line, ready.measured, earth.as_array(), *ready[5:10], ready.gate, 5.0
+    )
+    known = np.isfinite(found.position).all(axis=1)
+    ours = np.hstack(
+        [found.position, found.velocity, found.quaternion, found.accelerometer_bias, found.gyro_bias]
+    )
+    assert np.abs(ours - states[:, :16])[known].max() < 1e-8
+    theirs = covariances[:, :15, :15]
+    scale = np.sqrt(np.einsum("kii,kjj->kij", theirs, theirs))
+    assert (np.abs(found.covariance - theirs) / scale)[known].max() < 1e-7
+    assert np.allclose(found.innovations.nis, nis, rtol=1e-6)
+    assert np.array_equal(found.innovations.verdict, verdicts)
+    without = run_mekf(imu, start, NOISE, earth, [antennas[0]], wanted)
+    assert np.abs(without.covariance - found.covariance)[known].max() > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_transition_with_axes_is_the_derivative_of_a_step(seed):
+    rng = np.random.default_rng(seed)
+    x = np.concatenate([some_state(rng), rng.uniform(-1e-3, 1e-3, 18)])
+    f, w, dt = rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3), 0.01
+    earth = flat_earth(GRAVITY).as_array()
+
+    def step(state):
+        after = plain.strapdown_step(state[:16], *plain.along_axes(state, f, w), dt, earth)[0]
+        return np.concatenate([after, state[16:]])
+
+    after = step(x)
+    found = differences(lambda e: between(after, step(shifted(x, e))), np.full(33, 1e-4))
+    Phi = plain.transition(x, f, w, dt, earth, (1.0, 1.0), axes=True)
+    # Of errors of the axes only the first order is kept: a thousandth of what a bias does in a step.
+    assert np.abs(found - Phi)[:, :12].max() < 2e-4
+    assert np.abs(found - Phi)[:, 12:].max() < 3e-4
+    assert np.abs(Phi[3:9, 15:]).max() > 0.02
+
+
+def test_wrong_axes_are_found_in_turns_and_owned_up_to():
+    """Gyros turned by half a degree: told so, the filter stays within its bounds; else it is wrong."""
+    flight = fly()
+    imu, biases = spoil(flight, np.random.default_rng(11))
+    lean = rotation_vector_to_matrix(np.array([0.0, 0.009, -0.006]))
+    turned = imu._replace(angular_rate=imu.angular_rate @ lean.T)
+    rng = np.random.default_rng(12)
+    start, antennas = begin(flight, biases, rng), fixes(flight, rng)
+    rows = np.arange(9000, len(flight.imu.times), 50)
+    nees = {}
+    for name, axes in (("told", AxisErrors(0.006)), ("not told", None)):
+        found = run_mekf(turned, start, NOISE, EARTH, antennas, flight.imu.times[rows], axes=axes)
+        nees[name] = nees_of(errors_of(found, flight.motion, rows), found.covariance, slice(6, 9)).mean() / 3
+    assert nees["told"] < 2.5
+    assert nees["not told"] > 2 * nees["told"]
+
+
+def test_a_fix_that_wanders_keeps_its_place_in_doubt(flight):
+    """Averaging does not help against an error that stays: the position remains that uncertain."""
+    imu, start, antennas, _ = spoilt(flight, 13)
+    rng = np.random.default_rng(14)
+    slow = [gauss_markov(len(a.times), 0.2, [0.2] * 3, 60.0, rng) for a in antennas]
+    rows = np.arange(9000, len(flight.imu.times), 50)
+    told, untold = (
+        run_mekf(
+            imu,
+            start,
+            NOISE,
+            EARTH,
+            [
+                positions(a.times, a.value + s, GNSS_SD, lever, wander_sd=sd, wander_time=60.0)
+                for a, s, lever, sd in zip(antennas, slow, LEVERS, (wander, wander), strict=True)
+            ],
+            flight.imu.times[rows],
+        )
+        for wander in (0.2, 0.0)
+    )
+    squares = [
+        nees_of(errors_of(found, flight.motion, rows), found.covariance, slice(0, 3)).mean() / 3
+        for found in (told, untold)
+    ]
+    assert np.sqrt(told.covariance[:, 0, 0]).min() > 0.05
+    assert squares[0] < 3 < 10 < squares[1]
+
+
+def test_axis_errors_have_the_covariance_of_misaligned_triads():
+    """Turned as a whole and leaning one by one, each evenly up to its limit: the simulated sensor's own."""
+    rng = np.random.default_rng(15)
+    package, lean = np.radians(0.25), np.radians(0.05)
+    triads = np.array([(misaligned_triad(lean, package, rng) - np.eye(3)).ravel() for _ in range(20_000)])
+    stated = AxisErrors(package / np.sqrt(3), lean / np.sqrt(3)).covariance()
+    assert np.abs(np.cov(triads.T) - stated).max() < 0.03 * stated.max()
+    assert AxisErrors(0.0, 0.0, 0.01).covariance()[4, 4] == pytest.approx(1e-4)
+
+
+def test_a_constant_and_a_process_are_one_process():
+    """With the variance of both, driven as the second is."""
+    noise = with_turn_on(ImuNoise(0.1, 0.2, 0.003, 300.0, 1e-5, np.inf), 0.04, 0.5)
+    assert noise.accelerometer_bias_sd == pytest.approx(np.hypot(0.003, 0.04))
+    drive = noise.accelerometer_bias_sd**2 * 2 / noise.accelerometer_bias_time
+    assert drive == pytest.approx(0.003**2 * 2 / 300)
+    assert noise[4:] == (1e-5, np.inf)  # a random walk forgets where it began: the start says what is known
+    assert with_turn_on(noise, 0.0, 0.0) == pytest.approx(noise)

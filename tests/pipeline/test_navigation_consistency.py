@@ -1,0 +1,78 @@
+"""The filter's covariance against the truth of real twins, over many seeds: straight, in turns, without GNSS.
+
+The sensors err as the manifest says, with all that a data sheet has: turn-on biases, axes that are not
+where they should be, fixes whose error wanders. Attitude error: ``q_true = q_hat * dq``, as four times the
+modified Rodrigues parameters of ``dq`` in b; position: truth less estimate in n.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.flight.store import Flight
+from wildlab.pipeline.navigate import navigate_mekf
+from wildlab.pipeline.navigation_errors import errors_against
+from wildlab.simulation.aboard import gnss_table, imu_table, nav_table, payload_attitude, ticks
+from wildlab.simulation.courses import trajectory
+from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.simulation.sensors import stream
+from wildlab.simulation.settings import twin_manifest
+from wildlab.simulation.trajectory import angular_rates, move
+
+DURATION, SEEDS = 200.0, 50
+OUTAGE = (115.0, 175.0)
+#: Of the mean over seeds and time, over its degrees of freedom.
+LIMITS = (0.7, 1.4)
+
+
+def shortened(name: str) -> TwinParameters:
+    twin = load_twin(name)
+    duration = twin.flight.duration.model_copy(update={"value": DURATION})
+    return twin.model_copy(update={"flight": twin.flight.model_copy(update={"duration": duration})})
+
+
+def sensors(twin: TwinParameters, seed: int) -> tuple[Flight, np.ndarray]:
+    """Inertial unit, receivers and truth alone, with the outage; and whether it turns at each time."""
+    path, attitude = trajectory(twin, stream(seed, "trajectory"))
+    payload = payload_attitude(twin, attitude, seed)
+    times = ticks(5.0, DURATION)
+    gnss = gnss_table(twin, path, payload, seed)
+    gnss = gnss[~gnss["time_s"].between(*OUTAGE)].reset_index(drop=True)
+    tables = {"imu": imu_table(twin, path, payload, seed), "gnss": gnss}
+    truth = nav_table(move(path, payload, times))
+    turning = np.abs(angular_rates(payload, times)[:, 2]) > 0.05
+    return Flight(twin_manifest(twin, seed), {"truth-payload": truth}, tables), turning
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["fast-vessel", "drifting-vessel-eight"])
+def test_errors_are_as_large_as_the_filter_says(name):
+    twin, times = shortened(name), ticks(5.0, DURATION)
+    squares: dict[str, list[np.ndarray]] = {"position": [], "attitude": []}
+    nis, turns = [], []
+    for seed in range(SEEDS):
+        flight, turning = sensors(twin, seed)
+        found = navigate_mekf(flight, times)
+        errors = errors_against(flight.nav["truth-payload"], found.nav, times)
+        for block, values in squares.items():
+            values.append(errors.nees[block] / 3)
+        late = found.innovations["time_s"] > 60.0
+        nis.append((found.innovations["nis"] / found.innovations["dof"])[late].mean())
+        turns.append(turning)
+    with_gnss = (times > 60) & ~((times > OUTAGE[0]) & (times < OUTAGE[1]))
+    off = (times > OUTAGE[0]) & (times < OUTAGE[1])
+    parts = {
+        "straight": with_gnss & ~np.array(turns),
+        "in turns": with_gnss & np.array(turns),
+        "without GNSS": np.broadcast_to(off, (SEEDS, len(times))),
+    }
+    means = {
+        (part, block): float(np.array(values)[rows].mean())
+        for part, rows in parts.items()
+        for block, values in squares.items()
+    }
+    print(name, {" ".join(key): round(value, 2) for key, value in means.items()}, f"NIS {np.mean(nis):.2f}")
+    assert min(rows.sum() for rows in parts.values()) > 20 * SEEDS
+    assert all(LIMITS[0] < mean < LIMITS[1] for mean in means.values()), means
+    assert 0.95 < np.mean(nis) < 1.05
