@@ -1,0 +1,357 @@
+"""Which of two detections belongs to the tracked target: three ways to ask, by Monte Carlo, H 6.4.3.
+
+Two targets at rest are seen in every image of a short flight, from poses that are known with white errors.
+One of them, the main object, is tracked, and the detection with the smaller normalised innovation squared is
+given to it. That distance is computed from georeferenced positions (H 6.2.3), from pixels (6.8), or from
+azimuth and elevation (6.11). All runs go through the flight together, image by image.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera, in_image
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.tracking.association import distances, nearest_within
+from wildlab.tracking.kalman import correct, predict
+from wildlab.tracking.measurement import (
+    CameraPoses,
+    Prediction,
+    azimuth_elevation_of_pixel,
+    difference,
+    on_state,
+    predict_azimuth_elevation,
+    predict_pixel,
+)
+from wildlab.tracking.motion import constant_velocity
+
+#: The three forms of H table 6.6, in its order.
+FORMS = ("position", "pixels", "angles")
+
+#: H 6.4.3: 141 images at 10 Hz; the second target 10 m north and 15 m east of the main one, each displaced
+#: by 10 m per axis; 50 iterations of the filter before, on the true position with 10 m of noise per axis.
+IMAGES, RATE_HZ, WARM_UP = 141, 10.0, 50
+APART, DISPLACED_M, WARM_UP_M = (10.0, 15.0), 10.0, 10.0
+#: H table 6.4: standard deviations of north, east, down (m), roll, pitch, yaw, pan and tilt (rad); pixels.
+POSE_SD = np.array([2.0, 2.0, 5.0, *np.radians([1.0, 1.0, 2.0, 1.0, 1.0])])
+PIXEL_SD = 2.0
+#: H table 6.5: start, and noise of the measurements as the filters assume it.
+START_P = np.diag([10.0**2, 10.0**2, 20.0, 20.0])
+R_FORM = {
+    "position": np.diag([10.0**2, 10.0**2]),
+    "pixels": np.diag([360.0, 160.0]),
+    "angles": np.diag(np.radians([6.0, 3.0]) ** 2),
+}
+IS_ANGLE = {"position": (False, False), "pixels": (False, False), "angles": (True, False)}
+
+#: Normal draws of a run: targets, start, warm-up, poses and pixels.
+_DRAWS = (4, 2, 2 * WARM_UP, 8 * IMAGES, 4 * IMAGES)
+
+
+@dataclass(frozen=True)
+class Overflight:
+    """True poses of `IMAGES` images, and where between the two targets the middle is.
+
+    Attributes
+    ----------
+    time_s
+        (T,).
+    p_nb, euler
+        (T, 3) metres and roll, pitch, yaw in radians.
+    pan, tilt
+        (T,) rad, of a gimbal whose camera looks down at zero.
+    place
+        (2,) north and east of the middle between the targets' mean positions, on the plane ``down = 0``.
+    """
+
+    camera: Camera
+    time_s: Array
+    p_nb: Array
+    euler: Array
+    pan: Array
+    tilt: Array
+    place: Array
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What H 6.4.3 does not print about the filters; each default has its reason.
+
+    Attributes
+    ----------
+    sd_acceleration
+        Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside it.
+    updated_with
+        The measurement that was assigned to the track ("assigned to the main target"), the main object's
+        ``own`` whatever was assigned, or nothing.
+    angles_update
+        H 6.3.2: pixels are used in the update and angles for gating.
+    azimuth
+        ``atan2``: two-argument arctangents. ``arctan``: an azimuth that cannot tell a target from the one
+        opposite. ``printed``: H (6.10) to the letter, where moreover the measured elevation is negative for
+        detections in the left half of the image.
+    warm_up_step
+        Seconds between the iterations before association begins: that of the images.
+    in_image_only
+        Leave out images where one of the two lies beyond the edge; the print has both in all 141.
+    """
+
+    sd_acceleration: float = 0.01
+    updated_with: Literal["assigned", "own", "nothing"] = "assigned"
+    angles_update: Literal["pixels", "angles"] = "pixels"
+    azimuth: Literal["atan2", "arctan", "printed"] = "atan2"
+    warm_up_step: float = 1 / RATE_HZ
+    in_image_only: bool = False
+
+
+class Gated(NamedTuple):
+    """What happened in N runs of T images; forms in the order of `FORMS`, the main object first."""
+
+    right: NDArray[np.bool_]  # (3, N, T)
+    counted: NDArray[np.bool_]  # (N, T)
+    nis: Array  # (3, N, T, 2)
+    estimate: Array  # (3, N, T, 2) north, east after the update
+    measured: Array  # (N, T, 2, 2) georeferenced detections
+    pixels: Array  # (N, T, 2, 2) detections
+    targets: Array  # (N, 2, 2) true positions
+
+
+class Scene(NamedTuple):
+    """Draws of N runs as things: targets (N, 2, 2), warm-up, detected pixels, and poses as they are known."""
+
+    targets: Array
+    start: Array  # (N, 2)
+    warm_up: Array  # (N, WARM_UP, 2)
+    pixels: Array  # (N, T, 2, 2)
+    p_nc: Array  # (N, T, 3)
+    R_nc: Array  # (N, T, 3, 3)
+
+
+def overflight(
+    flight: Flight,
+    *,
+    gimbal: Literal["follows", "down"] = "follows",
+    focal_scale: float = 1.0,
+    height_scale: float = 1.0,
+    right: float = 0.0,
+) -> Overflight:
+    """The stretch of a twin's true trajectory that passes over the origin of n with the targets in view.
+
+    Of all stretches of 141 images at 10 Hz in which every image shows the origin, the one whose farthest
+    image (horizontally) is nearest to it. A camera that looks straight down from 100 m has a point in view
+    for five seconds, not for fourteen: so the gimbal, which H table 6.4 says there was, keeps pan zero and
+    tilts forwards and backwards after the targets (``follows``). ``down`` leaves it at rest, and the pinhole
+    camera goes on beyond the edge.
+
+    Parameters
+    ----------
+    focal_scale, height_scale
+        Factors on focal length and height, on the same stretch, to see what they do.
+    right
+        How far to the right of the origin, seen along the stretch, the middle between the targets is, m.
+
+    Raises
+    ------
+    WildlabError
+        If the flight has no true poses, or no stretch of them that has the origin in view.
+    """
+    if "truth" not in flight.nav:
+        raise WildlabError("the flight has no true poses", "use a twin", file=flight.folder, field="nav")
+    nav = flight.nav["truth"]
+    known = nav["time_s"].to_numpy(float)
+    ticks = np.arange(np.ceil(known[0] * RATE_HZ), np.floor(known[-1] * RATE_HZ) + 1) / RATE_HZ
+    rows = np.searchsorted(known, ticks - 1e-6)
+    p = nav[["north_m", "east_m", "down_m"]].to_numpy(float)[rows]
+    R_nb = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)[rows])
+    camera = flight.manifest.geometry_camera()
+    part = _stretch(camera, p, R_nb)
+    p, R_nb = p[part], R_nb[part]
+    along = (p[-1, :2] - p[0, :2]) / np.hypot(*(p[-1, :2] - p[0, :2]))
+    place = right * np.array([-along[1], along[0]])
+    p = p * (1.0, 1.0, height_scale)
+    tilt = _tilt_after(place, p, R_nb) if gimbal == "follows" else np.zeros(IMAGES)
+    camera = replace(camera, fx=camera.fx * focal_scale, fy=camera.fy * focal_scale)
+    return Overflight(camera, ticks[part], p, matrix_to_euler(R_nb), np.zeros(IMAGES), tilt, place)
+
+
+def _stretch(camera: Camera, p: Array, R_nb: Array) -> slice:
+    """See `overflight`."""
+    seen = camera_pose(Mount(), p, R_nb, np.zeros(len(p)), _tilt_after(np.zeros(2), p, R_nb))
+    shown = in_image(camera, ground_to_pixel(camera, np.zeros(3), *seen))
+    away = np.where(shown, np.hypot(p[:, 0], p[:, 1]), np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(away, min(IMAGES, len(away)))
+    first = int(np.argmin(windows.max(axis=1)))
+    if len(p) < IMAGES or np.isinf(windows[first]).any():
+        fix = "use a flight that passes over the origin, as large-ship does"
+        raise WildlabError("nowhere does the flight have the origin of n in view for 14 s", fix, field="nav")
+    return slice(first, first + IMAGES)
+
+
+def _tilt_after(place: Array, p: Array, R_nb: Array) -> Array:
+    """Tilt (T,) with which a camera that looks down has ``place`` on the line across its axis."""
+    to_place = np.einsum("tji,tj->ti", R_nb, np.append(place, 0.0) - p)
+    return np.asarray(np.arctan2(to_place[:, 0], to_place[:, 2]))
+
+
+def streams(seed: int, runs: int) -> list[np.random.SeedSequence]:
+    """An independent stream for each run; a run's does not depend on how many there are."""
+    return np.random.SeedSequence(seed).spawn(runs)
+
+
+def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
+    """Targets, detections and known poses of runs, with the noise of H table 6.4."""
+    normal = np.stack([np.random.default_rng(run).standard_normal(sum(_DRAWS)) for run in runs])
+    around, start, warm_up, pose, pixel = np.split(normal, np.cumsum(_DRAWS)[:-1], axis=1)
+    N, T = len(runs), IMAGES
+    half = np.array(APART) / 2
+    targets = over.place + np.stack([-half, half]) + DISPLACED_M * around.reshape(N, 2, 2)
+    at_sea = np.concatenate([targets, np.zeros((N, 2, 1))], axis=-1)
+    p_nc, R_nc = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
+    true = ground_to_pixel(over.camera, at_sea[:, None], p_nc[:, None], R_nc[:, None])
+    off = POSE_SD * pose.reshape(N, T, 8)
+    euler = over.euler + off[..., 3:6]
+    known = camera_pose(
+        Mount(),
+        over.p_nb + off[..., :3],
+        euler_to_matrix(*np.moveaxis(euler, -1, 0)),
+        over.pan + off[..., 6],
+        over.tilt + off[..., 7],
+    )
+    main = targets[:, 0]
+    return Scene(
+        targets,
+        main + np.sqrt(START_P[0, 0]) * start,
+        main[:, None] + WARM_UP_M * warm_up.reshape(N, WARM_UP, 2),
+        true + PIXEL_SD * pixel.reshape(N, T, 2, 2),
+        *known,
+    )
+
+
+def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence]) -> Gated:
+    """Every image of every run, associated in the three forms. Keeps everything: for some 1000 runs."""
+    scene = draw_scene(over, runs)
+    ground = pixel_to_plane(over.camera, scene.pixels, scene.p_nc[:, :, None], scene.R_nc[:, :, None], 0.0)[
+        ..., :2
+    ]
+    detections = {
+        "position": ground,
+        "pixels": scene.pixels,
+        "angles": _measured_angles(over.camera, scene.pixels, choices),
+    }
+    inside = np.asarray(in_image(over.camera, scene.pixels).all(axis=-1), bool)
+    counted = inside if choices.in_image_only else np.ones_like(inside)
+    start = _warm_up(scene, choices)
+    steps = [_associate(form, over.camera, scene, choices, detections, counted, start) for form in FORMS]
+    chosen, nis, estimate = (np.stack(parts) for parts in zip(*steps, strict=True))
+    return Gated((chosen == 0) & counted, counted, nis, estimate, ground, scene.pixels, scene.targets)
+
+
+def success_rates(over: Overflight, choices: Choices, runs: int, seed: int, chunk: int = 500) -> Array:
+    """Share of right associations in each run, (3, runs) in per cent; forms in the order of `FORMS`.
+
+    ``chunk`` runs are held in memory at a time; the numbers do not depend on it. A run without an image that
+    counts is NaN.
+    """
+    sources = streams(seed, runs)
+    parts = []
+    for first in range(0, runs, chunk):
+        done = gate(over, choices, sources[first : first + chunk])
+        n = done.counted.sum(axis=-1)
+        parts.append(100 * done.right.sum(axis=-1) / np.where(n > 0, n, np.nan))
+    return np.concatenate(parts, axis=1)
+
+
+def share_in_image(over: Overflight, runs: int, seed: int) -> float:
+    """Share of the images of some runs that have both detections inside the edge."""
+    pixels = draw_scene(over, streams(seed, runs)).pixels
+    return float(in_image(over.camera, pixels).all(axis=-1).mean())
+
+
+def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
+    """State (N, 4) and covariance (4, 4) after the iterations on positions: the same for all three forms."""
+    x = np.concatenate([scene.start, np.zeros_like(scene.start)], axis=-1)
+    P = START_P
+    H, R = on_state(np.eye(2), 4), R_FORM["position"]
+    F, Q = constant_velocity(choices.warm_up_step, choices.sd_acceleration)
+    for k in range(WARM_UP):
+        x, P = predict(x, P, F, Q)
+        step = correct(x, P, scene.warm_up[:, k] - x[:, :2], H, R)
+        x, P = step.x, step.P
+    return x, P
+
+
+def _associate(
+    form: str,
+    camera: Camera,
+    scene: Scene,
+    choices: Choices,
+    detections: dict[str, Array],
+    counted: NDArray[np.bool_],
+    start: tuple[Array, Array],
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Index of the detection taken (N, T), NIS of both (N, T, 2), estimate (N, T, 2)."""
+    x, P = start
+    if form != "position":  # an extended filter's covariance differs from run to run
+        P = np.broadcast_to(P, (len(x), 4, 4))
+    by = choices.angles_update if form == "angles" else form
+    F, Q = constant_velocity(1 / RATE_HZ, choices.sd_acceleration)
+    N, T = counted.shape
+    taken, nis, estimate = np.empty((N, T), np.int64), np.empty((N, T, 2)), np.empty((N, T, 2))
+    every = np.arange(N)
+    for t in range(T):
+        x, P = predict(x, P, F, Q)
+        # The derivatives with respect to the pose, which R_bc is for, are not used here.
+        poses = CameraPoses(scene.p_nc[:, t], scene.R_nc[:, t], np.eye(3))
+        seen = _expected(form, camera, x[:, :2], poses)
+        compared = _printed(seen, choices) if form == "angles" else seen
+        angles = IS_ANGLE[form] if choices.azimuth == "atan2" else (False, False)
+        nis[:, t] = distances(compared, angles, P, detections[form][:, t], R_FORM[form])
+        taken[:, t] = nearest_within(nis[:, t], None, 2)
+        if choices.updated_with != "nothing":
+            used = taken[:, t] if choices.updated_with == "assigned" else np.zeros(N, np.int64)
+            if by != form:
+                seen = _expected(by, camera, x[:, :2], poses)
+            gap = difference(detections[by][every, t, used], seen.z, IS_ANGLE[by])
+            step = correct(x, P, gap, on_state(seen.H_position, 4), R_FORM[by])
+            fine = counted[:, t] & (used >= 0) & np.isfinite(gap).all(axis=-1)
+            if fine.all():
+                x, P = step.x, step.P
+            else:
+                x = np.where(fine[:, None], step.x, x)
+                P = np.where(fine[:, None, None], step.P, P)
+        estimate[:, t] = x[:, :2]
+    return taken, nis, estimate
+
+
+def _expected(form: str, camera: Camera, position: Array, poses: CameraPoses) -> Prediction:
+    if form == "position":
+        return Prediction(position, np.eye(2), np.zeros((2, 6)))
+    if form == "pixels":
+        return predict_pixel(camera, position, poses, 0.0)
+    return predict_azimuth_elevation(position, poses, 0.0)
+
+
+def _printed(expected: Prediction, choices: Choices) -> Prediction:
+    """H (6.9) with the arctangent of one argument, unless `atan2`; its derivatives are the same."""
+    if choices.azimuth == "atan2":
+        return expected
+    azimuth, elevation = np.moveaxis(expected.z, -1, 0)
+    return expected._replace(z=np.stack([np.arctan(np.tan(azimuth)), elevation], axis=-1))
+
+
+def _measured_angles(camera: Camera, pixels: Array, choices: Choices) -> Array:
+    angles = azimuth_elevation_of_pixel(camera, pixels)
+    if choices.azimuth == "atan2":
+        return angles
+    azimuth, elevation = np.moveaxis(angles, -1, 0)
+    if choices.azimuth == "printed":
+        elevation = np.where(np.cos(azimuth) < 0, -elevation, elevation)
+    return np.stack([np.arctan(np.tan(azimuth)), elevation], axis=-1)
