@@ -16,7 +16,7 @@ from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import Aiding, positions, velocities
 from wildlab.navigation.mekf import Start, pose_covariance, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
-from wildlab.navigation.observer import baseline_reference, course_reference, run_observer
+from wildlab.navigation.observer import Gains, baseline_reference, course_reference, run_observer
 from wildlab.navigation.start import start_from_baseline, start_from_course
 from wildlab.navigation.timeline import Imu
 
@@ -31,6 +31,9 @@ BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"
 
 #: How much wider than the fixes behind it the heading at the start is taken to be.
 LOOSE = 5.0
+#: Gain of the observer on a course that stands in for the heading, rad/s. It is off by the crab angle, which
+#: changes sides from one leg to the next: slow enough to see both, half a minute.
+COURSE_GAIN = 1 / 30
 
 
 class Navigated(NamedTuple):
@@ -170,6 +173,7 @@ def navigate_observer(flight: Flight, times: ArrayLike | None = None, *, velocit
         flight.manifest.origin_tuple(),
         [*given.aiding.values(), given.reference],
         _wanted(flight, times),
+        gains=Gains() if "second position" in given.aiding else Gains(k2=COURSE_GAIN),
     )
     biases = pd.DataFrame(found.gyro_bias, columns=BIASES[3:]).assign(time_s=found.times)
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
