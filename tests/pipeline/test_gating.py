@@ -13,7 +13,14 @@ from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.pipeline import gating
 from wildlab.pipeline.gating import IMAGES, Choices, Overflight, draw_scene, gate, overflight, streams
-from wildlab.pipeline.gating_variations import standard_error, variations, vary
+from wildlab.pipeline.gating_variations import (
+    chosen_parts,
+    claim_margins,
+    standard_error,
+    variations,
+    vary,
+    verdict,
+)
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -253,3 +260,23 @@ def test_a_flight_without_truth_or_too_short(flight: Flight) -> None:
     with pytest.raises(WildlabError, match="in view for 14 s"):
         far = flight.nav["truth"].assign(north_m=lambda nav: nav["north_m"] + 2000)
         overflight(Flight(flight.manifest, {"truth": far}, flight.tables))
+
+
+def test_claims_are_decided_run_by_run() -> None:
+    wobble = np.tile([-5.0, 5.0], 500)
+    level = np.array([[96.6], [96.8], [96.0]]) + wobble  # what the runs share does not blur the differences
+    margins = claim_margins(level)
+    assert {name: verdict(margin) for name, margin in margins.items()} == {
+        "forms-agree": "holds",
+        "angles-least-accurate": "holds",
+    }
+    np.testing.assert_allclose(margins["forms-agree"], 0.2)
+    apart = claim_margins(level[[2, 1, 0]] * [[0.9], [1], [1]])
+    assert {verdict(margin) for margin in apart.values()} == {"does not hold"}
+    assert verdict(np.array([-1.0, 1.0, 0.5])) == "cannot be decided"
+
+
+def test_every_choice_has_its_reason(over: Overflight) -> None:
+    table = chosen_parts(over, 0.93)
+    assert (table.map(len) > 0).all(axis=None) and table["part"].is_unique
+    assert "93 %" in table.set_index("part").loc["beyond the edge", "chosen"]
