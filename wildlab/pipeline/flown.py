@@ -45,6 +45,7 @@ class Flown(NamedTuple):
 FLOWN: dict[str, Flown] = {
     "static-point": Flown("wildlab.pipeline.at_rest:fly", ("twin", "observer_seeds")),
     "navigation": Flown("wildlab.pipeline.navigation_errors:fly", ("twin",)),
+    "schmidt": Flown("wildlab.pipeline.schmidt_study:fly", ("twin",)),
 }
 
 #: A change in any of these rooms can change a number.
