@@ -1,4 +1,4 @@
-"""The Schmidt filter against the extended one: what each subject is, the claims' logic, and flights in full."""
+"""The Schmidt filter against the extended one: what each subject is, the claims' logic, whole flights."""
 
 import numpy as np
 import pandas as pd

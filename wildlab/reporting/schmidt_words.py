@@ -38,18 +38,19 @@ COLUMNS = {
 }
 DIGITS = {"inside": 0, "nees": 1, "nees_predicted": 1, "nis": 2, "mae": 1, "rmse_speed": 2, "rmse_course": 1}
 
-METHOD = r"""Both filters have the constant-velocity model of H (6.1) and (6.2) with $\sigma_v = 0.05\ \mathrm{m/s^2}$,
-start on the first georeferenced detection at rest with 10 m and 10 m/s, and take pixels with a noise of 30 pixels:
-the tuning of H 7.5.3, for all three flights. They step to every image, whether it shows the target or not.
+METHOD = r"""Both filters have the constant-velocity model of H (6.1) and (6.2) with $\sigma_v = 0.05\
+\mathrm{m/s^2}$, start at rest on the first georeferenced detection with 10 m and 10 m/s, and take pixels
+with a noise of 30 pixels: the tuning of H 7.5.3, for all three flights. They step to every image, whether
+it shows the target or not.
 
-The poses are an MEKF's (H 7.3) on simulated inertial samples and two antennas. The extended filter (H 6.3) takes
-them for true. The Schmidt-Kalman filter (H 7.4) keeps the cross-covariance of the target with the errors of the pose
-and does not estimate these. As (7.32) stands, the joint covariance stops being one where the pose's covariance
-shrinks; here the cross-covariance is then scaled along, which keeps the thesis's constant bias, counted in standard
-deviations.
+The poses are an MEKF's (H 7.3) on simulated inertial samples and two antennas. The extended filter (H 6.3)
+takes them for true. The Schmidt-Kalman filter (H 7.4) keeps the cross-covariance of the target with the
+errors of the pose and does not estimate these. As (7.32) stands, the joint covariance stops being one where
+the pose's covariance shrinks; here the cross-covariance is then scaled along, which keeps the thesis's
+constant bias, counted in standard deviations.
 
-NEES and mean errors are those at every image from the first to the last detection, also between measurements;
-errors are truth minus estimate. The course counts where the true speed is above 0.2 m/s."""
+NEES and mean errors are those at every image from the first to the last detection, also between
+measurements; errors are truth minus estimate. The course counts where the true speed is above 0.2 m/s."""
 
 
 def times_too_small(nees: float) -> str:
