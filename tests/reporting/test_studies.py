@@ -139,6 +139,20 @@ def test_sensors_of_a_ferry_judged_on_one_scenario(
     assert faults(folder / "report.html") == []
 
 
+def test_gating_beside_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("gating", reports)
+    found = values(folder)
+    for form in ("position", "pixels", "angles"):
+        assigned, own = (found["success_rate", f"{form}{fed}"] for fed in ("", "/updated-with-own"))
+        assert assigned["published"] is not None and assigned["n"] == own["n"] == 10_000
+        assert assigned["value"] < own["value"]
+        assert abs(own["value"] - assigned["published"]) <= 2.0
+        assert found["success_rate_standard_error", form]["value"] < 0.5
+    for figure in ("17a", "17b", "18a", "18b", "19a", "19b"):
+        assert (folder / "figures" / f"fig-6-{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
     page = reports / "index.html"
     assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")
