@@ -46,6 +46,8 @@ FLOWN: dict[str, Flown] = {
     "static-point": Flown("wildlab.pipeline.at_rest:fly", ("twin", "observer_seeds")),
     "navigation": Flown("wildlab.pipeline.navigation_errors:fly", ("twin",)),
     "schmidt": Flown("wildlab.pipeline.schmidt_study:fly", ("twin",)),
+    "linear-vs-nonlinear": Flown("wildlab.pipeline.linear_vs_nonlinear:fly", ("twin",)),
+    "coloured-noise": Flown("wildlab.pipeline.coloured_noise:fly", ("twin",)),
 }
 
 #: A change in any of these rooms can change a number.
