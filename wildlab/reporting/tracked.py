@@ -49,7 +49,7 @@ CONVENTIONS = (
 
 def record_filters(report: Report, spread: pd.DataFrame, measurements: Mapping[str, str]) -> None:
     """Record every number of every filter over flights, and those of the measurements with their units."""
-    columns: list[tuple[str, str]] = spread.columns.to_list()
+    columns: Any = spread.columns  # (subject, name)
     keys = {
         (who, name): (name, who, UNITS.get(name, "1"))
         for who, name in columns
@@ -131,7 +131,9 @@ def show_paths(
         track_map(
             seen.truth,
             states,
-            f"On average {list_numbers(apart)} m from the first track",
+            f"Tracks {list_numbers(apart)} m from {names[0]}"
+            if len(apart) > 1
+            else f"The tracks are {apart[0]:.1f} m apart on average",
             measured=seen.positions,
         ),
         **_named(
