@@ -39,7 +39,7 @@ from wildlab.reporting.seeds import (
 )
 from wildlab.reporting.studies import load_studies
 
-PARAMETERS = {"twin": "static-antenna", "observer_seeds": 0, "not its own": 3}
+PARAMETERS = {"twin": "static-antenna", "not its own": 3}
 
 
 def work(folder: Path, count: int = 4) -> SeedWork:
@@ -76,10 +76,10 @@ def test_seeds_besides_the_one_drawn(drawn: int, count: int) -> None:
 
 def test_the_key_follows_what_the_numbers_depend_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = work(tmp_path)
-    assert first.parameters == {"twin": "static-antenna", "observer_seeds": 0}
+    assert first.parameters == {"twin": "static-antenna"}
     assert work(tmp_path, 9).key == first.key == flown.work_key(first.name, first.parameters, first.code)
     others = {
-        flown.work_key(first.name, first.parameters | {"observer_seeds": 1}, first.code),
+        flown.work_key(first.name, first.parameters | {"twin": "slow-vessel"}, first.code),
         flown.work_key(first.name, first.parameters, "other code"),
     }
     monkeypatch.setitem(flown.FLOWN, "static-point", flown.Flown("wildlab.pipeline.at_rest:other"))
@@ -140,7 +140,7 @@ def test_the_table_has_the_drawn_flight_first(tmp_path: Path) -> None:
         write_seed(one, seed, {"a/b": seed / 3})
     table = seeds_table(
         "static-point", 4, study="study", seed=2, drawn={("a", "b"): 9.0, ("a", "c"): 1.0},
-        out=str(tmp_path / ".study.part"), twin="static-antenna", observer_seeds=0,
+        out=str(tmp_path / ".study.part"), twin="static-antenna",
     )  # fmt: skip
     assert list(table.index) == [2, 1, 3, 4] and list(table["a", "b"]) == [9.0, 1 / 3, 1.0, 4 / 3]
     assert list(table["a", "c"].isna()) == [False, True, True, True]
@@ -153,7 +153,6 @@ def test_a_notebook_opened_by_hand_computes_what_is_missing(
     def table(seeds: int, twin: str) -> Any:
         return seeds_table(
             "static-point", seeds, study="study", seed=2, drawn={}, out=str(tmp_path / "study"), twin=twin,
-            observer_seeds=0,
         )  # fmt: skip
 
     with pytest.raises(RunFailed, match=r"Seed 1 failed \(so did 1 more: 3\).*twin"):
@@ -161,7 +160,7 @@ def test_a_notebook_opened_by_hand_computes_what_is_missing(
     capsys.readouterr()
     assert table(2, "static-antenna")["pixhawk-autopilot", "mae"].iloc[1] > 0
     assert "study: 1 of 1 seeds" in capsys.readouterr().out
-    fresh = flown.fly_seed("static-point", 1, {"twin": "static-antenna", "observer_seeds": 0})
+    fresh = flown.fly_seed("static-point", 1, {"twin": "static-antenna"})
     assert read_seed(replace(work(tmp_path), seeds=(1,)), 1) == fresh
 
 
@@ -175,8 +174,8 @@ def test_other_code_is_not_mixed_in() -> None:
     [
         (lambda: flown.find_flown("static-pont"), "nothing named 'static-pont' is computed for each seed"),
         (
-            lambda: make_work(Path(), "s", "static-point", 1, 3, {"twin": "x"}),
-            "needs the parameter 'observer_seeds'",
+            lambda: make_work(Path(), "s", "slow-vessel", 1, 3, {"twin": "x"}),
+            "needs the parameter 'first'",
         ),
         (lambda: make_work(Path(), "s", "static-point", 1, 3, {"twin": None}), "Name the study's twin"),
         (lambda: cluster.Cluster("127.0.0.1:8786"), "is no address of a scheduler.*tcp://127.0.0.1:8786"),

@@ -43,7 +43,8 @@ class Flown(NamedTuple):
 
 #: The only functions that a study can name.
 FLOWN: dict[str, Flown] = {
-    "static-point": Flown("wildlab.pipeline.at_rest:fly", ("twin", "observer_seeds")),
+    "static-point": Flown("wildlab.pipeline.at_rest:fly", ("twin",)),
+    "slow-vessel": Flown("wildlab.pipeline.slow_vessel:fly", ("twin", "first")),
     "navigation": Flown("wildlab.pipeline.navigation_errors:fly", ("twin",)),
     "schmidt": Flown("wildlab.pipeline.schmidt_study:fly", ("twin",)),
     "linear-vs-nonlinear": Flown("wildlab.pipeline.linear_vs_nonlinear:fly", ("twin",)),

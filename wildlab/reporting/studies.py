@@ -16,7 +16,7 @@
                                          # processes: a name in wildlab/pipeline/flown.py
     timeout_minutes = 30                 # for the notebook, and for each seed
     [static-point.parameters]            # handed to the notebook besides the five every notebook gets
-    observer_seeds = 20
+    steps = 60
     [static-point.missing]               # published numbers not reproduced yet: subject or name -> reason
     observer = "it follows with the navigation filters"
 """
