@@ -87,9 +87,9 @@ def partings(spread: pd.DataFrame, published: Mapping[tuple[str, str], float]) -
         f"flights come up to the published one. The same errors of angles weigh 200/350 as much from here as "
         f"in the first case, where they made {first:.1f} m: {first * scale:.1f} m are left.",
         f"The thesis explains its larger error by the reference. Here the reference is {reference:.1f} m "
-        f"off, which takes the mean error from {middle['observer-exact', 'mae']:.1f} to {ours:.1f} m. To take it "
-        f"from the {FIRST_PUBLISHED * scale:.1f} m that the first case's published {FIRST_PUBLISHED:.2f} m "
-        f"come to at this height, to {theirs:.2f} m, the reference would have to be some {needed:.0f} m off, "
+        f"off, which takes the mean error from {middle['observer-exact', 'mae']:.1f} to {ours:.1f} m. To "
+        f"take it from the {FIRST_PUBLISHED * scale:.1f} m that the first case's published "
+        f"{FIRST_PUBLISHED:.2f} m come to at this height, to {theirs:.2f} m, the reference would have to be some {needed:.0f} m off, "
         'where the text says "potentially a few meters".',
         f"The mean of all positions is {offs:.1f} m off here (median), {printed:.1f} m in print.",
     ]
