@@ -89,7 +89,8 @@ def partings(spread: pd.DataFrame, published: Mapping[tuple[str, str], float]) -
         f"The thesis explains its larger error by the reference. Here the reference is {reference:.1f} m "
         f"off, which takes the mean error from {middle['observer-exact', 'mae']:.1f} to {ours:.1f} m. To "
         f"take it from the {FIRST_PUBLISHED * scale:.1f} m that the first case's published "
-        f"{FIRST_PUBLISHED:.2f} m come to at this height, to {theirs:.2f} m, the reference would have to be some {needed:.0f} m off, "
+        f"{FIRST_PUBLISHED:.2f} m come to at this height, to {theirs:.2f} m, the reference would have to be "
+        f"some {needed:.0f} m off, "
         'where the text says "potentially a few meters".',
         f"The mean of all positions is {offs:.1f} m off here (median), {printed:.1f} m in print.",
     ]
