@@ -22,7 +22,7 @@ Integers = NDArray[np.int64]
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; of positions that wander.
-N_ERRORS = 15
+N_ERRORS, N_AXES = 15, 18
 #: Kinds of measurement.
 POSITION, VELOCITY, HEADING = 0, 1, 2
 #: What became of a measurement.
@@ -241,15 +241,20 @@ def predict_measurement(
 
 @compiled
 def correct(
-    x: Array, P: Array, H: Array, m: int, y: Array, variance: Array, S_inverse: Array, PH: Array,
+    x: Array, P: Array, H: Array, m: int, y: Array, variance: Array, axes: bool, S_inverse: Array, PH: Array,
     K: Array, M: Array, work: Array,
 ) -> None:  # fmt: skip
-    """Take in a measurement, Joseph form; the attitude error is then folded into the quaternion."""
+    """Take in a measurement, Joseph form; the attitude error is then folded into the quaternion.
+
+    Errors of the axes have no gain, as in a Schmidt filter: they are reckoned with, not estimated.
+    """
     n = P.shape[0]
     dx = np.zeros(n)
+    K[:] = 0.0
     for i in range(n):
+        if axes and N_ERRORS <= i < N_ERRORS + N_AXES:
+            continue
         for a in range(m):
-            K[i, a] = 0.0
             for b in range(m):
                 K[i, a] += PH[i, b] * S_inverse[b, a]
             dx[i] += K[i, a] * y[a]
@@ -325,11 +330,6 @@ def mekf(
                     f_mean[i] = (f[k - 1, i] + f[k, i]) / 2
                     w_mean[i] = (w[k - 1, i] + w[k, i]) / 2
                     f_felt[i], w_felt[i] = f_mean[i] - x[10 + i], w_mean[i] - x[13 + i]
-                if axes:
-                    for i in range(3):
-                        for j in range(3):
-                            f_mean[i] -= x[16 + 3 * i + j] * f_felt[j]
-                            w_mean[i] -= x[25 + 3 * i + j] * w_felt[j]
                 rotation_of(x[6:10], R_start)
                 exponential(
                     -(w_mean[0] - x[13]) * dt, -(w_mean[1] - x[14]) * dt, -(w_mean[2] - x[15]) * dt, work[0]
@@ -391,7 +391,7 @@ def mekf(
                 growth *= 2.0
             if verdicts[event] != REJECTED:
                 P *= growth
-                correct(x, P, H, m, y, variance[event], S_inverse, PH, K, M, work)
+                correct(x, P, H, m, y, variance[event], axes, S_inverse, PH, K, M, work)
             event += 1
         row = row_of_node[k]
         if row >= 0:

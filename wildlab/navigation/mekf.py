@@ -5,8 +5,10 @@ b (``q = q_hat * dq``, H 7.15-7.16), accelerometer bias, gyro bias. What may be 
 (7.26) lost the sign of its attitude block: (7.25), of which it is the derivative, has ``-R S(r)``, and so has
 the filter.
 
-Behind the fifteen come, where asked for, what H leaves out and sensors have: axes that are not where they
-should be (constants), and positions whose error wanders. Both look like motion to a filter of fifteen states.
+Behind the fifteen come, where asked for, what H leaves out and sensors have, and what looks like motion to a
+filter of fifteen states. Positions whose error wanders have it estimated. Axes that are not where they should
+be are only reckoned with, as the pose is in the tracking of H 7.4: estimated, they come out surer than they
+are, since what little tells them from biases hangs on estimates that still move.
 
 Everything is computed after the flight, so a latency needs no model: a fix belongs to the time at which it
 was valid.
@@ -192,8 +194,8 @@ def run_mekf(
         (M,) s at which the estimate is wanted, camera stamps for instance; without them, at every inertial
         sample (the covariances of 25 minutes at 250 Hz then take 0.7 GB).
     axes
-        How far the inertial sensors' axes may be from where they should be. They are then estimated too,
-        which H does not do: in a turn, a wrong axis is a bias that was not there before.
+        How far the inertial sensors' axes may be from where they should be; in a turn, a wrong one is a bias
+        that was not there before. Reckoned with, not estimated.
     gate
         Probability with which a good measurement is left out as an outlier, by its NIS. 0 leaves none out.
     patience

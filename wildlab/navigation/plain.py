@@ -32,19 +32,10 @@ def strapdown_step(x: Array, f: Array, w: Array, dt: float, earth: Array) -> tup
     return after, R_mid, f_n
 
 
-def along_axes(x: Array, f: Array, w: Array) -> tuple[Array, Array]:
-    """What was measured, less what comes from axes that are not where they should be (x[16:34])."""
-    E = x[16:34].reshape(2, 3, 3)
-    return f - E[0] @ (f - x[10:13]), w - E[1] @ (w - x[13:16])
-
-
 def transition(
     x: Array, f: Array, w: Array, dt: float, earth: Array, kept: tuple[float, float], axes: bool = False
 ) -> Array:
     """How the errors (15 or more) before a step become those after it."""
-    felt = f - x[10:13], w - x[13:16]
-    if axes:
-        f, w = along_axes(x, f, w)
     _, R_mid, f_n = strapdown_step(x, f, w, dt, earth)
     Phi = np.eye(len(x) - 1)
     Phi[3:6, 6:9] = -dt * skew(f_n) @ rotation(x[6:10]).as_matrix()
@@ -54,7 +45,7 @@ def transition(
     Phi[6:9, 6:9] = Rotation.from_rotvec(-(w - x[13:16]) * dt).as_matrix()
     Phi[6:9, 12:15] = -dt * np.eye(3)
     if axes:  # a bias of the size of the error times what is measured
-        for first, bias, of in ((15, 9, felt[0]), (24, 12, felt[1])):
+        for first, bias, of in ((15, 9, f - x[10:13]), (24, 12, w - x[13:16])):
             Phi[3:9, first : first + 9] = Phi[3:9, bias : bias + 3] @ np.kron(np.eye(3), of)
     Phi[:3, 6:] = dt / 2 * Phi[3:6, 6:]
     Phi[9:12, 9:12] *= kept[0]
@@ -88,9 +79,11 @@ def predict_measurement(kind: int, x: Array, w: Array, value: Array, lever: Arra
     return value - x[3:6] - R @ swing, H
 
 
-def correct(x: Array, P: Array, H: Array, y: Array, R: Array) -> tuple[Array, Array]:
-    """State and covariance after a measurement, Joseph form."""
+def correct(x: Array, P: Array, H: Array, y: Array, R: Array, axes: bool = False) -> tuple[Array, Array]:
+    """State and covariance after a measurement, Joseph form; errors of the axes have no gain."""
     K = np.linalg.solve(H @ P @ H.T + R, H @ P).T
+    if axes:
+        K[15:33] = 0.0
     dx = K @ y
     kept = np.eye(len(P)) - K @ H
     P = kept @ P @ kept.T + K @ R @ K.T
@@ -139,8 +132,6 @@ def mekf(
                 f, w = line.f[k - 1 : k + 1].mean(axis=0), line.w[k - 1 : k + 1].mean(axis=0)
                 Phi = transition(x, f, w, dt, earth, (kept[0], kept[1]), axes)
                 Q = process_noise(dt, *(noise[:2] ** 2), *drive)
-                if axes:
-                    f, w = along_axes(x, f, w)
                 x = strapdown_step(x, f, w, dt, earth)[0]
             x = x * np.concatenate([np.ones(10), np.repeat(kept, 3), kept_extra])
             Phi[15:, 15:] = np.diag(kept_extra)
@@ -166,7 +157,7 @@ def mekf(
                 P = growth * P
             if verdicts[event] != REJECTED:
                 rejected_since[kind] = np.nan
-                x, P = correct(x, P, H, y, R)
+                x, P = correct(x, P, H, y, R, axes)
             event += 1
         if line.row_of_node[k] >= 0:
             states[line.row_of_node[k]], covariances[line.row_of_node[k]] = x, P
