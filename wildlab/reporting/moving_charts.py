@@ -48,8 +48,8 @@ def positions_map(
     """
     xy, path = np.asarray(points, float), np.asarray(reference, float)
     fig, ax = new_figure(4.6, 4.6)
-    ax.plot(xy[:, 1], xy[:, 0], ".", color=color, ms=3, alpha=0.4, mec="none")
-    ax.plot(path[:, 1], path[:, 0], color=colour("truth"), lw=1.8)
+    ax.plot(xy[:, 1], xy[:, 0], ".", color=color, ms=4, alpha=0.5, mec="none", zorder=3)
+    ax.plot(path[:, 1], path[:, 0], color=colour("truth"), lw=1.1)
     if bounds is not None:
         low, high = (np.asarray(b, float) for b in bounds)
         ax.set_xlim(low[1], high[1])

@@ -63,7 +63,7 @@ def tracking(spread: pd.DataFrame) -> tuple[str, str]:
     loose = middle["filter-by-detections", "mean"]
     verdict = "nearer than single images" if track < images else "no nearer than single images"
     return (
-        f"The track: {verdict} with the thesis' tuning",
+        f"The track: {verdict} with a tuning of the thesis",
         "The thesis prints no tuning for this filter; it has the one of table 7.3, made for a vessel that "
         f"drifts. With it the estimate is {track:.1f} m off on average (median of the flights), single "
         f"images {images:.1f} m. How the filter cuts time matters: stepping from detection to detection, so "
