@@ -153,6 +153,67 @@ def test_gating_beside_the_print(reports: Path, faults: Faults) -> None:
     assert faults(folder / "report.html") == []
 
 
+TRACKED = {
+    "linear-vs-nonlinear-fast": {"kf", "ekf"},
+    "linear-vs-nonlinear-slow": {"kf", "ekf"},
+    "coloured-noise-fast": {"cv", "singer", "coloured"},
+    "coloured-noise-drifting": {"cv", "singer", "coloured"},
+    "schmidt-fast-vessel": {"ekf", "schmidt"},
+    "schmidt-slow-vessel-eight": {"ekf", "schmidt"},
+    "schmidt-drifting-vessel-eight": {"ekf", "schmidt"},
+}
+
+
+@pytest.mark.parametrize("study", TRACKED)
+def test_tracks_of_a_vessel_over_a_few_flights(study: str, reports: Path, faults: Faults) -> None:
+    folder = run(study, reports, seeds=3, parallel=2)
+    found = values(folder)
+    for subject in TRACKED[study]:
+        for name in ("mean_north", "mean_east", "mae", "nees", "nis"):
+            metric = found[name, subject]
+            assert metric["low"] <= metric["value"] <= metric["high"]
+            assert metric["published"] is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert content["seeds"] == 3
+    assert content["claims"]
+    assert faults(folder / "report.html") == []
+
+
+@pytest.mark.parametrize(
+    "study", ["navigation-fast-vessel", "navigation-slow-vessel-eight", "navigation-drifting-vessel-eight"]
+)
+def test_navigation_beside_the_published_deviations(study: str, reports: Path, faults: Faults) -> None:
+    folder = run(study, reports, seeds=2, parallel=2)
+    found = values(folder)
+    for axis in ("north", "east", "down", "roll", "pitch", "yaw"):
+        assert found[f"mean_sd_{axis}", "mekf-published-like"]["published"] is not None
+    assert {"nees_position", "nees_attitude", "rms_yaw"} <= {name for name, who in found if who == "mekf"}
+    assert faults(folder / "report.html") == []
+
+
+@pytest.mark.parametrize(
+    ("dataset", "study"), [("umn_thor75", "navigation-thor75"), ("inertialnav_x8", "navigation-x8")]
+)
+def test_navigation_of_a_logged_flight(
+    dataset: str, study: str, reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("logs", dataset)
+    import_flight(DATA / "recipes" / f"{dataset.replace('_', '-')}.toml", raw, tmp_path / "flight")
+    folder = run(study, reports, flight=tmp_path / "flight")
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert content["kind"] == "logged"
+    assert {metric["subject"].split("/")[0] for metric in content["metrics"]} >= {"mekf", "observer"}
+    assert faults(folder / "report.html") == []
+
+
+def test_slow_vessel_over_a_few_flights(reports: Path, faults: Faults) -> None:
+    folder = run("slow-vessel", reports, seeds=3, parallel=2)
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert sum(metric["published"] is not None for metric in content["metrics"]) == 20
+    assert content["claims"]
+    assert faults(folder / "report.html") == []
+
+
 def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
     page = reports / "index.html"
     assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")
