@@ -150,3 +150,14 @@ def test_without_any_other_pose_there_is_nothing_to_compare_with(early):
     with pytest.raises(WildlabError, match="no pose to compare with") as caught:
         reference_of(Flight(early.manifest, {"mine": early.nav["truth"]}, early.tables))
     assert caught.value.field == "nav"
+
+
+def test_innovations_are_counted_between_the_times_asked_for(early):
+    found = navigate_mekf(early, [60.0])
+    counted = summarise_innovations(found, 40.0, 50.0)
+    assert (counted["n"] == 100).all()  # ten seconds at 10 Hz
+    stamps = found.innovations["time_s"]
+    some = found.innovations[(stamps >= 40.0) & (stamps < 50.0) & (found.innovations["source"] == "velocity")]
+    row = counted[counted["source"] == "velocity"].iloc[0]
+    assert row["nis"] == pytest.approx(some["nis"].mean())
+    assert row["left_out"] == (some["verdict"] == 0).mean()

@@ -174,16 +174,17 @@ def _rms(values: Array) -> Array:
     return np.sqrt(_mean(values**2))
 
 
-def summarise_innovations(found: Navigated, since: float = -np.inf) -> pd.DataFrame:
-    """NIS and whiteness of each source's innovations after a time (s), one row for each source.
+def summarise_innovations(found: Navigated, begin: float = -np.inf, end: float = np.inf) -> pd.DataFrame:
+    """NIS and whiteness of each source's innovations between two times (s), one row for each source.
 
     Columns: ``source``, ``n``, ``nis`` (mean, ideally ``dof``), ``dof``, ``inside`` (share within the 95 %
     interval of one), ``left_out`` (share), ``lag1`` (largest autocorrelation of an element of the innovation,
     in units of what the filter expects of it, at lag 1) and ``bound`` (what white noise stays below).
     """
     rows = []
-    late = found.innovations[found.innovations["time_s"] >= since]
-    for source, part in late.groupby("source", sort=False):
+    stamps = found.innovations["time_s"]
+    inside = found.innovations[(stamps >= begin) & (stamps < end)]
+    for source, part in inside.groupby("source", sort=False):
         dof = int(part["dof"].iloc[0])
         whitened = normalised_innovations(part, dof)
         rows.append(
@@ -263,7 +264,7 @@ def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tupl
         for name, value in summarise(errors, begin, end).items()
         if np.isfinite(value) and not name.startswith(tuple(hidden))
     }
-    for row in summarise_innovations(studied.found["mekf"], begin).to_dict(orient="records"):
+    for row in summarise_innovations(studied.found["mekf"], begin, end).to_dict(orient="records"):
         numbers["mekf", f"nis_{row['source']}".replace(" ", "_")] = row["nis"]
     if "autopilot" in studied.judged:
         for subject in [name for name in TUNINGS if name in studied.found]:
