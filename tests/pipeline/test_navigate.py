@@ -125,3 +125,12 @@ def test_what_the_filter_must_know_is_asked_for(flight):
         navigate_observer(Flight(manifest, flight.nav, {**flight.tables, "gnss": gnss}))
     with pytest.raises(WildlabError, match="no table 'imu'"):
         navigate_observer(Flight(flight.manifest, flight.nav, {"gnss": flight.gnss}))
+
+
+def test_what_cannot_be_believed_says_so() -> None:
+    flight = simulate_twin("fast-vessel", 1)
+    assert navigate_mekf(flight).signs == ()
+    wrong = flight.tables["imu"].copy()
+    wrong[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]] *= 180 / np.pi  # deg/s taken for rad/s
+    flight.tables["imu"] = wrong
+    assert navigate_mekf(flight).signs

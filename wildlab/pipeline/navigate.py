@@ -19,6 +19,7 @@ from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import Gains, baseline_reference, course_reference, run_observer
 from wildlab.navigation.start import start_from_baseline, start_from_course
 from wildlab.navigation.timeline import Imu
+from wildlab.navigation.trouble import signs_of_trouble
 
 Array = NDArray[np.float64]
 
@@ -51,12 +52,16 @@ class Navigated(NamedTuple):
         filter expects of them (``sd_...``); empty for the observer.
     velocity_covariance
         (M, 3, 3) of the velocities in n, (m/s)^2; None for the observer.
+    signs
+        Of trouble: sentences about why the estimate should not be believed; none where nothing is wrong, nor
+        for the observer.
     """
 
     nav: pd.DataFrame
     biases: pd.DataFrame
     innovations: pd.DataFrame
     velocity_covariance: Array | None = None
+    signs: tuple[str, ...] = ()
 
 
 class Tuning(NamedTuple):
@@ -161,7 +166,8 @@ def navigate_mekf(
         | {f"sd_{name}": np.sqrt(what.S[:, i, i]) for i, name in enumerate(("first", "second", "third"))}
     )
     biases = biases.assign(time_s=found.times)
-    return _known(Navigated(nav, biases, innovations, found.covariance[:, 3:6, 3:6]))
+    signs = tuple(signs_of_trouble(found, list(given.aiding.values())))
+    return _known(Navigated(nav, biases, innovations, found.covariance[:, 3:6, 3:6], signs))
 
 
 def navigate_observer(flight: Flight, times: ArrayLike | None = None, *, velocity: bool = True) -> Navigated:

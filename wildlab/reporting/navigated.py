@@ -226,6 +226,9 @@ def show_innovations(report: Report, studied: Studied, window: tuple[float, floa
         digits={"nis": 2, "inside": 1, "left_out": 1, "lag1": 3, "bound": 3},
         caption="Innovations of the filter.",
     )
+    if found.signs:
+        report.subsection("What should make you doubt it")
+        report.points(list(found.signs))
 
 
 def show_nees(report: Report, studied: Studied, begin: float) -> None:
