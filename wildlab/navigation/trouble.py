@@ -45,8 +45,8 @@ def _misfits(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
         ratio = float(np.median(nis)) / (0.455 if source.kind == kernels.HEADING else 2.366)
         if forced:
             sentences.append(
-                f"The filter lost its way {'once' if forced == 1 else f'{forced} times'} and had to be widened "
-                f"until the {name} fitted: check units, axes and clocks of the inertial sensors."
+                f"The filter lost its way {'once' if forced == 1 else f'{forced} times'} and had to be "
+                f"widened until the {name} fitted: check units, axes and clocks of the inertial sensors."
             )
         if left_out > LEFT_OUT:
             sentences.append(f"{100 * left_out:.0f} % of the {name} did not fit and were left out.")
