@@ -79,7 +79,7 @@ def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
             assert metric["low"] <= metric["value"] <= metric["high"]
             assert metric["published"] is not None
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 6)
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 7)
     assert json.loads((folder / "provenance.json").read_text())["seeds"]["seeds"] == [1, 2, 3]
     for figure in ("02", "03a", "03b", "04a", "04b", "05a", "05b", "06", "07"):
         assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
