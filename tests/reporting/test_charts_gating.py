@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.reporting.charts_gating import FED, rates_chart, rates_table, varied_table
+from wildlab.reporting.charts.gating import FED, rates_chart, rates_table, varied_table
 
 PUBLISHED = {"position": 96.64, "pixels": 96.83, "angles": 95.99}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.reporting.charts_navigation import (
+from wildlab.reporting.charts.navigation import (
     MOST_POINTS,
     bias_chart,
     correlation_strips,

@@ -10,8 +10,8 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.pipeline.compare_filters import beside_white, gains
 from wildlab.pipeline.follow_sensors import COLUMNS, Followed, table
 from wildlab.pipeline.sensor_tuning import Tuning
-from wildlab.reporting import sensor_charts as charts
 from wildlab.reporting import sensor_tracks as words
+from wildlab.reporting.charts import sensors as charts
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, open_report
 

@@ -18,14 +18,15 @@ from wildlab.pipeline.navigation_errors import (
     summarise,
     summarise_innovations,
 )
-from wildlab.reporting.charts import poses_between, strips
-from wildlab.reporting.charts_navigation import (
+from wildlab.reporting.charts.navigation import (
     bias_chart,
     correlation_strips,
     deviation_chart,
     error_bands,
+    poses_between,
     speed_chart,
     squares_chart,
+    strips,
     velocities_of,
 )
 from wildlab.reporting.report import Report

@@ -14,7 +14,7 @@ from wildlab.evaluation.whiteness import Whiteness, innovation_whiteness
 from wildlab.pipeline.linear_vs_nonlinear import UNITS, Followed
 from wildlab.pipeline.track import Sighting
 from wildlab.reporting import many
-from wildlab.reporting.charts_tracking import (
+from wildlab.reporting.charts.linear_tracks import (
     GAP_S,
     error_over_time,
     innovation_correlations,

@@ -1,4 +1,4 @@
-"""Charts that more than one notebook draws: errors about the truth, their distribution, their order."""
+"""Charts of georeferenced positions: from where they were seen, how far off they are, and filtered."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
@@ -25,6 +24,9 @@ from wildlab.reporting.figures import (
 )
 
 Array = NDArray[np.float64]
+
+#: A pause in the observations longer than this (seconds) breaks a line.
+PAUSE_S = 10.0
 
 
 def error_scatter(errors: ArrayLike, title: str, color: str = BLUE, reach: float | None = None) -> Figure:
@@ -91,11 +93,6 @@ def errors_by_image(judged: pd.DataFrame, title: str, color: str = BLUE) -> Figu
     return fig
 
 
-def _finite(errors: ArrayLike) -> Array:
-    e = np.asarray(errors, float).reshape(-1, 2)
-    return np.asarray(e[np.isfinite(e).all(axis=1)])
-
-
 def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str = "target") -> Figure:
     """The path of a nav table in local metres, the places at ``times`` marked, the target at the origin."""
     at = np.clip(np.searchsorted(nav["time_s"], np.asarray(times, float)), 0, len(nav) - 1)
@@ -109,46 +106,49 @@ def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str = "tar
     return fig
 
 
-#: Quantities over time by label with unit: times (seconds), and values.
-Strips = tuple[ArrayLike, Mapping[str, ArrayLike]]
+def aircraft_map(
+    aircraft: ArrayLike, seeing: ArrayLike, target: ArrayLike, title: str, name: str = "vessel"
+) -> Figure:
+    """Paths of aircraft (N, 2) and target (M, 2), north and east, and from where it was seen (K, 2)."""
+    path, seen, below = (np.asarray(a, float) for a in (aircraft, seeing, target))
+    fig, ax = new_figure(5.2, 4.6)
+    ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.5, alpha=0.7)
+    ax.plot(seen[:, 1], seen[:, 0], ".", color=ORANGE, ms=2)
+    ax.plot(below[:, 1], below[:, 0], color=colour("truth"), lw=2.2)
+    ax.annotate(
+        name,
+        below[-1, ::-1],
+        (6, 6),
+        textcoords="offset points",
+        fontsize=9.5,
+        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
+    )
+    ax.set_title(title)
+    map_axes(ax)
+    return fig
 
 
-def poses_between(
-    nav: Mapping[str, pd.DataFrame], start: float, end: float
-) -> tuple[dict[str, Strips], dict[str, Strips]]:
-    """Attitude (degrees) and velocity of nav tables between two times (seconds), for `strips`."""
-    attitude: dict[str, Strips] = {}
-    velocity: dict[str, Strips] = {}
-    for name, table in nav.items():
-        part = table[table["time_s"].between(start, end)]
-        q = part[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
-        euler = np.degrees(matrix_to_euler(quaternion_to_matrix(q))).T
-        attitude[name] = (part["time_s"], dict(zip(("roll (°)", "pitch (°)", "yaw (°)"), euler, strict=True)))
-        axes = ("north", "east", "down")
-        velocity[name] = (part["time_s"], {f"{axis} (m/s)": part[f"v_{axis}_m_s"] for axis in axes})
-    return attitude, velocity
+def positions_map(
+    points: ArrayLike,
+    reference: ArrayLike,
+    title: str,
+    color: str,
+    bounds: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Figure:
+    """Georeferenced positions (N, 2) and the target's path (M, 2), north and east.
 
-
-def strips(sources: Mapping[str, Strips], title: str) -> Figure:
-    """Quantities over time, one strip each, one line for each source; jumps of angles are not joined.
-
-    Parameters
-    ----------
-    sources
-        By name of the source, which has its fixed colour; all have the same labels.
+    ``bounds`` are the lowest and highest north and east of the map, for figures that are to be compared.
     """
-    labels = list(next(iter(sources.values()))[1])
-    fig, axes = new_figure(5.9, 1.5 * len(labels) + 0.1, rows=len(labels), sharex=True)
-    for ax, label in zip(axes, labels, strict=True):
-        for name, (times, quantities) in sources.items():
-            y = np.array(quantities[label], float)
-            y[1:][np.abs(np.diff(y)) > 180] = np.nan
-            ax.plot(times, y, lw=1.0, color=colour(name), label=name)
-        ax.set_ylabel(label)
-    if len(sources) > 1:
-        fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
-    axes[0].set_title(title)
-    axes[-1].set_xlabel("time (s)")
+    xy, path = np.asarray(points, float), np.asarray(reference, float)
+    fig, ax = new_figure(4.6, 4.6)
+    ax.plot(xy[:, 1], xy[:, 0], ".", color=color, ms=4, alpha=0.5, mec="none", zorder=3)
+    ax.plot(path[:, 1], path[:, 0], color=colour("truth"), lw=1.1)
+    if bounds is not None:
+        low, high = (np.asarray(b, float) for b in bounds)
+        ax.set_xlim(low[1], high[1])
+        ax.set_ylim(low[0], high[0])
+    ax.set_title(title)
+    map_axes(ax)
     return fig
 
 
@@ -168,6 +168,31 @@ def filter_chart(raw: ArrayLike, estimate: ArrayLike, stated: ArrayLike, title: 
     return fig
 
 
+def errors_over_time(
+    times: ArrayLike, measured: ArrayLike, estimated: ArrayLike, title: str, reach: float | None = None
+) -> Figure:
+    """Distances from the truth (T,) of single images and of the estimate, over minutes.
+
+    ``reach`` is the top of the axis in metres, for figures that are to be compared.
+    """
+    t, raw, estimate = (np.array(a, float) for a in (times, measured, estimated))
+    fig, ax = new_figure(5.9, 3.4)
+    ax.plot(t / 60, raw, ".", color=GREY, ms=3, alpha=0.5, mec="none")
+    breaks = np.flatnonzero(np.diff(t) > PAUSE_S) + 1
+    line = np.insert(estimate, breaks, np.nan)
+    ax.plot(np.insert(t, breaks, np.nan) / 60, line, color=BLUE, lw=1.8)
+    end, middle = float(estimate[-1]), float(np.median(raw))
+    top = reach if reach is not None else 1.05 * float(max(raw.max(), estimate.max()))
+    near = abs(end - middle) < 0.12 * top
+    end_label(ax, t[-1] / 60, end + (0.06 * top if near and end >= middle else 0), "filtered", BLUE)
+    end_label(ax, t[-1] / 60, middle - (0.09 * top if near and end >= middle else 0), "single\nimages", GREY)
+    ax.set_ylim(0, top)
+    ax.set_xlabel("time (min)")
+    ax.set_ylabel("distance from the reference (m)")
+    ax.set_title(title)
+    return fig
+
+
 def autocorrelation_chart(series: Mapping[str, ArrayLike], bound: float, title: str) -> Figure:
     """Autocorrelations by lag, one line for each series, with the band that white noise stays in."""
     fig, ax = new_figure(5.9, 3.4)
@@ -181,3 +206,8 @@ def autocorrelation_chart(series: Mapping[str, ArrayLike], bound: float, title: 
     ax.set_ylabel("autocorrelation")
     ax.set_title(title)
     return fig
+
+
+def _finite(errors: ArrayLike) -> Array:
+    e = np.asarray(errors, float).reshape(-1, 2)
+    return np.asarray(e[np.isfinite(e).all(axis=1)])

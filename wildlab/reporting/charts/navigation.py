@@ -1,4 +1,4 @@
-"""Charts of navigation: errors within their bounds, deviations, biases, and how far to believe a filter."""
+"""Charts of navigation: poses, errors within their bounds, biases, and how far to believe a filter."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.reporting.figures import BLUE, GREEN, GREY, PURPLE, VERMILLION, colour, log_band, new_figure
 
 Array = NDArray[np.float64]
@@ -19,6 +20,47 @@ Array = NDArray[np.float64]
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
 MOST_POINTS = 3000
 LINES = (BLUE, VERMILLION, PURPLE)
+#: Quantities over time by label with unit: times (seconds), and values.
+Strips = tuple[ArrayLike, Mapping[str, ArrayLike]]
+
+
+def poses_between(
+    nav: Mapping[str, pd.DataFrame], start: float, end: float
+) -> tuple[dict[str, Strips], dict[str, Strips]]:
+    """Attitude (degrees) and velocity of nav tables between two times (seconds), for `strips`."""
+    attitude: dict[str, Strips] = {}
+    velocity: dict[str, Strips] = {}
+    for name, table in nav.items():
+        part = table[table["time_s"].between(start, end)]
+        q = part[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float)
+        euler = np.degrees(matrix_to_euler(quaternion_to_matrix(q))).T
+        attitude[name] = (part["time_s"], dict(zip(("roll (°)", "pitch (°)", "yaw (°)"), euler, strict=True)))
+        axes = ("north", "east", "down")
+        velocity[name] = (part["time_s"], {f"{axis} (m/s)": part[f"v_{axis}_m_s"] for axis in axes})
+    return attitude, velocity
+
+
+def strips(sources: Mapping[str, Strips], title: str) -> Figure:
+    """Quantities over time, one strip each, one line for each source; jumps of angles are not joined.
+
+    Parameters
+    ----------
+    sources
+        By name of the source, which has its fixed colour; all have the same labels.
+    """
+    labels = list(next(iter(sources.values()))[1])
+    fig, axes = new_figure(5.9, 1.5 * len(labels) + 0.1, rows=len(labels), sharex=True)
+    for ax, label in zip(axes, labels, strict=True):
+        for name, (times, quantities) in sources.items():
+            y = np.array(quantities[label], float)
+            y[1:][np.abs(np.diff(y)) > 180] = np.nan
+            ax.plot(times, y, lw=1.0, color=colour(name), label=name)
+        ax.set_ylabel(label)
+    if len(sources) > 1:
+        fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
+    axes[0].set_title(title)
+    axes[-1].set_xlabel("time (s)")
+    return fig
 
 
 def error_bands(
