@@ -7,7 +7,6 @@ import pytest
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.charts.navigation import (
-    MOST_POINTS,
     bias_chart,
     correlation_strips,
     deviation_chart,
@@ -15,6 +14,7 @@ from wildlab.reporting.charts.navigation import (
     speed_chart,
     squares_chart,
 )
+from wildlab.reporting.figures import MOST_POINTS
 
 TIMES = np.linspace(0.0, 60.0, 301)
 

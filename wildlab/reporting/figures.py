@@ -25,6 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 DPI = 144
+#: Points of a line beyond which a figure only grows: more than a screen has columns.
+MOST_POINTS = 3000
 #: Okabe and Ito's colours, which colour-blind readers can tell apart; their yellow is too faint for lines
 #: on white.
 ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
@@ -237,6 +239,11 @@ def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: A
     """Write a line's name at its end, in its colour: easier to read than a legend."""
     settings: dict[str, Any] = {"va": "center", "fontsize": 9.5, "annotation_clip": False} | annotate
     ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
+
+
+def thinned(count: int) -> slice:
+    """Which of ``count`` points a line keeps, evenly, so that there are no more than `MOST_POINTS`."""
+    return slice(None, None, max(1, -(-count // MOST_POINTS)))
 
 
 def png_bytes(figure: Figure) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,10 @@ from wildlab.evaluation.whiteness import Whiteness, innovation_whiteness
 from wildlab.pipeline.linear_vs_nonlinear import UNITS, Followed
 from wildlab.pipeline.track import Sighting
 from wildlab.reporting import many
-from wildlab.reporting.charts.linear_tracks import (
+from wildlab.reporting.charts.tracks import (
     GAP_S,
     error_over_time,
     innovation_correlations,
-    name_of,
     speed_and_course,
     squares_over_time,
     track_map,
@@ -29,6 +28,17 @@ Array = NDArray[np.float64]
 
 #: Lags of the autocorrelations, in detections: eight seconds of uninterrupted images.
 LAGS = 60
+#: Words for a legend; a track without one goes by its own name.
+NAMES = {
+    "kf": "KF, on the ground",
+    "ekf": "EKF, on pixels",
+    "ukf": "UKF, on pixels",
+    "imm": "IMM, on pixels",
+    "cv": "constant velocity",
+    "singer": "Singer",
+    "coloured": "differenced",
+    "schmidt": "Schmidt",
+}
 #: Words for the numbers in a table.
 QUANTITIES = {
     "mean north": "mean error north (m)",
@@ -45,6 +55,16 @@ CONVENTIONS = (
     "that their signs cannot be compared. The truth is the target's own single-frequency GPS receiver, as in "
     "the thesis: its error counts as the filter's. NEES is that of the position alone."
 )
+
+
+def name_of(subject: str) -> str:
+    """What a legend calls a track."""
+    return NAMES.get(subject, subject)
+
+
+def names_of(subjects: Iterable[str]) -> dict[str, str]:
+    """What a legend calls each of several tracks."""
+    return {subject: name_of(subject) for subject in subjects}
 
 
 def record_filters(report: Report, spread: pd.DataFrame, measurements: Mapping[str, str]) -> None:
@@ -69,8 +89,7 @@ def beside_published(
     names: Sequence[str],
 ) -> pd.DataFrame:
     """As `wildlab.reporting.many.beside_published`, in words for tracks."""
-    words = {subject: name_of(subject) for subject in subjects}
-    table = many.beside_published(published, spread, words, names)
+    table = many.beside_published(published, spread, names_of(subjects), names)
     return table.replace({"quantity": QUANTITIES})
 
 
@@ -112,10 +131,12 @@ def show_paths(
     states = {who: one.track.x for who, one in followed.items()}
     first, *others = [x[:, :2] for x in states.values()]
     apart = [float(np.nanmean(np.hypot(*(other - first).T))) for other in others]
-    names = [name_of(who) for who in followed]
+    names = names_of(followed)
+    called = list(names.values())
     report.figure(
         track_map(
             seen.truth,
+            {},
             {},
             f"Seen {share:.0f} % of the time, in {periods(seen)} periods",
             measured=seen.positions,
@@ -131,15 +152,16 @@ def show_paths(
         track_map(
             seen.truth,
             states,
-            f"Tracks {list_numbers(apart)} m from {names[0]}"
+            names,
+            f"Tracks {list_numbers(apart)} m from {called[0]}"
             if len(apart) > 1
             else f"The tracks are {apart[0]:.1f} m apart on average",
             measured=seen.positions,
         ),
         **_named(
             figures["tracks"],
-            f"Map of the tracks by {list_words(names)} beside the target's true path, with the detections.",
-            f"Tracks by {list_words(names)}; dots: detections on the ground; dashed: the target's GPS.",
+            f"Map of the tracks by {list_words(called)} beside the target's true path, with the detections.",
+            f"Tracks by {list_words(called)}; dots: detections on the ground; dashed: the target's GPS.",
         ),
     )
 
@@ -148,15 +170,16 @@ def show_errors(
     report: Report, seen: Sighting, followed: Mapping[str, Followed], figures: Mapping[str, str]
 ) -> None:
     """Errors in position over time, and speed and course; ``figures`` as in `show_paths`."""
-    times = seen.times - seen.times[0]
+    times, names = seen.times - seen.times[0], names_of(followed)
     errors = {who: np.hypot(*(seen.truth - one.track.x[:, :4])[:, :2].T) for who, one in followed.items()}
     means = [one.judged.numbers["mae"] for one in followed.values()]
     at_end = [float(e[np.isfinite(e)][-1]) for e in errors.values()]
     report.figure(
         error_over_time(
             times,
-            errors,
             seen.seen,
+            errors,
+            names,
             f"{list_numbers(means)} m off on average",
             measured=np.hypot(*(seen.truth[:, :2] - seen.positions).T),
         ),
@@ -164,7 +187,7 @@ def show_errors(
             figures["error"],
             f"Distance of each track from the truth over time; at the end {list_numbers(at_end)} metres.",
             f"Distance from the truth; at the end {list_numbers(at_end)} m. Strokes at the bottom: "
-            "frames with a detection.",
+            "frames with a detection; grey: no detections.",
         ),
     )
     speeds = [one.judged.numbers["rmse_speed"] for one in followed.values()]
@@ -172,9 +195,10 @@ def show_errors(
     report.figure(
         speed_and_course(
             times,
+            seen.seen,
             seen.truth,
             {who: one.track.x[:, :4] for who, one in followed.items()},
-            seen.seen,
+            names,
             f"Speed {list_numbers(speeds, 2)} m/s off (RMS)",
         ),
         **_named(
@@ -199,7 +223,11 @@ def show_consistency(
         means = [one.judged.numbers[what.lower()] for one in followed.values()]
         report.figure(
             squares_over_time(
-                times, values, seen.seen, bounds, f"Mean {what} {list_numbers(means)}; consistent is 2", what
+                times,
+                seen.seen,
+                {what: values},
+                names_of(followed),
+                f"Mean {what} {list_numbers(means)}; consistent is 2",
             ),
             **_named(
                 figures["squares"],
@@ -226,6 +254,7 @@ def show_correlations(
         innovation_correlations(
             {who: one.autocorrelation for who, one in white.items()},
             bound,
+            names_of(followed),
             f"Up to {list_numbers(at_one, 2)} at lag one; white is below {bound:.2f}",
             axes,
         ),

@@ -13,12 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-from wildlab.reporting.figures import BLUE, GREEN, GREY, PURPLE, VERMILLION, colour, log_band, new_figure
+from wildlab.reporting.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    PURPLE,
+    VERMILLION,
+    colour,
+    log_band,
+    new_figure,
+    thinned,
+)
 
 Array = NDArray[np.float64]
 
-#: Points of a line beyond which a figure only grows: more than a screen has columns.
-MOST_POINTS = 3000
 LINES = (BLUE, VERMILLION, PURPLE)
 #: Quantities over time by label with unit: times (seconds), and values.
 Strips = tuple[ArrayLike, Mapping[str, ArrayLike]]
@@ -88,7 +96,7 @@ def error_bands(
     """
     fig, axes = new_figure(5.9, 4.9, rows=3, sharex=True)
     t = np.asarray(times, float)
-    keep = _thinned(len(t))
+    keep = thinned(len(t))
     for i, (ax, label) in enumerate(zip(axes, labels, strict=True)):
         reach = 0.0
         for name, stated in bounds.items():
@@ -120,7 +128,7 @@ def deviation_chart(
     """
     fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
     t, values = np.asarray(times, float), np.asarray(sd, float)
-    keep = _thinned(len(t))
+    keep = thinned(len(t))
     for ax, first, names, unit in zip(
         axes, (0, 3), (("north", "east", "down"), ("roll", "pitch", "yaw")), units, strict=True
     ):
@@ -144,7 +152,7 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -
     standard deviations."""
     fig, axes = new_figure(5.9, 4.4, rows=2, sharex=True)
     t = np.asarray(times, float)
-    keep = _thinned(len(t))
+    keep = thinned(len(t))
     scales = (1e3, np.degrees(3600.0))
     for ax, first, scale, label in zip(
         axes, (0, 3), scales, ("accelerometers (mm/s²)", "gyros (°/h)"), strict=True
@@ -172,7 +180,7 @@ def squares_chart(
     low, high = chi_square_interval(dof)
     for ax, (name, (times, values)) in zip(axes[:, 0], series.items(), strict=True):
         t, v = np.asarray(times, float), np.asarray(values, float)
-        keep = _thinned(len(t))
+        keep = thinned(len(t))
         ax.plot(t[keep], v[keep], ".", ms=2, color=BLUE, alpha=0.5, mec="none", rasterized=True)
         log_band(ax, low, high)
         ax.set_ylim(
@@ -189,7 +197,7 @@ def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) 
     fig, ax = new_figure(5.9, 3.0)
     for name, (times, velocity) in sources.items():
         speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
-        keep = _thinned(len(speed))
+        keep = thinned(len(speed))
         ax.plot(np.asarray(times, float)[keep], speed[keep], lw=1.0, color=_ink(name), label=name)
     ax.set_ylim(0, None)
     ax.set_ylabel("speed over ground (m/s)")
@@ -221,10 +229,6 @@ def _short(source: str) -> str:
 
 def _ink(name: str) -> str:
     return BLUE if name == "mekf" else colour(name)
-
-
-def _thinned(count: int) -> slice:
-    return slice(None, None, max(1, -(-count // MOST_POINTS)))
 
 
 def _finished(fig: Figure, axes: Sequence[Axes], title: str, xlabel: str | None = "time (s)") -> Figure:

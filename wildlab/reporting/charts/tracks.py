@@ -1,4 +1,9 @@
-"""Charts of a target's tracks by several filters: errors, map, speed and course, consistency."""
+"""Charts of one target's tracks beside its truth: map, errors, speed and course, consistency, innovations.
+
+Tracks are given by their subject, which has its fixed colour (`wildlab.reporting.figures.COLOURS`), in the
+order in which they are drawn; ``names`` says what each is called in the legend. Times, (N,), are seconds
+since the first detection, and ``seen``, (N,) bool, tells the frames with a detection from the others.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.evaluation.track_errors import SLOWEST_M_S
 from wildlab.reporting.figures import (
     GREEN,
     GREY,
@@ -21,149 +27,177 @@ from wildlab.reporting.figures import (
     map_axes,
     mark_gaps,
     new_figure,
+    thinned,
 )
 
 Array = NDArray[np.float64]
 
-#: Periods without measurements longer than this (seconds) are marked.
-PAUSE_S = 2.0
-#: Points of a line beyond which a figure only grows.
-MOST_POINTS = 3000
-
-
-def track_error_chart(
-    times: ArrayLike, seen: ArrayLike, errors: Mapping[str, ArrayLike], words: Mapping[str, str], title: str
-) -> Figure:
-    """Errors (N, 2) north and east over time by filter, with the detections marked.
-
-    Parameters
-    ----------
-    times, seen
-        (N,) s, and whether there is a detection then.
-    words
-        What each filter is called.
-    """
-    t, detected = np.asarray(times, float), np.asarray(seen, bool)
-    fig, axes = new_figure(5.9, 4.6, rows=2, sharex=True)
-    keep = _thinned(len(t))
-    for i, (ax, axis) in enumerate(zip(axes, ("north", "east"), strict=True)):
-        for name, error in errors.items():
-            ax.plot(t[keep], np.asarray(error, float)[keep, i], lw=1.2, color=colour(name), label=words[name])
-        ax.axhline(0, color=GREY, lw=0.6)
-        mark_gaps(ax, t[detected], PAUSE_S)
-        ax.set_ylabel(f"error, {axis} (m)")
-        _ticks(ax, t[detected])
-    return _finished(fig, axes, title)
+#: A pause in the detections longer than this (seconds) is shaded.
+GAP_S = 2.0
+#: Later lines are thinner, so that one which lies on another does not hide it.
+_WIDTHS = (2.6, 1.3, 1.3, 1.0)
+#: The truth is drawn last and broken, so that the tracks show through.
+_TRUTH = {"color": colour("truth"), "lw": 1.1, "ls": (0, (4, 2)), "label": "truth"}
+#: Single measurements, and values at single detections.
+_DOTS = {"ls": "none", "marker": ".", "mec": "none", "rasterized": True}
+#: Room that a legend's entry takes besides its text, and each of its letters, inches.
+_ENTRY, _LETTER = 0.63, 0.073
 
 
 def track_map(
     truth: ArrayLike,
     tracks: Mapping[str, ArrayLike],
-    measured: ArrayLike,
-    words: Mapping[str, str],
+    names: Mapping[str, str],
     title: str,
+    *,
+    measured: ArrayLike | None = None,
+    aircraft: ArrayLike | None = None,
 ) -> Figure:
-    """Truth, tracks by filter and georeferenced detections, (N, 2 or more) each: north and east, metres."""
+    """Map of the truth and of tracks, of measurements and of the aircraft's path.
+
+    All are (N, 2 or more), north and east in metres first; they need not be equally long.
+    """
     fig, ax = new_figure(5.6, 5.2)
-    z, way = np.asarray(measured, float), np.asarray(truth, float)
-    ax.plot(
-        z[:, 1],
-        z[:, 0],
-        ".",
-        color=GREY,
-        ms=5,
-        alpha=0.6,
-        mec="none",
-        label="single images",
-        rasterized=True,
+    if aircraft is not None:
+        path = np.asarray(aircraft, float)
+        ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.8, label="aircraft")
+    if measured is not None:
+        z = np.asarray(measured, float)
+        ax.plot(z[:, 1], z[:, 0], color=GREY, ms=4, alpha=0.5, label="single images", **_DOTS)
+    for width, (subject, states) in zip(_WIDTHS, tracks.items(), strict=False):
+        x = np.asarray(states, float)
+        ax.plot(x[:, 1], x[:, 0], color=colour(subject), lw=width, label=names[subject])
+    way = np.asarray(truth, float)
+    ax.plot(way[:, 1], way[:, 0], **_TRUTH)
+    start = way[np.isfinite(way[:, :2]).all(axis=1)][0, 1::-1]
+    ax.plot(*start, "o", color=colour("truth"), ms=5)
+    behind = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
+    ax.annotate(
+        "start", start, (-6, 6), textcoords="offset points", ha="right", fontsize=9, color=INK, bbox=behind
     )
-    for name, x in tracks.items():
-        x = np.asarray(x, float)
-        ax.plot(x[:, 1], x[:, 0], lw=1.2, color=colour(name), label=words[name])
-    ax.plot(way[:, 1], way[:, 0], color=colour("truth"), lw=1.6, label="truth")
-    known = way[np.isfinite(way[:, :2]).all(axis=1)]
-    ax.plot(known[0, 1], known[0, 0], "o", color=colour("truth"), ms=5)
-    ax.annotate("start", known[0, 1::-1], (6, 6), textcoords="offset points", fontsize=9, color=INK)
     ax.set_title(title)
+    _legend(fig, ax)
     map_axes(ax)
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return fig
 
 
-def speed_course_chart(
+def error_over_time(
+    times: ArrayLike,
+    seen: ArrayLike,
+    errors: Mapping[str, ArrayLike],
+    names: Mapping[str, str],
+    title: str,
+    *,
+    measured: ArrayLike | None = None,
+) -> Figure:
+    """Errors of tracks in metres over time, with strokes at the detections; pauses are shaded.
+
+    Parameters
+    ----------
+    errors
+        Distances from the truth, (N,), or errors north and east, (N, 2), which get a strip each.
+    measured
+        The same of the measurements themselves.
+    """
+    t, there = np.asarray(times, float), np.asarray(seen, bool)
+    columns = {subject: _columns(error) for subject, error in errors.items()}
+    signed = next(iter(columns.values())).shape[1] == 2
+    labels = ("error, north (m)", "error, east (m)") if signed else ("distance from the truth (m)",)
+    fig, strips = new_figure(5.9, 4.6 if signed else 3.6, rows=len(labels), sharex=True, squeeze=False)
+    keep = thinned(len(t))
+    for i, (ax, label) in enumerate(zip(strips[:, 0], labels, strict=True)):
+        if measured is not None:
+            z = _columns(measured)[:, i]
+            ax.plot(t, z, color=GREY, ms=3, alpha=0.5, label="single images", **_DOTS)
+        for width, (subject, e) in zip(_WIDTHS, columns.items(), strict=False):
+            ax.plot(t[keep], e[keep, i], color=colour(subject), lw=width, label=names[subject])
+        ax.axhline(0, color=GREY, lw=0.6)
+        mark_gaps(ax, t[there], GAP_S)
+        ax.set_ylabel(label)
+        _strokes(ax, t[there])
+    return _finished(fig, strips[:, 0], title)
+
+
+def speed_and_course(
     times: ArrayLike,
     seen: ArrayLike,
     truth: ArrayLike,
     tracks: Mapping[str, ArrayLike],
-    words: Mapping[str, str],
+    names: Mapping[str, str],
     title: str,
-    slowest: float,
 ) -> Figure:
-    """Speed and course over time of the truth and by filter, from states (N, 4).
+    """Speed and course of tracks and of the truth, all (N, 4): north, east, and their rates.
 
-    Below ``slowest`` m/s the truth has no course.
+    Courses of what hardly moves are left out, and so are the jumps over north.
     """
-    t, detected = np.asarray(times, float), np.asarray(seen, bool)
-    fig, axes = new_figure(5.9, 4.6, rows=2, sharex=True)
-    keep = _thinned(len(t))
-    lines = {name: np.asarray(x, float)[keep] for name, x in tracks.items()} | {
-        "truth": np.asarray(truth, float)[keep]
-    }
+    t = np.asarray(times, float)
+    fig, (fast, course) = new_figure(5.9, 4.8, rows=2, sharex=True)
+    keep = thinned(len(t))
+    looks = [
+        {"color": colour(subject), "lw": width, "label": names[subject]}
+        for width, subject in zip(_WIDTHS, tracks, strict=False)
+    ]
     top = 0.0
-    for name, x in lines.items():
+    for states, look in zip((*tracks.values(), truth), (*looks, _TRUTH), strict=True):
+        x = np.asarray(states, float)[keep]
         speed = np.hypot(x[:, 2], x[:, 3])
-        course = np.degrees(np.arctan2(x[:, 3], x[:, 2])) % 360
-        course[1:][np.abs(np.diff(course)) > 180] = np.nan  # a jump over north is not a line
-        if name == "truth":
-            course[speed <= slowest] = np.nan
+        angle = np.degrees(np.arctan2(x[:, 3], x[:, 2])) % 360
+        angle[~(speed > SLOWEST_M_S)] = np.nan
+        angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
+        fast.plot(t[keep], speed, **look)
+        course.plot(t[keep], angle, **look)
+        # The start, with no idea of the velocity, would press all the rest flat.
         top = max(top, float(np.nanquantile(speed, 0.99)))
-        for ax, y in zip(axes, (speed, course), strict=True):
-            ax.plot(t[keep], y, lw=1.2, color=colour(name), label=words.get(name, name))
-    for ax in axes:
-        mark_gaps(ax, t[detected], PAUSE_S)
-    axes[0].set_ylim(0, 1.2 * top)
-    axes[0].set_ylabel("speed (m/s)")
-    axes[1].set_ylim(0, 360)
-    axes[1].set_yticks([0, 90, 180, 270, 360])
-    axes[1].set_ylabel("course (°)")
-    return _finished(fig, axes, title)
+    for ax in (fast, course):
+        mark_gaps(ax, t[np.asarray(seen, bool)], GAP_S)
+    fast.set_ylim(0, 1.2 * top)
+    fast.set_ylabel("speed (m/s)")
+    course.set_ylim(-5, 365)
+    course.set_yticks([0, 90, 180, 270, 360])
+    course.set_ylabel("course (°)")
+    return _finished(fig, (fast, course), title)
 
 
-def consistency_chart(
+def squares_over_time(
     times: ArrayLike,
     seen: ArrayLike,
-    nis: Mapping[str, ArrayLike],
-    nees: Mapping[str, ArrayLike],
-    words: Mapping[str, str],
+    values: Mapping[str, Mapping[str, ArrayLike]],
+    names: Mapping[str, str],
     title: str,
 ) -> Figure:
-    """NIS above and NEES of the position below by filter, with the 95 % band of single values; both (N,)."""
-    t, detected = np.asarray(times, float), np.asarray(seen, bool)
+    """NEES or NIS (N,) of tracks on log axes, with the 95 % band of single values; pauses are shaded.
+
+    Where a track has a value at detections only, it is drawn as dots. Values far below the band are cut off:
+    they say no more than that they are there.
+
+    Parameters
+    ----------
+    values
+        By what they are, which names the axis of their strip, and then by subject; two degrees of freedom.
+    """
+    t, there = np.asarray(times, float), np.asarray(seen, bool)
     low, high = chi_square_interval(2)
-    fig, axes = new_figure(5.9, 5.2, rows=2, sharex=True)
-    keep = _thinned(len(t))
-    for ax, what, series in zip(axes, ("NIS", "NEES (position)"), (nis, nees), strict=True):
-        smallest, largest = low / 3, high * 3
-        for name, values in series.items():
-            v = np.asarray(values, float)
-            if what == "NIS":
-                ax.plot(t, v, ".", ms=3, color=colour(name), alpha=0.5, mec="none", rasterized=True)
+    fig, strips = new_figure(5.9, 2.0 * len(values) + 1.5, rows=len(values), sharex=True, squeeze=False)
+    keep = thinned(len(t))
+    for ax, (what, series) in zip(strips[:, 0], values.items(), strict=True):
+        highest = high
+        for width, (subject, v) in zip(_WIDTHS, series.items(), strict=False):
+            y = np.asarray(v, float)
+            look = {"color": colour(subject), "label": names[subject]}
+            if np.isfinite(y[~there]).any():
+                ax.plot(t[keep], y[keep], lw=width, **look)
             else:
-                ax.plot(t[keep], v[keep], lw=1.2, color=colour(name), label=words[name])
-            smallest = min(smallest, float(np.nanquantile(v, 0.02)))
-            largest = max(largest, 1.3 * float(np.nanmax(v)))
+                ax.plot(t, y, ms=3, alpha=0.6, **look, **_DOTS)
+            highest = max(highest, float(np.nanmax(y)))
         log_band(ax, low, high)
-        mark_gaps(ax, t[detected], PAUSE_S)
-        ax.set_ylim(smallest, largest)
+        mark_gaps(ax, t[there], GAP_S)
+        ax.set_ylim(low / 12, 2 * highest)
         ax.set_ylabel(what)
-    axes[0].set_title(title)
-    axes[-1].set_xlabel("time (s)")
-    fig.legend(*axes[1].get_legend_handles_labels(), loc="outside lower right", ncols=len(nees))
-    return fig
+    return _finished(fig, strips[:, 0], title)
 
 
 def nees_over_flights(
-    spread: pd.DataFrame, published: Mapping[str, float], words: Mapping[str, str], title: str
+    spread: pd.DataFrame, published: Mapping[str, float], names: Mapping[str, str], title: str
 ) -> Figure:
     """Time-averaged NEES of every flight by filter, on a log axis with the 95 % band of one run.
 
@@ -175,9 +209,9 @@ def nees_over_flights(
         What was printed, for those that have it: a hollow diamond.
     """
     low, high = chi_square_interval(2)
-    fig, ax = new_figure(5.9, 0.62 * len(words) + 1.5)
+    fig, ax = new_figure(5.9, 0.62 * len(names) + 1.5)
     ax.axvspan(low, high, color=GREEN, alpha=0.13, lw=0, zorder=0)
-    for place, name in enumerate(words):
+    for place, name in enumerate(names):
         values = np.sort(spread[name].to_numpy(float))
         color = colour(name.split("-")[0] if name != "inflation" else "kf")
         # Spread out by rank, in a pattern that repeats, so that equal values do not hide one another.
@@ -188,26 +222,67 @@ def nees_over_flights(
             ax.plot(published[name], place, "D", mfc="white", mec=INK, ms=8, mew=1.6, zorder=5)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.set_yticks(range(len(words)), list(words.values()))
-    ax.set_ylim(len(words) - 0.4, -0.6)
+    ax.set_yticks(range(len(names)), list(names.values()))
+    ax.set_ylim(len(names) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("NEES of the position, mean over a flight")
     ax.set_title(title)
     return fig
 
 
-def _ticks(ax: Axes, times: Array) -> None:
-    """Short marks at the lower edge where there are detections."""
-    ax.plot(times, np.zeros(len(times)), "|", color=INK, ms=7, alpha=0.35, transform=ax.get_xaxis_transform())
+def innovation_correlations(
+    series: Mapping[str, ArrayLike],
+    bound: float,
+    names: Mapping[str, str],
+    title: str,
+    axes: tuple[str, ...] = ("north", "east"),
+) -> Figure:
+    """Autocorrelations (m, lags + 1) of innovations, one strip for each of the m elements.
+
+    Parameters
+    ----------
+    bound
+        What white noise stays below.
+    axes
+        What the elements are called.
+    """
+    fig, strips = new_figure(5.9, 2.1 * len(axes) + 0.6, rows=len(axes), sharex=True, squeeze=False)
+    for i, (ax, name) in enumerate(zip(strips[:, 0], axes, strict=True)):
+        ax.axhspan(-bound, bound, color=GREY, alpha=0.18, lw=0)
+        ax.axhline(0, color=INK, lw=0.6)
+        for width, (subject, r) in zip(_WIDTHS, series.items(), strict=False):
+            y = np.asarray(r, float)[i]
+            ax.plot(np.arange(len(y)), y, color=colour(subject), lw=width, label=names[subject])
+        ax.set_ylabel(f"autocorrelation,\n{name}")
+    return _finished(fig, strips[:, 0], title, "lag (detections)")
 
 
-def _thinned(count: int) -> slice:
-    return slice(None, None, max(1, -(-count // MOST_POINTS)))
+def _columns(values: ArrayLike) -> Array:
+    """(N,) as (N, 1); (N, 2) stays."""
+    array = np.asarray(values, float)
+    return array.reshape(len(array), -1)
 
 
-def _finished(fig: Figure, axes: Sequence[Axes], title: str) -> Figure:
-    axes[0].set_title(title)
-    axes[-1].set_xlabel("time (s)")
-    handles = axes[0].get_legend_handles_labels()
-    fig.legend(*handles, loc="outside lower right", ncols=len(handles[0]))
+def _strokes(ax: Axes, times: Array) -> None:
+    """Short strokes along the lower edge, below all lines, where there are detections."""
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(bottom - 0.06 * (top - bottom), top)
+    edge = ax.get_xaxis_transform()
+    ax.plot(times, np.full(len(times), 0.025), "|", color=INK, ms=6, alpha=0.35, transform=edge)
+
+
+def _finished(
+    fig: Figure, strips: Sequence[Axes], title: str, xlabel: str = "time since the first detection (s)"
+) -> Figure:
+    strips[0].set_title(title)
+    strips[-1].set_xlabel(xlabel)
+    _legend(fig, strips[-1])
     return fig
+
+
+def _legend(fig: Figure, ax: Axes) -> None:
+    """The names of an axes' lines below the figure, in one row where that is wide enough."""
+    handles, labels = ax.get_legend_handles_labels()
+    width = _ENTRY * len(labels) + _LETTER * sum(map(len, labels))
+    columns = len(labels) if width < fig.get_figwidth() else -(-len(labels) // 2)
+    fig.legend(handles, labels, loc="outside lower center", ncols=columns, markerscale=2)

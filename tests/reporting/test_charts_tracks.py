@@ -1,0 +1,86 @@
+"""Charts of tracks draw what they are given, in strips for as many quantities as there are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.reporting.charts.tracks import (
+    error_over_time,
+    innovation_correlations,
+    nees_over_flights,
+    speed_and_course,
+    squares_over_time,
+    track_map,
+)
+from wildlab.reporting.figures import colour
+
+TIMES = np.arange(0.0, 20.0, 0.1)
+SEEN = (TIMES < 5.0) | (TIMES > 15.0)
+NAMES = {"ekf": "Extended", "schmidt": "Schmidt"}
+#: At 1 m/s to the north, a little east and west of it.
+TRUTH = np.column_stack([TIMES, 0 * TIMES, 0 * TIMES + 1.0, 0.05 * np.sin(TIMES)])
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_a_map_has_the_truth_over_all_else():
+    tracks = {who: TRUTH + i + 1 for i, who in enumerate(NAMES)}
+    figure = track_map(TRUTH, tracks, NAMES, "Map", measured=TRUTH[SEEN], aircraft=10 * TRUTH)
+    assert legend(figure) == ["aircraft", "single images", "Extended", "Schmidt", "truth"]
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    assert np.array_equal(lines["Schmidt"].get_ydata(), TRUTH[:, 0] + 2)  # north is up
+    assert lines["Extended"].get_linewidth() > lines["Schmidt"].get_linewidth()
+    assert lines["truth"].get_color() == colour("truth")
+
+
+@pytest.mark.parametrize("strips", [1, 2])
+def test_errors_are_distances_or_north_and_east(strips):
+    error = TRUTH[:, 0] if strips == 1 else TRUTH[:, :2]
+    figure = error_over_time(TIMES, SEEN, {"ekf": error}, NAMES, "Errors", measured=error)
+    assert len(figure.axes) == strips
+    for i, ax in enumerate(figure.axes):
+        line = next(line for line in ax.lines if line.get_label() == "Extended")
+        assert np.array_equal(line.get_ydata(), np.column_stack([error])[:, i])
+        assert len(ax.patches) == 1  # the pause
+        strokes = ax.lines[-1]
+        assert len(strokes.get_xdata()) == SEEN.sum()
+    assert figure.axes[0].get_title(loc="left") == "Errors"
+    assert figure.axes[-1].get_xlabel() == "time since the first detection (s)"
+
+
+def test_courses_break_over_north_and_where_hardly_anything_moves():
+    rest = TRUTH.copy()
+    rest[:, 2:] *= 0.1
+    figure = speed_and_course(TIMES, SEEN, TRUTH, {"ekf": rest}, NAMES, "Speed")
+    course = {line.get_label(): np.asarray(line.get_ydata(), float) for line in figure.axes[1].lines}
+    assert np.isnan(course["Extended"]).all()
+    seen = course["truth"][np.isfinite(course["truth"])]
+    assert (seen >= 0).all() and (seen < 360).all()
+    assert np.nanmax(np.abs(np.diff(course["truth"]))) < 180
+    assert figure.axes[0].get_ylim()[1] == pytest.approx(1.2, rel=0.01)
+
+
+def test_values_at_detections_alone_are_dots():
+    nees = np.full(len(TIMES), 2.0)
+    nis = np.where(SEEN, 0.5, np.nan)
+    figure = squares_over_time(TIMES, SEEN, {"NIS": {"ekf": nis}, "NEES": {"ekf": nees}}, NAMES, "Squares")
+    styles = [
+        [one.get_linestyle() for one in ax.lines if one.get_label() == "Extended"] for ax in figure.axes
+    ]
+    assert styles == [["None"], ["-"]]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["NIS", "NEES"]
+    assert all(ax.get_yscale() == "log" for ax in figure.axes)
+    assert legend(figure) == ["Extended"]
+
+
+def test_flights_and_correlations():
+    spread = pd.DataFrame({"ekf": [8.0, 12.0], "schmidt": [1.0, 3.0]})
+    figure = nees_over_flights(spread, {"ekf": 9.0}, NAMES, "Flights")
+    hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert [line.get_xdata()[0] for line in hollow] == [9.0]
+    figure = innovation_correlations({"ekf": np.ones((2, 5))}, 0.1, NAMES, "White?", ("u (px)", "v (px)"))
+    assert [ax.get_ylabel() for ax in figure.axes] == ["autocorrelation,\nu (px)", "autocorrelation,\nv (px)"]
