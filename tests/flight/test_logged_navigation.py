@@ -79,7 +79,7 @@ def test_thor_counts_and_rates(thor: Flight) -> None:
     assert np.median(np.diff(gnss["time_s"])) == pytest.approx(1.0, abs=1e-3)
     assert gnss["time_s"].iloc[0] == pytest.approx(22.04, abs=0.01)
     assert np.diff(gnss["time_s"]).max() == pytest.approx(3.0, abs=0.01)
-    np.testing.assert_allclose(gnss_times(thor), gnss["time_s"] - 0.09)
+    np.testing.assert_allclose(gnss_times(thor), gnss["time_s"] - 0.04)
     # valid from 24.8 s, but for two seconds in a turn without satellites
     assert len(nav) == 33473
     assert nav["time_s"].iloc[0] == pytest.approx(24.8, abs=0.01)

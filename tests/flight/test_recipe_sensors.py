@@ -180,6 +180,33 @@ def test_gimbal(sensors: Any) -> None:
     np.testing.assert_allclose(gimbal["tilt_rad"], [-0.5, -0.7])
 
 
+def test_magnetometer(sensors: Any) -> None:
+    sensors.tables["mag.csv"] = "ms,mx,my,mz\n0,100,200,-300\n100,110,210,-310\n"
+    sensors.set(
+        "magnetometer",
+        {
+            "name": "compass",
+            "declination_deg": 3.0,
+            "inclination_deg": 70.0,
+            "heading_sd_deg": 5.0,
+            "file": "mag.csv",
+            "time": {"column": "ms", "format": "elapsed", "unit": "ms"},
+            "field": {"x": _q("my", "mG"), "y": _q("mx", "nT"), "z": _q("mz", "G", negate=True)},
+        },
+    )
+    flight = sensors.run()
+    table = flight.table("magnetometer")
+    np.testing.assert_allclose(table["time_s"], [0.0, 0.1])
+    np.testing.assert_allclose(
+        table[[f"field_{axis}_ut" for axis in "xyz"]], [[20, 0.1, 30000], [21, 0.11, 31000]]
+    )
+    assert flight.manifest.magnetometer.inclination_deg == 70.0
+    assert flight.manifest.magnetometer.name == "compass"
+    sensors.set("magnetometer.field.x.unit", "m")
+    with pytest.raises(WildlabError, match="'m' is a unit of length, not of field"):
+        sensors.run()
+
+
 @pytest.mark.parametrize(
     ("dotted", "value", "said"),
     [

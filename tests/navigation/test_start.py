@@ -13,6 +13,7 @@ from wildlab.geometry.frames import (
 )  # fmt: skip
 from wildlab.navigation.start import (
     attitude_from_directions,
+    find_rest,
     start_at,
     start_at_rest,
     start_from_baseline,
@@ -105,6 +106,35 @@ def test_a_start_on_the_ground_finds_its_heading_from_the_roll_out():
     assert start.state[13:] == pytest.approx(bias, abs=1e-6)
     with pytest.raises(WildlabError, match="0 fixes after it move"):
         start_at_rest(imu, t, np.zeros((len(t), 3)), 0 * v, rest=(5.0, 55.0), gravity=GRAVITY)
+
+
+def standing_and_flying(rests, end=100.0):
+    """Sensors that rest in these intervals (s) and are moved about in between; a take-off at 80 s."""
+    rng = np.random.default_rng(4)
+    times = np.arange(3.0, end, 0.02)
+    still = np.any([(times >= begin) & (times < until) for begin, until in rests], axis=0)
+    size = np.where(still, 1.0, 20.0)[:, None]
+    f = [0.0, 0.0, -9.8] + 0.03 * size * rng.standard_normal((len(times), 3))
+    w = [0.02, 0.0, 0.0] + 0.005 * size * rng.standard_normal((len(times), 3))
+    t = np.arange(3.5, end, 1.0)
+    v = np.zeros((len(t), 3))
+    v[t > 80, 0] = 15.0
+    return Imu(times, f, w), t, v
+
+
+def test_the_last_rest_before_the_take_off_is_found():
+    rests = [(10.0, 30.0), (45.0, 65.0), (70.0, 74.0), (85.0, 99.0)]
+    begin, end = find_rest(*standing_and_flying(rests))
+    assert (begin, end) == (45.0, 65.0)  # 4 s are too short, and what lies behind the take-off is no start
+    assert find_rest(*standing_and_flying(rests), longest=5.0) == (60.0, 65.0)
+    assert find_rest(*standing_and_flying([(40.0, 45.0)])) is None
+
+
+def test_what_glides_evenly_is_not_at_rest():
+    imu, t, v = standing_and_flying([(10.0, 30.0), (40.0, 60.0)])
+    v[(t > 40) & (t < 60), 1] = 3.0
+    assert find_rest(imu, t, v) == (10.0, 30.0)
+    assert find_rest(imu, t, v + np.array([9.0, 0.0, 0.0])) is None  # flying from the first fix on
 
 
 def test_no_sample_near_the_start_is_said(flight):

@@ -7,14 +7,16 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import ImuPart
+from wildlab.flight.manifest import ImuPart, replace_in_manifest
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.flight.sync import poses_at
 from wildlab.geometry.frames import matrix_to_rotation_vector
+from wildlab.navigation.magnetometer import earth_field
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.judge import judge
-from wildlab.pipeline.navigate import imu_noise, navigate_mekf, navigate_observer
+from wildlab.pipeline.navigate import likelihoods_of_latency, navigate_mekf, navigate_observer
+from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.simulation.parameters import load_twin, twin_names
 from wildlab.simulation.twins import simulate_twin
 
@@ -125,6 +127,65 @@ def test_what_the_filter_must_know_is_asked_for(flight):
         navigate_observer(Flight(manifest, flight.nav, {**flight.tables, "gnss": gnss}))
     with pytest.raises(WildlabError, match="no table 'imu'"):
         navigate_observer(Flight(flight.manifest, flight.nav, {"gnss": flight.gnss}))
+
+
+IRON = np.array([8.0, -3.0, 5.0])
+
+
+def with_field(flight: Flight, **stated: object) -> Flight:
+    """The flight with one antenna, and a magnetometer beside iron that turns with the airframe."""
+    truth = flight.nav["truth"]
+    R = poses_at(truth, truth["time_s"].to_numpy())[1]
+    field = 50.0 * np.einsum("kji,j->ki", R, earth_field(0.05, 1.2)) + IRON
+    field += np.random.default_rng(1).normal(0, 0.5, field.shape)
+    table = pd.DataFrame(field, columns=["field_x_ut", "field_y_ut", "field_z_ut"])
+    tables = {**flight.tables, "gnss": flight.gnss.drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS[3:]])}
+    tables["magnetometer"] = table.assign(time_s=truth["time_s"])
+    return Flight(replace_in_manifest(flight.manifest, {"magnetometer": stated}), flight.nav, tables)
+
+
+def test_a_magnetometer_stands_in_for_the_second_antenna():
+    """On eights, which bank to both sides. By the course, the observer is off by the crab angle."""
+    flight, times = simulate_twin("slow-vessel-eight", 3), np.arange(0.0, 420.0, 0.5)
+    stated = {"declination_deg": np.degrees(0.05), "inclination_deg": np.degrees(1.2), "heading_sd_deg": 3.0}
+    known, silent = with_field(flight, **stated), with_field(flight)  # silent: where does the field point?
+    by_field = errors(known, navigate_observer(known, times).nav)[1][2]
+    by_course = errors(silent, navigate_observer(silent, times).nav)[1][2]
+    print(f"heading by the field {by_field:.1f} deg, by the course {by_course:.1f} deg")
+    assert 2 * by_field < by_course
+    filtered = navigate_mekf(known, times, magnetometer=True)
+    assert set(filtered.innovations["source"]) == {"position", "velocity", "heading"}
+    assert errors(known, filtered.nav)[1][2] < 2.0
+    with pytest.raises(WildlabError, match="declination_deg is not stated") as caught:
+        navigate_mekf(silent, times, magnetometer=True)
+    assert caught.value.field == "magnetometer.declination_deg"
+
+
+def test_a_flight_that_banks_to_one_side_has_its_iron_stated(flight):
+    """A loiter shows too little of the sphere."""
+    stated = {"declination_deg": np.degrees(0.05), "inclination_deg": np.degrees(1.2)}
+    with pytest.raises(WildlabError, match="state hard_iron_ut"):
+        navigate_observer(with_field(flight, **stated), [60.0])
+    known = with_field(flight, **stated, hard_iron_ut=tuple(IRON))
+    assert errors(known, navigate_observer(known, np.arange(0.0, 420.0, 0.5)).nav)[1][2] < 4.0
+
+
+def test_the_latency_that_was_put_in_is_the_likeliest(flight):
+    late = {**flight.tables, "gnss": flight.gnss.assign(time_s=flight.gnss["time_s"] + 0.12)}
+    latencies = np.array([0.0, 0.06, 0.1, 0.12, 0.14, 0.2])
+    likely = likelihoods_of_latency(Flight(flight.manifest, flight.nav, late), latencies)
+    assert latencies[np.argmax(likely)] == 0.12
+
+
+def test_an_accelerometer_off_by_a_known_bias_is_the_same_as_none(flight):
+    off = np.array([0.3, -0.2, 0.1])
+    wrong = flight.imu.copy()
+    wrong[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]] += off
+    times = np.arange(0.0, 100.0, 1.0)
+    mended = navigate_observer(
+        Flight(flight.manifest, flight.nav, {**flight.tables, "imu": wrong}), times, accelerometer_bias=off
+    )
+    pd.testing.assert_frame_equal(mended.nav, navigate_observer(flight, times).nav, rtol=1e-6, atol=1e-6)
 
 
 def test_what_cannot_be_believed_says_so() -> None:

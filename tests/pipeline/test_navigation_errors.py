@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariance_columns
-from wildlab.pipeline.navigate import PUBLISHED_LIKE, VELOCITY, navigate_mekf
+from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.navigation_errors import (
     AXES,
     comparison_times,
@@ -25,6 +25,7 @@ from wildlab.pipeline.navigation_errors import (
     summarise_innovations,
     unit_of,
 )
+from wildlab.pipeline.navigation_inputs import VELOCITY
 from wildlab.simulation.twins import simulate_twin
 
 

@@ -110,7 +110,11 @@ def _unknown_columns(name: str, table: pd.DataFrame) -> Iterator[Finding]:
 def order(flight: Flight) -> Iterator[Finding]:
     """Timestamps that run backwards or stand still."""
     series = [(f"nav/{name}", nav) for name, nav in flight.nav.items() if "frame_id" not in nav]
-    series += [(name, flight.tables[name]) for name in ("imu", "gnss", "gimbal") if name in flight.tables]
+    series += [
+        (name, flight.tables[name])
+        for name in ("imu", "gnss", "magnetometer", "gimbal")
+        if name in flight.tables
+    ]
     for name, table in series:
         yield from _increasing(name, table["time_s"], "")
     if flight.truth is not None:

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.check import find
 from wildlab.flight.files import check_model
-from wildlab.flight.manifest import CameraPart, GnssPart, ImuPart, Manifest, make_manifest
+from wildlab.flight.manifest import (
+    CameraPart,
+    GnssPart,
+    ImuPart,
+    MagnetometerPart,
+    Manifest,
+    make_manifest,
+)
 from wildlab.flight.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
 from wildlab.flight.recipe_model import Recipe, read_recipe
 from wildlab.flight.recipe_poses import Fixes, Places, PoseRows, read_poses
@@ -252,6 +259,9 @@ def _manifest(
             "gnss": {}
             if recipe.gnss is None
             else {k: getattr(recipe.gnss, k) for k in GnssPart.model_fields},
+            "magnetometer": {}
+            if recipe.magnetometer is None
+            else {k: getattr(recipe.magnetometer, k) for k in MagnetometerPart.model_fields},
             "time": {"kind": recipe.time.kind, "epoch": epoch},
             "clocks": recipe.clocks,
             "vertical": {
@@ -275,8 +285,7 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     for finding in find(flight):
         if finding.level != "problem":
             continue
-        sensors = {"imu": recipe.imu, "gnss": recipe.gnss, "gimbal": recipe.gimbal}
-        sensor = sensors.get(finding.table)
+        sensor = recipe.sensors.get(finding.table)
         if sensor is not None:
             part, files = finding.table, [sensor.file]
         elif finding.table.startswith("nav/"):

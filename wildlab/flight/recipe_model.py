@@ -35,6 +35,7 @@ from wildlab.flight.recipe_series import (
     Gimbal,
     Inertial,
     LogTable,
+    Magnetometer,
     MatlabTable,
     Satellite,
     Separator,
@@ -156,9 +157,16 @@ class Recipe(Strict):
     poses: dict[str, Poses] = Field(default_factory=dict)
     imu: Inertial | None = None
     gnss: Satellite | None = None
+    magnetometer: Magnetometer | None = None
     gimbal: Gimbal | None = None
     detections: tuple[Detections, ...] = ()
     truth: tuple[Truth, ...] = ()
+
+    @property
+    def sensors(self) -> dict[str, Inertial | Satellite | Magnetometer | Gimbal]:
+        """Those on board, by the names of their tables."""
+        every = {"imu": self.imu, "gnss": self.gnss, "magnetometer": self.magnetometer, "gimbal": self.gimbal}
+        return {name: one for name, one in every.items() if one is not None}
 
     @field_validator("name")
     @classmethod
@@ -200,8 +208,7 @@ class Recipe(Strict):
     @model_validator(mode="after")
     def _times(self) -> Self:
         times = {} if self.frames is None else {"frames": self.frames.time}
-        sensors = {"imu": self.imu, "gnss": self.gnss, "gimbal": self.gimbal}
-        times |= {name: one.time for name, one in sensors.items() if one is not None}
+        times |= {name: one.time for name, one in self.sensors.items()}
         times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
         times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
         if self.time.kind == "utc" and self.frames is not None and self.frames.time is None:

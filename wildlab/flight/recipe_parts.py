@@ -50,6 +50,7 @@ Speed = Annotated[Quantity, _of("speed")]
 Pixel = Annotated[Quantity, _of("pixel")]
 Acceleration = Annotated[Quantity, _of("acceleration")]
 Rate = Annotated[Quantity, _of("rate")]
+MagneticField = Annotated[Quantity, _of("field")]
 
 
 def parse_zone(text: str) -> tzinfo:

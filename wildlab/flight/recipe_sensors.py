@@ -1,4 +1,4 @@
-"""Sensors on board of a recipe: inertial samples, satellite positions, gimbal angles."""
+"""Sensors on board of a recipe: inertial samples, satellite positions, magnetic field, gimbal angles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SensorRows:
 
 
 def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, SensorRows]:
-    """Those of `imu`, `gnss` and `gimbal` that the recipe has.
+    """Those of `imu`, `gnss`, `magnetometer` and `gimbal` that the recipe has.
 
     Raises
     ------
@@ -42,6 +42,15 @@ def read_sensors(recipe: Recipe, raw: RawFiles) -> dict[str, SensorRows]:
         found["imu"] = _imu(recipe, raw)
     if recipe.gnss is not None:
         found["gnss"] = _gnss(recipe, raw)
+    if recipe.magnetometer is not None:
+        magnetometer = recipe.magnetometer
+        rows = raw.series(magnetometer, "magnetometer")
+        columns = {
+            f"field_{a}_ut": numbers(rows, getattr(magnetometer.field, a), "field", f"magnetometer.field.{a}")
+            for a in "xyz"
+        }
+        stamps = _stamps(rows, magnetometer.time, recipe, "magnetometer.time")
+        found["magnetometer"] = SensorRows(columns, stamps)
     if recipe.gimbal is not None:
         block = recipe.gimbal
         rows = raw.series(block, "gimbal")

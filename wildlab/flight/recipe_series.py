@@ -8,9 +8,19 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, is_safe_name, leaves_folder
-from wildlab.flight.manifest import GnssPart, ImuPart
+from wildlab.flight.manifest import GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.readers.autoferry import Part
-from wildlab.flight.recipe_parts import Acceleration, Angle, Length, Position, Rate, Speed, Stamp, Velocity
+from wildlab.flight.recipe_parts import (
+    Acceleration,
+    Angle,
+    Length,
+    MagneticField,
+    Position,
+    Rate,
+    Speed,
+    Stamp,
+    Velocity,
+)
 
 Separator = Annotated[str, Field(min_length=1, max_length=1)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -87,6 +97,21 @@ class Satellite(Series, GnssPart):
     sd_velocity: Speed | None = None
     satellites: str | None = None
     fix: str | None = None
+
+
+class MagneticFields(Strict):
+    """Along the same axes. In the north it points north and down, in the south north and up."""
+
+    x: MagneticField
+    y: MagneticField
+    z: MagneticField
+
+
+class Magnetometer(Series, MagnetometerPart):
+    """As in the manifest; and the field in the axes of the body."""
+
+    time: Stamp
+    field: MagneticFields
 
 
 class Gimbal(Series):

@@ -149,6 +149,14 @@ TABLES: dict[str, Table] = {
             ),
         ),
         Table(
+            "magnetometer",
+            "magnetic field in b, as measured: what is magnetic on board still in it",
+            (
+                _TIME,
+                *(Column(f"field_{a}_ut", "float", "uT", f"magnetic field along {a}") for a in "xyz"),
+            ),
+        ),
+        Table(
             "gnss",
             "satellite positions",
             (

@@ -1,11 +1,11 @@
-"""Units a recipe may name, and what takes a value in them to radians, metres, seconds or pixels."""
+"""Units a recipe may name, and what takes a value in them to radians, metres, seconds, pixels, microtesla."""
 
 from __future__ import annotations
 
 import math
 from typing import Literal
 
-Dimension = Literal["angle", "length", "speed", "acceleration", "rate", "pixel", "time"]
+Dimension = Literal["angle", "length", "speed", "acceleration", "rate", "pixel", "time", "field"]
 
 #: Of the unit g, by definition; m/s^2.
 STANDARD_GRAVITY = 9.80665
@@ -18,6 +18,8 @@ UNITS: dict[Dimension, dict[str, float]] = {
     "rate": {"rad/s": 1.0, "deg/s": math.radians(1), "mrad/s": 1e-3, "deg/h": math.radians(1) / 3600},
     # A proportion counts from 0 at the left or upper edge to 1 at the other.
     "pixel": {"px": 1.0, "proportion-of-width": math.nan, "proportion-of-height": math.nan},
+    # To microtesla.
+    "field": {"uT": 1.0, "nT": 1e-3, "T": 1e6, "G": 100.0, "mG": 0.1},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
 }
 

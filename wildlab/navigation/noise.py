@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.geometry.frames import Array
-from wildlab.navigation.timeline import Imu, checked_imu
 
 
 class ImuNoise(NamedTuple):
@@ -123,43 +122,3 @@ STIM300 = from_data_sheet(
     velocity_random_walk=0.07, angle_random_walk_deg=0.15, accelerometer_bias=0.05e-3 * 9.81,
     gyro_bias_deg=0.3, bias_time=100.0,
 )  # fmt: skip
-
-
-def with_axis_errors(noise: ImuNoise, imu: Imu, accelerometer_error: float, gyro_error: float) -> ImuNoise:
-    """Noise that covers scale factors and misalignments too, for the motion of a given flight.
-
-    A scale factor that is 1 % wrong makes an error of 1 % of whatever is measured. As long as that changes,
-    it is taken as a first-order process with its size and its correlation time, and its spectral density at
-    low frequencies is added to the random walks. The steady part is a matter of the biases.
-
-    Parameters
-    ----------
-    imu
-        N samples of the flight, without the time on the ground.
-    accelerometer_error, gyro_error
-        Scale factor and misalignment (rad) together, as data sheets give them, for instance 0.01.
-    """
-    samples = checked_imu(imu)
-    step = float(np.median(np.diff(samples.times)))
-    added = [
-        error * _density(signal, step)
-        for error, signal in (
-            (accelerometer_error, samples.specific_force),
-            (gyro_error, samples.angular_rate),
-        )
-    ]
-    return noise._replace(
-        velocity_random_walk=float(np.hypot(noise.velocity_random_walk, added[0])),
-        angle_random_walk=float(np.hypot(noise.angle_random_walk, added[1])),
-    )
-
-
-def _density(signal: Array, step: float) -> float:
-    """Root of the spectral density of a signal (N, 3) about its mean, per axis, were it of first order."""
-    off = signal - signal.mean(axis=0)
-    n = len(off)
-    power = (np.abs(np.fft.rfft(off, 2 * n, axis=0)) ** 2).sum(axis=1)
-    correlation = np.fft.irfft(power)[:n]
-    below = correlation < correlation[0] / np.e
-    time = step * max(int(np.argmax(below)) if below.any() else n, 1)
-    return float(np.sqrt(off.var(axis=0).mean() * 2 * time))

@@ -16,6 +16,10 @@ from wildlab.navigation.mekf import Start
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import Imu, checked_imu
 
+#: Deviations within a second, per axis, up to which an airframe stands: m/s^2 and rad/s; and the speed that
+#: a receiver at rest stays below, m/s. Thrice what sensors of small drones show on the ground in wind.
+STILL_FORCE, STILL_RATE, STILL_SPEED = 0.3, 0.05, 1.0
+
 
 def attitude_from_directions(
     first_b: ArrayLike, first_n: ArrayLike, second_b: ArrayLike, second_n: ArrayLike
@@ -185,6 +189,48 @@ def start_from_course(
 def _turned(q: Array, vector: Array) -> Array:
     w, u = q[0], q[1:]
     return np.asarray(vector + 2 * np.cross(u, np.cross(u, vector) + w * vector), float)
+
+
+def find_rest(
+    imu: Imu, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
+    longest: float = 30.0,
+) -> tuple[float, float] | None:  # fmt: skip
+    """From when to when (s) it last stood still before it took off; None where it did not.
+
+    Still is a second in which neither force nor rate changes as it does in anybody's hands, and in which no
+    fix moves. A long rest is cut to its end, since biases change while sensors warm up.
+
+    Parameters
+    ----------
+    times, v_n
+        As in :func:`start_from_course`.
+    min_speed
+        Level speed (m/s) from which it counts as having taken off.
+    shortest, longest
+        How long a rest must be and what it is cut to, s.
+    """
+    t, v = np.asarray(times, float), np.asarray(v_n, float)
+    samples = checked_imu(imu)
+    flown = t[np.hypot(v[:, 0], v[:, 1]) >= min_speed]
+    first, seconds = samples.times[0], int((flown.min(initial=samples.times[-1]) - samples.times[0]) // 1.0)
+    if seconds < shortest:
+        return None
+    before = samples.times < first + seconds
+    second = (samples.times[before] - first).astype(int)
+    count = np.bincount(second, minlength=seconds)
+    still = count > 1
+    for values, limit in ((samples.specific_force, STILL_FORCE), (samples.angular_rate, STILL_RATE)):
+        for column in values[before].T:
+            mean = np.bincount(second, column, seconds) / np.maximum(count, 1)
+            off = column - mean[second]
+            still &= np.bincount(second, off**2, seconds) <= limit**2 * count
+    moving = (np.linalg.norm(v, axis=1) > STILL_SPEED) & (t >= first) & (t < first + seconds)
+    still[(t[moving] - first).astype(int)] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
+    for begin, end in edges.reshape(-1, 2)[::-1]:
+        if end - begin >= shortest:
+            return float(first + max(begin, end - longest)), float(first + end)
+    return None
 
 
 def start_at_rest(

@@ -22,13 +22,14 @@ from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.flight.store import Flight
 from wildlab.flight.sync import covariances, poses_at
 from wildlab.pipeline.navigate import (
+    BIASES,
     PUBLISHED_LIKE,
     PUBLISHED_LIKE_TURNING,
-    VELOCITY,
     Navigated,
     navigate_mekf,
     navigate_observer,
 )
+from wildlab.pipeline.navigation_inputs import VELOCITY
 from wildlab.simulation.twins import simulate_twin
 
 Array = NDArray[np.float64]
@@ -211,8 +212,15 @@ def normalised_innovations(innovations: pd.DataFrame, dof: int = 3) -> Array:
 
 def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
     """Every estimate that is compared, by its subject: the filter by what is stated, and the observer; with
-    two antennas also the filter with the tunings of `TUNINGS`."""
-    found = {"mekf": navigate_mekf(flight, times), "observer": navigate_observer(flight, times)}
+    two antennas also the filter with the tunings of `TUNINGS`.
+
+    The observer of H is for calibrated accelerometers. Where the manifest does not say what they are off by
+    at switching on, their calibration is the bias that the filter found, the median over the flight.
+    """
+    filtered, off = navigate_mekf(flight, times), np.zeros(3)
+    if flight.manifest.imu.accelerometer_turn_on_m_s2 is None:
+        off = filtered.biases[BIASES[:3]].median().to_numpy(float)
+    found = {"mekf": filtered, "observer": navigate_observer(flight, times, accelerometer_bias=off)}
     if "second_north_m" in flight.table("gnss"):
         found |= {name: navigate_mekf(flight, times, tuning=tuning) for name, tuning in TUNINGS.items()}
     return found
