@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.reporting.charts.gating import FED, rates_chart, rates_table, varied_table
+from wildlab.reporting.charts.gating import rates_chart
+from wildlab.reporting.words.gating import FED, rates_table, varied_table
 
 PUBLISHED = {"position": 96.64, "pixels": 96.83, "angles": 95.99}
 

@@ -1,4 +1,4 @@
-"""Charts and tables of the study of gating, H 6.4.3: rates beside published, one run, what moves them."""
+"""Charts of the study of gating, H 6.4.3: rates beside published, one run, what moves them."""
 
 from __future__ import annotations
 
@@ -22,53 +22,12 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
+from wildlab.reporting.words.gating import FED, NAMES
 
 Array = NDArray[np.float64]
 
-NAMES = {"position": "position", "pixels": "pixels", "angles": "azimuth and elevation"}
-#: What the track is updated with, in words.
-FED = {
-    "assigned": "with what was assigned",
-    "own": "with the main object's own",
-    "nothing": "with nothing",
-}
-RATES_COLUMNS = {
-    "fed": "track updated",
-    "form": "gating by",
-    "published": "published (%)",
-    "here": "here (%)",
-    "se": "standard error",
-    "difference": "difference",
-    "sd": "SD over runs",
-    "range": "90 % of runs",
-}
-RATES_DIGITS = {"published": 2, "here": 2, "se": 2, "difference": 2, "sd": 1}
-
 _COLOURS = {"position": BLUE, "pixels": VERMILLION, "angles": GREEN}
 _OBJECTS = {"main object": BLUE, "second object": ORANGE}
-
-
-def rates_table(rates: Mapping[str, Array], published: Mapping[str, float]) -> pd.DataFrame:
-    """A row for each of `FED` and each form: published and mean success rates, and their spread over runs.
-
-    ``rates`` are (3, runs) in per cent.
-    """
-    return pd.DataFrame(
-        [
-            {
-                "fed": words,
-                "form": NAMES[form],
-                "published": published[form],
-                "here": runs.mean(),
-                "se": standard_error(runs),
-                "difference": runs.mean() - published[form],
-                "sd": runs.std(ddof=1),
-                "range": "{:.0f} to {:.0f}".format(*np.quantile(runs, (0.05, 0.95))),
-            }
-            for fed, words in FED.items()
-            for form, runs in zip(FORMS, rates[fed], strict=True)
-        ]
-    )
 
 
 def rates_chart(rates: Mapping[str, Array], published: Mapping[str, float], title: str) -> Figure:
@@ -166,13 +125,3 @@ def varied_chart(varied: pd.DataFrame, published: Mapping[str, float], title: st
     ax.set(xlabel="right associations (%), dashed: published", title=title)
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return fig
-
-
-def varied_table(varied: pd.DataFrame) -> pd.DataFrame:
-    """The same as a table: each rate, and in brackets its change with twice the standard error."""
-    shown = pd.DataFrame({"changed": varied["variation"]})
-    for form in FORMS:
-        cells = varied[[form, f"{form}_change", f"{form}_se"]].to_numpy(float)
-        words = [f"{rate:.1f} ({change:+.1f} ± {2 * se:.1f})" for rate, change, se in cells]
-        shown[f"{NAMES[form]} (%)"] = [f"{cells[0, 0]:.1f}", *(w.replace("-", "−") for w in words[1:])]
-    return shown

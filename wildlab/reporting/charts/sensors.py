@@ -25,7 +25,7 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.reporting.sensor_tracks import FILTER_WORDS, SENSOR_WORDS, WITH_ITS_BOAT_M, signed
+from wildlab.reporting.words.autoferry import FILTER_WORDS, SENSOR_WORDS, WITH_ITS_BOAT_M, signed
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]

@@ -1,4 +1,4 @@
-"""Tables and words of a report on boats followed by several sensors."""
+"""What the report on boats followed by several sensors of a ferry says: words, tables and metrics."""
 
 from __future__ import annotations
 

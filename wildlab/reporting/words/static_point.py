@@ -11,6 +11,19 @@ OBSERVER, AUTOPILOT = "observer", "pixhawk-autopilot"
 UNSYNCED, UNCALIBRATED = "without-time-synchronization", "without-misalignment-calibration"
 _LAGS = [("filter", "lag1_north"), ("filter", "lag1_east")]
 
+METHOD = r"""Pixels are placed on the plane at the target's height by H (5.13). Mean, standard
+deviation and mean error are those of the distances to the known position. Without synchronisation the pose is
+taken at the stamp that the on-board computer gave the image. Without calibration the observer's attitude is
+that of the IMU as it was mounted: the published misalignment is put behind it, as
+$\mathbf{R}_b^n\mathbf{R}_i^b$, and not taken out.
+
+The observer is the nonlinear one of H 5.5 on the simulated inertial samples and the two receivers' positions
+and velocities, with the gains of its defaults.
+
+The filter has the motion model of an object at rest ($\mathbf{F} = \mathbf{I}$, $\mathbf{Q} = \mathbf{0}$)
+and the observer's poses; $\mathbf{R}$ is each point's own ground covariance. Autocorrelations are divided by
+their value at lag zero; white noise of this length stays within the grey band at 95 % of the lags."""
+
 
 def summary(spread: pd.DataFrame, bound: float) -> list[str]:
     """Three sentences on what `wildlab.pipeline.at_rest.summarise_at_rest` gives, one row for each flight.

@@ -1,4 +1,4 @@
-"""Words and tables of the reports that set the extended against the Schmidt-Kalman filter."""
+"""What the reports on the extended and the Schmidt-Kalman filter say, as the computed numbers have it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of a report on positions read from single images: the words, tables and metrics about accuracy."""
+"""What the report on positions read from single images says: words, tables and metrics about accuracy."""
 
 from __future__ import annotations
 
@@ -48,19 +48,6 @@ where the images have times, all of a minute, because the error of a pose wander
 
 Shares of the squared error: one-way analysis of variance with images as groups. Intervals: a thousand times
 as many draws with replacement as there are, middle 90 %."""
-
-METHOD_AT_REST = r"""Pixels are placed on the plane at the target's height by H (5.13). Mean, standard
-deviation and mean error are those of the distances to the known position. Without synchronisation the pose is
-taken at the stamp that the on-board computer gave the image. Without calibration the observer's attitude is
-that of the IMU as it was mounted: the published misalignment is put behind it, as
-$\mathbf{R}_b^n\mathbf{R}_i^b$, and not taken out.
-
-The observer is the nonlinear one of H 5.5 on the simulated inertial samples and the two receivers' positions
-and velocities, with the gains of its defaults.
-
-The filter has the motion model of an object at rest ($\mathbf{F} = \mathbf{I}$, $\mathbf{Q} = \mathbf{0}$)
-and the observer's poses; $\mathbf{R}$ is each point's own ground covariance. Autocorrelations are divided by
-their value at lag zero; white noise of this length stays within the grey band at 95 % of the lags."""
 
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),

@@ -7,8 +7,9 @@ import pytest
 from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.geometry.calibration import Calibration
-from wildlab.reporting import accuracy, many
+from wildlab.reporting import many
 from wildlab.reporting.report import open_report
+from wildlab.reporting.words import georeferencing
 
 
 @pytest.fixture
@@ -35,19 +36,19 @@ def scatter(bias, image, within):
     [((0.7, 0.2, 0.1), "constant"), ((0.1, 0.8, 0.1), "wrong together"), ((0.1, 0.2, 0.7), "its own way")],
 )
 def test_the_largest_share_is_named(shares, word):
-    assert word in accuracy.main_limit(scatter(*shares))
+    assert word in georeferencing.main_limit(scatter(*shares))
 
 
 def test_too_few_points_are_said_so():
     nan = float("nan")
     silent = Scatter(nan, nan, nan, np.full(2, nan), np.full(2, nan))
-    assert "too few" in accuracy.main_limit(silent)
-    assert accuracy.limiting_factors(silent, summarise(np.ones((2, 2))), None) == []
+    assert "too few" in georeferencing.main_limit(silent)
+    assert georeferencing.limiting_factors(silent, summarise(np.ones((2, 2))), None) == []
 
 
 def test_factors_are_sorted_by_their_share_and_carry_their_numbers():
     logged = summarise(np.array([[3.0, 4.0], [3.0, 4.0]]))
-    factors = accuracy.limiting_factors(scatter(0.2, 0.3, 0.5), logged, None)
+    factors = georeferencing.limiting_factors(scatter(0.2, 0.3, 0.5), logged, None)
     assert ["Single" in factors[0], "pose" in factors[1], "constant" in factors[2]] == [True] * 3
     assert "1.0 m" in factors[0]
     assert "5.0 m" in factors[1]
@@ -55,7 +56,7 @@ def test_factors_are_sorted_by_their_share_and_carry_their_numbers():
 
 
 def test_metrics_have_the_promised_names(report):
-    accuracy.record_errors(report, "logged-pose", judged_table(), {"horizontal_error_mean": (0.5, 2.0)})
+    georeferencing.record_errors(report, "logged-pose", judged_table(), {"horizontal_error_mean": (0.5, 2.0)})
     names = [m["name"] for m in report._metrics]
     assert names == [
         "horizontal_error_mean", "horizontal_error_median", "horizontal_error_p90", "horizontal_error_max",
@@ -73,7 +74,7 @@ def test_noise_is_shown_in_degrees():
         "yaw_deg": 1,
         "pixel_px": 1,
     }
-    table = accuracy.noise_table(noise, stated).set_index("what")
+    table = georeferencing.noise_table(noise, stated).set_index("what")
     assert table.loc["yaw", "estimated"] == pytest.approx(2.0)
     assert len(table) == len(KINDS)
 
@@ -82,10 +83,10 @@ def test_what_was_not_estimated_is_said_with_its_partners(report):
     found = Calibration(
         ("roll",), np.array([0.02]), np.array([[1e-6]]), {"clock": ("tilt",), "pan": ()}, 10, 5
     )
-    words = accuracy.undetermined_words(found)
+    words = georeferencing.undetermined_words(found)
     assert "cannot tell it from tilt" in words[0]
     assert "no effect" in words[1]
-    table = accuracy.calibration_table(report, found)
+    table = georeferencing.calibration_table(report, found)
     assert table.loc[0, "value"] == pytest.approx(np.degrees(0.02))
     assert table.loc[0, "verdict"] == "differs from zero"
     assert report._metrics[0]["name"] == "boresight_roll"
@@ -108,14 +109,14 @@ def test_claims_are_decided_by_their_share_of_flights(report, monkeypatch):
 
 
 def test_lengths_in_words():
-    assert accuracy.length(5.06) == "5.1 metres"
-    assert accuracy.length(0.404) == "40 centimetres"
-    assert accuracy.short_length(0.404) == "40 cm"
-    assert accuracy.span([50.6, 111.2, np.nan]) == "51 to 111"
-    assert accuracy.span([100.1, 99.9]) == "100"
+    assert georeferencing.length(5.06) == "5.1 metres"
+    assert georeferencing.length(0.404) == "40 centimetres"
+    assert georeferencing.short_length(0.404) == "40 cm"
+    assert georeferencing.span([50.6, 111.2, np.nan]) == "51 to 111"
+    assert georeferencing.span([100.1, 99.9]) == "100"
 
 
 def test_too_few_points_are_not_praised():
     few, many_points = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
-    assert "too few" in accuracy.summary_sentences(few, scatter(1, 0, 0))[0]
-    assert "nine times out of ten" in accuracy.summary_sentences(many_points, scatter(1, 0, 0))[0]
+    assert "too few" in georeferencing.summary_sentences(few, scatter(1, 0, 0))[0]
+    assert "nine times out of ten" in georeferencing.summary_sentences(many_points, scatter(1, 0, 0))[0]

@@ -10,10 +10,10 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.pipeline.compare_filters import beside_white, gains
 from wildlab.pipeline.follow_sensors import COLUMNS, Followed, table
 from wildlab.pipeline.sensor_tuning import Tuning
-from wildlab.reporting import sensor_tracks as words
 from wildlab.reporting.charts import sensors as charts
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, open_report
+from wildlab.reporting.words import autoferry as words
 
 LIDAR = Tuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
 CAMERA = Tuning(
