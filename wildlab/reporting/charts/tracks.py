@@ -69,12 +69,7 @@ def track_map(
         ax.plot(x[:, 1], x[:, 0], color=colour(subject), lw=width, label=names[subject])
     way = np.asarray(truth, float)
     ax.plot(way[:, 1], way[:, 0], **_TRUTH)
-    start = way[np.isfinite(way[:, :2]).all(axis=1)][0, 1::-1]
-    ax.plot(*start, "o", color=colour("truth"), ms=5)
-    behind = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
-    ax.annotate(
-        "start", start, (-6, 6), textcoords="offset points", ha="right", fontsize=9, color=INK, bbox=behind
-    )
+    _mark_start(ax, way[np.isfinite(way[:, :2]).all(axis=1)])
     ax.set_title(title)
     _legend(fig, ax)
     map_axes(ax)
@@ -255,6 +250,24 @@ def innovation_correlations(
             ax.plot(np.arange(len(y)), y, color=colour(subject), lw=width, label=names[subject])
         ax.set_ylabel(f"autocorrelation,\n{name}")
     return _finished(fig, strips[:, 0], title, "lag (detections)")
+
+
+def _mark_start(ax: Axes, way: Array) -> None:
+    """A dot where a way (N, 2 or more) begins, and its name on the side that the way turns away from."""
+    north, east = way[0, 0], way[0, 1]
+    northward = way[-1, 0] > north
+    ax.plot(east, north, "o", color=colour("truth"), ms=5)
+    ax.annotate(
+        "start",
+        (east, north),
+        (0, -7 if northward else 7),
+        textcoords="offset points",
+        ha="center",
+        va="top" if northward else "bottom",
+        fontsize=9,
+        color=INK,
+        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
+    )
 
 
 def _columns(values: ArrayLike) -> Array:
