@@ -67,6 +67,31 @@ def test_positions(runs, gate):
         agree(batch, run, run_filter(times, z[run], R[run], m.positions(), CV, own, gate=gate), but=[6])
 
 
+@pytest.mark.parametrize("runs", [1, 70])
+@pytest.mark.parametrize("row", [-1, 0])
+def test_positions_of_runs_that_know_the_same_of_their_errors(runs, row):
+    """Covariances are then computed once; the estimates are those of each run all the same."""
+    rng = np.random.default_rng(runs)
+    times = np.cumsum(rng.uniform(0, 2, N))
+    times[7] = times[6]
+    z = np.cumsum(rng.normal(0, 3, (runs, N, 2)), axis=1)
+    z[:, rng.random(N) < 0.2] = np.nan
+    A = rng.normal(size=(N, 2, 3))
+    R = A @ np.swapaxes(A, -1, -2) + np.eye(2)
+    start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=row)
+    batch = run_batch(times, z, R, CV, start)
+    assert not batch.P.flags.writeable
+    for run in range(runs):
+        own = start._replace(x=start.x[run])
+        agree(batch, run, run_filter(times, z[run], R, m.positions(), CV, own), but=[6])
+    some = run_batch(times, z, R, CV, start, rows=[0, 5, -1])
+    assert np.array_equal(some.x, batch.x[:, [0, 5, -1]])
+    assert np.array_equal(some.P, batch.P[:, [0, 5, -1]])
+    # One run with a gap of its own, and every run is computed by itself.
+    z[0, 12:14] = np.nan
+    assert run_batch(times, z, R, CV, start).P.flags.writeable == (runs > 1)
+
+
 @pytest.mark.parametrize("gate", [None, 0.99])
 def test_pixels(gate):
     runs = 67

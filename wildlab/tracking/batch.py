@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
-from wildlab.tracking import schmidt
-from wildlab.tracking.batch_kernels import run_lanes
+from wildlab.tracking import kalman, schmidt
+from wildlab.tracking.batch_kernels import Flags, run_lanes
 from wildlab.tracking.measurement import CameraPoses
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, checked
@@ -26,7 +26,8 @@ from wildlab.tracking.schmidt import PoseUncertainty
 class BatchTracks(NamedTuple):
     """What the filter made of B runs of N measurements; the estimates after each of M rows.
 
-    NaN before the start. Views of arrays in which the runs come last.
+    NaN before the start. Views of arrays in which the runs come last; where all runs have the same
+    covariances, ``P`` is one array that every run looks at, and cannot be written to.
     """
 
     times: Array  # (M,)
@@ -117,7 +118,7 @@ def run_batch(
     noise = _per_run(R, 2, N)
     noise[~np.isfinite(noise).all(axis=2)] = [1.0, 0.0, 0.0, 1.0]  # their measurements are NaN by now
     P0 = np.asarray(start.P, float)
-    kept = np.arange(N) if rows is None else np.asarray(rows, np.int64)
+    kept = np.arange(N) if rows is None else np.arange(N)[np.asarray(rows, np.int64)]
     slots = np.full(N, -1)
     slots[kept] = np.arange(len(kept))
     estimates = [np.empty((len(kept), *shape, B)) for shape in ((4,), (4, 4))]
@@ -127,6 +128,11 @@ def run_batch(
     for a in judged:
         a[:first] = np.nan
     out = (*estimates, *judged, np.zeros((N, B), bool), np.zeros((N, B), bool))
+    there = np.isfinite(z).all(axis=2)
+    alike = len(noise) == 1 and P0.ndim == 2 and bool((there == there[:1]).all())
+    if alike and view is None and pose is None and gate is None:
+        x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
+        return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
     singular = run_lanes(
         F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
@@ -135,17 +141,64 @@ def run_batch(
         first, given.threshold, view is not None, pose is not None, slots, *out,
     )  # fmt: skip
     if singular >= 0:
-        raise WildlabError(
-            f"the innovation covariance S of row {singular} is not positive definite",
-            "check the covariances of start, motion and measurements",
-            field="S",
-        )
+        raise _singular(singular)
     if start.row >= 0:
         if slots[start.row] >= 0:
             out[0][slots[start.row]] = np.asarray(start.x, float).T.reshape(4, -1)
             out[1][slots[start.row]] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
         out[4][start.row] = True
     return BatchTracks(given.times[kept], *(np.moveaxis(a, -1, 0) for a in out))
+
+
+def _run_alike(
+    times: Array, z: Array, there: Flags, R: Array, F: Array, Q: Array, x0: Array, start: Start, first: int,
+    kept: NDArray[np.int64],
+) -> BatchTracks:  # fmt: skip
+    """Positions without a gate, with the same noise and the same gaps in all runs.
+
+    What such a filter knows of its errors does not depend on what it measures: covariances and gains are
+    those of a single run, and only the estimates are many. z (B, N, 2); there (N,); R (N, 2, 2); x0 (B, 4).
+    """
+    B, N = z.shape[:2]
+    H, P, x = np.eye(2, 4), np.asarray(start.P, float), np.array(x0.T, order="C")
+    z_last = np.ascontiguousarray(np.moveaxis(z, 0, -1))
+    estimates, covariances = np.empty((len(kept), 4, B)), np.empty((len(kept), 4, 4))
+    innovation, nis = np.empty((N, 2, B)), np.empty((N, B))
+    used = np.zeros((N, B), bool)
+    slots = {int(row): slot for slot, row in enumerate(kept)}
+    for a in (estimates, covariances):
+        a[kept < first] = np.nan
+    unseen = ~there | (np.arange(N) < first)
+    innovation[unseen], nis[unseen] = np.nan, np.nan
+    if start.row >= 0:
+        used[start.row] = True
+        if start.row in slots:
+            estimates[slots[start.row]], covariances[slots[start.row]] = x, P
+    for row in range(first, N):
+        x = F[row] @ x
+        P = kalman.predict(np.zeros(4), P, F[row], Q[row])[1]
+        if there[row]:
+            S = P[:2, :2] + R[row]
+            if not (S[0, 0] > 0 and np.linalg.det(S) > 0):
+                raise _singular(row)
+            single = kalman.correct(np.zeros(4), P, np.zeros(2), H, R[row])
+            v = np.subtract(z_last[row], x[:2], out=innovation[row])
+            x = x + single.gain @ v
+            nis[row] = (v * (np.linalg.inv(single.S) @ v)).sum(axis=0)
+            P, used[row] = single.P, True
+        if row in slots:
+            estimates[slots[row]], covariances[slots[row]] = x, P
+    x_first, v_first = np.moveaxis(estimates, -1, 0), np.moveaxis(innovation, -1, 0)
+    shared = np.broadcast_to(covariances, (B, len(kept), 4, 4))
+    return BatchTracks(times[kept], x_first, shared, v_first, nis.T, used.T, np.zeros((B, N), bool))
+
+
+def _singular(row: int) -> WildlabError:
+    return WildlabError(
+        f"the innovation covariance S of row {row} is not positive definite",
+        "check the covariances of start, motion and measurements",
+        field="S",
+    )
 
 
 def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
