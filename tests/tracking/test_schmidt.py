@@ -262,6 +262,22 @@ def test_a_row_without_a_pose_covariance_is_passed_over():
     assert np.allclose(phi[2] @ covariances[0] @ phi[2].T, covariances[2])
 
 
+@pytest.mark.parametrize("change", ["bias", "navigated"])
+def test_many_transitions_are_those_of_each_pair(change):
+    """Also where nothing changes, and from a pose without variance in some direction, or in none."""
+    rng = np.random.default_rng(3)
+    covariances = np.array([random_pose_covariance(rng) for _ in range(12)])
+    covariances[3] = covariances[2]
+    covariances[5, 2] = covariances[5, :, 2] = 0.0
+    covariances[7] = 0.0
+    covariances[9] = np.outer(np.arange(1, 7), np.arange(1, 7)) * 1e-4
+    phi = schmidt.transitions_of_pose(covariances, change)
+    for k in range(1, 12):
+        expected = schmidt.transition_of_pose(covariances[k - 1], covariances[k], change)
+        assert np.allclose(phi[k], np.eye(6) if k == 3 else expected, rtol=1e-6, atol=1e-6), k
+    assert schmidt.transitions_of_pose(covariances[:1], change) == pytest.approx(np.eye(6)[None])
+
+
 def swinging(n):
     """Sizes of a pose covariance that grows between fixes and shrinks with each, and how its error goes."""
     P, sizes, gains = 1.0, [], []

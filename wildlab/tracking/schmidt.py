@@ -31,7 +31,6 @@ first-order process whose variance is kept at ``P^o``. Infinity is the thesis's 
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -135,12 +134,28 @@ def transition_of_pose(before: Array, after: Array, change: Change) -> Array:
 
 
 def transitions_of_pose(covariances: Array, change: Change) -> Array:
-    """``Phi`` (N, 6, 6) from each row's predecessor to it; rows of NaN are passed over, with the identity."""
+    """``Phi`` (N, 6, 6) from each row's predecessor to it; rows of NaN are passed over, with the identity.
+
+    Row by row what `transition_of_pose` gives, all rows together: directions without variance are not left
+    out but have a length of zero.
+    """
     phi = np.tile(np.eye(6), (len(covariances), 1, 1))
     known = np.flatnonzero(np.isfinite(covariances).all(axis=(1, 2)))
-    for before, after in pairwise(known):
-        if not np.array_equal(covariances[before], covariances[after]):
-            phi[after] = transition_of_pose(covariances[before], covariances[after], change)
+    rows, before, after = known[1:], covariances[known[:-1]], covariances[known[1:]]
+    differ = (before != after).any(axis=(1, 2))
+    before, after = before[differ], after[differ]
+    sd = np.sqrt(np.maximum(np.diagonal(before, axis1=1, axis2=2), 0))
+    per_sd = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
+    values, vectors = np.linalg.eigh(before * per_sd[:, :, None] * per_sd[:, None, :])
+    there = values > NEGLIGIBLE * np.maximum(values[:, -1:], NEGLIGIBLE)
+    lengths = np.sqrt(np.where(there, values, 0))
+    per_length = np.divide(1, lengths, out=np.zeros_like(lengths), where=there)
+    root = sd[:, :, None] * vectors * lengths[:, None, :]
+    inverse = np.swapaxes(vectors * per_length[:, None, :], 1, 2) * per_sd[:, None, :]
+    kept, axes = np.linalg.eigh(inverse @ after @ np.swapaxes(inverse, 1, 2))
+    kept = np.maximum(kept, 0)
+    kept = np.sqrt(kept) if change == "bias" else np.minimum(kept, 1)
+    phi[rows[differ]] = root @ (axes * kept[:, None, :]) @ np.swapaxes(axes, 1, 2) @ inverse
     return phi
 
 
