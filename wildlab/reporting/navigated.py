@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.whiteness import innovation_whiteness
+from wildlab.flight.schema import SECOND_COLUMNS
+from wildlab.flight.store import Flight
 from wildlab.pipeline.navigation_errors import (
     AXES,
     PLACES,
@@ -18,6 +20,7 @@ from wildlab.pipeline.navigation_errors import (
     summarise,
     summarise_innovations,
 )
+from wildlab.pipeline.navigation_inputs import field_of
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     correlation_strips,
@@ -49,6 +52,23 @@ _SPEEDS = [f"{place} (m/s)" for place in PLACES]
 def has_truth(studied: Studied) -> bool:
     """Whether it was judged by the truth, rather than by another estimate."""
     return studied.reference == "truth-payload"
+
+
+def limits_of_observer(flight: Flight) -> list[str]:
+    """What the observer's figures hang on, in sentences, for a flight with one antenna."""
+    if set(SECOND_COLUMNS) <= set(flight.table("gnss").columns):
+        return []
+    course = "takes the course for the heading, and is off by the crab angle in wind"
+    field = (
+        "takes the magnetic field for its second vector, and is off by what calibrating that in flight leaves"
+    )
+    found = [f"With one antenna the observer {course if field_of(flight) is None else field}."]
+    if flight.manifest.imu.accelerometer_turn_on_m_s2 is None:
+        found.append(
+            "The observer is for calibrated accelerometers, and how well these are is not stated: the bias "
+            "that the filter found was taken off before. So the two do not check each other in that."
+        )
+    return found
 
 
 def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
