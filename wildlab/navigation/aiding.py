@@ -16,7 +16,15 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.navigation import kernels
 from wildlab.navigation.kernels import Integers
-from wildlab.navigation.timeline import Measurements, Timeline
+from wildlab.navigation.timeline import (
+    Gap,
+    Imu,
+    Measurements,
+    Timeline,
+    checked_imu,
+    find_gaps,
+    lay_out,
+)
 
 
 class Wander(NamedTuple):
@@ -133,6 +141,29 @@ def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: f
     spread = np.asarray(sd, float)
     spread = spread[:, None] if spread.ndim == 1 else spread
     return _aiding(kernels.HEADING, times, field_b, spread, [declination, 0.0, 0.0], "magnetometer headings")
+
+
+def set_out(
+    imu: Imu, start: float, aiding: Sequence[Aiding], wanted: Array, max_gap: float
+) -> tuple[Timeline, list[Gap]]:
+    """The line of time from ``start`` (s) on, with the times that are wanted (M,), and the gaps along it.
+
+    Raises
+    ------
+    WildlabError
+        For inertial samples that cannot be used, or a start outside them.
+    """
+    samples = checked_imu(imu)
+    if not samples.times[0] <= start < samples.times[-1]:
+        raise WildlabError(
+            f"the start at {start} s is not within the inertial samples, {samples.times[0]} to "
+            f"{samples.times[-1]} s",
+            "check that inertial sensors and GNSS are on the same clock",
+            field="start",
+        )
+    others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
+    gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start]
+    return lay_out(samples, start, others, wanted, max_gap), gaps
 
 
 def gather(

@@ -24,15 +24,14 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
 from wildlab.navigation import kernels
-from wildlab.navigation.aiding import Aiding, gather
+from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers
 from wildlab.navigation.noise import AxisErrors
 from wildlab.navigation.noise import ImuNoise as ImuNoise  # part of what a run takes, so also found here
-from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
+from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu
 
 #: Verdicts on a measurement: left out by its gate; taken in; taken in after the covariance was widened.
 REJECTED, ACCEPTED, FORCED = kernels.REJECTED, kernels.ACCEPTED, kernels.FORCED
@@ -123,16 +122,7 @@ def prepare(
     imu: Imu, start: Start, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array, gate: float,
     max_gap: float, gap_acceleration: float, gap_rate: float, axes: AxisErrors | None = None,
 ) -> Prepared:  # fmt: skip
-    samples = checked_imu(imu)
-    if not samples.times[0] <= start.time < samples.times[-1]:
-        raise WildlabError(
-            f"the start at {start.time} s is not within the inertial samples, {samples.times[0]} to "
-            f"{samples.times[-1]} s",
-            "check that inertial sensors and GNSS are on the same clock",
-            field="start",
-        )
-    others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
-    line = lay_out(samples, start.time, others, output_times, max_gap)
+    line, gaps = set_out(imu, start.time, aiding, output_times, max_gap)
     beyond, extra = _extra(aiding, axes)
     state = np.concatenate([start.state, np.zeros(len(extra))])
     covariance = block_diag(start.covariance, beyond)
@@ -143,7 +133,6 @@ def prepare(
     ]
     numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], gap_acceleration, gap_rate])
     limits = chi2.isf(gate, [3, 3, 1]) if gate > 0 else np.full(3, np.inf)
-    gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start.time]
     return Prepared(
         line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
         np.asarray(limits, float),

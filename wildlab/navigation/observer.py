@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -26,10 +25,10 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.navigation import kernels
-from wildlab.navigation.aiding import Aiding, gather
+from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.observer_kernel import observe
-from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu, find_gaps, lay_out
+from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu
 
 REFERENCE = 3
 
@@ -143,16 +142,7 @@ def prepare(
     wanted: Array,
     max_gap: float,
 ) -> Prepared:
-    samples = checked_imu(imu)
-    if not samples.times[0] <= start.time < samples.times[-1]:
-        raise WildlabError(
-            f"the start at {start.time} s is not within the inertial samples, {samples.times[0]} to "
-            f"{samples.times[-1]} s",
-            "check that inertial sensors and GNSS are on the same clock",
-            field="start",
-        )
-    others = np.concatenate([np.empty(0)] + [source.times for source in aiding])
-    line = lay_out(samples, start.time, others, wanted, max_gap)
+    line, gaps = set_out(imu, start.time, aiding, wanted, max_gap)
     p_e, R_en = earth_axes(origin)
     in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == kernels.POSITION else 0.0)) for a in aiding]
     measured, _, unused = gather(in_e, line)
@@ -174,7 +164,6 @@ def prepare(
     force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
     spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
     P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
-    gaps = [gap for gap in find_gaps(samples.times, max_gap) if gap.end > start.time]
     return Prepared(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
 
 
