@@ -32,15 +32,6 @@ def white_bound(n: int, level: float = 0.95) -> float:
     return float(norm.ppf((1 + level) / 2) / np.sqrt(n))
 
 
-def ljung_box(series: ArrayLike, lags: int) -> tuple[float, float]:
-    """Ljung and Box's statistic over lags 1..``lags`` and the probability of a larger one if white."""
-    x = np.asarray(series, float)
-    n = len(x)
-    r = autocorrelation(x, lags)[1:]
-    statistic = float(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    return statistic, float(chi2.sf(statistic, lags))
-
-
 def effective_sample_size(series: ArrayLike, max_lag: int) -> float:
     """How many independent samples a correlated series (T,) is worth for its mean.
 

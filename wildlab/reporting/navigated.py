@@ -10,6 +10,7 @@ import pandas as pd
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.schema import SECOND_COLUMNS
 from wildlab.flight.store import Flight
+from wildlab.pipeline.navigate import likelihoods_of_latency
 from wildlab.pipeline.navigation_errors import (
     AXES,
     PLACES,
@@ -45,6 +46,8 @@ CONVENTION = (
     "Position and velocity in n (m, m/s), attitude as four times the modified Rodrigues parameters of dq in "
     "q_true = q_hat dq, in b (rad); truth minus estimate."
 )
+#: Delays of a receiver that are tried, s.
+LATENCIES = np.arange(0.0, 0.41, 0.02)
 _TURNS = [f"{axis} (°)" for axis in AXES]
 _SPEEDS = [f"{place} (m/s)" for place in PLACES]
 
@@ -69,6 +72,17 @@ def limits_of_observer(flight: Flight) -> list[str]:
             "that the filter found was taken off before. So the two do not check each other in that."
         )
     return found
+
+
+def words_on_latency(flight: Flight) -> str:
+    """How late the receiver is taken to be, and what the flight's own measurements say of it."""
+    likely = likelihoods_of_latency(flight, LATENCIES)
+    stated, likeliest = flight.manifest.gnss.latency_s, float(LATENCIES[int(np.argmax(likely))])
+    return (
+        f"The receiver is taken to stamp its fixes {stated:.2f} s late. To the filter, the fixes of this "
+        f"flight are likeliest with {likeliest:.2f} s, of all delays up to {LATENCIES[-1]:.1f} s in steps of "
+        f"{LATENCIES[1] - LATENCIES[0]:.2f} s; no attitude found on board has a part in that."
+    )
 
 
 def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
