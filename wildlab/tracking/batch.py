@@ -103,9 +103,13 @@ def run_batch(
     B, N = z.shape[:2]
     first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
     F, Q, left = np.empty((N, 4, 4)), np.empty((N, 4, 4)), np.ones(N)
-    for row, dt in enumerate(np.diff(given.times[first:], prepend=start.time), first):
-        F[row], Q[row] = motion(float(dt))
-        left[row] = 1.0 if pose is None else schmidt.fade(float(dt), pose.correlation_time)
+    steps, which = np.unique(np.diff(given.times[first:], prepend=start.time), return_inverse=True)
+    if len(steps):  # cameras keep time: the same few steps again and again
+        F[first:], Q[first:] = (
+            np.array(one)[which] for one in zip(*map(motion, steps.tolist()), strict=True)
+        )
+        if pose is not None:
+            left[first:] = np.array([schmidt.fade(dt, pose.correlation_time) for dt in steps.tolist()])[which]
 
     P_poses = phis = np.zeros((1, N, 36))
     if pose is not None:

@@ -1,7 +1,7 @@
 """The hot loops of many runs, compiled: constant velocity's four states, two measured elements.
 
-Runs are taken in blocks of `LANES`, one run in each lane, with the lanes on the last axis: the innermost
-loops run over lanes, and their number and all sizes are known to the compiler. What they compute is what
+Runs are taken in blocks of at most `LANES`, one run in each lane, with the lanes on the last axis: the
+innermost loops run over lanes, and all other sizes are known to the compiler. What they compute is what
 `wildlab.tracking.run.run_filter` computes for each run; tests hold the two together.
 
 All compiled functions stay in this one file, see `wildlab.navigation.kernels`.
@@ -33,19 +33,20 @@ def compiled(function: Function) -> Function:
 @compiled
 def predict_lanes(x: Array, P: Array, F: Array, Q: Array, y: Array, M: Array) -> None:
     """H (3.5a)-(3.5b) for x (4, L) and P (4, 4, L); ``y`` and ``M`` are scratch of the same shapes."""
+    lanes = x.shape[-1]
     for i in range(4):
-        for r in range(LANES):
+        for r in range(lanes):
             y[i, r] = F[i, 0] * x[0, r] + F[i, 1] * x[1, r] + F[i, 2] * x[2, r] + F[i, 3] * x[3, r]
         for j in range(4):
-            for r in range(LANES):
+            for r in range(lanes):
                 M[i, j, r] = (
                     F[i, 0] * P[0, j, r] + F[i, 1] * P[1, j, r] + F[i, 2] * P[2, j, r] + F[i, 3] * P[3, j, r]
                 )
     for i in range(4):
-        for r in range(LANES):
+        for r in range(lanes):
             x[i, r] = y[i, r]
         for j in range(i + 1):
-            for r in range(LANES):
+            for r in range(lanes):
                 P[i, j, r] = P[j, i, r] = Q[i, j] + (
                     M[i, 0, r] * F[j, 0] + M[i, 1, r] * F[j, 1] + M[i, 2, r] * F[j, 2] + M[i, 3, r] * F[j, 3]
                 )
@@ -54,25 +55,27 @@ def predict_lanes(x: Array, P: Array, F: Array, Q: Array, y: Array, M: Array) ->
 @compiled
 def carry_cross(C: Array, F: Array, left: float, phi: Array, M: Array) -> None:
     """``F C Phi'`` times what is left of the correlation; C (4, 6, L), phi (36, L)."""
+    lanes = C.shape[-1]
     for i in range(4):
         for a in range(6):
-            for r in range(LANES):
+            for r in range(lanes):
                 M[i, a, r] = left * (
                     F[i, 0] * C[0, a, r] + F[i, 1] * C[1, a, r] + F[i, 2] * C[2, a, r] + F[i, 3] * C[3, a, r]
                 )
     for i in range(4):
         for a in range(6):
-            for r in range(LANES):
+            for r in range(lanes):
                 C[i, a, r] = 0.0
             for b in range(6):
-                for r in range(LANES):
+                for r in range(lanes):
                     C[i, a, r] += M[i, b, r] * phi[6 * a + b, r]
 
 
 @compiled
 def invert_and_weigh(S: Array, v: Array, inverse: Array, nis: Array, ok: Array, singular: Flags) -> None:
     """Inverse of S (2, 2, L) and NIS; lanes whose S is no covariance are marked."""
-    for r in range(LANES):
+    lanes = v.shape[-1]
+    for r in range(lanes):
         determinant = S[0, 0, r] * S[1, 1, r] - S[0, 1, r] * S[0, 1, r]
         singular[r] = ok[r] > 0 and not (determinant > 0 and S[0, 0, r] > 0)
         inverse[0, 0, r], inverse[1, 1, r] = S[1, 1, r] / determinant, S[0, 0, r] / determinant
@@ -94,62 +97,63 @@ def update_lanes(
     scratch. Nothing changes where ``ok`` (L,) is zero or the gate is missed; ``ok`` comes back as what was
     used. ``v`` must be finite everywhere.
     """
+    lanes = x.shape[-1]
     for i in range(4):
         for a in range(2):
-            for r in range(LANES):
+            for r in range(lanes):
                 U[i, a, r] = P[i, 0, r] * H[a, 0, r] + P[i, 1, r] * H[a, 1, r]
             if with_pose:
                 for c in range(6):
-                    for r in range(LANES):
+                    for r in range(lanes):
                         U[i, a, r] += C[i, c, r] * H_pose[a, c, r]
     for a in range(2):
         for b in range(2):
-            for r in range(LANES):
+            for r in range(lanes):
                 S[a, b, r] = H[a, 0, r] * U[0, b, r] + H[a, 1, r] * U[1, b, r] + R[a, b, r]
     if with_pose:
         for c in range(6):
             for b in range(2):
-                for r in range(LANES):
+                for r in range(lanes):
                     W[c, b, r] = C[0, c, r] * H[b, 0, r] + C[1, c, r] * H[b, 1, r]
                 for d in range(6):
-                    for r in range(LANES):
+                    for r in range(lanes):
                         W[c, b, r] += P_pose[c, d, r] * H_pose[b, d, r]
                 for a in range(2):
-                    for r in range(LANES):
+                    for r in range(lanes):
                         S[a, b, r] += H_pose[a, c, r] * W[c, b, r]
     invert_and_weigh(S, v, inverse, nis, ok, singular)
-    for r in range(LANES):
+    for r in range(lanes):
         ok[r] = ok[r] if nis[r] <= threshold else 0.0
     for i in range(4):
         for a in range(2):
-            for r in range(LANES):
+            for r in range(lanes):
                 gain = U[i, 0, r] * inverse[0, a, r] + U[i, 1, r] * inverse[1, a, r]
                 K[i, a, r] = gain if ok[r] > 0 else 0.0
-        for r in range(LANES):
+        for r in range(lanes):
             x[i, r] += K[i, 0, r] * v[0, r] + K[i, 1, r] * v[1, r]
     # The target's rows of (7.37): [G, C] is the left factor times the prior, then comes the right one.
     for i in range(4):
         for j in range(4):
-            for r in range(LANES):
+            for r in range(lanes):
                 G[i, j, r] = P[i, j, r] - K[i, 0, r] * U[j, 0, r] - K[i, 1, r] * U[j, 1, r]
         if with_pose:
             for c in range(6):
-                for r in range(LANES):
+                for r in range(lanes):
                     C[i, c, r] -= K[i, 0, r] * W[c, 0, r] + K[i, 1, r] * W[c, 1, r]
     for i in range(4):
         for a in range(2):
-            for r in range(LANES):
+            for r in range(lanes):
                 U[i, a, r] = (
                     G[i, 0, r] * H[a, 0, r] + G[i, 1, r] * H[a, 1, r]
                     - K[i, 0, r] * R[0, a, r] - K[i, 1, r] * R[1, a, r]
                 )  # fmt: skip
             if with_pose:
                 for c in range(6):
-                    for r in range(LANES):
+                    for r in range(lanes):
                         U[i, a, r] += C[i, c, r] * H_pose[a, c, r]
     for i in range(4):
         for j in range(i + 1):
-            for r in range(LANES):
+            for r in range(lanes):
                 one = G[i, j, r] - U[i, 0, r] * K[j, 0, r] - U[i, 1, r] * K[j, 1, r]
                 other = G[j, i, r] - U[j, 0, r] * K[i, 0, r] - U[j, 1, r] * K[i, 1, r]
                 P[i, j, r] = P[j, i, r] = (one + other) / 2
@@ -167,7 +171,8 @@ def expect_pixels(
     ``ok`` is one where the pixel and the pose are there and the target is in front of the camera; the rest is
     zero then.
     """
-    for r in range(LANES):
+    lanes = x.shape[-1]
+    for r in range(lanes):
         n, e, d = x[0, r] - pose[0, r], x[1, r] - pose[1, r], plane - pose[2, r]
         X = pose[3, r] * n + pose[6, r] * e + pose[9, r] * d
         Y = pose[4, r] * n + pose[7, r] * e + pose[10, r] * d
@@ -245,46 +250,47 @@ def limit_lanes(C: Array, P: Array, P_pose: Array, L: Array, Y: Array, M: Array,
 
     By Cholesky's pivots of P_pose and of what P has beyond ``C P_pose^-1 C'``.
     """
-    for r in range(LANES):
+    lanes = C.shape[-1]
+    for r in range(lanes):
         sound[r] = 1.0
     for i in range(6):
         for j in range(i + 1):
-            for r in range(LANES):
+            for r in range(lanes):
                 L[i, j, r] = P_pose[i, j, r]
             for k in range(j):
-                for r in range(LANES):
+                for r in range(lanes):
                     L[i, j, r] -= L[i, k, r] * L[j, k, r]
             if j < i:
-                for r in range(LANES):
+                for r in range(lanes):
                     L[i, j, r] /= L[j, j, r]
-        for r in range(LANES):
+        for r in range(lanes):
             # A pivot near nothing (or a NaN) is left to the careful way.
             sound[r] = sound[r] if L[i, i, r] > 1e-9 * P_pose[i, i, r] else 0.0
             L[i, i, r] = np.sqrt(L[i, i, r]) if sound[r] > 0 else 1.0
     for i in range(4):
         for a in range(6):
-            for r in range(LANES):
+            for r in range(lanes):
                 Y[i, a, r] = C[i, a, r]
             for k in range(a):
-                for r in range(LANES):
+                for r in range(lanes):
                     Y[i, a, r] -= L[a, k, r] * Y[i, k, r]
-            for r in range(LANES):
+            for r in range(lanes):
                 Y[i, a, r] /= L[a, a, r]
     highest = LARGEST_CORRELATION**2
     for i in range(4):
         for j in range(i + 1):
-            for r in range(LANES):
+            for r in range(lanes):
                 M[i, j, r] = highest * P[i, j, r]
             for a in range(6):
-                for r in range(LANES):
+                for r in range(lanes):
                     M[i, j, r] -= Y[i, a, r] * Y[j, a, r]
             for k in range(j):
-                for r in range(LANES):
+                for r in range(lanes):
                     M[i, j, r] -= M[i, k, r] * M[j, k, r]
             if j < i:
-                for r in range(LANES):
+                for r in range(lanes):
                     M[i, j, r] /= M[j, j, r]
-        for r in range(LANES):
+        for r in range(lanes):
             sound[r] = sound[r] if M[i, i, r] > 1e-9 * P[i, i, r] else 0.0
             M[i, i, r] = np.sqrt(M[i, i, r]) if sound[r] > 0 else 1.0
 
@@ -292,8 +298,9 @@ def limit_lanes(C: Array, P: Array, P_pose: Array, L: Array, Y: Array, M: Array,
 @compiled
 def load(source: Array, row: int, first: int, target: Array) -> None:
     """Row of (B or 1, N, k) into (k, L): one run in each lane, the last run in lanes beyond it."""
+    lanes = target.shape[-1]
     last = len(source) - 1
-    for r in range(LANES):
+    for r in range(lanes):
         for i in range(source.shape[2]):
             target[i, r] = source[min(first + r, last), row, i]
 
@@ -312,20 +319,21 @@ def run_lanes(
     outputs with the runs last, x and P of each row at its place in ``slots`` (N,), nowhere where that is -1.
     """
     n_runs, n_rows = z.shape[:2]
-    x, P, C = np.empty((4, LANES)), np.empty((4, 4, LANES)), np.zeros((4, 6, LANES))
-    y, M, N = np.empty((4, LANES)), np.empty((4, 4, LANES)), np.empty((4, 6, LANES))
-    U, W, K = np.empty((4, 2, LANES)), np.zeros((6, 2, LANES)), np.empty((4, 2, LANES))
-    S, inverse, L = np.empty((2, 2, LANES)), np.empty((2, 2, LANES)), np.zeros((6, 6, LANES))
-    seen, v, noise = np.empty((2, LANES)), np.empty((2, LANES)), np.empty((4, LANES))
-    H, H_pose = np.zeros((2, 2, LANES)), np.zeros((2, 6, LANES))
-    pose, turn, P_pose = np.zeros((12, LANES)), np.zeros((9, LANES)), np.zeros((36, LANES))
-    phi = np.empty((36, LANES))
-    ok, nis, offered, singular = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.zeros(LANES, np.bool_)
-    R_now, pose_now = noise.reshape(2, 2, LANES), P_pose.reshape(6, 6, LANES)
-    for first in range(0, n_runs, LANES):
-        width = min(LANES, n_runs - first)
+    lanes = min(LANES, n_runs)
+    x, P, C = np.empty((4, lanes)), np.empty((4, 4, lanes)), np.zeros((4, 6, lanes))
+    y, M, N = np.empty((4, lanes)), np.empty((4, 4, lanes)), np.empty((4, 6, lanes))
+    U, W, K = np.empty((4, 2, lanes)), np.zeros((6, 2, lanes)), np.empty((4, 2, lanes))
+    S, inverse, L = np.empty((2, 2, lanes)), np.empty((2, 2, lanes)), np.zeros((6, 6, lanes))
+    seen, v, noise = np.empty((2, lanes)), np.empty((2, lanes)), np.empty((4, lanes))
+    H, H_pose = np.zeros((2, 2, lanes)), np.zeros((2, 6, lanes))
+    pose, turn, P_pose = np.zeros((12, lanes)), np.zeros((9, lanes)), np.zeros((36, lanes))
+    phi = np.empty((36, lanes))
+    ok, nis, offered, singular = np.empty(lanes), np.empty(lanes), np.empty(lanes), np.zeros(lanes, np.bool_)
+    R_now, pose_now = noise.reshape(2, 2, lanes), P_pose.reshape(6, 6, lanes)
+    for first in range(0, n_runs, lanes):
+        width = min(lanes, n_runs - first)
         C[:] = 0.0
-        for r in range(LANES):
+        for r in range(lanes):
             run = min(first + r, n_runs - 1)
             x[:, r], P[:, :, r] = x0[run], P0[min(run, len(P0) - 1)]
         for row in range(start, n_rows):
@@ -337,7 +345,7 @@ def run_lanes(
                 load(R_bc, row, first, turn)
                 expect_pixels(x, seen, pose, turn, lever, planes[row], A, v, H, H_pose, ok)
             else:
-                for r in range(LANES):
+                for r in range(lanes):
                     there = np.isfinite(seen[0, r]) and np.isfinite(seen[1, r])
                     ok[r] = 1.0 if there else 0.0
                     for i in range(2):
