@@ -102,6 +102,12 @@ footer p { margin: .25rem 0; max-width: none }
   h1 { font-size: 1.5rem }
   .summary { padding: .75rem .9rem }
   .tiles b { font-size: 1.3rem }
+  /* Narrow enough that what is published and what came out here stand side by side. */
+  table { font-size: .86rem }
+  th, td { padding: .34rem .4rem }
+  thead th { font-size: .76rem }
+  th.text, td.text { min-width: 4.6rem }
+  th.wide { min-width: 8rem }
 }
 @page { size: A4; margin: 16mm 15mm }
 @media print {
