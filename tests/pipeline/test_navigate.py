@@ -156,6 +156,9 @@ def test_a_magnetometer_stands_in_for_the_second_antenna():
     filtered = navigate_mekf(known, times, magnetometer=True)
     assert set(filtered.innovations["source"]) == {"position", "velocity", "heading"}
     assert errors(known, filtered.nav)[1][2] < 2.0
+    flipped = known.tables["magnetometer"].assign(field_y_ut=-known.tables["magnetometer"]["field_y_ut"])
+    with pytest.raises(WildlabError, match="the magnetic field's turning in the air, the gyros explain"):
+        navigate_observer(Flight(known.manifest, known.nav, {**known.tables, "magnetometer": flipped}), times)
     with pytest.raises(WildlabError, match="declination_deg is not stated") as caught:
         navigate_mekf(silent, times, magnetometer=True)
     assert caught.value.field == "magnetometer.declination_deg"

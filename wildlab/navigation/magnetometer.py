@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, quaternion_to_matrix
+from wildlab.geometry.gravity import flat_earth
+from wildlab.navigation.strapdown import integrate_strapdown
+from wildlab.navigation.timeline import Imu, checked_imu
 
 #: Largest standard deviation of a centre, over the radius: a heading by it is then good to some two degrees.
 SURE = 0.03
@@ -48,3 +51,39 @@ def earth_field(declination: float, inclination: float) -> Array:
     """Direction of the Earth's field in n, (3,): turned from north towards east, then down (rad)."""
     level = np.cos(inclination)
     return np.array([level * np.cos(declination), level * np.sin(declination), np.sin(inclination)])
+
+
+def share_turned(times: ArrayLike, field_b: ArrayLike, imu: Imu, step: float = 2.0) -> float:
+    """How much of the field's turning in b the gyros explain: near one where both are in the same axes.
+
+    The Earth's field stands still in n, so in b it turns as the airframe does, the other way round. With an
+    axis flipped or exchanged it turns in ways that no gyro felt, and the share falls, below zero even.
+
+    Parameters
+    ----------
+    times, field_b
+        (N,) s and (N, 3) in b, of any unit, without the part that turns with the airframe.
+    imu
+        Of the same flight.
+    step
+        From one sample compared to the next, s: long enough to turn by more than the field's noise.
+
+    Returns
+    -------
+    float
+        One less the ratio of what is left unexplained to all change; NaN where nothing turns.
+    """
+    t, m = np.asarray(times, float), np.asarray(field_b, float)
+    samples = checked_imu(imu)
+    every = max(1, round(step / float(np.median(np.diff(t))))) if len(t) > 1 else 1
+    t, m = t[::every], m[::every]
+    inside = (t >= samples.times[0]) & (t <= samples.times[-1]) & np.isfinite(m).all(axis=1)
+    t, m = t[inside], m[inside]
+    if len(t) < 2:
+        return float("nan")
+    none = np.zeros(3)
+    moved = integrate_strapdown(samples, none, none, [1.0, 0.0, 0.0, 0.0], flat_earth(0.0), max_gap=np.inf)
+    R = quaternion_to_matrix(moved.quaternion[np.searchsorted(samples.times, t)])
+    expected = np.einsum("kji,kjl,kl->ki", R[1:], R[:-1], m[:-1])
+    change = float(((m[1:] - m[:-1]) ** 2).sum())
+    return 1 - float(((m[1:] - expected) ** 2).sum()) / change if change > 0 else float("nan")

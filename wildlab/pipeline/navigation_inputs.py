@@ -14,7 +14,7 @@ from wildlab.flight.store import Flight
 from wildlab.flight.sync import gnss_times
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import Aiding, headings, positions, velocities
-from wildlab.navigation.magnetometer import earth_field, hard_iron
+from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import baseline_reference, course_reference, field_reference
@@ -28,6 +28,8 @@ VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
 #: Level speed from which an airframe counts as flying, and its course as a heading, m/s.
 FLYING = 8.0
+#: Share of the magnetic field's turning that gyros in the same axes explain at least; it is nearer one.
+TURNED = 0.6
 #: How much wider than the fixes behind it the heading at the start is taken to be.
 LOOSE = 5.0
 
@@ -114,12 +116,9 @@ def inputs_of(
     WildlabError
         Where the flight lacks inertial samples, satellite positions, or what is known of their errors.
     """
-    imu, gnss = flight.table("imu"), flight.table("gnss")
-    samples = Imu(
-        imu["time_s"].to_numpy(float),
-        imu[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]].to_numpy(float) - np.asarray(accelerometer_bias, float),
-        imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float),
-    )
+    gnss, samples = flight.table("gnss"), samples_of(flight)
+    off = np.asarray(accelerometer_bias, float)
+    samples = samples._replace(specific_force=samples.specific_force - off)
     t, p = gnss_times(flight), gnss[POSITION].to_numpy(float)
     sd = _position_sd(flight, gnss)
     spread = float(np.sqrt(2) * np.nanmedian(sd))
@@ -204,6 +203,16 @@ def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Arra
     return np.array(flight.manifest.gnss.lever_arm_m)
 
 
+def samples_of(flight: Flight) -> Imu:
+    """The flight's inertial samples."""
+    imu = flight.table("imu")
+    return Imu(
+        imu["time_s"].to_numpy(float),
+        imu[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]].to_numpy(float),
+        imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float),
+    )
+
+
 def field_of(flight: Flight) -> Aiding | None:
     """The magnetic field as the observer's second vector; None where the flight has no magnetometer, or the
     manifest does not say how the Earth's field lies there."""
@@ -244,15 +253,29 @@ def headings_of(flight: Flight) -> Aiding:
 
 
 def _field(flight: Flight) -> tuple[Array, Array]:
-    """Times (N,) and the field (N, 3) in b, less what is magnetic on board: stated or found in the air."""
+    """Times (N,) and the field (N, 3) in b, less what is magnetic on board: stated or found in the air.
+
+    Raises
+    ------
+    WildlabError
+        Where the field does not turn as the gyros say: its axes are not those of the inertial samples.
+    """
     table, gnss = flight.table("magnetometer"), flight.table("gnss")
     times, field = table["time_s"].to_numpy(float), table[list(FIELD)].to_numpy(float)
-    if flight.manifest.magnetometer.hard_iron_ut is not None:
-        return times, field - flight.manifest.magnetometer.hard_iron_ut
     flown = np.full(len(times), True)
     if set(VELOCITY) <= set(gnss.columns):
         t, v = gnss_times(flight), gnss[VELOCITY].to_numpy(float)
         fast = t[np.hypot(v[:, 0], v[:, 1]) >= FLYING]
         if len(fast):
             flown = (times >= fast[0]) & (times <= fast[-1])
-    return times, field - hard_iron(field[flown])
+    stated = flight.manifest.magnetometer.hard_iron_ut
+    field = field - (hard_iron(field[flown]) if stated is None else stated)
+    share = share_turned(times[flown], field[flown], samples_of(flight))
+    if share < TURNED:
+        raise WildlabError(
+            f"of the magnetic field's turning in the air, the gyros explain {100 * max(share, 0):.0f} %",
+            "check axes and signs of [magnetometer.field], and that both are on the same clock",
+            file=flight.folder,
+            field="magnetometer",
+        )
+    return times, field
