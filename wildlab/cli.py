@@ -169,25 +169,28 @@ def run(
     "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes it may take.  [default: 30]"
 )
 def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float | None) -> None:
-    """How accurate is the georeferencing of a flight? FLIGHT is a folder made by `wildlab import`.
+    """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
+
+    One report on the accuracy of its georeferencing, and one on its navigation, as far as the data go.
 
     \b
     Examples:
       wildlab evaluate flights/tuesday
       wildlab evaluate flights/antenna --source autopilot
     """
-    from wildlab.reporting.run import evaluate_flight
+    from wildlab.reporting.evaluate import evaluate_flight
 
-    outcome = evaluate_flight(
+    outcomes = evaluate_flight(
         flight,
         source=source,
         reports=_reports(out),
         timeout_s=None if timeout is None else timeout * 60,
         console=_console(),
     )
-    if outcome.folder is not None:
-        click.echo(shown(outcome.folder / "report.html"))
-    if outcome.state == "failed":
+    for outcome in outcomes:
+        if outcome.folder is not None:
+            click.echo(shown(outcome.folder / "report.html"))
+    if any(outcome.state == "failed" for outcome in outcomes):
         sys.exit(1)
 
 

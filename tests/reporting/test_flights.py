@@ -12,9 +12,12 @@ import pytest
 from tests.flight.conftest import make_flight
 from tests.reporting.conftest import OPEN, notebook, write
 from wildlab.errors import WildlabError
+from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting import flights
-from wildlab.reporting.run import evaluate_flight, run_studies
+from wildlab.reporting.evaluate import evaluate_flight, lacking_for_navigation
+from wildlab.reporting.run import run_studies
+from wildlab.simulation.twins import simulate_twin
 
 __all__ = ["make_flight"]
 
@@ -97,7 +100,7 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
     folder = tmp_path / "tuesday"
     save_flight(make_flight(), folder)
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    outcome = evaluate_flight(folder, **where)
+    (outcome,) = evaluate_flight(folder, **where)
     assert outcome.state == "done", outcome.reason
     assert outcome.folder == (tmp_path / "reports" / "small-flight").resolve()
     content = json.loads((outcome.folder / "metrics.json").read_text())
@@ -126,6 +129,38 @@ def test_which_poses_are_meant_is_asked_before_anything_runs(
     with pytest.raises(WildlabError, match="no nav source 'mekf'"):
         evaluate_flight(tmp_path / "flight", source="mekf", **where)
     assert not (tmp_path / "reports").exists()
+
+
+def test_a_flight_of_which_nothing_can_be_judged_is_refused(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    """With what it lacks for each report, before anything runs."""
+    flight = make_flight()
+    del flight.tables["detections"], flight.tables["truth"]
+    save_flight(flight, tmp_path / "flight")
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    with pytest.raises(WildlabError, match="nothing of this flight can be judged") as caught:
+        evaluate_flight(tmp_path / "flight", **where)
+    assert "Georeferencing: it lacks detections of kind pixel and truth" in caught.value.problem
+    assert "Navigation: it lacks inertial measurements (imu)" in caught.value.problem
+    with pytest.raises(WildlabError, match="poses are named, and the georeferencing cannot be judged"):
+        evaluate_flight(tmp_path / "flight", source="logged", **where)
+    assert not (tmp_path / "reports").exists()
+
+
+def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
+    """In the words of the navigation itself: a reference, and how the sensor errs."""
+    twin = simulate_twin("fast-vessel", 1)
+    assert "studies of its own" in lacking_for_navigation(twin)
+    stated = twin.manifest.model_dump(exclude={"twin", "kind"}, exclude_none=True)
+    logged = make_manifest({**stated, "kind": "logged"})
+    tables = {name: twin.tables[name] for name in ("imu", "gnss")}
+    assert lacking_for_navigation(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables)) == ""
+    assert "no pose to compare with" in lacking_for_navigation(Flight(logged, {}, tables))
+    silent = make_manifest({**stated, "kind": "logged", "imu": {}})
+    flight = Flight(silent, {"onboard": twin.nav["autopilot"]}, tables)
+    assert "how the inertial sensor errs is not stated" in lacking_for_navigation(flight)
+    assert "inertial measurements" in lacking_for_navigation(Flight(logged, {}, {"gnss": tables["gnss"]}))
 
 
 def test_a_flight_named_like_a_study_would_replace_its_report(

@@ -11,7 +11,8 @@ import pytest
 
 from wildlab.flight.recipe import import_flight
 from wildlab.paths import DATA
-from wildlab.reporting.run import evaluate_flight, run_studies
+from wildlab.reporting.evaluate import evaluate_flight
+from wildlab.reporting.run import run_studies
 
 pytestmark = pytest.mark.slow
 
@@ -108,7 +109,7 @@ def test_a_flight_with_labelled_markers_is_evaluated(
 ) -> None:
     raw = shared_data("georeferencing", "openathena-f1")
     import_flight(DATA / "recipes" / "openathena-f1.toml", raw, tmp_path / "flight")
-    outcome = evaluate_flight(tmp_path / "flight", reports=reports)
+    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
     found = values(outcome.folder)
     assert found["horizontal_error_mean", "logged-pose"]["value"] <= 3.0
     assert found["horizontal_error_mean", "logged-pose"]["n"] == 103
@@ -117,6 +118,22 @@ def test_a_flight_with_labelled_markers_is_evaluated(
         for subject in ("logged-pose", "logged-pose/estimated-noise")
     )
     assert 0.8 <= after <= before <= 1.0
+    assert outcome.folder is not None
+    assert faults(outcome.folder / "report.html") == []
+
+
+def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("logs", "umn_thor75")
+    import_flight(DATA / "recipes" / "umn-thor75.toml", raw, tmp_path / "flight")
+    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
+    assert outcome.name == "umn-thor75-navigation"
+    found = values(outcome.folder)
+    # In the air, which nobody had to point out: rotations about the axes of the body, in degrees.
+    for axis, most in (("roll", 1.0), ("pitch", 1.0), ("yaw", 2.0)):
+        assert found[f"rms_{axis}", "mekf"]["value"] < most
+        assert found[f"rms_{axis}", "observer"]["value"] < 2 * most
     assert outcome.folder is not None
     assert faults(outcome.folder / "report.html") == []
 

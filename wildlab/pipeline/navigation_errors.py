@@ -20,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, nees, share_inside
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import covariances, poses_at
+from wildlab.flight.sync import covariances, gnss_times, poses_at
 from wildlab.pipeline.navigate import (
     BIASES,
     PUBLISHED_LIKE,
@@ -29,7 +29,7 @@ from wildlab.pipeline.navigate import (
     navigate_mekf,
     navigate_observer,
 )
-from wildlab.pipeline.navigation_inputs import VELOCITY
+from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY
 from wildlab.simulation.twins import simulate_twin
 
 Array = NDArray[np.float64]
@@ -96,6 +96,20 @@ def comparison_times(flight: Flight, reference: str) -> Array:
     felt = flight.table("imu")["time_s"].to_numpy(float)
     every = max(1, round(1 / (RATE_HZ * float(np.median(np.diff(stamps))))))
     return np.asarray(stamps[(stamps >= felt[0]) & (stamps <= felt[-1])][::every])
+
+
+def flown_part(flight: Flight, times: ArrayLike) -> tuple[str, float, float]:
+    """The part of a flight to judge where nobody names one: what to call it, and from when to when, s.
+
+    In the air, where the receiver's speeds tell; else from a minute after the first of ``times`` on.
+    """
+    t, gnss = np.asarray(times, float), flight.table("gnss")
+    if set(VELOCITY) <= set(gnss.columns):
+        speed = np.hypot(*gnss[["v_north_m_s", "v_east_m_s"]].to_numpy(float).T)
+        fast = gnss_times(flight)[speed >= FLYING]
+        if len(fast):
+            return "in the air", float(max(fast[0], t[0])), float(min(fast[-1], t[-1]))
+    return "after the first minute", float(t[0]) + SETTLING_S, float(t[-1])
 
 
 def errors_against(

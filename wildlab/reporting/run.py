@@ -27,9 +27,6 @@ from wildlab.reporting.progress import outcome_line, shown
 from wildlab.reporting.seeds import SeedWork, make_work
 from wildlab.reporting.studies import OTHERS, STANDARD_PARAMETERS, Study, find_study, load_studies
 
-#: The notebook that judges any flight.
-EVALUATION = "georeferencing.ipynb"
-
 
 def make_job(
     study: Study,
@@ -184,7 +181,9 @@ def run_studies(
         )
         jobs.append(job)
     notes = _notes(chosen, seeds, scheduler)
-    return _run(jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler)
+    return run_all(
+        jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
+    )
 
 
 def _notes(chosen: Sequence[Study], seeds: int | None, scheduler: str | None) -> list[str]:
@@ -199,52 +198,7 @@ def _notes(chosen: Sequence[Study], seeds: int | None, scheduler: str | None) ->
     return notes
 
 
-def evaluate_flight(
-    folder: Path,
-    *,
-    source: str | None = None,
-    reports: Path = REPORTS,
-    notebooks: Path = NOTEBOOKS,
-    timeout_s: float | None = None,
-    console: Console | None = None,
-) -> Outcome:
-    """Judge the georeferencing of a flight folder; the report goes to ``<reports>/<name of the flight>/``.
-
-    Parameters
-    ----------
-    source
-        Which of the flight's poses to judge; not needed where it has one navigation source, or one named
-        ``logged``.
-
-    Raises
-    ------
-    WildlabError
-        If the folder is not a usable flight, it is not clear which poses are meant, or its name is that of a
-        study.
-    """
-    from wildlab.flight.store import load_flight
-
-    flight = load_flight(folder)
-    name, (source, _) = flight.name, flight.pose_source(source)
-    studies = load_studies(notebooks / "studies.toml")
-    if name in studies:
-        raise WildlabError(
-            f"the flight is named {name!r} like a study, whose report it would replace",
-            "give the flight another name in flight.toml, or the report another folder with --out",
-        )
-    job = make_job(
-        Study(name="evaluate", title=f"Flight {name}", notebook=EVALUATION, parameters={"source": source}),
-        flight=folder,
-        reports=reports,
-        notebooks=notebooks,
-        timeout_s=timeout_s,
-        name=name,
-        again=f"wildlab evaluate {folder.name} --source {source}",
-    )
-    return _run([job], [], studies, reports, console)[0]
-
-
-def _run(
+def run_all(
     jobs: list[Job],
     skipped: list[Outcome],
     studies: dict[str, Study],
@@ -255,6 +209,7 @@ def _run(
     parallel: int = 1,
     scheduler: str | None = None,
 ) -> list[Outcome]:
+    """Run what was made ready, show how it goes, and rebuild the ledger; outcomes as of `run_studies`."""
     if console is not None:
         for note in notes:
             console.print(note, highlight=False, soft_wrap=True)
