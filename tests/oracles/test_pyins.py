@@ -186,25 +186,17 @@ def test_told_the_same_both_filters_find_the_same(thor: Thor) -> None:
 
 
 @pytest.mark.slow
-def test_attitude_is_at_least_as_close_and_velocity_not_quite(thor: Thor) -> None:
+def test_the_filter_is_at_least_as_close(thor: Thor) -> None:
     """The filter as it is delivered, with what the manifest says: axes reckoned with, biases that fade.
 
-    Attitude is closer than pyins'. Level velocity is not, by some centimetres a second, and that is a finding
-    about the manifest rather than about the filter: it states biases of 0.09 m/s^2, and in this flight two
-    accelerometers are off by 0.4 to 0.5 m/s^2 throughout. Told that biases last, ours is as close in velocity
-    too, and gives up most of its lead in attitude. That lead owes to the reference as well: the filter on
-    board finds 0.36 and -0.39 m/s^2, near ours with biases that fade (0.35, -0.40), not pyins' (0.43, -0.54).
+    Of the reference's own: its filter finds accelerometers off by 0.36 and -0.39 m/s^2, pyins 0.43 and -0.54.
+    Before the manifest stated how far off they may be at switching on, ours took them for 0.09 m/s^2, was
+    0.2 deg closer in roll, and 0.04 m/s further in level velocity than pyins.
     """
-    pyins = thor.pyins
-    ours = by_wildlab(thor, thor.noise, axis_errors(thor.flight), gate=1e-4)
-    lasting = by_wildlab(thor, walking(thor.noise), axis_errors(thor.flight), gate=1e-4)
-    for name, judged in (("pyins", pyins), ("ours", ours), ("ours, biases that last", lasting)):
-        show(name, judged)
+    pyins, ours = thor.pyins, by_wildlab(thor, thor.noise, axis_errors(thor.flight), gate=1e-4)
+    show("pyins", pyins)
+    show("ours", ours)
     print(f"pyins takes {pyins.seconds / ours.seconds:.0f} times as long")
-    for found in (ours, lasting):
-        assert (found.attitude <= np.maximum(pyins.attitude * (1 + SHARE), pyins.attitude + ANGLE)).all()
-    tie = np.maximum(pyins.velocity * (1 + SHARE), pyins.velocity + SPEED)
-    assert (lasting.velocity <= tie).all()
-    assert ours.velocity[2] <= tie[2]
-    assert (ours.velocity[:2] <= pyins.velocity[:2] + 0.05).all()  # the finding
+    assert (ours.attitude <= np.maximum(pyins.attitude * (1 + SHARE), pyins.attitude + ANGLE)).all()
+    assert (ours.velocity <= np.maximum(pyins.velocity * (1 + SHARE), pyins.velocity + SPEED)).all()
     assert ours.seconds < pyins.seconds / 20

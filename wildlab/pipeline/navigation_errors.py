@@ -40,6 +40,8 @@ REFERENCES = ("truth-payload", "onboard", "autopilot")
 RATE_HZ = 5.0
 #: Until the filters have forgotten their start, s.
 SETTLING_S = 60.0
+#: What calibrated accelerometers are off by at switching on, m/s^2: it leans an attitude by half a degree.
+CALIBRATED = 0.1
 AXES = ("roll", "pitch", "yaw")
 PLACES = ("north", "east", "down")
 #: Blocks of an error: columns of `Errors.error`, and what they are called.
@@ -224,15 +226,21 @@ def normalised_innovations(innovations: pd.DataFrame, dof: int = 3) -> Array:
     return np.asarray(innovations[names].to_numpy(float) / expected)
 
 
+def calibrated(flight: Flight) -> bool:
+    """Whether the flight's manifest says that its accelerometers are off by no more than `CALIBRATED`."""
+    stated = flight.manifest.imu.accelerometer_turn_on_m_s2
+    return stated is not None and stated <= CALIBRATED
+
+
 def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
     """Every estimate that is compared, by its subject: the filter by what is stated, and the observer; with
     two antennas also the filter with the tunings of `TUNINGS`.
 
-    The observer of H is for calibrated accelerometers. Where the manifest does not say what they are off by
-    at switching on, their calibration is the bias that the filter found, the median over the flight.
+    The observer of H is for calibrated accelerometers. Where these are not (see `calibrated`), their
+    calibration is the bias that the filter found, the median over the flight.
     """
     filtered, off = navigate_mekf(flight, times), np.zeros(3)
-    if flight.manifest.imu.accelerometer_turn_on_m_s2 is None:
+    if not calibrated(flight):
         off = filtered.biases[BIASES[:3]].median().to_numpy(float)
     found = {"mekf": filtered, "observer": navigate_observer(flight, times, accelerometer_bias=off)}
     if "second_north_m" in flight.table("gnss"):

@@ -16,6 +16,7 @@ from wildlab.pipeline.navigation_errors import (
     PLACES,
     Studied,
     against_autopilot,
+    calibrated,
     normalised_innovations,
     shares_within,
     summarise,
@@ -66,10 +67,10 @@ def limits_of_observer(flight: Flight) -> list[str]:
         "takes the magnetic field for its second vector, and is off by what calibrating that in flight leaves"
     )
     found = [f"With one antenna the observer {course if field_of(flight) is None else field}."]
-    if flight.manifest.imu.accelerometer_turn_on_m_s2 is None:
+    if not calibrated(flight):
         found.append(
-            "The observer is for calibrated accelerometers, and how well these are is not stated: the bias "
-            "that the filter found was taken off before. So the two do not check each other in that."
+            "The observer is for calibrated accelerometers, and by what is stated these are not: the "
+            "bias that the filter found was taken off before. So the two do not check each other in that."
         )
     return found
 
