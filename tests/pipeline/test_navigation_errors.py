@@ -110,6 +110,7 @@ def test_a_twin_is_judged_by_the_truth_of_its_payload(early):
         "observer",
         "mekf-published-like",
         "mekf-published-like-turning",
+        "mekf-published-like-long",
         "autopilot",
     }
     numbers = numbers_of(studied, 60.0)

@@ -24,6 +24,7 @@ from wildlab.flight.sync import covariances, gnss_times, poses_at
 from wildlab.pipeline.navigate import (
     BIASES,
     PUBLISHED_LIKE,
+    PUBLISHED_LIKE_LONG,
     PUBLISHED_LIKE_TURNING,
     Navigated,
     navigate_mekf,
@@ -47,7 +48,11 @@ PLACES = ("north", "east", "down")
 #: Blocks of an error: columns of `Errors.error`, and what they are called.
 BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
 #: The filter with the tunings that are compared with print, by the subject of their numbers.
-TUNINGS = {"mekf-published-like": PUBLISHED_LIKE, "mekf-published-like-turning": PUBLISHED_LIKE_TURNING}
+TUNINGS = {
+    "mekf-published-like": PUBLISHED_LIKE,
+    "mekf-published-like-turning": PUBLISHED_LIKE_TURNING,
+    "mekf-published-like-long": PUBLISHED_LIKE_LONG,
+}
 
 
 class Errors(NamedTuple):

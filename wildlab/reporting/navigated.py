@@ -41,7 +41,8 @@ WORDS = {
     "observer": "Nonlinear observer",
     "autopilot": "Autopilot",
     "mekf-published-like": "MEKF, tuned like H 7.5.3",
-    "mekf-published-like-turning": "MEKF, tuned like H 7.5.4",
+    "mekf-published-like-turning": "MEKF, tuned like H 7.5.4, flight 1",
+    "mekf-published-like-long": "MEKF, tuned like H 7.5.4, flight 2",
 }
 CONVENTION = (
     "Position and velocity in n (m, m/s), attitude as four times the modified Rodrigues parameters of dq in "
