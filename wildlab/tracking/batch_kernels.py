@@ -245,7 +245,7 @@ def limit_one(C: Array, P: Array, P_pose: Array) -> tuple[Array, bool]:
 
 
 @compiled
-def limit_lanes(C: Array, P: Array, P_pose: Array, L: Array, Y: Array, M: Array, sound: Array) -> None:
+def mark_sound(C: Array, P: Array, P_pose: Array, L: Array, Y: Array, M: Array, sound: Array) -> None:
     """Marks (in ``sound``) the lanes whose ``[P C; C' P_pose]`` is surely a covariance.
 
     By Cholesky's pivots of P_pose and of what P has beyond ``C P_pose^-1 C'``.
@@ -355,7 +355,7 @@ def run_lanes(
                 load(phis, row, first, phi)
                 carry_cross(C, F[row], left[row], phi, N)
                 load(P_poses, row, first, P_pose)
-                limit_lanes(C, P, pose_now, L, N, M, nis)
+                mark_sound(C, P, pose_now, L, N, M, nis)
                 for r in range(width):
                     if ok[r] > 0 and nis[r] == 0:
                         C[:, :, r], out_limited[row, first + r] = limit_one(
