@@ -28,6 +28,14 @@ from wildlab.reporting.figures import (
 Array = NDArray[np.float64]
 
 LINES = (BLUE, VERMILLION, PURPLE)
+#: What legends call sources whose names are not words.
+NAMES = {
+    "mekf": "filter (MEKF)",
+    "mekf-published-like": "filter, tuned like H 7.5.3",
+    "mekf-published-like-turning": "filter, tuned like H 7.5.4, flight 1",
+    "mekf-published-like-long": "filter, tuned like H 7.5.4, flight 2",
+    "onboard": "found on board",
+}
 #: Quantities over time by label with unit: times (seconds), and values.
 Strips = tuple[ArrayLike, Mapping[str, ArrayLike]]
 
@@ -62,7 +70,7 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
         for name, (times, quantities) in sources.items():
             y = np.array(quantities[label], float)
             y[1:][np.abs(np.diff(y)) > 180] = np.nan
-            ax.plot(times, y, lw=1.0, color=colour(name), label=name)
+            ax.plot(times, y, lw=1.0, color=colour(name), label=NAMES.get(name, name))
         ax.set_ylabel(label)
     if len(sources) > 1:
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
@@ -101,11 +109,12 @@ def error_bands(
         reach = 0.0
         for name, stated in bounds.items():
             two = 2 * np.asarray(stated, float)[keep, i]
-            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.25, lw=0, label=f"{name}, 2 SD")
+            two_of = f"two SD of the {NAMES.get(name, name)}"
+            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.25, lw=0, label=two_of)
             reach = max(reach, float(np.nanmax(two, initial=0.0)))
         for name, error in errors.items():
             e = np.asarray(error, float)[keep, i]
-            ax.plot(t[keep], e, lw=0.9, color=_ink(name), label=name)
+            ax.plot(t[keep], e, lw=0.9, color=_ink(name), label=NAMES.get(name, name))
             reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
         ax.axhline(0, color=GREY, lw=0.6)
         if reach > 0:
@@ -198,7 +207,9 @@ def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) 
     for name, (times, velocity) in sources.items():
         speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
         keep = thinned(len(speed))
-        ax.plot(np.asarray(times, float)[keep], speed[keep], lw=1.0, color=_ink(name), label=name)
+        ax.plot(
+            np.asarray(times, float)[keep], speed[keep], lw=1.0, color=_ink(name), label=NAMES.get(name, name)
+        )
     ax.set_ylim(0, None)
     ax.set_ylabel("speed over ground (m/s)")
     return _finished(fig, [ax], title)
