@@ -126,7 +126,7 @@ def by_wildlab(thor: Thor, noise: ImuNoise, axes: AxisErrors | None, gate: float
     times = thor.pyins.nav["time_s"].to_numpy(float)
 
     def run():
-        (imu, aiding, _, start), earth = given
+        (imu, aiding, start), earth = given
         return run_mekf(imu, start, noise, earth, list(aiding.values()), times, axes=axes, gate=gate)
 
     run()  # compiles

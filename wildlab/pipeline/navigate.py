@@ -19,10 +19,11 @@ from wildlab.pipeline.navigation_inputs import (
     POSITION,
     VELOCITY,
     axis_errors,
-    field_of,
+    heading_from,
     headings_of,
     imu_noise,
     inputs_of,
+    second_vector,
 )
 
 Array = NDArray[np.float64]
@@ -190,12 +191,12 @@ def navigate_observer(
     attitude by a degree for every 0.17 m/s^2: ``accelerometer_bias`` (3,) m/s^2 is what a calibration found.
     """
     given = inputs_of(flight, velocity=velocity, accelerometer_bias=accelerometer_bias)
-    by_course = "second position" not in given.aiding and field_of(flight) is None
+    by_course = heading_from(flight) == "course"
     found = run_observer(
         given.imu,
         given.start,
         flight.manifest.origin_tuple(),
-        [*given.aiding.values(), given.reference],
+        [*given.aiding.values(), second_vector(flight)],
         _wanted(flight, times),
         gains=Gains(k2=COURSE_GAIN) if by_course else Gains(),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,12 +34,15 @@ TURNED = 0.6
 LOOSE = 5.0
 
 
+#: See `heading_from`.
+Heading = Literal["antennas", "field", "course"]
+
+
 class Inputs(NamedTuple):
-    """Samples, aiding by what it is called in a report, the observer's second vector, and the start."""
+    """Samples, aiding by what it is called in a report, and the start."""
 
     imu: Imu
     aiding: dict[str, Aiding]
-    reference: Aiding
     start: Start
 
 
@@ -127,11 +130,10 @@ def inputs_of(
         wander = np.zeros(3)
         sd = np.tile([position_sd[0], position_sd[0], position_sd[1]], (len(t), 1))
     white = np.sqrt(np.maximum(sd**2 - wander**2, (0.01 * sd) ** 2))
-    arms = [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
+    arms = _levers(flight, gnss)
     aiding = {"position": positions(t, p, white, arms[0], 0.0, wander, wander_time)}
-    two = set(SECOND_COLUMNS) <= set(gnss.columns)
     moving = set(VELOCITY) <= set(gnss.columns)
-    v = gnss[VELOCITY].to_numpy(float) if moving else np.gradient(p, t, axis=0)
+    v = _velocities(gnss, t)
     spread_v = _velocity_sd(flight, gnss)
     if velocity and moving and spread_v is not None:
         aiding["velocity"] = velocities(t, v, spread_v, arms[0])
@@ -142,10 +144,9 @@ def inputs_of(
             known["accelerometer_bias_sd"] = noise.accelerometer_bias_sd
         if flight.manifest.imu.gyro_turn_on_deg_h is not None:
             known["gyro_bias_sd"] = noise.gyro_bias_sd
-    if two:
+    if set(SECOND_COLUMNS) <= set(gnss.columns):
         second = gnss[list(SECOND_COLUMNS)].to_numpy(float)
         aiding["second position"] = positions(t, second, white, arms[1], 0.0, wander, wander_time)
-        reference = baseline_reference(t, p, second, *arms)
         # The fixes that it starts from are taken in once more: loosely here, so that they count once.
         known["baseline_sd"] = LOOSE * spread
         start = start_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)
@@ -155,8 +156,7 @@ def inputs_of(
             start = start_from_course(samples, t, p, v, gravity=gravity, **known)
         else:
             start = start_at_rest(samples, t, p, v, rest=rest, gravity=gravity, min_speed=FLYING, **known)
-        reference = field_of(flight) or course_reference(t, v, FLYING)
-    return Inputs(samples, aiding, reference, start)
+    return Inputs(samples, aiding, start)
 
 
 def _position_sd(flight: Flight, gnss: pd.DataFrame) -> Array:
@@ -197,6 +197,18 @@ def _velocity_sd(flight: Flight, gnss: pd.DataFrame) -> Array | None:
     return None if level is None or vertical is None else np.array([level, level, vertical])
 
 
+def _velocities(gnss: pd.DataFrame, times: Array) -> Array:
+    """(N, 3) m/s, as logged or else from the positions."""
+    if set(VELOCITY) <= set(gnss.columns):
+        return np.asarray(gnss[VELOCITY].to_numpy(float))
+    return np.asarray(np.gradient(gnss[POSITION].to_numpy(float), times, axis=0))
+
+
+def _levers(flight: Flight, gnss: pd.DataFrame) -> list[Array]:
+    """From b to the first antenna and to the second one, (3,) m in b each."""
+    return [_lever(flight, gnss, LEVER_COLUMNS[:3]), _lever(flight, gnss, LEVER_COLUMNS[3:])]
+
+
 def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Array:
     if set(columns) <= set(gnss.columns):
         return np.asarray(gnss[list(columns)].iloc[0].to_numpy(float))
@@ -213,19 +225,33 @@ def samples_of(flight: Flight) -> Imu:
     )
 
 
-def field_of(flight: Flight) -> Aiding | None:
-    """The magnetic field as the observer's second vector; None where the flight has no magnetometer, or the
-    manifest does not say how the Earth's field lies there."""
+def heading_from(flight: Flight) -> Heading:
+    """What shows the observer the heading, the best that the flight has: two antennas, the magnetic field
+    where the manifest says how the Earth's lies there, or the course."""
     stated = flight.manifest.magnetometer
-    if (
-        "magnetometer" not in flight.tables
-        or stated.inclination_deg is None
-        or stated.declination_deg is None
-    ):
-        return None
-    times, field = _field(flight)
-    direction = earth_field(np.radians(stated.declination_deg), np.radians(stated.inclination_deg))
-    return field_reference(times, field, direction)
+    if set(SECOND_COLUMNS) <= set(flight.table("gnss").columns):
+        return "antennas"
+    known = None not in (stated.inclination_deg, stated.declination_deg)
+    return "field" if known and "magnetometer" in flight.tables else "course"
+
+
+def second_vector(flight: Flight) -> Aiding:
+    """The observer's second vector, of what `heading_from` names.
+
+    Raises
+    ------
+    WildlabError
+        Where it is the magnetic field, and that cannot be used.
+    """
+    gnss, t, stated = flight.table("gnss"), gnss_times(flight), flight.manifest.magnetometer
+    which = heading_from(flight)
+    if which == "antennas":
+        both = (gnss[columns].to_numpy(float) for columns in (POSITION, list(SECOND_COLUMNS)))
+        return baseline_reference(t, *both, *_levers(flight, gnss))
+    if which == "field":
+        lies = np.radians([stated.declination_deg or 0.0, stated.inclination_deg or 0.0])
+        return field_reference(*_field(flight), earth_field(*lies))
+    return course_reference(t, _velocities(gnss, t), FLYING)
 
 
 def headings_of(flight: Flight) -> Aiding:

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.whiteness import innovation_whiteness
-from wildlab.flight.schema import SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.pipeline.navigate import likelihoods_of_latency
 from wildlab.pipeline.navigation_errors import (
@@ -22,7 +21,7 @@ from wildlab.pipeline.navigation_errors import (
     summarise,
     summarise_innovations,
 )
-from wildlab.pipeline.navigation_inputs import field_of
+from wildlab.pipeline.navigation_inputs import heading_from
 from wildlab.reporting.charts.navigation import (
     bias_chart,
     correlation_strips,
@@ -61,13 +60,14 @@ def has_truth(studied: Studied) -> bool:
 
 def limits_of_observer(flight: Flight) -> list[str]:
     """What the observer's figures hang on, in sentences, for a flight with one antenna."""
-    if set(SECOND_COLUMNS) <= set(flight.table("gnss").columns):
+    if heading_from(flight) == "antennas":
         return []
     course = "takes the course for the heading, and is off by the crab angle in wind"
     field = (
         "takes the magnetic field for its second vector, and is off by what calibrating that in flight leaves"
     )
-    found = [f"With one antenna the observer {course if field_of(flight) is None else field}."]
+    by_course = heading_from(flight) == "course"
+    found = [f"With one antenna the observer {course if by_course else field}."]
     if not calibrated(flight):
         found.append(
             "The observer is for calibrated accelerometers, and by what is stated these are not: the "
