@@ -52,16 +52,33 @@ def test_errors_are_distances_or_north_and_east(strips):
     assert figure.axes[-1].get_xlabel() == "time since the first detection (s)"
 
 
-def test_courses_break_over_north_and_where_hardly_anything_moves():
+def courses(figure):
+    return {line.get_label(): np.asarray(line.get_ydata(), float) for line in figure.axes[1].lines}
+
+
+def test_a_steady_course_is_drawn_about_itself_also_over_north():
     rest = TRUTH.copy()
     rest[:, 2:] *= 0.1
     figure = speed_and_course(TIMES, SEEN, TRUTH, {"ekf": rest}, NAMES, "Speed")
-    course = {line.get_label(): np.asarray(line.get_ydata(), float) for line in figure.axes[1].lines}
-    assert np.isnan(course["Extended"]).all()
-    seen = course["truth"][np.isfinite(course["truth"])]
-    assert (seen >= 0).all() and (seen < 360).all()
-    assert np.nanmax(np.abs(np.diff(course["truth"]))) < 180
+    assert np.isnan(courses(figure)["Extended"]).all()  # of what hardly moves
+    about = courses(figure)["truth"]
+    assert np.ptp(about) == pytest.approx(2 * np.degrees(np.arctan(0.05)), rel=0.01)
+    low, high = figure.axes[1].get_ylim()
+    assert low < about.min() and about.max() < high and high - low == pytest.approx(20.0)
+    assert figure.axes[1].yaxis.get_major_formatter()(-5.0, 0) == "355"
     assert figure.axes[0].get_ylim()[1] == pytest.approx(1.2, rel=0.01)
+
+
+def test_courses_all_round_break_over_north():
+    turning = TRUTH.copy()
+    turning[:, 2], turning[:, 3] = np.cos(0.7 * TIMES), np.sin(0.7 * TIMES)
+    figure = speed_and_course(TIMES, SEEN, turning, {"ekf": turning}, NAMES, "Speed")
+    angle = courses(figure)["truth"]
+    seen = angle[np.isfinite(angle)]
+    assert len(seen) < len(angle)
+    assert (seen >= 0).all() and (seen <= 360).all()
+    assert np.nanmax(np.abs(np.diff(angle))) < 180
+    assert figure.axes[1].get_ylim() == (-5.0, 365.0)
 
 
 def test_values_at_detections_alone_are_dots():

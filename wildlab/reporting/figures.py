@@ -211,17 +211,19 @@ def log_band(ax: Axes, low: float, high: float, label: str = "95 % band", *, col
     ax.axhspan(low, high, color=color, alpha=0.13, lw=0, zorder=0)
     for edge in (low, high):
         ax.axhline(edge, color=color, lw=0.8, alpha=0.7, zorder=0.5)
-    # Below the band: what is consistent hardly ever goes there, so the words cover nothing.
+    # Beside the axes, where the words cover nothing.
     ax.annotate(
         label,
-        xy=(0.0, low),
+        xy=(1.0, (low * high) ** 0.5),
         xycoords=("axes fraction", "data"),
-        xytext=(4, -3),
+        xytext=(3, 0),
         textcoords="offset points",
         ha="left",
-        va="top",
+        va="center",
+        rotation=270,
         fontsize=9,
         color="#00664B",
+        annotation_clip=False,
     )
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 

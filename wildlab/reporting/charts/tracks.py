@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 #: A pause in the detections longer than this (seconds) is shaded.
 GAP_S = 2.0
+#: Courses that stay this near to one, degrees, are drawn about it.
+STEADY = 60.0
 #: Later lines are thinner, so that one which lies on another does not hide it.
 _WIDTHS = (2.6, 1.3, 1.3, 1.0)
 #: The truth is drawn last and broken, so that the tracks show through.
@@ -123,7 +125,8 @@ def speed_and_course(
 ) -> Figure:
     """Speed and course of tracks and of the truth, all (N, 4): north, east, and their rates.
 
-    Courses of what hardly moves are left out, and so are the jumps over north.
+    Courses of what hardly moves are left out, and so are the jumps over north. Where the target keeps its
+    course, the axis shows what is near it.
     """
     t = np.asarray(times, float)
     fig, (fast, course) = new_figure(5.9, 4.8, rows=2, sharex=True)
@@ -132,12 +135,12 @@ def speed_and_course(
         {"color": colour(subject), "lw": width, "label": names[subject]}
         for width, subject in zip(_WIDTHS, tracks, strict=False)
     ]
-    top = 0.0
+    top, courses = 0.0, [course_of(states) for states in (*tracks.values(), truth)]
+    middle, reach = steady_course(courses)
     for states, look in zip((*tracks.values(), truth), (*looks, _TRUTH), strict=True):
         x = np.asarray(states, float)[keep]
         speed = np.hypot(x[:, 2], x[:, 3])
-        angle = np.degrees(np.arctan2(x[:, 3], x[:, 2])) % 360
-        angle[~(speed > SLOWEST_M_S)] = np.nan
+        angle = (course_of(states)[keep] - middle + 180) % 360 + middle - 180
         angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
         fast.plot(t[keep], speed, **look)
         course.plot(t[keep], angle, **look)
@@ -147,10 +150,31 @@ def speed_and_course(
         mark_gaps(ax, t[np.asarray(seen, bool)], GAP_S)
     fast.set_ylim(0, 1.2 * top)
     fast.set_ylabel("speed (m/s)")
-    course.set_ylim(-5, 365)
-    course.set_yticks([0, 90, 180, 270, 360])
+    course.set_ylim(middle - reach, middle + reach)
+    if reach > 180:
+        course.set_yticks([0, 90, 180, 270, 360])
+    else:
+        course.yaxis.set_major_formatter(FuncFormatter(lambda angle, _: f"{angle % 360:g}"))
     course.set_ylabel("course (°)")
     return _finished(fig, (fast, course), title)
+
+
+def course_of(states: ArrayLike) -> Array:
+    """Courses (N,) of states (N, 4), degrees from 0 to 360; NaN of what hardly moves."""
+    x = np.asarray(states, float)
+    angle = np.degrees(np.arctan2(x[:, 3], x[:, 2])) % 360
+    return np.where(np.hypot(x[:, 2], x[:, 3]) > SLOWEST_M_S, angle, np.nan)
+
+
+def steady_course(courses: Sequence[Array]) -> tuple[float, float]:
+    """The course that several (N,), the last one the truth's, keep to, and how far an axis about it reaches;
+    180 and a little more than that where they do not keep to one. Degrees."""
+    truth = np.radians(courses[-1][np.isfinite(courses[-1])])
+    middle = float(np.degrees(np.arctan2(np.sin(truth).sum(), np.cos(truth).sum()))) % 360
+    off = np.abs((np.concatenate(courses) - middle + 180) % 360 - 180)
+    off = off[np.isfinite(off)]
+    spread = float(np.quantile(off, 0.98)) if len(off) else 180.0
+    return (middle, max(10.0, 1.4 * spread)) if spread < STEADY else (180.0, 185.0)
 
 
 def squares_over_time(
