@@ -12,6 +12,7 @@ import pytest
 from tests.flight.conftest import make_flight
 from tests.reporting.conftest import OPEN, notebook, write
 from wildlab.errors import WildlabError
+from wildlab.flight.check import usable_for
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting import flights
@@ -148,19 +149,24 @@ def test_a_flight_of_which_nothing_can_be_judged_is_refused(
     assert not (tmp_path / "reports").exists()
 
 
+def lacking(flight: Flight) -> str:
+    (use,) = (use for use in usable_for(flight) if use.purpose == "navigation")
+    return lacking_for_navigation(flight, use)
+
+
 def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
     """In the words of the navigation itself: a reference, and how the sensor errs."""
     twin = simulate_twin("fast-vessel", 1)
-    assert "studies of its own" in lacking_for_navigation(twin)
+    assert "studies of its own" in lacking(twin)
     stated = twin.manifest.model_dump(exclude={"twin", "kind"}, exclude_none=True)
     logged = make_manifest({**stated, "kind": "logged"})
     tables = {name: twin.tables[name] for name in ("imu", "gnss")}
-    assert lacking_for_navigation(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables)) == ""
-    assert "no pose to compare with" in lacking_for_navigation(Flight(logged, {}, tables))
+    assert lacking(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables)) == ""
+    assert "no pose to compare with" in lacking(Flight(logged, {}, tables))
     silent = make_manifest({**stated, "kind": "logged", "imu": {}})
     flight = Flight(silent, {"onboard": twin.nav["autopilot"]}, tables)
-    assert "how the inertial sensor errs is not stated" in lacking_for_navigation(flight)
-    assert "inertial measurements" in lacking_for_navigation(Flight(logged, {}, {"gnss": tables["gnss"]}))
+    assert "how the inertial sensor errs is not stated" in lacking(flight)
+    assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
 
 
 def test_a_flight_named_like_a_study_would_replace_its_report(

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.flight.check import usable_for
+from wildlab.flight.check import Use, usable_for
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.pipeline.navigation_errors import reference_of
@@ -52,7 +52,7 @@ def evaluate_flight(
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
-    usable = {use.purpose: use for use in usable_for(flight)}
+    uses = {use.purpose: use for use in usable_for(flight)}
     jobs: list[Job] = []
     skipped: list[Outcome] = []
 
@@ -75,7 +75,7 @@ def evaluate_flight(
             )
         )
 
-    places = usable["georeferencing accuracy"]
+    places = uses["georeferencing accuracy"]
     again = f"wildlab evaluate {folder.name}"
     if places.usable:
         found, _ = flight.pose_source(source)
@@ -87,7 +87,7 @@ def evaluate_flight(
             file=folder,
             field="--source",
         )
-    lacking = lacking_for_navigation(flight)
+    lacking = lacking_for_navigation(flight, uses["navigation"])
     if not lacking:
         prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
     elif flight.imu is not None and flight.manifest.twin is None:
@@ -101,11 +101,10 @@ def evaluate_flight(
     return run_all(jobs, skipped, studies, reports, console)
 
 
-def lacking_for_navigation(flight: Flight) -> str:
-    """Why the navigation of a flight cannot be judged; empty where it can."""
+def lacking_for_navigation(flight: Flight, use: Use) -> str:
+    """Why the navigation of a flight cannot be judged; empty where it can. ``use``: what the checks say of it."""
     if flight.manifest.twin is not None:
         return "on simulated flights it has studies of its own"
-    use = next(use for use in usable_for(flight) if use.purpose == "navigation")
     if not use.usable:
         return use.why
     try:
