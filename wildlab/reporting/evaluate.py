@@ -102,7 +102,7 @@ def evaluate_flight(
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:
-    """Why the navigation of a flight cannot be judged; empty where it can. ``use``: what the checks say of it."""
+    """Why the navigation of a flight cannot be judged, or nothing; ``use`` is what the checks say of it."""
     if flight.manifest.twin is not None:
         return "on simulated flights it has studies of its own"
     if not use.usable:
