@@ -1,10 +1,12 @@
-"""What every test shares: when slow tests run, where larger data may lie, and how hypothesis behaves."""
+"""What every test shares: when slow tests run, where larger data lie, how hypothesis behaves, a browser."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -56,3 +58,54 @@ def shared_data() -> Callable[..., Path]:
         return path
 
     return find
+
+
+def find_chromium() -> str | None:
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+    return os.environ.get("WILDLAB_CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    program = find_chromium()
+    if program is None:
+        pytest.skip("needs Chromium: install it, or name one in WILDLAB_CHROMIUM")
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (the extra `dev`)")
+    with playwright.sync_playwright() as play:
+        chromium = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def faults(browser: Any) -> Callable[[Path], list[str]]:
+    """``faults(page.html)`` opens a page offline, wide and narrow, and lists what is wrong with it."""
+
+    def look(path: Path) -> list[str]:
+        found = [] if path.stat().st_size <= 5_000_000 else ["larger than 5 MB"]
+        return found + [fault for width in (1200, 360) for fault in _faults_at(browser, path.as_uri(), width)]
+
+    return look
+
+
+def _faults_at(browser: Any, address: str, width: int) -> list[str]:
+    found: list[str] = []
+    context = browser.new_context(viewport={"width": width, "height": 800}, offline=True)
+    page = context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("console", lambda message: found.append(f"console: {message.text}"))
+    page.on("pageerror", lambda error: found.append(f"error: {error}"))
+    page.on("dialog", lambda dialog: found.append(f"dialog: {dialog.message}"))
+    page.goto(address)
+    page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
+    found += [f"asks for {url[:80]}" for url in asked if url != address and not url.startswith("data:")]
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    if wide > width:
+        found.append(f"{wide} px wide on a screen of {width}")
+    if page.evaluate("[...document.images].some(one => !one.alt.trim() || !one.naturalWidth)"):
+        found.append("a picture without alt text, or broken")
+    if page.evaluate("document.documentElement.lang") != "en":
+        found.append("no language")
+    context.close()
+    return found

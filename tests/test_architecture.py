@@ -36,21 +36,24 @@ MAY_IMPORT: dict[str, set[str]] = {
     "evaluation": {"geometry", "tracking"},
     "pipeline": BELOW_PIPELINE,
     "reporting": BELOW_PIPELINE | {"pipeline"},
-    "cli": BELOW_PIPELINE | {"pipeline", "reporting", "doctor", "terminal"},
+    "studies": BELOW_PIPELINE | {"pipeline", "reporting"},
+    "runner": BELOW_PIPELINE | {"pipeline", "reporting", "studies"},
+    "cli": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "doctor", "terminal"},
     "__main__": {"cli"},
     "doctor": set(),
     "terminal": set(),
     "errors": set(),
+    "files": set(),
     "paths": set(),
     "__init__": set(),
 }
 #: These know nothing about flights and may be used by all.
-FOR_ALL = {"errors", "paths", "__version__"}
+FOR_ALL = {"errors", "files", "paths", "__version__"}
 
 NOTEBOOK_PACKAGES = {
     "papermill", "nbconvert", "nbclient", "nbformat", "IPython", "ipykernel", "jupyter_client",
 }  # fmt: skip
-KNOW_NOTEBOOKS = {"reporting", "cli"}
+KNOW_NOTEBOOKS = {"reporting", "runner", "cli"}
 #: The doctor asks which kernel Jupyter would start, no more.
 ALSO = {("doctor", "jupyter_client")}
 
@@ -106,7 +109,7 @@ def check_imports(room: str, line: int, name: str) -> Iterator[str]:
         if target and target != room and target not in FOR_ALL | MAY_IMPORT.get(room, set()):
             yield f"{line}: {room} may not import {target}"
     if package in NOTEBOOK_PACKAGES and room not in KNOW_NOTEBOOKS and (room, package) not in ALSO:
-        yield f"{line}: only reporting and cli know about notebooks, {room} imports {package}"
+        yield f"{line}: only reporting, runner and cli know about notebooks, {room} imports {package}"
     if package in ORACLES:
         yield f"{line}: {package} is an oracle for tests and benchmarks"
     if package in COPYLEFT:
@@ -140,6 +143,69 @@ def violations(root: Path) -> list[str]:
             found += [f"{place}:{problem}" for problem in check_imports(room, line, name)]
         found += [f"{place}:{problem}" for problem in check_calls(tree)]
     return found
+
+
+def module_of(place: Path) -> str:
+    """``"wildlab.geometry.frames"`` for its path below the root; a package's is that of its ``__init__``."""
+    parts = place.with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def import_graph(root: Path) -> dict[str, set[str]]:
+    """Which modules of wildlab each one imports, also inside functions, but not for type checkers alone."""
+    places = {path: path.relative_to(root) for path in (root / "wildlab").rglob("*.py")}
+    modules = {module_of(place) for place in places.values()}
+    graph: dict[str, set[str]] = {}
+    for path, place in places.items():
+        tree = without_type_checking(ast.parse(path.read_text(encoding="utf-8")))
+        names = {name for _, name in imported_names(tree, place.parts[:-1])}
+        # "wildlab.geometry.frames.wrap" is a name in a module, "wildlab.geometry.frames" a module.
+        found = {name if name in modules else name.rpartition(".")[0] for name in names}
+        graph[module_of(place)] = {name for name in found if name in modules} - {module_of(place)}
+    return graph
+
+
+def without_type_checking(tree: ast.Module) -> ast.Module:
+    """The module without what stands under ``if TYPE_CHECKING``."""
+
+    class Leave(ast.NodeTransformer):
+        def visit_If(self, node: ast.If) -> ast.AST | None:
+            return None if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else node
+
+    left: ast.Module = Leave().visit(tree)
+    return left
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Modules that import each other round and round: strongly connected sets of more than one, sorted."""
+    reach: dict[str, set[str]] = {}
+    for start in graph:
+        seen: set[str] = set()
+        todo = list(graph[start])
+        while todo:
+            if (one := todo.pop()) not in seen:
+                seen.add(one)
+                todo += graph.get(one, set())
+        reach[start] = seen
+    together = {
+        frozenset({one, *(other for other in reach[one] if one in reach.get(other, set()))})
+        for one in graph
+        if one in reach[one]
+    }
+    return sorted(sorted(group) for group in together)
+
+
+def folder_graph(graph: dict[str, set[str]]) -> dict[str, set[str]]:
+    """The same between the folders of a room and the files beside them: ``wildlab.flight.recipe``."""
+
+    def place(module: str) -> str:
+        return ".".join(module.split(".")[:3])
+
+    result: dict[str, set[str]] = {}
+    for module, names in graph.items():
+        own = place(module)
+        result.setdefault(own, set()).update(place(name) for name in names if place(name) != own)
+    return result
 
 
 def undeclared(root: Path) -> list[str]:
@@ -190,6 +256,45 @@ def test_rooms_import_only_what_lies_below() -> None:
     assert violations(paths.ROOT) == []
 
 
+def test_nothing_imports_in_a_circle() -> None:
+    graph = import_graph(paths.ROOT)
+    assert "wildlab.geometry.frames" in graph["wildlab.geometry.flodell"]
+    assert circles(graph) == []
+    assert circles(folder_graph(graph)) == []
+
+
+def test_a_trial_imports_no_other_part_of_the_studies() -> None:
+    """Kept numbers of a seed stay as long as the trials and what lies below them do."""
+    for module, names in import_graph(paths.ROOT).items():
+        if module.startswith("wildlab.studies.") and module.endswith(".trial"):
+            above = {name for name in names if name.startswith(("wildlab.studies", "wildlab.reporting"))}
+            assert all(name.endswith(".trial") for name in above), module
+
+
+def test_a_circle_is_found(tmp_path: Path) -> None:
+    sources = {
+        "a/__init__.py": "",
+        "a/one.py": "from wildlab.a.two import x\n",
+        "a/two.py": "def f():\n    from wildlab.b import three\n",
+        "b/__init__.py": "",
+        "b/three.py": "import wildlab.a.one\n",
+        "b/four.py": "if TYPE_CHECKING:\n    from wildlab.b.five import y\n",
+        "b/five.py": "from wildlab.b.four import y\n",
+        "c/__init__.py": "",
+        "c/deep/__init__.py": "",
+        "c/deep/six.py": "from wildlab.c.seven import z\n",
+        "c/deep/eight.py": "",
+        "c/seven.py": "from wildlab.c.deep.eight import z\n",
+    }
+    for name, source in sources.items():
+        path = tmp_path / "wildlab" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(source, encoding="utf-8")
+    graph = import_graph(tmp_path)
+    assert circles(graph) == [["wildlab.a.one", "wildlab.a.two", "wildlab.b.three"]]
+    assert ["wildlab.c.deep", "wildlab.c.seven"] in circles(folder_graph(graph))
+
+
 def test_what_is_imported_is_asked_for() -> None:
     assert undeclared(paths.ROOT) == []
 
@@ -197,7 +302,7 @@ def test_what_is_imported_is_asked_for() -> None:
 def test_the_rules_cover_what_is_there() -> None:
     entries = (paths.ROOT / "wildlab").iterdir()
     there = {path.stem for path in entries if path.is_dir() or path.suffix == ".py"} - {"__pycache__"}
-    assert {"geometry", "flight", "reporting"} <= there <= set(MAY_IMPORT)
+    assert {"geometry", "flight", "reporting", "studies", "runner"} <= there <= set(MAY_IMPORT)
 
 
 def test_files_stay_short() -> None:
@@ -243,11 +348,18 @@ def test_no_copyleft_in_the_lock() -> None:
         ("tracking/a.py", "import wildlab.flight", "tracking may not import flight"),
         ("flight/a.py", "import wildlab.pipeline", "flight may not import pipeline"),
         ("simulation/a.py", "import wildlab.pipeline", "simulation may not import pipeline"),
-        ("pipeline/a.py", "from wildlab.reporting import run", "pipeline may not import reporting"),
-        ("reporting/a.py", "from wildlab.cli import main", "reporting may not import cli"),
+        ("pipeline/a.py", "from wildlab.reporting import page", "pipeline may not import reporting"),
+        ("reporting/a.py", "from wildlab.studies import schmidt", "reporting may not import studies"),
+        ("reporting/a.py", "from wildlab.runner import run", "reporting may not import runner"),
+        ("studies/a.py", "from wildlab.runner import seeds", "studies may not import runner"),
+        ("runner/a.py", "from wildlab.cli import main", "runner may not import cli"),
         ("attic/a.py", "x = 1", "the room attic is not in MAY_IMPORT"),
-        ("pipeline/a.py", "import papermill", "only reporting and cli know about notebooks"),
-        ("flight/a.py", "from IPython.display import display", "only reporting and cli know about notebooks"),
+        ("pipeline/a.py", "import papermill", "only reporting, runner and cli know about notebooks"),
+        (
+            "flight/a.py",
+            "from IPython.display import display",
+            "only reporting, runner and cli know about notebooks",
+        ),
         ("pipeline/a.py", "import cameratransform", "is an oracle"),
         ("pipeline/a.py", "from osgeo import gdal", "is an oracle"),
         ("detection/a.py", "from ultralytics import YOLO", "copyleft"),
@@ -283,8 +395,9 @@ def test_what_is_allowed_passes(tmp_path: Path) -> None:
         "geometry/a.py": "from wildlab.errors import WildlabError\nfrom .frames import x\nimport numpy\n",
         "tracking/a.py": "from wildlab.geometry.frames import x\nfrom wildlab import __version__, paths\n",
         "flight/a.py": "import subprocess\nsubprocess.run(['git'], shell=False)\nframe.eval('x')\n",
-        "reporting/a.py": "import papermill\nfrom wildlab.pipeline import judge\n",
-        "cli.py": "from wildlab import doctor\nfrom wildlab.reporting.run import run_study\n",
+        "reporting/a.py": "import papermill\nfrom wildlab.pipeline import georeference\n",
+        "runner/a.py": "from wildlab.studies.protocol import find_case\nfrom wildlab.files import sha256\n",
+        "cli.py": "from wildlab import doctor\nfrom wildlab.runner.run import run_study\n",
         "doctor.py": "import jupyter_client\n",
     }
     for name, source in sources.items():

@@ -17,7 +17,7 @@ from tests.flight.conftest import make_flight
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.flight.store import Flight, save_flight
-from wildlab.reporting.run import Outcome
+from wildlab.runner.run import Outcome
 
 __all__ = ["make_flight"]
 
@@ -37,7 +37,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Any:
         def fail(*_: Any, **__: Any) -> None:
             raise error
 
-        monkeypatch.setattr("wildlab.reporting.studies.load_studies", fail)
+        monkeypatch.setattr("wildlab.runner.catalogue.load_studies", fail)
 
     return install
 
@@ -140,7 +140,7 @@ def test_run_prints_the_ledger_and_fails_if_one_failed(
         given.update(options, names=names)
         return [Outcome("a", "done", 1.0), Outcome("b", "failed", 1.0, "why"), Outcome("c", "skipped", 0.0)]
 
-    monkeypatch.setattr("wildlab.reporting.run.run_studies", run_studies)
+    monkeypatch.setattr("wildlab.runner.run.run_studies", run_studies)
     code, out, err = call(capsys, "run", "a", "b", "--seed", "7", "--timeout", "0.5", "--out", str(tmp_path))
     assert code == 1 and out.strip() == str(tmp_path / "index.html") and "1 of 3 failed: b." in err
     assert (given["names"], given["seed"], given["timeout_s"]) == (("a", "b"), 7, 30.0)

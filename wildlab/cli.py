@@ -69,15 +69,16 @@ def list_(out: Path | None, as_json: bool) -> None:
     Example:
       wildlab list
     """
-    from wildlab.reporting.standing import REPRODUCED, as_plain, standing
-    from wildlab.reporting.studies import load_studies
+    from wildlab.reporting.status import REPRODUCED
+    from wildlab.runner.catalogue import load_studies
+    from wildlab.runner.status import as_plain, study_status
 
-    standings = [standing(study, _reports(out)) for study in load_studies().values()]
+    statuses = [study_status(study, _reports(out)) for study in load_studies().values()]
     if as_json:
-        print_json([as_plain(one) for one in standings])
+        print_json([as_plain(one) for one in statuses])
         return
     rows = []
-    for one in standings:
+    for one in statuses:
         numbers = f"{one.count(REPRODUCED)} of {len(one.numbers)}" if one.numbers else "-"
         holding = sum(claim.verdict == "holds" for claim in one.claims)
         claims = f"{holding} of {len(one.claims)}" if one.claims else "-"
@@ -138,7 +139,7 @@ def run(
       wildlab run static-point --seeds 200 --jobs 4
       wildlab run static-point --scheduler tcp://127.0.0.1:8786
     """
-    from wildlab.reporting.run import run_studies
+    from wildlab.runner.run import run_studies
 
     if everything and studies:
         raise click.UsageError("Name studies or say --all, not both.")
@@ -178,7 +179,7 @@ def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float 
       wildlab evaluate flights/tuesday
       wildlab evaluate flights/antenna --source autopilot
     """
-    from wildlab.reporting.evaluate import evaluate_flight
+    from wildlab.runner.evaluate import evaluate_flight
 
     outcomes = evaluate_flight(
         flight,
@@ -204,7 +205,7 @@ def check(flight: Path, as_json: bool) -> None:
     Example:
       wildlab check flights/tuesday
     """
-    from wildlab.flight.check import check_flight, usable_for
+    from wildlab.flight.checks.check import check_flight, usable_for
     from wildlab.flight.store import load_flight
 
     loaded = load_flight(flight)
@@ -241,7 +242,7 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
     Example:
       wildlab import data/recipes/openathena-f1.toml --source raw --into flights/f1
     """
-    from wildlab.flight.recipe import import_flight
+    from wildlab.flight.recipe.importing import import_flight
 
     import_flight(recipe, source, into, overwrite=overwrite)
     click.echo(shown(into))

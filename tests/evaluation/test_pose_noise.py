@@ -7,8 +7,8 @@ from wildlab.evaluation.pose_noise import estimate_pose_noise
 from wildlab.geometry.frames import euler_errors_to_body, euler_to_matrix, matrix_to_rotation_vector
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.geometry.sensitivity import TAU2
 from wildlab.geometry.uncertainty import ground_jacobians
+from wildlab.studies.sensitivity.tables import TAU2
 
 ASSUMED = {
     "position_horizontal": 2.0,

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from wildlab.flight.manifest import make_manifest
-from wildlab.flight.recipe import import_flight
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.flight.toml import dump_toml

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.files import sha256
 from wildlab.flight.catalog import find_dataset
-from wildlab.flight.check import check_flight, usable_for
-from wildlab.flight.files import sha256_of
+from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.readers import autoferry
 from wildlab.flight.readers.autoferry import SENSORS, read_part
-from wildlab.flight.recipe import import_flight
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 
@@ -239,7 +239,7 @@ def test_the_catalogue_has_the_files_as_published(shared_data: Callable[..., Pat
     files = find_dataset("autoferry").files
     assert len(files) == 2 * len(SCENARIOS)
     for one in files:
-        assert sha256_of(root / one.path) == one.sha256
+        assert sha256(root / one.path) == one.sha256
         assert one.url.endswith(one.path)
 
 

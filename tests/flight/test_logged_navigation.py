@@ -11,14 +11,14 @@ import pytest
 import scipy.io
 from scipy.spatial.transform import Rotation
 
+from wildlab.files import sha256
 from wildlab.flight.catalog import fetch, is_fetched, read_catalog
-from wildlab.flight.check import check_flight, usable_for
-from wildlab.flight.files import sha256_of
-from wildlab.flight.inertial_data import FORCE, RATE, turns
-from wildlab.flight.inertial_data import samples as inertial_samples
-from wildlab.flight.recipe import import_flight
+from wildlab.flight.checks.check import check_flight, usable_for
+from wildlab.flight.checks.inertial_data import FORCE, RATE, turns
+from wildlab.flight.checks.inertial_data import samples as inertial_samples
+from wildlab.flight.clocks import gnss_times
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
-from wildlab.flight.sync import gnss_times
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.paths import DATA
 
@@ -30,7 +30,7 @@ THOR = "thor_flight75_WaypointTracker_150squareWaypointNew_2012_10_10.mat"
 
 def _import(recipe: str, source: Path, into: Path) -> Flight:
     def state() -> dict[Path, tuple[int, str]]:
-        return {path: (path.stat().st_mtime_ns, sha256_of(path)) for path in source.iterdir()}
+        return {path: (path.stat().st_mtime_ns, sha256(path)) for path in source.iterdir()}
 
     before = state()
     import_flight(DATA / "recipes" / f"{recipe}.toml", source, into)

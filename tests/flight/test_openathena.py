@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.check import check_flight, usable_for
-from wildlab.flight.files import sha256_of
-from wildlab.flight.recipe import import_flight
-from wildlab.flight.recipe_model import read_recipe
+from wildlab.files import sha256
+from wildlab.flight.checks.check import check_flight, usable_for
+from wildlab.flight.clocks import frame_poses
+from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.recipe.model import read_recipe
 from wildlab.flight.store import Flight, load_flight
-from wildlab.flight.sync import frame_poses
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.mount import camera_pose
@@ -28,9 +28,9 @@ NED = ["north_m", "east_m", "down_m"]
 
 
 def _import(name: str, source: Path, into: Path) -> Flight:
-    before = {path: (path.stat().st_mtime_ns, sha256_of(path)) for path in source.iterdir()}
+    before = {path: (path.stat().st_mtime_ns, sha256(path)) for path in source.iterdir()}
     import_flight(RECIPES / f"{name}.toml", source, into)
-    assert {path: (path.stat().st_mtime_ns, sha256_of(path)) for path in source.iterdir()} == before
+    assert {path: (path.stat().st_mtime_ns, sha256(path)) for path in source.iterdir()} == before
     flight = load_flight(into)
     for one in flight.manifest.sources:
         assert one.sha256 == before[source / one.file][1]

@@ -13,7 +13,7 @@ from wildlab.geometry.calibration import (
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.geometry.sensitivity import TAU2
+from wildlab.studies.sensitivity.tables import TAU2
 
 TRUE = Mount("down", misalignment=(0.03, -0.04, 0.02))
 

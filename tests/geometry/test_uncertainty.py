@@ -7,7 +7,6 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import intersect_plane, pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose, camera_rotation, mount_rotation
-from wildlab.geometry.sensitivity import TAU2
 from wildlab.geometry.uncertainty import (
     PoseErrors,
     ellipse_axes,
@@ -17,6 +16,7 @@ from wildlab.geometry.uncertainty import (
     ray_flatness,
     sample_ground,
 )
+from wildlab.studies.sensitivity.tables import TAU2
 
 BENT = Camera(640, 512, 700.0, 705.0, 322.0, 250.0, 1.5, (-0.1, 0.05, 0.001, -0.002, 0.0))
 ZERO = np.zeros(3)

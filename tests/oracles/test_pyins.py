@@ -18,7 +18,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.pipeline.test_navigate_logged import THOR_AIRBORNE, euler_differences, rms
-from wildlab.flight.recipe import import_flight
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.geometry.frames import matrix_to_euler, ned_to_geodetic, quaternion_to_matrix
 from wildlab.geometry.gravity import local_earth

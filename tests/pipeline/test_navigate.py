@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clocks import poses_at
 from wildlab.flight.manifest import ImuPart, replace_in_manifest
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight, save_flight
-from wildlab.flight.sync import poses_at
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.navigation.magnetometer import earth_field
+from wildlab.pipeline.evaluate import judge
 from wildlab.pipeline.georeference import georeference, observe
-from wildlab.pipeline.judge import judge
 from wildlab.pipeline.navigate import likelihoods_of_latency, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.simulation.parameters import load_twin, twin_names

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wildlab.flight.recipe import import_flight
+from wildlab.flight.clocks import covariances, gnss_times, poses_at
+from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
-from wildlab.flight.sync import covariances, gnss_times, poses_at
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler, matrix_to_rotation_vector
 from wildlab.paths import DATA
 from wildlab.pipeline.navigate import Navigated, likelihoods_of_latency

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clocks import covariance_columns
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import covariance_columns
 from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.navigation_errors import (
     AXES,

@@ -9,7 +9,7 @@ import nbformat
 import pandas as pd
 import pytest
 
-from tests.reporting.conftest import notebook, shown
+from tests.notebooks import notebook, shown
 from wildlab.errors import WildlabError
 from wildlab.reporting import html
 from wildlab.reporting.failure import failure_page

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
-from wildlab.flight.check import check_flight
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.flight.sync import frame_times, gimbal_angles, poses_at
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.flight.sync import frame_times, poses_at
 from wildlab.geometry.frames import (
     euler_to_matrix,
     matrix_to_euler,
@@ -281,7 +281,7 @@ def test_a_saved_twin_is_a_flight_like_any_other(flight, tmp_path):
 
 
 def test_check_finds_nothing_wrong(flight, tmp_path):
-    check = pytest.importorskip("wildlab.flight.check")
+    check = pytest.importorskip("wildlab.flight.checks.check")
     save_flight(flight, tmp_path / "twin")
     findings = check.check_flight(load_flight(tmp_path / "twin"))
     assert [finding.sentence for finding in findings if finding.level == "problem"] == []

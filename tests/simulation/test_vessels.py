@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.check import check_flight
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.clocks import frame_times, poses_at
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.flight.sync import frame_times, poses_at
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose

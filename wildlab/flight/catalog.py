@@ -18,6 +18,7 @@ import pooch
 from pydantic import Field, RootModel, field_validator
 
 from wildlab.errors import WildlabError
+from wildlab.files import sha256
 from wildlab.flight.files import (
     Strict,
     check_model,
@@ -25,7 +26,6 @@ from wildlab.flight.files import (
     is_safe_name,
     leaves_folder,
     read_toml,
-    sha256_of,
 )
 from wildlab.paths import DATA
 
@@ -167,7 +167,7 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
 
 
 def _is_right(path: Path, file: DataFile) -> bool:
-    return path.is_file() and sha256_of(path) == file.sha256
+    return path.is_file() and sha256(path) == file.sha256
 
 
 def _copy(mirror: Path, file: DataFile, target: Path) -> None:
@@ -204,7 +204,7 @@ def _download(file: DataFile, target: Path) -> None:
 
 
 def _verify(path: Path, file: DataFile, whence: Path | str, fix: str) -> None:
-    found = sha256_of(path)
+    found = sha256(path)
     if found != file.sha256:
         raise WildlabError(
             f"has the SHA-256 {found}, and the catalog says {file.sha256} for {file.path}", fix, file=whence

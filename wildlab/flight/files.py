@@ -1,4 +1,4 @@
-"""Files as hostile input: names that may not leave a folder, hashes, atomic writes, strict TOML models.
+"""Files as hostile input: names that may not leave a folder, and strict models of TOML files.
 
 Manifests, recipes and the catalog are TOML files checked by a pydantic model. `check_model` turns the first
 thing pydantic finds into the one sentence a user reads.
@@ -7,10 +7,7 @@ thing pydantic finds into the one sentence a user reads.
 from __future__ import annotations
 
 import difflib
-import hashlib
-import os
 import re
-import tempfile
 import tomllib
 import typing
 from collections.abc import Iterable, Sequence
@@ -68,25 +65,6 @@ def inside(folder: Path, name: str, *, file: Path, field: str) -> Path:
             field=field,
         )
     return path
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, as 64 hexadecimal digits."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def write_atomic(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all: into a temporary sibling, then one rename."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".partial")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def printable(text: str) -> str:

@@ -122,7 +122,7 @@ class GnssPart(Strict):
     """The receiver: `lever_arm_m` from b to its antenna, in b (forward, right, down).
 
     `latency_s`: how long after the instant it is of a fix is stamped. It belongs to the fix, the offset in
-    `[clocks]` to the clock; `wildlab.flight.sync.gnss_times` applies both. `wander_...`: the part of a
+    `[clocks]` to the clock; `wildlab.flight.clocks.gnss_times` applies both. `wander_...`: the part of a
     position's standard deviation that fixes share for as long as `wander_time_s` (multipath, for instance).
     """
 

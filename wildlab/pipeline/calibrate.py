@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate, split_images
+from wildlab.pipeline.evaluate import draws_of, judge, known_points
 from wildlab.pipeline.georeference import (
     Observations,
     calibrated,
@@ -20,7 +21,6 @@ from wildlab.pipeline.georeference import (
     pose_errors,
     shifted_poses,
 )
-from wildlab.pipeline.judge import draws_of, judge, known_points
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def calibrate_flight(
 ) -> Calibrated:
     """Calibrate on a flight's known points, and judge each half of its images by the other half.
 
-    Draws (images, or minutes of them: see :func:`~wildlab.pipeline.judge.draws_of`) are halved at random,
+    Draws (images, or minutes of them: see :func:`~wildlab.pipeline.evaluate.draws_of`) are halved at random,
     ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
     asked for only where the flight has times.
 

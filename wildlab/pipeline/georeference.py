@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.geometry.calibration import Calibration, apply_calibration
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.flight.clocks import covariance_columns, frame_times
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import covariance_columns, frame_times
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf
 from wildlab.navigation.observer import Gains, run_observer

@@ -19,8 +19,8 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, nees, share_inside
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
+from wildlab.flight.clocks import covariances, gnss_times, poses_at
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import covariances, gnss_times, poses_at
 from wildlab.pipeline.navigate import (
     BIASES,
     PUBLISHED_LIKE,
@@ -31,7 +31,6 @@ from wildlab.pipeline.navigate import (
     navigate_observer,
 )
 from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY
-from wildlab.simulation.twins import simulate_twin
 
 Array = NDArray[np.float64]
 
@@ -346,14 +345,3 @@ def unit_of(name: str) -> str:
     if name.startswith(("nees", "nis", "inside")):
         return "1"
     return "deg" if name.endswith(AXES) else "m/s" if name.endswith("velocity") else "m"
-
-
-def fly(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
-    """One simulated flight, navigated and judged against its truth from `SETTLING_S` on.
-
-    Raises
-    ------
-    WildlabError
-        If there is no such twin, or it has no inertial unit and receivers.
-    """
-    return numbers_of(study_navigation(simulate_twin(twin, seed)), SETTLING_S)

@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import gnss_times
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import Aiding, headings, positions, velocities
 from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned

@@ -15,7 +15,7 @@ from scipy.optimize import curve_fit, nnls
 from wildlab.errors import WildlabError
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
-from wildlab.pipeline.looks import Looks, Truth, looks_of, truths_at
+from wildlab.pipeline.scans import Looks, Truth, looks_of, truths_at
 from wildlab.tracking.afloat import CLOCK, EAST, NORTH, YAW, predict_bearing, predict_position
 from wildlab.tracking.measurement import Prediction, difference
 

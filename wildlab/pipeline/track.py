@@ -17,8 +17,8 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.flight.sync import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose, camera_rotation

@@ -1,1 +1,1 @@
-"""From a notebook to one offline page, the numbers beside it, and the ledger of all studies."""
+"""From numbers to one offline page: the report, its figures, metrics, and the ledger. It starts no process."""

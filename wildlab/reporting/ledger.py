@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any
 
-from wildlab.errors import WildlabError
-from wildlab.reporting.files import write_atomic
-from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.page import page
-from wildlab.reporting.provenance import git_state
 from wildlab.reporting.report import TAGS
-from wildlab.reporting.standing import (
-    DIFFERS,
-    MISSING,
-    NOT_JUDGED,
-    REPRODUCED,
-    Claim,
-    Number,
-    Standing,
-    standing,
-)
-from wildlab.reporting.studies import Study
+from wildlab.reporting.status import DIFFERS, MISSING, NOT_JUDGED, REPRODUCED, Claim, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, inline, number, prose
 
 #: A longer table is folded away behind a line that sums it up.
@@ -45,25 +29,25 @@ _PILLS = {
 }
 
 
-def build_ledger(reports: Path, studies: Mapping[str, Study]) -> Path:
-    """Write ``index.html`` and return its path. Works whichever of the studies have been run."""
-    standings = [standing(study, reports) for study in studies.values()]
-    flights = _other_reports(reports, studies)
-    path = reports / "index.html"
-    reports.mkdir(parents=True, exist_ok=True)
-    write_atomic(path, ledger_page(standings, flights))
-    return path
+def ledger_page(
+    studies: Iterable[StudyStatus], flights: Iterable[tuple[str, str]] = (), *, code: str = ""
+) -> str:
+    """The whole page.
 
-
-def ledger_page(standings: Iterable[Standing], flights: Iterable[tuple[str, str]] = ()) -> str:
-    """The whole page. ``flights`` are reports besides the studies, as (folder, flight)."""
-    standings, flights = list(standings), list(flights)
+    Parameters
+    ----------
+    flights
+        Reports besides the studies, as (folder, flight).
+    code
+        Which code it was put together by, as HTML.
+    """
+    studies, flights = list(studies), list(flights)
     body = [
         "<header><h1>Ledger</h1>",
         '<p class="sub">Every published number and claim of the two theses, and what became of it here.</p>',
         "</header>",
-        _tiles(standings),
-        *(_section(one) for one in standings),
+        _tiles(studies),
+        *(_section(one) for one in studies),
     ]
     if flights:
         items = [
@@ -74,31 +58,30 @@ def ledger_page(standings: Iterable[Standing], flights: Iterable[tuple[str, str]
         ]
         body.append(f"<h2>Flights evaluated here</h2><ul>{''.join(items)}</ul>")
     body.append(_explanation())
-    git = git_state()
-    commit = f"commit <code>{git['commit'][:10]}</code>" if git["commit"] else escape(git["note"])
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    footer = f"<p>Put together {made}, {commit}. Each report says which code and data it came from.</p>"
+    made += f", {code}" if code else ""
+    footer = f"<p>Put together {made}. Each report says which code and data it came from.</p>"
     return page(title="wildlab ledger", body="\n".join(body), kicker="wildlab", footer=footer)
 
 
-def _tiles(standings: list[Standing]) -> str:
-    numbers = [one for study in standings for one in study.numbers]
-    claims = [one for study in standings for one in study.claims]
-    done = sum(study.state == "done" for study in standings)
-    failed = sum(study.state == "failed" for study in standings)
+def _tiles(studies: list[StudyStatus]) -> str:
+    numbers = [one for study in studies for one in study.numbers]
+    claims = [one for study in studies for one in study.claims]
+    done = sum(study.state == "done" for study in studies)
+    failed = sum(study.state == "failed" for study in studies)
     reproduced = sum(one.verdict == REPRODUCED for one in numbers)
-    tiles = [(f"{done} / {len(standings)}", "studies done" + (f", {failed} failed" if failed else ""))]
+    tiles = [(f"{done} / {len(studies)}", "studies done" + (f", {failed} failed" if failed else ""))]
     if numbers:
         tiles.append((f"{reproduced} / {len(numbers)}", "published numbers reproduced"))
     if claims:
         tiles.append((f"{sum(one.verdict == 'holds' for one in claims)} / {len(claims)}", "claims hold"))
-    logged = sum(study.state == "done" and study.study.kind == "logged" for study in standings)
-    if any(study.study.kind == "logged" for study in standings):
+    logged = sum(study.state == "done" and study.study.kind == "logged" for study in studies)
+    if any(study.study.kind == "logged" for study in studies):
         tiles.append((str(logged), "done on logged flights"))
     return f'<ul class="tiles">{"".join(f"<li><b>{v}</b><span>{t}</span></li>" for v, t in tiles)}</ul>'
 
 
-def _section(one: Standing) -> str:
+def _section(one: StudyStatus) -> str:
     study = one.study
     tag = f'<span class="tag {study.kind}">{escape(_tag(one))}</span>'
     answers = f" · {escape(study.section)}" if study.section else ""
@@ -115,7 +98,7 @@ def _section(one: Standing) -> str:
     return "\n".join([*(part for part in parts if part), "</section>"])
 
 
-def _tag(one: Standing) -> str:
+def _tag(one: StudyStatus) -> str:
     study = one.study
     if study.kind == "twin":
         flights = f", {one.seeds} flights" if one.seeds and one.seeds > 1 else ""
@@ -125,7 +108,7 @@ def _tag(one: Standing) -> str:
     return TAGS["computed"]
 
 
-def _state(one: Standing) -> str:
+def _state(one: StudyStatus) -> str:
     run = f"`wildlab run {one.study.name}`"
     if one.state == "failed":
         return f'<p><span class="pill no">failed</span> {inline(one.reason)}</p>'
@@ -141,7 +124,7 @@ def _state(one: Standing) -> str:
     return ""
 
 
-def _numbers(one: Standing) -> str:
+def _numbers(one: StudyStatus) -> str:
     if not one.numbers:
         return ""
     spread = any(n.low is not None and n.high is not None for n in one.numbers)
@@ -173,7 +156,7 @@ def _numbers(one: Standing) -> str:
     return table
 
 
-def _summary(one: Standing) -> str:
+def _summary(one: StudyStatus) -> str:
     count = len(one.numbers)
     if one.state != "done":
         return f"{count} published number{'s' * (count > 1)} waiting for it"
@@ -267,21 +250,6 @@ def _claims(claims: list[Claim]) -> str:
 
 def _explanation() -> str:
     return f"<details><summary>How to read this</summary>{prose(EXPLANATION)}</details>"
-
-
-def _other_reports(reports: Path, studies: Mapping[str, Study]) -> list[tuple[str, str]]:
-    """Reports of flights that somebody evaluated: (folder, flight)."""
-    found: list[tuple[str, str]] = []
-    for path in sorted(reports.glob("*/status.json")) if reports.is_dir() else []:
-        folder = path.parent
-        if folder.name in studies or folder.name.startswith(".") or not (folder / "report.html").is_file():
-            continue
-        try:
-            content: dict[str, Any] = read_metrics(folder / "metrics.json")
-        except WildlabError:
-            continue
-        found.append((folder.name, str(content["flight"]) or folder.name))
-    return found
 
 
 def _signed(n: Number) -> str:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.files import write_json
+from wildlab.files import write_json
 
 KINDS = ("logged", "twin", "computed")
 VERDICTS = ("holds", "does not hold", "cannot be decided")

@@ -1,0 +1,360 @@
+"""`check_flight` on inertial and satellite measurements: right ones pass, and one fault at a time is said."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.checks.check import Finding, check_flight, usable_for
+from wildlab.flight.checks.inertial_data import FORCE, RATE
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import matrix_to_quaternion
+from wildlab.simulation.trajectory import Array, angular_rates, attitude_of, loiter, move, specific_forces
+
+NED = ["north_m", "east_m", "down_m"]
+SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+DURATION = 240.0
+
+Change = Callable[[Flight], None]
+
+
+def _eight(times: Array) -> tuple[Array, Array, Array]:
+    """A figure of eight over 200 m by 120 m in 40 s, briskly up and down, never twice alike."""
+    size = np.array([100.0, 60.0, 6.0, 5.0])
+    pace = 2 * np.pi / np.array([40.0, 20.0, 10.7, 8.1])
+    angle = np.multiply.outer(np.asarray(times, float), pace) + np.array([0.3, 0.9, 0.0, 0.5])
+
+    def in_n(parts: Array) -> Array:
+        return np.column_stack([parts[:, :2], parts[:, 2] + parts[:, 3]])
+
+    position = in_n(size * np.sin(angle)) - np.array([0.0, 0.0, 100.0])
+    return position, in_n(size * pace * np.cos(angle)), in_n(-size * pace**2 * np.sin(angle))
+
+
+def _flight(path: Any = _eight, noisy: float = 1.0) -> Flight:
+    """IMU at 50 Hz, GNSS at 2 Hz and poses at 10 Hz of one motion, with noise of small sensors."""
+    rng = np.random.default_rng(4)
+    attitude = attitude_of(path, trim_pitch=0.05)
+
+    def noise(sd: float, n: int) -> np.ndarray:
+        return noisy * sd * rng.standard_normal((n, 3))
+
+    t = np.arange(0.0, DURATION, 0.02)
+    motion = move(path, attitude, t)
+    imu = pd.DataFrame({"time_s": t})
+    imu[list(FORCE)] = specific_forces(motion) + noise(0.5, len(t)) + noisy * np.array([0.2, -0.1, 0.15])
+    imu[list(RATE)] = angular_rates(attitude, t) + noise(0.02, len(t)) + noisy * np.array([0.01, -0.01, 0.02])
+    t = np.arange(0.0, DURATION - 0.02, 0.5)
+    position, velocity, _ = path(t)
+    gnss = pd.DataFrame({"time_s": t})
+    gnss[NED], gnss[SPEED] = position + noise(1.0, len(t)), velocity + noise(0.1, len(t))
+    t = np.arange(0.0, DURATION - 0.02, 0.1)
+    motion = move(path, attitude, t)
+    nav = pd.DataFrame({"time_s": t})
+    nav[NED], nav[QUATERNION] = motion.position, matrix_to_quaternion(motion.R_nb)
+    manifest = make_manifest(
+        {
+            "name": "synthetic",
+            "kind": "logged",
+            "origin": {"latitude_deg": 63.4, "longitude_deg": 10.4, "height_m": 40.0},
+            "platform": {"name": "X8"},
+            "time": {"kind": "utc", "epoch": "2024-07-25T04:05:57Z"},
+        }
+    )
+    return Flight(manifest, {"autopilot": nav}, {"imu": imu, "gnss": gnss})
+
+
+@pytest.fixture(scope="module")
+def right() -> Flight:
+    return _flight()
+
+
+def _copy(flight: Flight, nav: bool = True) -> Flight:
+    tables = {name: table.copy() for name, table in flight.tables.items()}
+    return Flight(flight.manifest, dict(flight.nav) if nav else {}, tables)
+
+
+def _found(flight: Flight) -> list[Finding]:
+    return [one for one in check_flight(flight) if one.table in ("imu", "gnss")]
+
+
+def _circle() -> Any:
+    return loiter([0.0, 0.0], 150.0, 100.0, 20.0, wind=(6.0, 2.0))
+
+
+def _straight(times: Array) -> tuple[Array, Array, Array]:
+    t = np.asarray(times, float)
+    v = np.tile([20.0, 3.0, 0.0], (len(t), 1))
+    return t[:, None] * v - np.array([0, 0, 100.0]), v, np.zeros_like(v)
+
+
+@pytest.mark.parametrize("nav", [True, False])
+@pytest.mark.parametrize("path", [_eight, _circle(), _straight], ids=["eight", "circle", "straight"])
+@pytest.mark.parametrize("speeds", [True, False])
+@pytest.mark.parametrize("noisy", [0.0, 1.0])
+def test_right_measurements_pass(path: Any, nav: bool, speeds: bool, noisy: float) -> None:
+    flight = _copy(_flight(path, noisy), nav)
+    if not speeds:
+        flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
+    assert _found(flight) == []
+    assert usable_for(flight)[2].usable
+
+
+def _drop(table: str, start: float, end: float) -> Change:
+    def change(flight: Flight) -> None:
+        rows = flight.tables[table]
+        flight.tables[table] = rows[~rows["time_s"].between(start, end)]
+
+    return change
+
+
+def _shift(table: str, seconds: float) -> Change:
+    def change(flight: Flight) -> None:
+        flight.tables[table]["time_s"] += seconds
+
+    return change
+
+
+def _scale(columns: tuple[str, ...], factor: float) -> Change:
+    def change(flight: Flight) -> None:
+        flight.tables["imu"][list(columns)] *= factor
+
+    return change
+
+
+def _turn(matrix: Any, *parts: tuple[str, ...]) -> Change:
+    """What a sensor measures whose axes are the rows of a matrix, in the axes of the body."""
+
+    def change(flight: Flight) -> None:
+        for columns in parts:
+            imu = flight.tables["imu"]
+            imu[list(columns)] = imu[list(columns)].to_numpy() @ np.asarray(matrix, float).T
+
+    return change
+
+
+def _gravity_off(flight: Flight) -> None:
+    imu, nav = flight.tables["imu"], flight.nav["autopilot"]
+    up = attitude_of(_eight, trim_pitch=0.05)(imu["time_s"].to_numpy())[:, 2, :]
+    assert len(nav)
+    imu[list(FORCE)] += 9.81 * up
+
+
+def _other_flight(flight: Flight) -> None:
+    rng = np.random.default_rng(9)
+    gnss = flight.tables["gnss"]
+    gnss[SPEED] = 20 + np.cumsum(rng.standard_normal((len(gnss), 3)), axis=0)
+
+
+def _both(*changes: Change) -> Change:
+    def change(flight: Flight) -> None:
+        for one in changes:
+            one(flight)
+
+    return change
+
+
+FLU = np.diag([1, -1, -1])
+FALSE_EXCHANGE = [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
+CASES: list[Any] = [
+    # gaps and outages
+    (
+        _drop("imu", 31.01, 32.99),
+        "warning",
+        "imu",
+        "time_s",
+        "nothing was measured for 2.0 s after 31.000 s",
+        "look",
+    ),
+    (
+        _both(_drop("imu", 31.01, 32.99), _drop("imu", 50.01, 51)),
+        "warning",
+        "imu",
+        "time_s",
+        "the longest of 2 gaps",
+        "Look for the lost samples",
+    ),
+    (
+        _drop("gnss", 100.1, 159.9),
+        "warning",
+        "gnss",
+        "time_s",
+        "no satellite position for 60.0 s after 100.000 s",
+        "Expect position and velocity to drift",
+    ),
+    (_drop("gnss", 180, 999), "warning", "gnss", "time_s", "position for 60.5 s after 179.500 s", "Expect"),
+    # clocks
+    (
+        _shift("gnss", 1e6),
+        "problem",
+        "gnss",
+        "time_s",
+        "the satellite positions from 1000000.000 s to 1000239.500 s: they do not overlap in time",
+        "State gnss_offset_s in [clocks]",
+    ),
+    (_shift("gnss", 180), "warning", "gnss", "time_s", "only 60 s are common to both", "gnss_offset_s"),
+    (
+        _shift("gnss", 3.0),
+        "warning",
+        "gnss",
+        "time_s",
+        "seem to be 3.0 s late against",
+        "gnss_offset_s = -3.0",
+    ),
+    (_shift("gnss", -18.0), "warning", "gnss", "time_s", "to be 18.0 s early", "gnss_offset_s = 18.0"),
+    (_shift("imu", 0.6), "warning", "gnss", "time_s", "seem to be 0.6 s early", "gnss_offset_s = 0.6"),
+    (_other_flight, "warning", "gnss", "time_s", "nothing in common", "the same flight and the same clock"),
+    # units
+    (_scale(FORCE, 1 / 9.80665), "problem", "imu", "f_z_m_s2", "it is in g", 'Set unit = "g" in [imu.force]'),
+    (
+        _scale(FORCE, 100),
+        "problem",
+        "imu",
+        "f_z_m_s2",
+        "gravity alone is 9.8",
+        "Check the unit in [imu.force]",
+    ),
+    (_gravity_off, "problem", "imu", "f_z_m_s2", "gravity was taken off", "Use the raw samples"),
+    (
+        _scale(RATE, 180 / np.pi),
+        "problem",
+        "imu",
+        "w_z_rad_s",
+        "times that of the attitude in nav/autopilot: it is in deg/s",
+        'Set unit = "deg/s" in [imu.rate]',
+    ),
+    (_scale(RATE, np.pi / 180), "problem", "imu", "w_z_rad_s", "it is far too small", 'Set unit = "rad/s"'),
+    # axes
+    (
+        _turn(FLU, FORCE, RATE),
+        "problem",
+        "imu",
+        "f_z_m_s2",
+        "and has to point along -z",
+        "(here the turns say that z points up)",
+    ),
+    (_scale(FORCE, -1), "problem", "imu", "f_z_m_s2", "has to point along -z", "say that z points down)"),
+    (
+        _turn(FALSE_EXCHANGE, FORCE, RATE),
+        "problem",
+        "imu",
+        "f_x_m_s2",
+        "has to point along -z",
+        "Exchange the axes in [imu.force] and [imu.rate] of the recipe: down is along x here",
+    ),
+    (
+        _turn(np.diag([-1, -1, 1]), FORCE, RATE),
+        "warning",
+        "imu",
+        "w_x_rad_s",
+        "x goes with minus x, y goes with minus y of it",
+        "Set columns and negate in [imu.rate]",
+    ),
+    (_turn(np.diag([1, -1, 1]), RATE), "warning", "imu", "w_y_rad_s", "y goes with minus y", "[imu.rate]"),
+    (_turn(np.diag([1, 1, -1]), RATE), "warning", "imu", "w_z_rad_s", "z goes with minus z", "[imu.rate]"),
+    (_turn(np.diag([-1, 1, 1]), RATE), "warning", "imu", "w_x_rad_s", "x goes with minus x", "[imu.rate]"),
+    (_turn(np.diag([-1, 1, 1]), FORCE), "warning", "imu", "f_x_m_s2", "x goes with minus x", "[imu.force]"),
+]
+
+
+@pytest.mark.parametrize(("change", "level", "table", "field", "said", "fix"), CASES)
+def test_each_fault_is_said(
+    right: Flight, change: Change, level: str, table: str, field: str, said: str, fix: str
+) -> None:
+    flight = _copy(right)
+    change(flight)
+    found = _found(flight)
+    fitting = [one for one in found if one.table == table and one.field == field and said in one.sentence]
+    assert [one.level for one in fitting] == [level], found
+    assert fix.lower() in fitting[0].fix.lower()
+    assert usable_for(flight)[2].usable == (level == "warning")
+
+
+@pytest.mark.parametrize(
+    ("change", "level", "field", "said"),
+    [
+        (
+            _scale(RATE, 180 / np.pi),
+            "problem",
+            "w_z_rad_s",
+            "as the course over ground turns: it is in deg/s",
+        ),
+        (_scale(RATE, np.pi / 180), "warning", "w_z_rad_s", "as fast as the course over ground turns"),
+        (_turn(np.diag([1, 1, -1]), RATE), "warning", "w_z_rad_s", "runs against the course over ground"),
+        (_turn(np.diag([-1, -1, 1]), FORCE, RATE), "warning", "w_y_rad_s", "the nose drops in turns"),
+        (_turn(FLU, FORCE, RATE), "problem", "f_z_m_s2", "has to point along -z"),
+    ],
+)
+def test_without_any_attitude(right: Flight, change: Change, level: str, field: str, said: str) -> None:
+    flight = _copy(right, nav=False)
+    change(flight)
+    found = _found(flight)
+    assert [(one.level, one.field) for one in found if said in one.sentence] == [(level, field)], found
+
+
+def test_degrees_without_anything_to_compare_with(right: Flight) -> None:
+    flight = _copy(right, nav=False)
+    _scale(RATE, 180 / np.pi)(flight)
+    del flight.tables["gnss"]
+    (found,) = _found(flight)
+    assert found.level == "problem"
+    assert "times around within a second: this looks like deg/s" in found.sentence
+
+
+def test_the_suggested_offset_and_a_latency_are_taken_into_account(right: Flight) -> None:
+    flight = _copy(right)
+    _shift("gnss", 3.0)(flight)
+    mended = dataclasses.replace(
+        flight,
+        manifest=replace_in_manifest(flight.manifest, {"clocks": {"gnss_offset_s": -3.0}}),
+    )
+    assert _found(mended) == []
+    late = dataclasses.replace(
+        flight, manifest=replace_in_manifest(flight.manifest, {"gnss": {"latency_s": 3.0}})
+    )
+    assert _found(late) == []
+    wrong = dataclasses.replace(
+        flight, manifest=replace_in_manifest(flight.manifest, {"clocks": {"gnss_offset_s": 2.0}})
+    )
+    (found,) = _found(wrong)
+    assert "gnss_offset_s = -3.0" in found.fix
+
+
+@pytest.mark.parametrize("offset", [3.0, -2.0])
+def test_an_offset_without_velocities(offset: float) -> None:
+    flight = _copy(_flight(noisy=0.05), nav=False)  # positions as good as RTK
+    flight.tables["gnss"] = flight.tables["gnss"].drop(columns=SPEED)
+    _shift("gnss", -offset)(flight)
+    (found,) = _found(flight)
+    assert f"seem to be {abs(offset):.1f} s {'early' if offset > 0 else 'late'}" in found.sentence
+
+
+def test_values_that_are_no_numbers_are_left_to_others(right: Flight) -> None:
+    flight = _copy(right)
+    flight.tables["imu"].loc[100, FORCE[0]] = np.nan
+    flight.tables["gnss"].loc[3, NED[0]] = np.nan
+    assert {one.field for one in _found(flight)} == {FORCE[0], NED[0]}
+    flight.tables["imu"].loc[:, FORCE[0]] = np.nan
+    assert {one.field for one in _found(flight)} == {FORCE[0], NED[0]}
+
+
+def test_times_that_do_not_increase_are_left_to_others(right: Flight) -> None:
+    flight = _copy(right)
+    flight.tables["imu"].loc[100, "time_s"] = 0.0
+    flight.tables["gnss"].loc[3, "time_s"] = 0.0
+    assert {(one.table, one.field) for one in _found(flight)} == {("imu", "time_s"), ("gnss", "time_s")}
+
+
+def test_a_few_samples_say_nothing(right: Flight) -> None:
+    flight = _copy(right)
+    for n in (0, 1, 2, 5):
+        flight.tables["imu"] = right.tables["imu"].iloc[:n]
+        flight.tables["gnss"] = right.tables["gnss"].iloc[:n]
+        assert [one for one in _found(flight) if "correlation" in one.sentence] == []

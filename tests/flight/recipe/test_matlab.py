@@ -1,0 +1,207 @@
+"""MATLAB files as tables of a recipe, and what is said about those that cannot be read."""
+
+from __future__ import annotations
+
+import struct
+import tomllib
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+
+from wildlab.errors import WildlabError
+from wildlab.files import sha256
+from wildlab.flight.recipe import matlab
+from wildlab.flight.recipe.matlab import read_matlab, table_of
+from wildlab.flight.recipe.series import MatlabTable
+
+HERE = Path("log.mat")
+
+
+def _cells(*names: str) -> np.ndarray:
+    cells = np.empty((len(names), 1), dtype=object)
+    cells[:, 0] = names
+    return cells
+
+
+@pytest.fixture
+def mat(raw: Any) -> Any:
+    """The right recipe, its poses and photos out of a MATLAB file."""
+    latitude = 63.44 + 1e-4 * np.arange(5)
+    seconds = 1718184600.0 + np.arange(5)
+    variables = {
+        "log": {
+            "nav": {
+                "t": seconds,
+                "lat": latitude,
+                "q": np.array([[1.0, 0, 0, 0]] * 5),
+                "odd": np.arange(7.0),
+                "complex": np.arange(5) * 1j,
+            },
+            "name": "thor",
+        },
+        "POS": np.column_stack([np.full(5, 10.4), np.full(5, 140.0), np.arange(5)]),
+        "POS_label": _cells("lon", "height", "n"),
+        "photo": _cells("A", "B", "C"),
+        "when": np.array([1.5, 2.0, 3.0]),
+        "one": np.array([1, 2, 3], dtype=np.int16),
+    }
+    (raw.folder / "raw").mkdir()
+    scipy.io.savemat(raw.folder / "raw" / "log.mat", variables, do_compression=True)
+    raw.set("tables", {"photos": {"file": "log.mat", "fields": ["photo", "when", "one"]}})
+    raw.set("frames", {"file": "photos", "id": "photo", "time": {"column": "when", "format": "elapsed"}})
+    return raw
+
+
+def test_fields_of_the_file_itself(mat: Any) -> None:
+    before = sha256(mat.folder / "raw" / "log.mat")
+    frames = mat.run().table("frames")
+    assert list(frames["frame_id"]) == ["A", "B", "C"]
+    np.testing.assert_allclose(frames["time_s"], [1.5, 2.0, 3.0])
+    assert sha256(mat.folder / "raw" / "log.mat") == before
+    sources = {one["file"]: one["sha256"] for one in _sources(mat)}
+    assert sources["log.mat"] == before
+
+
+def _sources(mat: Any) -> list[dict[str, Any]]:
+    return list(tomllib.loads((mat.into / "flight.toml").read_text())["sources"])
+
+
+def test_numbers_as_names(mat: Any) -> None:
+    mat.set("frames.id", "one")
+    mat.replace("clicks.csv", "A,", "1,")
+    mat.replace("clicks.csv", "C,", "3,")
+    assert list(mat.run().table("frames")["frame_id"]) == ["1", "2", "3"]
+
+
+def test_a_matrix_with_labels_and_a_struct(mat: Any) -> None:
+    variables = read_matlab(HERE, (mat.folder / "raw" / "log.mat").read_bytes())
+    table = table_of(variables, MatlabTable(file="log.mat", matrix="POS", labels="POS_label"), HERE, "x")
+    assert list(table) == ["lon", "height", "n"]
+    np.testing.assert_array_equal(table["n"], np.arange(5))
+    named = MatlabTable(file="log.mat", struct="log.nav", matrix="q", columns=("w", "x", "y", "z"))
+    np.testing.assert_array_equal(table_of(variables, named, HERE, "x")["w"], np.ones(5))
+    nav = table_of(variables, MatlabTable(file="log.mat", struct="log.nav", fields=("t", "lat")), HERE, "x")
+    np.testing.assert_array_equal(nav["t"] - nav["t"][0], np.arange(5))
+
+
+@pytest.mark.parametrize(
+    ("dotted", "value", "said"),
+    [
+        (
+            "fields",
+            ["photo", "whem"],
+            "whem (in [tables.photos]): there is no 'whem' in this file. Did you mean",
+        ),
+        ("struct", "lag", "there is no 'lag' in this file. Did you mean 'log'"),
+        ("struct", "log.naw", "there is no 'naw' in the struct 'log'. Did you mean 'nav'"),
+        ("struct", "POS.x", "'POS' is not a struct. Mend the path"),
+        ("file", "../log.mat", "leaves its folder"),
+        ("file", "lag.mat", "there is no such file, and [tables.photos] of recipe.toml asks for it"),
+        ("labels", "POS_label", "made of fields, or of a matrix with columns or labels"),
+        ("matrix", "POS", "made of fields, or of a matrix with columns or labels"),
+    ],
+)
+def test_what_a_recipe_gets_wrong(mat: Any, dotted: str, value: Any, said: str) -> None:
+    mat.set(f"tables.photos.{dotted}", value)
+    with pytest.raises(WildlabError) as caught:
+        mat.run()
+    assert said in str(caught.value)
+    assert not mat.into.exists()
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        (
+            {"struct": "log.nav", "fields": ("t", "odd")},
+            "has 7 values, and 't' has 5. Put fields of one length",
+        ),
+        ({"struct": "log.nav", "fields": ("q",)}, "is 5 x 4 of float64, and a column is one row of real"),
+        (
+            {"struct": "log.nav", "fields": ("complex",)},
+            "is 5 of complex128, and a column is one row of real",
+        ),
+        ({"struct": "log", "fields": ("nav",)}, "of object, and a column is one row of real numbers"),
+        ({"matrix": "POS", "columns": ("a", "b")}, "'POS' is 5 x 3, and there are 2 names of columns"),
+        ({"matrix": "POS", "columns": ("a", "b", "b")}, "'POS' is 5 x 3, and there are 2 names of columns"),
+    ],
+)
+def test_what_is_no_table(mat: Any, block: dict[str, Any], said: str) -> None:
+    variables = read_matlab(HERE, (mat.folder / "raw" / "log.mat").read_bytes())
+    with pytest.raises(WildlabError) as caught:
+        table_of(variables, MatlabTable(file="log.mat", **block), HERE, "tables.x")
+    assert said in str(caught.value)
+
+
+def test_a_cell_that_is_no_number_names_its_row(mat: Any) -> None:
+    path = mat.folder / "raw" / "log.mat"
+    scipy.io.savemat(path, {"photo": _cells("A", "B", "C"), "when": [1.0, np.nan, 3.0], "one": [1, 2, 3]})
+    with pytest.raises(WildlabError, match=r"row 2: 'nan' is not a finite number"):
+        mat.run()
+
+
+@pytest.mark.parametrize(
+    "start", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n"]
+)
+def test_version_7_3_is_told(start: bytes) -> None:
+    with pytest.raises(
+        WildlabError, match=r"version 7\.3 \(HDF5\), which is not read\. Load it in MATLAB.*-v7"
+    ):
+        read_matlab(HERE, start + bytes(600))
+
+
+@pytest.mark.parametrize("data", [b"", b"time,lat\n1,2\n", b"MATLAB 5.0", bytes(200)])
+def test_other_files_are_told(data: bytes) -> None:
+    with pytest.raises(WildlabError, match="is not a MATLAB file of version 5 to 7"):
+        read_matlab(HERE, data)
+
+
+def _header() -> bytes:
+    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+
+
+def test_a_damaged_file_is_one_sentence(mat: Any) -> None:
+    good = (mat.folder / "raw" / "log.mat").read_bytes()
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        bad = bytearray(good[: rng.integers(140, len(good))])
+        for at in rng.integers(128, len(bad), 20):
+            bad[at] = rng.integers(256)
+        try:
+            read_matlab(HERE, bytes(bad))
+        except WildlabError as error:
+            assert "damaged" in str(error) or "unpacked" in str(error)
+            assert "\n" not in str(error)
+
+
+def test_a_small_file_that_unpacks_to_a_huge_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(matlab, "MOST_BYTES", 1 << 22)
+    bomb = zlib.compress(bytes(1 << 24))
+    assert len(bomb) < 1 << 15
+    with pytest.raises(WildlabError, match="holds more than 4 MiB once it is unpacked"):
+        read_matlab(HERE, _header() + struct.pack("<II", 15, len(bomb)) + bomb)
+
+
+def test_a_variable_that_claims_to_be_huge() -> None:
+    """A cell array of 2^40 cells in a few bytes."""
+    flags = struct.pack("<IIII", 6, 8, 1, 0)
+    dims = struct.pack("<IIii", 5, 8, 1 << 20, 1 << 20)
+    name = struct.pack("<HH4s", 1, 1, b"x")
+    body = flags + dims + name
+    with pytest.raises(WildlabError, match="damaged MATLAB file"):
+        read_matlab(HERE, _header() + struct.pack("<II", 14, len(body)) + body)
+
+
+def test_objects_and_functions_do_nothing(mat: Any) -> None:
+    """What is not numbers or text is an error, whatever it is: nothing of a file is ever called."""
+    functions = np.array([(1, "disp('x')")], dtype=[("a", object), ("b", object)])
+    path = mat.folder / "raw" / "log.mat"
+    scipy.io.savemat(path, {"photo": functions, "when": np.arange(3.0), "one": np.arange(3)})
+    with pytest.raises(
+        WildlabError, match=r"photo \(in \[tables\.photos\]\): is .* a column is one row of real"
+    ):
+        mat.run()

@@ -1,0 +1,330 @@
+"""What a recipe converts: frames, units, signs, times, groups; against numbers from elsewhere."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import covariances
+from wildlab.flight.recipe.parts import Attitude, Stamp, parse_zone
+from wildlab.flight.recipe.poses import _covariance, _rotation
+from wildlab.flight.recipe.units import UNITS, factor
+from wildlab.flight.store import Flight
+from wildlab.geometry.flodell import geodetic_to_enu_linear
+from wildlab.geometry.frames import euler_to_matrix, geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
+
+ORIGIN = {"latitude_deg": 63.44, "longitude_deg": 10.4, "height_m": 40.0}
+ANGLES = {name: {"column": name, "unit": "deg"} for name in ("roll", "pitch", "yaw")}
+
+
+def _position(flight: Flight, source: str = "log") -> np.ndarray:
+    return flight.nav[source][["north_m", "east_m", "down_m"]].to_numpy()
+
+
+def _rotations(flight: Flight, source: str = "log") -> np.ndarray:
+    return quaternion_to_matrix(flight.nav[source][["q_w", "q_x", "q_y", "q_z"]].to_numpy())
+
+
+def test_the_plain_case(raw: Any) -> None:
+    flight = raw.run()
+    np.testing.assert_allclose(flight.nav["log"]["time_s"], range(5))
+    latitude = np.radians(63.44 + 1e-4 * np.arange(5))
+    origin = (math.radians(63.44), math.radians(10.4), 140.0)  # the first pose, since the recipe names none
+    np.testing.assert_allclose(
+        _position(flight), geodetic_to_ned(latitude, math.radians(10.4), 140.0, origin), atol=1e-6
+    )
+    assert list(flight.table("frames")["frame_id"]) == ["A", "B", "C"]
+    np.testing.assert_allclose(flight.table("frames")["time_s"], [1.5, 2.0, 3.0])
+    detections = flight.table("detections")
+    assert list(detections["detection_id"]) == ["0", "1", "2"]
+    assert list(detections["target_id"]) == ["boat", "", "buoy"]
+    np.testing.assert_allclose(detections["plane_down_m"], 100.0, atol=1e-3)
+    truth = flight.table("truth")
+    assert list(truth["target_id"]) == ["buoy", "boat", "boat"]
+    np.testing.assert_allclose(truth["time_s"], [np.nan, 0.0, 4.0])
+    np.testing.assert_allclose(truth["sd_horizontal_m"], [0.02, np.nan, np.nan])
+    assert flight.manifest.locations.sensitivity == "withheld"
+
+
+def test_local_positions_both_ways(raw: Any) -> None:
+    raw.tables["nav.csv"] = "time,a,b,c,roll,pitch,yaw\n0,100,2,-3000,10,-20,30\n4,300,2,-3000,10,-20,30\n"
+    raw.set("origin", ORIGIN)
+    raw.set("poses.log.time", {"column": "time", "format": "elapsed"})
+    raw.set("poses.log.attitude", {**ANGLES, "pitch": {"column": "pitch", "unit": "deg", "negate": True}})
+    local = {
+        "north": {"column": "a", "unit": "ft"},
+        "east": {"column": "b", "unit": "km"},
+        "down": {"column": "c", "unit": "cm"},
+    }
+    raw.set("poses.log.position", local)
+    flight = raw.run()
+    np.testing.assert_allclose(_position(flight)[0], [30.48, 2000, -30])
+    np.testing.assert_allclose(np.degrees(matrix_to_euler(_rotations(flight))), [[10, 20, 30]] * 2)
+
+    raw.folder = raw.folder / "again"
+    raw.folder.mkdir()
+    raw.set(
+        "poses.log.position",
+        {"east": local["north"], "north": local["east"], "up": {**local["down"], "negate": True}},
+    )
+    np.testing.assert_allclose(_position(raw.run())[0], [2000, 30.48, -30])
+
+
+def test_linear_enu_is_undone(raw: Any) -> None:
+    latitude, longitude = np.radians([63.45, 63.43]), np.radians([10.41, 10.38])
+    origin = (math.radians(63.44), math.radians(10.4), 40.0)
+    east, north = geodetic_to_enu_linear(latitude, longitude, origin[:2]).T
+    raw.tables["nav.csv"] = "time,e,n,u\n" + "".join(
+        f"{4 * i},{float(east[i])!r},{float(north[i])!r},60\n" for i in range(2)
+    )
+    raw.set("origin", ORIGIN)
+    raw.set("poses.log.time", {"column": "time", "format": "elapsed"})
+    raw.set("poses.log.attitude", {name: {"value": 0.0, "unit": "deg"} for name in ("roll", "pitch", "yaw")})
+    names = {"east": "e", "north": "n", "up": "u"}
+    raw.set(
+        "poses.log.position",
+        {"linear": True} | {name: {"column": c, "unit": "m"} for name, c in names.items()},
+    )
+    np.testing.assert_allclose(
+        _position(raw.run()), geodetic_to_ned(latitude, longitude, 100.0, origin), atol=1e-6
+    )
+
+
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3))
+def test_attitudes_in_other_axes(rotation_vector: list[float]) -> None:
+    """The same body, described forward-left-up in east-north-up, and by the inverse quaternion."""
+    R = Rotation.from_rotvec(rotation_vector)
+    nose, right = R.apply([1, 0, 0]), R.apply([0, 1, 0])  # in n: north, east, down
+
+    def ned_to_enu(v: np.ndarray) -> np.ndarray:
+        return np.array([v[1], v[0], -v[2]])
+
+    columns = np.column_stack([ned_to_enu(nose), -ned_to_enu(right), -ned_to_enu(R.apply([0, 0, 1]))])
+    q = Rotation.from_matrix(columns).as_quat(scalar_first=True)[None]
+    names = ("a", "b", "c", "d")
+    ros = Attitude(quaternion=names, order="wxyz", axes="flu-enu")
+    np.testing.assert_allclose(_rotation(q, ros)[0], R.as_matrix(), atol=1e-12)
+
+
+def test_order_and_inverse_of_quaternions(raw: Any) -> None:
+    q = Rotation.from_euler("ZYX", [30, 20, 10], degrees=True)
+    x, y, z, w = q.inv().as_quat().tolist()
+    raw.tables["nav.csv"] = (
+        raw.tables["nav.csv"]
+        .replace(",1,0,0,0", f",{x!r},{y!r},{z!r},{w!r}")
+        .replace("np.float64(", "")
+        .replace(")", "")
+    )
+    raw.set("poses.log.attitude", {"quaternion": ["qw", "qx", "qy", "qz"], "order": "xyzw", "inverse": True})
+    np.testing.assert_allclose(_rotations(raw.run()), [q.as_matrix()] * 5, atol=1e-12)
+
+
+def test_velocity_and_spreads(raw: Any) -> None:
+    metres, degrees = {"value": 2.0, "unit": "m"}, {"value": 1.0, "unit": "deg"}
+    raw.set(
+        "poses.log.spreads",
+        {
+            "horizontal": metres,
+            "vertical": {**metres, "value": 3.0},
+            "roll": degrees,
+            "pitch": degrees,
+            "yaw": {**degrees, "value": 4.0},
+        },
+    )
+    knots = {"value": 10.0, "unit": "kn"}
+    raw.set("poses.log.velocity", {"north": knots, "east": knots, "up": knots})
+    flight = raw.run()
+    np.testing.assert_allclose(
+        flight.nav["log"][["v_north_m_s", "v_down_m_s"]], [[5.14444, -5.14444]] * 5, rtol=1e-5
+    )
+    P = covariances(flight.nav["log"])
+    assert P is not None
+    np.testing.assert_allclose(np.sqrt(np.diag(P[0])), [2, 2, 3, *np.radians([1, 1, 4])])
+
+
+def test_spreads_of_angles_against_small_turns() -> None:
+    angles, step = np.array([0.4, -0.3, 2.0]), 1e-6
+    R = euler_to_matrix(*angles)
+    P = np.zeros((3, 3))
+    sd = np.array([0.01, 0.02, 0.05])
+    for i in range(3):
+        turned = euler_to_matrix(*(angles + step * np.eye(3)[i]))
+        column = Rotation.from_matrix(R.T @ turned).as_rotvec() / step
+        P += sd[i] ** 2 * np.outer(column, column)
+    found = _covariance(np.array([[1.0, 1.0, *sd]]), R[None])[0]
+    np.testing.assert_allclose(found[3:, 3:], P, atol=1e-9)
+    np.testing.assert_allclose(found[:3, :3], np.eye(3))
+
+
+def test_the_vertical_correction_is_taken_off_what_is_named(raw: Any) -> None:
+    raw.set("origin", ORIGIN)
+    before = raw.run()
+    raw.folder = raw.folder / "again"
+    raw.folder.mkdir()
+    raw.set(
+        "vertical",
+        {"reference": "geoid", "correction_m": -39.5, "taken_off": ["poses", "truth"], "note": "why"},
+    )
+    after = raw.run()
+    np.testing.assert_allclose(_position(before)[:, 2] - _position(after)[:, 2], 39.5, atol=1e-6)
+    np.testing.assert_allclose(
+        before.table("truth")["down_m"] - after.table("truth")["down_m"], 39.5, atol=1e-6
+    )
+    same = "plane_down_m"
+    np.testing.assert_allclose(before.table("detections")[same], after.table("detections")[same], atol=1e-6)
+    assert after.manifest.vertical.correction_m == -39.5
+
+
+def test_proportions_are_of_the_image(raw: Any) -> None:
+    raw.tables["clicks.csv"] = "photo,x,y,what\nA,0.25,0.5,\n"
+    raw.set("detections.0.pixel.u.unit", "proportion-of-width")
+    raw.set("detections.0.pixel.v.unit", "proportion-of-height")
+    detections = raw.run().table("detections")
+    assert list(detections[["u_px", "v_px"]].iloc[0]) == [160.0, 256.0]
+
+
+def test_other_kinds_of_detections(raw: Any) -> None:
+    angle = {"value": 90.0, "unit": "deg"}
+    radar = {"source": "radar", "file": "clicks.csv", "azimuth": angle, "elevation": {**angle, "value": -5.0}}
+    raw.recipe["detections"] += [
+        radar | {"range": {"value": 2.0, "unit": "km"}},
+        {**radar, "source": "microphone"},
+    ]
+    detections = raw.run().table("detections")
+    assert list(detections["kind"]) == ["pixel"] * 3 + ["range-bearing"] * 3 + ["bearing"] * 3
+    assert list(detections["detection_id"]) == ["0", "1", "2"] * 3
+    assert detections["azimuth_rad"].iloc[3] == pytest.approx(math.pi / 2)
+    assert detections["range_m"].iloc[3] == 2000.0
+    assert np.isnan(detections["range_m"].iloc[6])
+    assert list(detections["frame_id"].iloc[3:]) == [""] * 6
+
+
+def test_groups_by_edges(raw: Any) -> None:
+    raw.tables["photos.csv"] = (
+        "photo,time,h\nA,2024-06-12T09:30:01Z,10\nB,2024-06-12T09:30:02Z,30\nC,2024-06-12T09:30:03Z,52\n"
+    )
+    raw.set(
+        "frames.group",
+        {"column": "h", "edges": [20.0, 40.0], "labels": ["low", "mid", "high"], "clear": 10.0},
+    )
+    assert list(raw.run().table("frames")["group"]) == ["low", "mid", "high"]
+    raw.replace("photos.csv", ",30", ",31")
+    raw.into.rename(raw.folder / "old")
+    with pytest.raises(WildlabError, match=r"line 3: 31 is closer than 10 to the edge between two groups"):
+        raw.run()
+    raw.set("frames.group.labels", ["low", "high"])
+    with pytest.raises(WildlabError, match="2 edges make 3 groups, and there are 2 labels"):
+        raw.run()
+
+
+def test_a_gimbal_in_the_frames(raw: Any) -> None:
+    raw.set("frames.pan", {"value": 30.0, "unit": "deg"})
+    raw.set("frames.tilt", {"value": 0.5, "unit": "rad"})
+    frames = raw.run().table("frames")
+    np.testing.assert_allclose(frames["pan_rad"], math.radians(30))
+    np.testing.assert_allclose(frames["tilt_rad"], 0.5)
+
+
+def test_frames_made_of_rows_that_agree(raw: Any) -> None:
+    """Poses, frames and clicks in one file: a frame is a unique time, and its rows have to say the same."""
+    raw.tables = {
+        "all.csv": "time,h,yaw,x\n2024-01-01T00:00:05Z,100,0.1,1\n2024-01-01T00:00:05Z,100,0.1,2\n"
+        "2024-01-01T00:00:09Z,101,0.2,3\n",
+        "buoy.csv": raw.tables["buoy.csv"],
+    }
+    zero = {"value": 0.0, "unit": "deg"}
+    raw.set("time", {"kind": "utc"})
+    raw.set("clocks", {"camera_offset_s": 2.5})
+    raw.set("frames", {"file": "all.csv", "unique": ["time"], "prefix": "F", "time": {"column": "time"}})
+    position = {
+        "latitude": {"value": 63.44, "unit": "deg"},
+        "longitude": {"value": 10.4, "unit": "deg"},
+        "height": {"column": "h", "unit": "m"},
+    }
+    raw.set(
+        "poses.log",
+        {
+            "file": "all.csv",
+            "position": position,
+            "attitude": {"roll": zero, "pitch": zero, "yaw": {"column": "yaw", "unit": "rad"}},
+        },
+    )
+    pixel = {"u": {"column": "x", "unit": "px"}, "v": {"column": "x", "unit": "px"}}
+    raw.set("detections", [{"source": "click", "file": "all.csv", "pixel": pixel}])
+    raw.recipe["truth"].pop()
+    flight = raw.run()
+    assert list(flight.nav["log"]["frame_id"]) == ["F0", "F1"]
+    np.testing.assert_allclose(flight.nav["log"]["time_s"], [2.5, 6.5])
+    np.testing.assert_allclose(flight.table("frames")["time_s"], [0.0, 4.0])
+    assert list(flight.table("detections")["frame_id"]) == ["F0", "F0", "F1"]
+    raw.into.rename(raw.folder / "old")
+    raw.replace("all.csv", "0.1,2", "0.3,2")
+    with pytest.raises(WildlabError, match=r"line 3: this row of frame 'F0' says something else than line 2"):
+        raw.run()
+    assert not raw.into.exists()
+
+
+@pytest.mark.parametrize(
+    ("stamp", "zone", "cell"),
+    [
+        ({}, None, "2024-06-12T11:30:05.250+02:00"),
+        ({}, None, "2024-06-12 09:30:05.25Z"),
+        ({}, "Europe/Oslo", "2024-06-12T11:30:05.25"),
+        ({}, "America/Phoenix", "2024-06-12 02:30:05.25"),
+        ({"zone": "+05:30"}, "Europe/Oslo", "2024-06-12T15:00:05.25"),
+        ({"format": "%d/%m/%y %I:%M:%S.%f %p"}, "UTC", "12/06/24 09:30:05.250 AM"),
+        ({"format": "%d/%m/%y %H:%M:%S.%f %z"}, None, "12/06/24 08:30:05.250 -0100"),
+        ({"format": "%m/%d/%Y %H:%M:%S.%f MST"}, "America/Phoenix", "06/12/2024 02:30:05.250 MST"),
+        ({"format": "unix"}, None, "1718184605.25"),
+        ({"format": "unix", "unit": "ms"}, None, "1718184605250"),
+        ({"format": "elapsed", "unit": "us"}, None, "5250000"),
+    ],
+)
+def test_ways_to_write_one_time(raw: Any, stamp: dict[str, str], zone: str | None, cell: str) -> None:
+    raw.tables["photos.csv"] = f"photo,time\nA,{cell}\n"
+    raw.tables["clicks.csv"] = "photo,x,y,what\nA,10,20,boat\n"
+    raw.set("frames.time", {"column": "time", **stamp})
+    if zone is not None:
+        raw.set("time.zone", zone)
+    # until the poses, whose stamps are UTC by themselves, end before it
+    raw.replace("nav.csv", "09:30:04Z", "09:30:14Z")
+    raw.replace("boat.csv", "\n4,", "\n14,")
+    assert raw.run().table("frames")["time_s"].iloc[0] == pytest.approx(5.25, abs=1e-6)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.integers(-14 * 60, 14 * 60))
+def test_fixed_offsets(minutes: int) -> None:
+    sign, size = "-" if minutes < 0 else "+", abs(minutes)
+    zone = parse_zone(f"{sign}{size // 60:02d}:{size % 60:02d}")
+    assert datetime(2024, 1, 1, tzinfo=UTC).astimezone(zone).utcoffset() == timedelta(minutes=minutes)
+
+
+def test_units_against_their_definitions() -> None:
+    assert factor("ft", "length") == 0.3048
+    assert factor("kn", "speed") == pytest.approx(0.514444, rel=1e-5)
+    assert factor("deg-e7", "angle") * 634400000 == pytest.approx(math.radians(63.44))
+    assert factor("km/h", "speed") * 36 == pytest.approx(10.0)
+    assert factor("proportion-of-height", "pixel", 640, 512) == 512
+    assert all(len(set(units)) == len(units) for units in UNITS.values())
+
+
+def test_a_time_has_some_column() -> None:
+    with pytest.raises(ValueError, match="either a column or several columns"):
+        Stamp()
+
+
+def test_a_mark_at_the_start_and_blanks_do_no_harm(raw: Any) -> None:
+    raw.tables["buoy.csv"] = "\ufeffid, lat , lon,height,sd\r\n buoy , 63.44,10.401,40,\r\n\r\n"
+    truth = raw.run().table("truth")
+    assert truth["target_id"].iloc[0] == "buoy"
+    assert pd.isna(truth["sd_horizontal_m"].iloc[0])

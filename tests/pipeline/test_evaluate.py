@@ -1,0 +1,180 @@
+"""From a flight to errors: what is put in comes out, by both scoring rules, with moving targets too."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import covariance_columns
+from wildlab.geometry.frames import (
+    euler_errors_to_body,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+)
+from wildlab.pipeline.calibrate import calibrate_flight
+from wildlab.pipeline.evaluate import draws_of, errors_of, judge, recorded_answers
+from wildlab.pipeline.georeference import USUAL, assumed_deviations, georeference, observe, pose_errors
+from wildlab.pipeline.pose_noise import estimate_noise, judge_with_estimated_noise
+
+
+def judged(flight, seed=0, **kwargs):
+    rng = np.random.default_rng(seed)
+    return judge(flight, georeference(flight, observe(flight, **kwargs), rng))
+
+
+@pytest.mark.parametrize("rule", ["labelled", "nearest"])
+def test_a_perfect_flight_has_no_error(make_flight, rule):
+    table = judged(make_flight(rule=rule))
+    assert len(table) == 160
+    assert table["error_m"].max() < 1e-6
+    assert table["inside_90"].all()
+
+
+def test_a_moving_target_is_judged_where_it_was_at_the_time(make_flight):
+    assert judged(make_flight(moving=True))["error_m"].max() < 1e-6
+
+
+def test_a_clock_offset_shows_and_the_manifest_s_offset_takes_it_off(make_flight):
+    flight = make_flight(clock_s=0.5)
+    assert judged(flight)["error_m"].mean() > 4.0
+    assert judged(flight, clock_shift=0.5)["error_m"].max() < 1e-6
+    flight.manifest = flight.manifest.model_copy(
+        update={"clocks": flight.manifest.clocks.model_copy(update={"camera_offset_s": 0.5})}
+    )
+    assert judged(flight)["error_m"].max() < 1e-6
+
+
+def test_calibration_finds_boresight_and_clock_and_helps_images_it_has_not_seen(make_flight):
+    flight = make_flight(misalignment_deg=(1.0, -2.0, 1.5), clock_s=0.3, pixel_px=1.0)
+    result = calibrate_flight(
+        flight, np.random.default_rng(0), estimate=("roll", "tilt", "pan", "clock"), splits=3
+    )
+    found = result.calibration
+    assert not found.undetermined
+    assert np.allclose(
+        np.degrees([found.value(k) for k in ("roll", "tilt", "pan")]), [1.0, -2.0, 1.5], atol=0.15
+    )
+    assert found.value("clock") == pytest.approx(0.3, abs=0.03)
+    assert result.judged["error_m"].mean() < 0.3 < judged(flight)["error_m"].mean()
+    assert len(result.judged) == 160
+    assert len(result.mean_errors) == 3
+
+
+def test_images_without_time_are_not_asked_for_the_clock(make_flight):
+    flight = make_flight(misalignment_deg=(1.0, 0.0, 0.0))
+    flight.manifest = flight.manifest.model_copy(
+        update={"time": flight.manifest.time.model_copy(update={"kind": "sequence"})}
+    )
+    result = calibrate_flight(flight, np.random.default_rng(0), estimate=("roll", "clock"), splits=1)
+    assert result.calibration.names == ("roll",)
+    assert "clock" not in result.calibration.undetermined
+
+
+def test_ellipses_from_estimated_noise_hold_what_they_say(make_flight):
+    """Assumed 1 deg, true 0.3 deg: far too wide before, right after, on images the estimate has not seen."""
+    flight = make_flight(n_images=150, attitude_deg=0.3, position_m=0.3, pixel_px=2.0)
+    table = judged(flight)
+    observations = observe(flight)
+    assert table["inside_90"].mean() > 0.97
+    after = judge_with_estimated_noise(flight, observations, table, np.random.default_rng(1))
+    assert len(after) == len(table)
+    assert 0.84 < after["inside_90"].mean() < 0.95
+    assert estimate_noise(flight, observations, table).sd["roll_pitch"] == pytest.approx(
+        np.radians(0.3), rel=0.35
+    )
+
+
+def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
+    flight = make_flight()
+    own = np.diag([0.01, 0.01, 0.04, 1e-6, 1e-6, 4e-6])
+    nav = flight.nav["logged"]
+    flight.nav["logged"] = nav.join(covariance_columns(np.tile(own, (len(nav), 1, 1))))
+    observations = observe(flight)
+    assert np.allclose(pose_errors(flight, observations).pose, own)
+    overridden = pose_errors(flight, observations, {"roll_deg": 2.0, "pitch_deg": 2.0, "yaw_deg": 2.0}).pose
+    # Errors of the angles are not those about the axes once the airframe is tilted.
+    E = euler_errors_to_body(*matrix_to_euler(observations.R_nb)[:, :2].T)
+    assert np.allclose(overridden[:, 3:, 3:], E @ np.swapaxes(E, 1, 2) * np.radians(2.0) ** 2)
+
+
+def test_what_is_not_stated_is_the_usual(make_flight):
+    flight = make_flight()
+    assert assumed_deviations(flight)["pixel_px"] == 2.0
+    assert assumed_deviations(flight)["misalignment_deg"] == USUAL["misalignment_deg"]
+
+
+def test_recorded_answers_are_judged_by_the_same_rule(make_flight):
+    flight = make_flight()
+    table = flight.tables["detections"]
+    theirs = table.assign(kind="position", source="other", u_px=np.nan, v_px=np.nan)
+    place = flight.truth[["north_m", "east_m", "down_m"]].to_numpy() + np.array([3.0, -4.0, 0.0])
+    theirs[["north_m", "east_m", "down_m"]] = place
+    flight.tables["detections"] = pd.concat([table, theirs], ignore_index=True)
+    answers = recorded_answers(flight)
+    assert list(answers) == ["other"]
+    assert np.allclose(errors_of(answers["other"]), [3.0, -4.0])
+    assert len(judged(flight)) == 160
+
+
+def test_frames_without_a_pose_are_nan_and_stay_in_their_row(make_flight):
+    flight = make_flight()
+    flight.nav["logged"] = flight.nav["logged"].query("time_s < 20")
+    table = judged(flight)
+    assert len(table) == 160
+    assert table["error_m"].isna().sum() == 4 * 20
+    assert not table.loc[table["error_m"].isna(), "inside_90"].any()
+
+
+def test_no_label_that_is_known_is_an_error_with_the_fix(make_flight):
+    flight = make_flight()
+    flight.tables["detections"]["target_id"] = "elsewhere"
+    with pytest.raises(WildlabError, match="target_id") as caught:
+        judged(flight)
+    assert "nearest" in caught.value.fix
+
+
+def test_stamps_that_are_not_there_are_an_error(make_flight):
+    with pytest.raises(WildlabError, match="no stamps 'time_gps_s'") as caught:
+        observe(make_flight(), stamps="time_gps_s")
+    assert "time_s" in caught.value.fix
+
+
+def test_no_pixels_and_too_few_images_are_errors(make_flight):
+    flight = make_flight()
+    flight.tables["detections"]["kind"] = "position"
+    with pytest.raises(WildlabError, match="kind 'pixel'"):
+        observe(flight)
+    with pytest.raises(WildlabError, match="fewer than four images"):
+        calibrate_flight(make_flight(n_images=3), np.random.default_rng(0))
+
+
+def test_a_minute_is_one_draw_where_there_are_times(make_flight):
+    long, short = make_flight(n_images=250), make_flight(n_images=40)
+    table = observe(long).table
+    draws = draws_of(long, table)
+    assert len(np.unique(draws)) == 5
+    for label in np.unique(draws):
+        times = table["time_s"][draws == label]
+        assert times.max() - times.min() < 60.0
+    # Over too soon to be halved by minutes, or without times: images.
+    assert set(draws_of(short, observe(short).table)) == set(short.frames["frame_id"])
+    long.manifest = long.manifest.model_copy(
+        update={"time": long.manifest.time.model_copy(update={"kind": "sequence"})}
+    )
+    assert set(draws_of(long, table)) == set(long.frames["frame_id"])
+
+
+def test_errors_that_wander_widen_what_is_stated(make_flight):
+    """The same errors in every image of a minute are worth one image of it, not sixty."""
+    flight = make_flight(n_images=300, pixel_px=1.0)
+    rng = np.random.default_rng(0)
+    wander = np.repeat(rng.normal(0, np.radians(1.0), (6, 3)), 600, axis=0)[: len(flight.nav["logged"])]
+    nav = flight.nav["logged"].iloc[: len(wander)].copy()
+    R = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy()) @ rotation_vector_to_matrix(wander)
+    nav[["q_w", "q_x", "q_y", "q_z"]] = matrix_to_quaternion(R)
+    flight.nav["logged"] = nav
+    found = calibrate_flight(flight, rng, splits=1).calibration
+    # Six draws of one degree each: about 0.4 deg, where 300 images would claim 0.06.
+    assert 0.2 < np.degrees(found.sd("roll")) < 0.8

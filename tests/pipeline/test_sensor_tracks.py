@@ -1,0 +1,356 @@
+"""Sensors tuned and targets followed on made-up flights whose clocks, noises and correlations are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import make_manifest
+from wildlab.flight.store import Flight
+from wildlab.pipeline.scans import looks_of, sensors_of, truths_at
+from wildlab.pipeline.sensor_tracks import (
+    FILTERS,
+    GATE,
+    PATIENCE_S,
+    Followed,
+    follow_flight,
+    start_near,
+    table,
+)
+from wildlab.pipeline.sensor_tuning import REACH, Tuning, errors_near, tune
+from wildlab.studies.autoferry.comparison import beside_white, check_claims, gains, off_ideal, pooled
+
+KEYS = ["sensor", "target"]
+
+
+def boats(t: np.ndarray) -> dict[str, np.ndarray]:
+    """Two boats that turn a little, so that an offset of the clock is no offset of the place."""
+    one = np.column_stack([-100 + 2.0 * t, 60 + 15 * np.sin(t / 12)])
+    two = np.column_stack([150 - 1.5 * t, -80 - 12 * np.cos(t / 9)])
+    return {"one": one, "two": two}
+
+
+def platform(t: np.ndarray) -> np.ndarray:
+    return np.column_stack([0.4 * t, 20 * np.sin(t / 30)])
+
+
+def markov(rng: np.random.Generator, n: int, sd: float, correlation: float, m: int) -> np.ndarray:
+    e = np.empty((n, m))
+    e[0] = rng.normal(0, sd, m)
+    for k in range(1, n):
+        e[k] = correlation * e[k - 1] + rng.normal(0, sd * np.sqrt(1 - correlation**2), m)
+    return e
+
+
+def make(
+    seed: int = 0,
+    *,
+    late_s: float = 0.0,
+    sd: float = 2.0,
+    correlation: float = 0.0,
+    truth_until: float = 200.0,
+    sees: tuple[str, ...] = ("one", "two"),
+    seconds: float = 120.0,
+    kind: str = "position",
+    pace: float = 1.0,
+) -> Flight:
+    """A flight with a lidar (2 Hz) whose stamps are ``late_s`` late; every seventh look sees nothing."""
+    rng = np.random.default_rng(seed)
+    stamps = np.arange(2.0, seconds, 0.5)
+    when = stamps - late_s
+    own, at_stamp = platform(when), platform(stamps)
+    rows = []
+    for name in sees:
+        size = sd if kind == "position" else np.radians(sd)
+        noise = markov(rng, len(when), size, correlation, 2 if kind == "position" else 1)
+        offset = boats(pace * when)[name] - own
+        for k in range(len(when)):
+            if k % 7 == 3:
+                continue
+            row = {"detection_id": f"{name}-{k}", "frame_id": f"lidar-{k}", "source": "lidar", "kind": kind}
+            if kind == "position":
+                # What is published is relative to own ship, and its position at the stamp was added.
+                north, east = offset[k] + noise[k] + at_stamp[k]
+                row |= {"north_m": north, "east_m": east, "down_m": 0.0}
+            else:
+                row |= {"azimuth_rad": np.arctan2(offset[k, 1], offset[k, 0]) + noise[k, 0]}
+            rows.append(row)
+    t = np.arange(0.0, seconds + 5, 0.2)
+    nav = pd.DataFrame({"time_s": t, "down_m": 0.0, "q_w": 1.0, "q_x": 0.0, "q_y": 0.0, "q_z": 0.0})
+    nav[["north_m", "east_m"]] = platform(t)
+    truth = []
+    for name, path in boats(pace * t).items():
+        one = pd.DataFrame({"target_id": name, "time_s": t, "down_m": 0.0, "sd_horizontal_m": 0.1})
+        one[["north_m", "east_m"]] = path
+        truth.append(one[one["time_s"] <= truth_until])
+    manifest = make_manifest(
+        {
+            "name": "made-up",
+            "kind": "logged",
+            "origin": {"latitude_deg": 63.0, "longitude_deg": 10.0, "height_m": 0.0},
+            "platform": {"name": "ferry"},
+            "time": {"kind": "utc", "epoch": "2024-05-04T12:00:00Z"},
+        }
+    )
+    frames = pd.DataFrame(
+        {"frame_id": [f"lidar-{k}" for k in range(len(stamps))], "time_s": stamps, "sensor": "lidar"}
+    )
+    detections = pd.DataFrame(rows)
+    tables = {"frames": frames, "detections": detections, "truth": pd.concat(truth, ignore_index=True)}
+    return Flight(manifest, {"own": nav}, tables)
+
+
+def by_filter(followed: list[Followed], target: str = "one") -> pd.DataFrame:
+    rows = table(followed)
+    return rows[rows["target"] == target].set_index("filter")
+
+
+# --- looks --------------------------------------------------------------------------------------------------
+
+
+def test_looks_keep_those_that_saw_nothing():
+    flight = make(sd=0.0)
+    looks = looks_of(flight, "lidar")
+    assert sensors_of(flight) == ["lidar"]
+    assert looks.detections.shape == (len(flight.table("frames")), 2, 2)
+    empty = np.isnan(looks.detections).all(axis=(1, 2))
+    np.testing.assert_array_equal(np.flatnonzero(empty), np.arange(3, len(empty), 7))
+    assert looks.interval_s == pytest.approx(0.5)
+    np.testing.assert_allclose(looks.platform, platform(looks.times), atol=0.02)
+    slope = (platform(looks.times + 1e-3) - platform(looks.times - 1e-3)) / 2e-3
+    np.testing.assert_allclose(looks.platform_velocity[2:], slope[2:], atol=0.01)
+
+
+def test_what_a_late_sensor_saw_stands_where_the_platform_was_then():
+    looks = looks_of(make(sd=0.0, late_s=1.5), "lidar", -1.5)
+    truth = truths_at(make(), looks.times)[0]
+    error, which = errors_near(looks, truth)
+    seen = which >= 0
+    assert seen.sum() > 150
+    assert np.abs(error[seen]).max() < 0.02
+    uncorrected = looks_of(make(sd=0.0, late_s=1.5), "lidar")
+    late = errors_near(uncorrected, truths_at(make(), uncorrected.times)[0])[0]
+    assert np.nanmean(np.hypot(*late.T)) > 2
+
+
+def test_truth_that_ends_early_is_not_known_behind_its_end():
+    flight = make(truth_until=60.0)
+    truth = truths_at(flight, [59.9, 60.0, 60.1, 61.0])[0]
+    np.testing.assert_array_equal(np.isfinite(truth.position[:, 0]), [True, True, False, False])
+    np.testing.assert_allclose(truth.covariance, np.eye(2) * 0.01)
+
+
+def test_what_cannot_be_followed_is_said():
+    flight = make()
+    with pytest.raises(WildlabError, match=r"no sensor 'radar'.*Use one of lidar"):
+        looks_of(flight, "radar")
+    flight.tables["detections"]["kind"] = "pixel"
+    with pytest.raises(WildlabError, match=r"the sensor 'lidar' detects pixel.*position or bearing"):
+        looks_of(flight, "lidar")
+    del flight.tables["frames"]["sensor"]
+    with pytest.raises(WildlabError, match="the frames do not say which sensor looked"):
+        sensors_of(flight)
+
+
+# --- tuning -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_clock_noise_and_correlation_come_back():
+    correlation = float(np.exp(-0.5 / 6.0))
+    found = [tune(make(seed, late_s=1.5, correlation=correlation), "lidar") for seed in range(6)]
+    assert np.mean([one.offset_s for one in found]) == pytest.approx(-1.5, abs=0.15)
+    inside = [one.offset_low_s - 0.05 <= -1.5 <= one.offset_high_s + 0.05 for one in found]
+    assert sum(inside) >= 5
+    assert np.mean([one.sd for one in found]) == pytest.approx(2.0, rel=0.12)
+    assert np.mean([one.correlation_time_s for one in found]) == pytest.approx(6.0, rel=0.4)
+    assert np.mean([one.next_correlation for one in found]) == pytest.approx(correlation, abs=0.05)
+    assert np.mean([one.driving_sd for one in found]) == pytest.approx(
+        2 * np.sqrt(1 - correlation**2), rel=0.15
+    )
+
+
+def test_white_errors_are_found_white():
+    found = tune(make(3), "lidar")
+    assert abs(found.next_correlation) < 0.1
+    assert found.white_sd == pytest.approx(2.0, rel=0.1)
+    # Every look may be kept.
+    assert found.thinning_s < found.interval_s
+
+
+def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
+    # Boats that hardly move: of boats that do, part of it would look like a clock that is late.
+    flight = make(1, sd=0.2, pace=0.02)
+    seen = flight.tables["detections"]
+    k = seen["frame_id"].str.removeprefix("lidar-").astype(int).to_numpy()
+    own = platform(flight.tables["frames"]["time_s"].to_numpy()[k])
+    turn, offset = np.radians(3.0), seen[["north_m", "east_m"]].to_numpy() - own
+    seen["north_m"] = own[:, 0] + np.cos(turn) * offset[:, 0] - np.sin(turn) * offset[:, 1]
+    seen["east_m"] = own[:, 1] + np.sin(turn) * offset[:, 0] + np.cos(turn) * offset[:, 1]
+    found = tune(flight, "lidar")
+    assert np.degrees(found.yaw_sd_rad) == pytest.approx(3.0, rel=0.25)
+    assert found.range_m * found.yaw_sd_rad > 2 * found.position_sd_m
+
+
+def test_too_few_errors_are_no_tuning():
+    flight = make()
+    flight.tables["detections"] = flight.tables["detections"].iloc[:19]
+    with pytest.raises(WildlabError, match="only 19 detections of 'lidar' lie near a target"):
+        tune(flight, "lidar")
+
+
+# --- following ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_white_noise_is_followed_honestly_and_coloured_noise_is_not():
+    def mean(correlation: float) -> pd.DataFrame:
+        tuning = tune(make(100, correlation=correlation), "lidar")
+        return pd.concat(
+            [table(follow_flight(make(k, correlation=correlation), {"lidar": tuning})) for k in range(8)]
+        )
+
+    white, coloured = mean(0.0), mean(float(np.exp(-0.5 / 8.0)))
+    # The boats accelerate less than the filter allows them to, which makes it a little pessimistic.
+    kf = white[white["filter"] == "kf"]
+    assert 0.5 < kf["anees"].mean() < 2.6
+    assert kf["fraction_nees_inside"].mean() > 0.85
+    groups = coloured.groupby("filter")["anees"].mean()
+    assert groups["kf"] > 1.5 * kf["anees"].mean()
+    for name in ("coloured", "schmidt"):
+        assert off_ideal(groups[name]) < off_ideal(groups["kf"]) or groups[name] < 2.6
+
+
+def test_a_bearing_sensor_that_moves_sees_where_a_target_is():
+    flight = make(2, kind="bearing", sd=0.3, sees=("two",))
+    flight.tables["truth"] = flight.tables["truth"].query("target_id == 'two'")
+    tuning = tune(flight, "lidar")
+    assert tuning.kind == "bearing"
+    rows = table(follow_flight(flight, {"lidar": tuning}))
+    assert list(rows["filter"]) == list(FILTERS["bearing"])
+    assert rows["lag1_autocorrelation_north"].isna().all()
+    assert np.isfinite(rows["lag1_autocorrelation"]).all()
+    assert (rows["share_followed"] > 0.95).all()
+
+
+def quiet(**changes: float) -> Tuning:
+    base = Tuning("lidar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100)
+    return base._replace(**changes)
+
+
+def test_a_track_ends_where_detections_end_and_truth_that_ends_is_counted():
+    flight = make(4, truth_until=90.0, sd=0.5)
+    seen = flight.tables["detections"]
+    k = seen["frame_id"].str.removeprefix("lidar-").astype(int)
+    flight.tables["detections"] = seen[(k < 100) | (k > 180)]
+    rows = follow_flight(flight, {"lidar": quiet(sd=0.5)})
+    one = next(f for f in rows if f.target == "one" and f.filter == "kf")
+    alive = one.times[np.isfinite(one.estimate[:, 0])]
+    last = one.times[99]
+    assert last < alive.max() <= last + PATIENCE_S
+    assert np.isnan(one.error[one.times > 90.0]).all()
+    row = by_filter(rows).loc["kf"]
+    known = (one.times <= 90.0).sum()
+    assert row["share_followed"] == pytest.approx(np.isfinite(one.error[:, 0]).sum() / known)
+    assert row["detections"] == np.isfinite(one.nis).sum() < 100
+
+
+def test_every_filter_is_given_the_same_detections():
+    rows = follow_flight(make(5), {"lidar": quiet()})
+    one = {f.filter: f for f in rows if f.target == "one"}
+    used = {name: np.isfinite(f.nis) for name, f in one.items()}
+    np.testing.assert_array_equal(used["kf"], used["coloured"])
+    np.testing.assert_array_equal(used["kf"], used["schmidt"])
+    assert used["thinned"].sum() < used["kf"].sum() / 4
+    assert (used["kf"] | ~used["thinned"]).all()
+    gaps = np.diff(one["thinned"].times[used["thinned"]])
+    assert gaps.min() >= quiet().thinning_s - 1e-9
+    assert 0 < GATE < 1
+
+
+def test_a_track_does_not_start_on_another_target():
+    flight = make(6, sees=("two",), sd=0.1)
+    # One is where two is at first, but three metres beside it; only two was seen.
+    truth = flight.tables["truth"]
+    two = truth[truth["target_id"] == "two"]
+    beside = two.assign(target_id="one", north_m=two["north_m"] + 3.0)
+    flight.tables["truth"] = pd.concat([beside, two], ignore_index=True)
+    looks = looks_of(flight, "lidar")
+    one, other = truths_at(flight, looks.times)
+    assert start_near(looks, one, quiet()) is not None
+    assert start_near(looks, one, quiet(), [other]) is None
+    start = start_near(looks, other, quiet(), [one])
+    assert start is not None
+    np.testing.assert_allclose(start.x[:2], other.position[0], atol=0.5)
+    np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * REACH["position"] ** 2)
+    rows = by_filter(follow_flight(flight, {"lidar": quiet()}))
+    assert (rows["share_followed"] == 0).all()
+    assert rows["rmse"].isna().all()
+
+
+# --- comparing ----------------------------------------------------------------------------------------------
+
+
+def cases() -> pd.DataFrame:
+    nan = float("nan")
+    columns = [
+        "sensor",
+        "target",
+        "filter",
+        "rmse",
+        "anees",
+        "nees_high",
+        "anis",
+        "north",
+        "east",
+        "compared",
+    ]
+    rows = [
+        ("lidar", "a", "kf", 4.0, 8.0, 3.0, 0.5, 0.6, 0.1, 10),
+        ("lidar", "a", "coloured", 4.2, 1.0, 3.0, 1.0, -0.2, 0.3, 10),
+        ("lidar", "a", "schmidt", 5.0, 2.0, 3.0, 1.0, 0.2, 0.3, 10),
+        ("lidar", "b", "kf", 2.0, 2.0, 3.0, 9.0, 0.1, 0.1, 30),
+        ("lidar", "b", "coloured", 1.9, 0.5, 3.0, 1.0, -0.2, 0.3, 30),
+        ("lidar", "c", "kf", nan, nan, nan, nan, nan, nan, 0),
+        ("lidar", "c", "coloured", nan, nan, nan, nan, nan, nan, 0),
+    ]
+    found = pd.DataFrame(rows, columns=columns)
+    found["lag1_autocorrelation"], found["kind"] = nan, "position"
+    return found.rename(columns={axis: f"lag1_autocorrelation_{axis}" for axis in ("north", "east")})
+
+
+def test_a_factor_too_small_is_as_wrong_as_one_too_large():
+    np.testing.assert_allclose(off_ideal([2.0, 4.0, 1.0, 20.0]), [0, np.log(2), np.log(2), np.log(10)])
+
+
+def test_gain_is_consistency_at_a_bounded_price():
+    both = beside_white(cases(), KEYS)
+    assert list(both["filter"]) == ["coloured", "schmidt", "coloured"]
+    assert list(both["nearer"]) == [True, True, False]
+    found = gains(cases(), KEYS).set_index("target")
+    # Schmidt's NEES is ideal, but its error is a quarter larger.
+    assert found.loc["a", "filter"] == "coloured"
+    assert bool(found.loc["a", "gained"])
+    assert found.loc["a", "rmse_ratio"] == pytest.approx(1.05)
+    assert not found.loc["b", "gained"]
+    assert "c" not in found.index
+
+
+def test_pooled_cases_weigh_by_what_was_compared():
+    found = pooled(cases(), ["sensor"]).set_index("filter")
+    assert found.loc["kf", "rmse"] == pytest.approx(np.sqrt((10 * 16 + 30 * 4) / 40))
+    assert found.loc["kf", "anees"] == pytest.approx((10 * 8 + 30 * 2) / 40)
+    assert found.loc["schmidt", "compared"] == 10
+
+
+def test_claims_are_decided_case_by_case():
+    checks = check_claims(cases(), KEYS)
+    assert checks["white-noise-overconfident"].tolist() == [True, False]
+    assert checks["white-noise-nis-within"].tolist() == [True, False]
+    assert checks["differencing-whitens"].tolist() == [True, False]
+    assert checks["differencing-nearer-ideal"].tolist() == [True, False]
+    assert checks["differencing-costs-accuracy"].tolist() == [True, False]
+    assert checks["schmidt-nearer-ideal"].tolist() == [True]
+    assert checks["schmidt-as-accurate"].tolist() == [False]

@@ -1,0 +1,265 @@
+"""The flights studies need: kept until their source changes; absent data are a sentence, not a failure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.flight.conftest import make_flight
+from tests.notebooks import OPEN, notebook, write
+from wildlab.errors import WildlabError
+from wildlab.flight.checks.check import usable_for
+from wildlab.flight.manifest import make_manifest
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.runner import flights
+from wildlab.runner.evaluate import evaluate_flight, lacking_for_navigation
+from wildlab.runner.run import run_studies
+from wildlab.simulation.twins import simulate_twin
+
+__all__ = ["make_flight"]
+
+SHOW = (
+    'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'
+    'report.metric("frames", "all", len(load_flight(flight).frames), "")\nreport.save()'
+)
+
+
+@pytest.fixture
+def simulated(monkeypatch: pytest.MonkeyPatch, make_flight: Callable[..., Flight]) -> list[tuple[str, int]]:
+    calls: list[tuple[str, int]] = []
+
+    def simulate(name: str, seed: int) -> Flight:
+        calls.append((name, seed))
+        return make_flight()
+
+    monkeypatch.setattr("wildlab.simulation.twins.simulate_twin", simulate)
+    return calls
+
+
+def test_a_twin_is_simulated_once_per_seed(tmp_path: Path, simulated: list[tuple[str, int]]) -> None:
+    one = flights.twin_flight("antenna", 1, tmp_path)
+    assert flights.twin_flight("antenna", 1, tmp_path) == one == tmp_path / ".flights" / "antenna-seed1"
+    flights.twin_flight("antenna", 2, tmp_path)
+    assert simulated == [("antenna", 1), ("antenna", 2)]
+    assert load_flight(one).name == "small-flight"
+    assert {path.name for path in one.parent.iterdir()} == {
+        *("antenna-seed1", "antenna-seed1.key", "antenna-seed2", "antenna-seed2.key")
+    }
+
+
+def test_it_is_simulated_again_when_its_parameters_change(
+    tmp_path: Path, simulated: list[tuple[str, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flights, "DATA", tmp_path / "data")
+    (tmp_path / "data" / "twins").mkdir(parents=True)
+    flights.twin_flight("antenna", 1, tmp_path)
+    (tmp_path / "data" / "twins" / "antenna.toml").write_text("height_m = 350")
+    flights.twin_flight("antenna", 1, tmp_path)
+    assert len(simulated) == 2
+    (tmp_path / "data" / "twins" / "parts").mkdir()
+    (tmp_path / "data" / "twins" / "parts" / "camera.toml").write_text("shared by twins")
+    flights.twin_flight("antenna", 1, tmp_path)
+    assert len(simulated) == 3
+
+
+def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> Flight:
+        raise WildlabError("it is raining", "wait")
+
+    monkeypatch.setattr("wildlab.simulation.twins.simulate_twin", fail)
+    with pytest.raises(WildlabError, match="raining"):
+        flights.twin_flight("antenna", 1, tmp_path)
+    assert list((tmp_path / ".flights").iterdir()) == []
+
+
+def studies(folder: Path) -> Path:
+    write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW, more='source = ""'))
+    text = '[s]\ntitle = "S"\nnotebook = "georeferencing.ipynb"\n'
+    text += 'dataset = "openathena"\nrecipe = "openathena.toml"\n'
+    (folder / "studies.toml").write_text(text)
+    return folder
+
+
+def test_absent_data_are_skipped_or_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    (outcome,) = run_studies(everything=True, **where)
+    assert outcome.state == "skipped" and "Get it first: wildlab fetch openathena" in outcome.reason
+    page = (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
+    assert "wildlab fetch openathena" in page
+    with pytest.raises(WildlabError, match="wildlab fetch openathena") as caught:
+        run_studies(["s"], **where)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.slow
+def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    folder = tmp_path / "tuesday"
+    save_flight(make_flight(), folder)
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    (outcome,) = evaluate_flight(folder, **where)
+    assert outcome.state == "done", outcome.reason
+    assert outcome.folder == (tmp_path / "reports" / "small-flight").resolve()
+    content = json.loads((outcome.folder / "metrics.json").read_text())
+    assert content["metrics"][0]["value"] == 3
+    assert "small-flight/report.html" in (tmp_path / "reports" / "index.html").read_text(encoding="utf-8")
+    origin = json.loads((outcome.folder / "provenance.json").read_text())["flight"]
+    assert origin["name"] == "small-flight" and "flight.toml" in origin["files"]
+    # The place of a flight whose locations are withheld gets into nothing that is written.
+    for path in outcome.folder.rglob("*"):
+        assert not path.is_file() or b"63.4" not in path.read_bytes()
+    (outcome,) = run_studies(["s"], flight=folder, **where)
+    assert outcome.state == "done" and outcome.name == "s-small-flight"
+
+
+def test_which_poses_are_meant_is_asked_before_anything_runs(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    flight = make_flight()
+    first = next(iter(flight.nav.values()))
+    flight.nav = {"autopilot": first, "observer": first}
+    save_flight(flight, tmp_path / "flight")
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    with pytest.raises(WildlabError, match="not clear which nav source") as caught:
+        evaluate_flight(tmp_path / "flight", **where)
+    assert "autopilot, observer" in caught.value.fix
+    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
+        evaluate_flight(tmp_path / "flight", source="mekf", **where)
+    assert not (tmp_path / "reports").exists()
+
+
+def test_a_flight_of_which_nothing_can_be_judged_is_refused(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    """With what it lacks for each report, before anything runs."""
+    flight = make_flight()
+    del flight.tables["detections"], flight.tables["truth"]
+    save_flight(flight, tmp_path / "flight")
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    with pytest.raises(WildlabError, match="nothing of this flight can be judged") as caught:
+        evaluate_flight(tmp_path / "flight", **where)
+    assert "Georeferencing: it lacks detections of kind pixel and truth" in caught.value.problem
+    assert "Navigation: it lacks inertial measurements (imu)" in caught.value.problem
+    with pytest.raises(WildlabError, match="poses are named, and the georeferencing cannot be judged"):
+        evaluate_flight(tmp_path / "flight", source="logged", **where)
+    assert not (tmp_path / "reports").exists()
+
+
+def lacking(flight: Flight) -> str:
+    (use,) = (use for use in usable_for(flight) if use.purpose == "navigation")
+    return lacking_for_navigation(flight, use)
+
+
+def test_what_a_flight_lacks_for_its_navigation_is_said() -> None:
+    """In the words of the navigation itself: a reference, and how the sensor errs."""
+    twin = simulate_twin("fast-vessel", 1)
+    assert "studies of its own" in lacking(twin)
+    stated = twin.manifest.model_dump(exclude={"twin", "kind"}, exclude_none=True)
+    logged = make_manifest({**stated, "kind": "logged"})
+    tables = {name: twin.tables[name] for name in ("imu", "gnss")}
+    assert lacking(Flight(logged, {"onboard": twin.nav["autopilot"]}, tables)) == ""
+    assert "no pose to compare with" in lacking(Flight(logged, {}, tables))
+    silent = make_manifest({**stated, "kind": "logged", "imu": {}})
+    flight = Flight(silent, {"onboard": twin.nav["autopilot"]}, tables)
+    assert "how the inertial sensor errs is not stated" in lacking(flight)
+    assert "inertial measurements" in lacking(Flight(logged, {}, {"gnss": tables["gnss"]}))
+
+
+def test_a_flight_named_like_a_study_would_replace_its_report(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    save_flight(make_flight(name="s"), tmp_path / "flight")
+    with pytest.raises(WildlabError, match="named 's' like a study"):
+        evaluate_flight(
+            tmp_path / "flight", notebooks=studies(tmp_path / "notebooks"), reports=tmp_path / "out"
+        )
+
+
+def several(folder: Path, **more: str) -> Path:
+    show = (
+        'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'
+        "names = [load_flight(one).name for one in (flight, *others)]\n"
+        'report.metric("flights", "-".join(names), len(names), "")\nreport.save()'
+    )
+    write(folder, "several.ipynb", notebook(OPEN, show, more="others = []"))
+    write(folder, "alone.ipynb", notebook(OPEN, show))
+    text = f'[s]\ntitle = "S"\nnotebook = "{more.get("notebook", "several.ipynb")}"\n'
+    text += 'dataset = "autoferry"\nrecipe = "autoferry-2.toml"\n'
+    text += f'beside = ["{more.get("beside", "autoferry-17.toml")}"]\n'
+    (folder / "studies.toml").write_text(text)
+    return folder
+
+
+def test_a_study_may_have_several_flights_of_a_data_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared_data: Callable[..., Path]
+) -> None:
+    source = shared_data("tracking", "autoferry")
+    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: True)
+    monkeypatch.setattr("wildlab.flight.catalog.dataset_folder", lambda name: source)
+    one = flights.dataset_flight("autoferry", "autoferry-2.toml", tmp_path)
+    two = flights.dataset_flight("autoferry", "autoferry-17.toml", tmp_path)
+    assert [load_flight(folder).name for folder in (one, two)] == ["autoferry-2", "autoferry-17"]
+    assert one.is_dir() and two.is_dir() and one != two
+
+
+def test_a_notebook_must_know_the_flights_beside_the_first(tmp_path: Path) -> None:
+    from wildlab.runner.catalogue import load_studies
+    from wildlab.runner.run import make_job
+
+    folder = several(tmp_path / "a")
+    job = make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
+    assert (job.recipe, job.beside) == ("autoferry-2.toml", ("autoferry-17.toml",))
+    folder = several(tmp_path / "b", notebook="alone.ipynb")
+    with pytest.raises(WildlabError, match="the notebook has no parameter 'others'"):
+        make_job(load_studies(folder / "studies.toml")["s"], notebooks=folder, reports=tmp_path)
+    folder = several(tmp_path / "c", beside="../elsewhere.toml")
+    with pytest.raises(WildlabError, match="leaves its folder"):
+        load_studies(folder / "studies.toml")
+
+
+@pytest.mark.parametrize(
+    ("entry", "problem"),
+    [
+        ('beside = ["second.toml"]', "flights beside the first need a recipe of the first"),
+        ("[s.parameters]\nothers = []", "the parameter 'others' is set by the runner"),
+    ],
+)
+def test_flights_beside_the_first_belong_to_a_recipe(tmp_path: Path, entry: str, problem: str) -> None:
+    from wildlab.runner.catalogue import load_studies
+
+    (tmp_path / "studies.toml").write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
+    with pytest.raises(WildlabError, match=problem):
+        load_studies(tmp_path / "studies.toml")
+
+
+def test_a_flight_of_the_readers_own_stands_alone(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    from wildlab.runner.catalogue import load_studies
+    from wildlab.runner.run import make_job
+
+    save_flight(make_flight(), tmp_path / "flight")
+    folder = several(tmp_path / "a")
+    study = load_studies(folder / "studies.toml")["s"]
+    job = make_job(study, notebooks=folder, reports=tmp_path, flight=tmp_path / "flight")
+    assert (job.recipe, job.beside) == (None, ())
+
+
+def test_provenance_names_every_flight(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
+    from wildlab.runner import provenance
+
+    for name in ("first", "second"):
+        save_flight(make_flight(name=name), tmp_path / name)
+    book = write(tmp_path, "n.ipynb", notebook(OPEN))
+    origin = provenance.collect(
+        study="s",
+        notebook=book,
+        flight=tmp_path / "first",
+        parameters={},
+        seed=1,
+        others=[tmp_path / "second"],
+    )
+    assert [one["name"] for one in origin["others"]] == ["second"]
+    assert "flight first:" in provenance.footer(origin) and "flight second:" in provenance.footer(origin)

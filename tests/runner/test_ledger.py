@@ -1,0 +1,227 @@
+"""Published numbers, studies, where each stands, and the ledger that shows it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.reporting import html, metrics
+from wildlab.reporting.ledger import ledger_page, strip
+from wildlab.reporting.published import load_claims, load_published
+from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
+from wildlab.runner.front_page import build_ledger
+from wildlab.runner.status import study_status
+
+PUBLISHED = """
+[[number]]
+study = "s"
+name = "error"
+subject = "kf/all"
+value = 7.90
+unit = "m"
+source = "H table 1"
+within = 0.15
+[[number]]
+study = "s"
+name = "error"
+subject = "observer/all"
+value = 5
+unit = "m"
+source = "H table 1"
+[[claim]]
+study = "s"
+id = "c1"
+text = "The <b>KF</b> is better."
+source = "H 1"
+"""
+
+
+def a_study(**more: Any) -> StudyEntry:
+    return StudyEntry(**({"name": "s", "title": "A study?", "notebook": "s.ipynb"} | more))
+
+
+def published(folder: Path, text: str = PUBLISHED) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "s.toml").write_text(text)
+    return folder
+
+
+def ran(reports: Path, *entries: dict[str, Any], study: str = "s", state: str = "done", **more: Any) -> Path:
+    """The folder a run leaves."""
+    folder = reports / study
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {"study": study, "flight": "f", "kind": "twin", "seed": 1, "seeds": 20, "claims": []} | more
+    metrics.write_metrics(folder / "metrics.json", metrics.document(**(content | {"metrics": entries})))
+    (folder / "report.html").write_text("report")
+    status = {
+        "study": study,
+        "state": state,
+        "reason": "It <b>broke</b>." * (state == "failed"),
+        "seconds": 1.5,
+    }
+    (folder / "status.json").write_text(json.dumps(status))
+    return folder
+
+
+def test_the_shipped_files_are_in_order() -> None:
+    studies = load_studies()
+    assert "consistency-bounds" in studies
+    for name in studies:
+        load_published(name)
+        load_claims(name)
+
+
+def test_published_numbers_keep_the_digits_they_are_printed_with(tmp_path: Path) -> None:
+    frame = load_published("s", published(tmp_path))
+    assert frame["value"].tolist() == [7.9, 5.0] and frame["digits"].tolist() == [2, 0]
+    assert frame["within"].tolist()[0] == 0.15 and frame["within"].isna().tolist() == [False, True]
+    assert len(load_published("other", tmp_path)) == 0
+    assert load_claims("s", tmp_path)[0]["id"] == "c1"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('unit = "m"\n', "", "'unit' is missing"),
+        ("within = 0.15", "tolerance = 0.15", "key 'tolerance' is unknown"),
+        ("value = 7.90", 'value = "7.90"', "'value' is '7.90'"),
+        ("value = 7.90", "value = nan", "not finite"),
+        ("[[claim]]", "[[claims]]", r"table .*claims.* is unknown"),
+        ('subject = "kf/all"', 'subject = "kf all"', "has a blank"),
+        ('subject = "observer/all"', 'subject = "kf/all"', "given twice"),
+        ("[[number]]", "[[number", "cannot be read"),
+    ],
+)
+def test_published_files_that_are_wrong_are_named(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    folder = published(tmp_path, PUBLISHED.replace(old, new, 1))
+    with pytest.raises(WildlabError, match=sentence):
+        load_published("s", folder)
+        load_claims("s", folder)
+
+
+@pytest.mark.parametrize(
+    ("entry", "sentence"),
+    [
+        ('[Bad]\ntitle = "a"\nnotebook = "a.ipynb"', "made of a-z"),
+        ('[a]\ntitle = "a"\nnotebook = "../a.ipynb"', "leaves its folder"),
+        ('[a]\ntitle = "a"\nnotebook = "a.ipynb"\nmirror = 1', "mirror"),
+        (
+            '[a]\ntitle = "a"\nnotebook = "a.ipynb"\ntwin = "t"\nrecipe = "r.toml"',
+            "either a twin or a recipe",
+        ),
+        ('[a]\ntitle = "a"\nnotebook = "a.ipynb"\ndataset = "d"', "needs a recipe"),
+        ('[a]\ntitle = "a"\nnotebook = "a.ipynb"\nparameters = {seed = 2}', "'seed' is set by the runner"),
+        ("[a]", "Field required"),
+        ("a = 1", "studies.toml"),
+        ("[a", "cannot be read"),
+    ],
+)
+def test_studies_that_are_wrong_are_named(tmp_path: Path, entry: str, sentence: str) -> None:
+    path = tmp_path / "studies.toml"
+    path.write_text(entry)
+    with pytest.raises(WildlabError, match=sentence):
+        load_studies(path)
+
+
+def test_a_misspelt_study_gets_a_hint() -> None:
+    with pytest.raises(WildlabError, match=r"(?i)did you mean 'sensitivity'"):
+        find_study("sensitivty", {"sensitivity": a_study()})
+    with pytest.raises(WildlabError, match=r"(?i)see: wildlab list"):
+        find_study("xyz", {})
+
+
+@pytest.mark.parametrize(
+    ("value", "spread", "verdict"),
+    [
+        (8.05, {}, "reproduced"),
+        (8.06, {}, "differs"),
+        (9.9, {"low": 7.0, "high": 12.0}, "reproduced"),
+        (9.9, {"low": 8.0, "high": 12.0}, "differs"),
+        (None, {}, "not reproduced yet"),
+    ],
+)
+def test_when_a_number_counts_as_reproduced(
+    tmp_path: Path, value: float | None, spread: dict[str, float], verdict: str
+) -> None:
+    ran(tmp_path / "reports", metrics.metric("error", "kf/all", value, "m", **spread))
+    one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
+    assert one.numbers[0].verdict == verdict
+
+
+def test_without_tolerance_or_spread_nothing_is_claimed(tmp_path: Path) -> None:
+    ran(tmp_path / "reports", metrics.metric("error", "observer/all", 5.0, "m"))
+    one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
+    assert one.numbers[1].verdict == "not judged" and one.numbers[1].difference == 0.0
+
+
+def test_what_is_missing_says_why(tmp_path: Path) -> None:
+    study = a_study(missing={"observer": "it follows with the navigation filters"})
+    ran(tmp_path / "reports", metrics.metric("error", "kf/all", 7.9, "m"))
+    one = study_status(study, tmp_path / "reports", published(tmp_path / "published"))
+    assert one.numbers[1].reason == "it follows with the navigation filters"
+    assert one.claims[0].verdict == "not tested yet"
+    assert "it follows with the navigation filters" in ledger_page([one])
+
+
+@pytest.mark.parametrize("damage", ["no status", "no metrics", "broken status", "status is a list"])
+def test_a_run_that_was_broken_off_counts_as_to_be_done_again(tmp_path: Path, damage: str) -> None:
+    folder = ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"))
+    if damage == "no metrics":
+        (folder / "metrics.json").unlink()
+    elif damage == "no status":
+        (folder / "status.json").unlink()
+    else:
+        (folder / "status.json").write_text("[1]" if "list" in damage else '{"state"')
+    one = study_status(a_study(), tmp_path)
+    assert one.state == "broken off" and not one.has_report
+    assert "Run it again" in ledger_page([one])
+
+
+def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[Path], list[str]]) -> None:
+    first = PUBLISHED.split("[[number]]")[1]
+    many = PUBLISHED + "".join(f"[[number]]{first}".replace("kf/all", f"kf/{i}") for i in range(15))
+    folder = published(tmp_path / "published", many)
+    entries = [metrics.metric("error", f"kf/{i}", 7.9 + i, "m", low=5, high=9 + i) for i in range(15)]
+    ran(tmp_path, *entries, claims=[metrics.claim("c1", "x", "does not hold", fraction=0.25, seeds=20)])
+    failed = ran(tmp_path, study="failed", state="failed")
+    statuses = [
+        study_status(a_study(twin="<i>twin"), tmp_path, folder),
+        study_status(a_study(name="failed"), tmp_path, folder),
+        study_status(
+            a_study(name="never", dataset="d", recipe="r.toml", title="<script>alert(1)</script>"), tmp_path
+        ),
+    ]
+    whole = ledger_page(statuses, [("tuesday", "tuesday")])
+    assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
+    assert "1 of 17 reproduced" not in whole and "25 % of 20 flights" in whole
+    assert "published 7.90, here 21.900, middle 90 percent 5.000 to 23.000" in whole
+    html.examine(whole, "ledger")
+    path = tmp_path / "index.html"
+    path.write_text(whole, encoding="utf-8")
+    assert faults(path) == []
+
+
+def test_long_tables_fold_behind_a_line_that_sums_them_up(tmp_path: Path) -> None:
+    first = PUBLISHED.split("[[number]]")[1].replace("7.90", "1.0")
+    entries = [f"[[number]]{first}".replace("kf/all", f"a/{i}") for i in range(42)]
+    folder = published(tmp_path / "published", "".join(entries))
+    ran(tmp_path, *(metrics.metric("error", f"a/{i}", 1.1 + (i == 3), "m") for i in range(42)))
+    status = study_status(a_study(), tmp_path, folder)
+    assert "<summary>41 of 42 within 0.15 m</summary>" in ledger_page([status])
+
+
+def test_build_ledger_works_before_anything_has_run(tmp_path: Path) -> None:
+    path = build_ledger(tmp_path / "reports", load_studies())
+    assert "not run yet" in path.read_text(encoding="utf-8")
+    assert [one.name for one in path.parent.iterdir()] == ["index.html"]
+
+
+def test_a_spread_without_width_can_be_drawn(tmp_path: Path) -> None:
+    ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m", low=7.9, high=7.9))
+    one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
+    assert 'role="img"' in strip(one.numbers[0]) and "nan" not in strip(one.numbers[0])

@@ -1,0 +1,245 @@
+"""Real notebooks in real kernels: those that succeed, and every way of failing."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+from rich.console import Console
+
+from tests.notebooks import OPEN, notebook, write
+from wildlab.errors import WildlabError
+from wildlab.paths import ROOT
+from wildlab.runner.run import Outcome, _socket_folder, run_studies
+
+pytestmark = pytest.mark.slow
+
+SHOW = (
+    'report.head("A <good> report", "sub")\n'
+    "from wildlab.reporting.figures import new_figure\n"
+    "import numpy as np\n"
+    "fig, ax = new_figure(4, 3)\n"
+    "values = np.random.default_rng(seed).standard_normal(runs)\n"
+    "ax.plot(values)\n"
+    'report.section("Figures")\n'
+    'report.figure(fig, name="fig-1", alt="A line.", caption="A line.")\n'
+    'report.math("x_k")\n'
+    'report.metric("mean", "all", values.mean(), "m", n=runs)\n'
+    "report.save()"
+)
+#: A process of the notebook's own, which must not outlive it; {} is where its number goes.
+SLEEP = (
+    "import subprocess, sys, pathlib, os\n"
+    'child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])\n'
+    "pathlib.Path({!r}).write_text(f'{{os.getpid()}} {{child.pid}}')\n"
+    "child.wait()"
+)
+HEAD = 'report.head("A report")\nreport.section("The hard part")'
+
+STUDIES = {
+    "good": [OPEN, SHOW],
+    "again": [OPEN, SHOW],
+    "raises": [OPEN, HEAD, "import wildlab.errors\n1 / 0"],
+    "complains": [
+        OPEN,
+        HEAD,
+        'from wildlab.errors import WildlabError\nraise WildlabError("it is raining", "wait")',
+    ],
+    "dies": ["# A heading", OPEN, "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)", "# Not reached"],
+    "elsewhere": [OPEN.replace("=expected_prefix", '="/somewhere/else"')],
+    "unsaved": [OPEN, HEAD],
+    "scripted": [
+        OPEN,
+        'report.head("a")\nreport.save()\nfrom IPython.display import HTML, display\n'
+        'display(HTML("<script>1</script>"))',
+    ],
+}
+
+
+def make_studies(folder: Path, pids: Path) -> Path:
+    entries = []
+    for name, cells in {**STUDIES, "slow": [OPEN, HEAD, SLEEP.format(str(pids))]}.items():
+        write(folder, f"{name}.ipynb", notebook(*cells, more="runs = 3"))
+        limit = "timeout_minutes = 0.25\n" if name == "slow" else ""
+        entries.append(f'[{name}]\ntitle = "Study {name}"\nnotebook = "{name}.ipynb"\n{limit}')
+        entries.append(f"[{name}.parameters]\nruns = 5\n")
+    (folder / "studies.toml").write_text("".join(entries))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Outcome], str, list[int]]:
+    """All studies, two at a time, with a foreign kernel of the same name lying in wait."""
+    base = tmp_path_factory.mktemp("run with blank {and} braces")
+    kernel = base / "jupyter" / "kernels" / "python3"
+    kernel.mkdir(parents=True)
+    (kernel / "kernel.json").write_text(
+        json.dumps({"argv": ["false"], "display_name": "x", "language": "python"})
+    )
+    notebooks, reports = make_studies(base / "notebooks", base / "pids"), base / "reports"
+    (reports / "raises").mkdir(parents=True)
+    for name in ("metrics.json", "report.html", "status.json"):
+        (reports / "raises" / name).write_text("old")
+    with pytest.MonkeyPatch.context() as patch, (base / "log").open("w") as log:
+        patch.setenv("JUPYTER_PATH", str(base / "jupyter"))
+        outcomes = run_studies(
+            everything=True,
+            notebooks=notebooks,
+            reports=reports,
+            parallel=2,
+            console=Console(file=log, force_terminal=False),
+        )
+    pids = [int(pid) for pid in (base / "pids").read_text().split()]
+    return reports, {one.name: one for one in outcomes}, (base / "log").read_text(), pids
+
+
+Ran = tuple[Path, dict[str, Outcome], str, list[int]]
+
+
+def gone(pids: list[int]) -> bool:
+    """Whether the processes have ended; waits a little for the system to notice."""
+    for _ in range(50):
+        alive = [pid for pid in pids if psutil.pid_exists(pid)]
+        if all(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE for pid in alive):
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def test_a_good_run_leaves_everything(ran: Ran) -> None:
+    reports, outcomes, log, _ = ran
+    folder = reports / "good"
+    assert outcomes["good"].state == "done", outcomes["good"].reason
+    left = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert left == {
+        *("report.html", "metrics.json", "provenance.json", "notebook.ipynb", "status.json"),
+        *("figures/fig-1.pdf", "figures/fig-1.png"),
+    }
+    status = json.loads((folder / "status.json").read_text())
+    assert (status["study"], status["state"], status["reason"]) == ("good", "done", "")
+    content = json.loads((folder / "metrics.json").read_text())
+    assert content["metrics"][0]["n"] == 5, "the study's own parameter arrived"
+    assert json.loads((folder / "provenance.json").read_text())["parameters"] == {"runs": 5}
+    assert "done  good" in log and "failed  raises" in log
+
+
+def test_the_same_seed_gives_the_same_numbers_and_figures(ran: Ran) -> None:
+    reports = ran[0]
+    one, two = (json.loads((reports / name / "metrics.json").read_text()) for name in ("good", "again"))
+    assert one["metrics"] == two["metrics"]
+    for name in ("fig-1.pdf", "fig-1.png"):
+        figures = [(reports / study / "figures" / name).read_bytes() for study in ("good", "again")]
+        assert figures[0] == figures[1]
+
+
+@pytest.mark.parametrize(
+    ("study", "reason", "step"),
+    [
+        ("raises", "The computation raised ZeroDivisionError: division by zero", "The hard part"),
+        ("complains", "It is raining. Wait.", "The hard part"),
+        ("dies", "crashed or was ended from outside", "A heading"),
+        ("elsewhere", "another Python environment", ""),
+        ("unsaved", "wrote no metrics.json", "The hard part"),
+        ("scripted", "has a <script>", ""),
+        ("slow", "time limit of 15 seconds", "The hard part"),
+    ],
+)
+def test_a_failed_run_says_so_in_words(ran: Ran, study: str, reason: str, step: str) -> None:
+    reports, outcomes, _, _ = ran
+    assert outcomes[study].state == "failed" and reason in outcomes[study].reason
+    status = json.loads((reports / study / "status.json").read_text())
+    assert status["state"] == "failed" and reason in status["reason"]
+    page = (reports / study / "report.html").read_text(encoding="utf-8")
+    assert "This study failed" in page and f"wildlab run {study}" in page and "<script" not in page
+    assert not step or f"step <b>{step}</b>" in page
+    assert "Not reached" not in page
+    assert not (reports / study / "metrics.json").exists()
+    assert (reports / study / "notebook.ipynb").is_file()
+
+
+def test_nothing_outlives_a_time_limit(ran: Ran) -> None:
+    assert len(ran[3]) == 2 and gone(ran[3])
+
+
+def test_nothing_is_left_lying_about(ran: Ran) -> None:
+    reports = ran[0]
+    assert not list(reports.glob(".*.part")) and not list((reports.parent / "notebooks").glob("*ipc*"))
+    assert {path.name for path in (reports.parent / "notebooks").iterdir()} == {
+        "studies.toml",
+        "slow.ipynb",
+        *(f"{name}.ipynb" for name in STUDIES),
+    }
+
+
+def test_no_path_of_this_machine_is_in_any_output(ran: Ran) -> None:
+    reports = ran[0]
+    secrets = [str(reports.parent), str(ROOT), sys.prefix]
+    secrets += [str(Path.home()) + "/"] if len(str(Path.home())) > 1 else []
+    looked = 0
+    for path in reports.rglob("*"):
+        if path.is_file():
+            content, looked = path.read_bytes(), looked + 1
+            assert not [secret for secret in secrets if secret.encode() in content], path.name
+    assert looked > 40
+
+
+def test_every_page_opens_offline(ran: Ran, faults: Callable[[Path], list[str]]) -> None:
+    pages = [ran[0] / "index.html", *(ran[0] / name / "report.html" for name in ("good", "raises", "slow"))]
+    assert {page.parent.name: faults(page) for page in pages} == {page.parent.name: [] for page in pages}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number: signal.Signals) -> None:
+    pids, reports = tmp_path / "pids", tmp_path / "reports"
+    notebooks = make_studies(tmp_path / "notebooks", pids)
+    (reports / "slow").mkdir(parents=True)
+    former = {"report.html": "old", "metrics.json": "old", "status.json": "old"}
+    for name, text in former.items():
+        (reports / "slow" / name).write_text(text)
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import signal\nfrom pathlib import Path\nfrom wildlab.runner.run import run_studies\n"
+        # In the background of a script Ctrl-C is ignored from birth; in a terminal it is not.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"if __name__ == '__main__':\n    run_studies(['slow'], notebooks=Path({str(notebooks)!r}), "
+        f"reports=Path({str(reports)!r}))\n"
+    )
+    runner = subprocess.Popen(
+        [sys.executable, str(program)], stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    deadline = time.monotonic() + 60
+    while not (pids.exists() and len(pids.read_text().split()) == 2) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    os.killpg(runner.pid, number)
+    assert runner.wait(20) != 0
+    assert gone([int(pid) for pid in pids.read_text().split()])
+    assert {path.name: path.read_text() for path in (reports / "slow").iterdir()} == former
+
+    def left() -> list[Path]:
+        return [*reports.glob(".*.part"), *_socket_folder().glob(f"wl{runner.pid}-*")]
+
+    # A notebook whose runner was killed tidies up after itself, which on a busy machine takes a while.
+    deadline = time.monotonic() + 30
+    while left() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert left() == [], "nothing is left of the work, whoever ended it"
+
+
+def test_wrong_use_is_an_error_before_anything_runs(tmp_path: Path) -> None:
+    notebooks = make_studies(tmp_path / "notebooks", tmp_path / "pids")
+    for names, more, sentence in (
+        ([], {}, "no study was named"),
+        (["goood"], {}, "did you mean 'good'"),
+        (["good", "raises"], {"flight": tmp_path}, "a flight goes with one study"),
+    ):
+        with pytest.raises(WildlabError, match=f"(?i){sentence}"):
+            run_studies(names, notebooks=notebooks, reports=tmp_path / "reports", **more)  # type: ignore[arg-type]
+    assert not (tmp_path / "reports").exists()

@@ -1,0 +1,268 @@
+"""The store of seeds: every float as it was, nothing taken for something else, and each error's sentence."""
+
+from __future__ import annotations
+
+import builtins
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.paths import NOTEBOOKS
+from wildlab.runner import cluster, fingerprint
+from wildlab.runner.catalogue import load_studies
+from wildlab.runner.progress import shown
+from wildlab.runner.run import _notes
+from wildlab.runner.scheduling import Outcome
+from wildlab.runner.seeds import (
+    SeedWork,
+    failed_seeds,
+    make_work,
+    missing_seeds,
+    other_seeds,
+    read_seed,
+    sweep_seeds,
+    write_seed,
+)
+from wildlab.runner.trials import trials_table
+from wildlab.runner.worker_pool import WorkerPool, answer
+from wildlab.studies import protocol
+
+PARAMETERS = {"twin": "static-antenna", "not its own": 3}
+
+
+def work(folder: Path, count: int = 4) -> SeedWork:
+    return make_work(folder, "study", "static-point", 2, count, PARAMETERS)
+
+
+@given(value=st.floats(allow_nan=False))
+def test_every_float_is_read_back_as_it_was(tmp_path_factory: pytest.TempPathFactory, value: float) -> None:
+    one = SeedWork(tmp_path_factory.getbasetemp() / "floats", "s", "n", {}, "c", "k", (1,))
+    write_seed(one, 1, {"a/b": value, "a/nan": math.nan})
+    read = read_seed(one, 1)
+    assert read is not None and list(read) == ["a/b", "a/nan"] and math.isnan(read["a/nan"])
+    assert read["a/b"].hex() == value.hex()
+    json.loads((one.folder / "1.json").read_text(), parse_constant=lambda word: pytest.fail(word))
+
+
+@pytest.mark.parametrize(
+    "text", ["", '{"seed": 1', "[]", '{"case": "static-point", "seed": 3, "values": {}}']
+)
+def test_a_file_that_says_something_else_is_no_seed(tmp_path: Path, text: str) -> None:
+    one = work(tmp_path)
+    write_seed(one, 1, {"a/b": 1.0})
+    assert missing_seeds(one) == [3, 4]
+    (one.folder / "1.json").write_text(text)
+    assert missing_seeds(one) == [1, 3, 4]
+
+
+@given(drawn=st.integers(0, 40), count=st.integers(1, 40))
+def test_seeds_besides_the_one_drawn(drawn: int, count: int) -> None:
+    seeds = other_seeds(drawn, count)
+    assert len({drawn, *seeds}) == count and list(seeds) == sorted(seeds)
+    assert not count > drawn > 0 or set(seeds) | {drawn} == set(range(1, count + 1))
+
+
+def test_the_key_follows_what_the_numbers_depend_on(tmp_path: Path) -> None:
+    first = work(tmp_path)
+    assert first.parameters == {"twin": "static-antenna"}
+    trial_key = fingerprint.trial_key
+    assert work(tmp_path, 9).key == first.key == trial_key(first.case, first.parameters, first.code)
+    others = {
+        trial_key(first.case, first.parameters | {"twin": "slow-vessel"}, first.code),
+        trial_key(first.case, first.parameters, "other code"),
+        trial_key("slow-vessel", first.parameters, first.code),
+    }
+    assert len(others | {first.key}) == 4
+
+
+def test_the_code_key_follows_code_twins_and_versions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = (
+        "wildlab/tracking/a.py",
+        "wildlab/flight/readers/b.py",
+        "data/twins/parts/c.toml",
+        "wildlab/studies/schmidt/trial.py",
+        "wildlab/cli.py",
+        "wildlab/studies/schmidt/text.py",
+    )
+    for name in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+    monkeypatch.setattr(fingerprint, "ROOT", tmp_path)
+    monkeypatch.setattr(fingerprint, "DATA", tmp_path / "data")
+    keys = [fingerprint.code_key(), fingerprint.code_key()]
+    for name in files:
+        (tmp_path / name).write_text("2")
+        keys.append(fingerprint.code_key())
+    monkeypatch.setattr(fingerprint, "version", lambda package: "0")
+    keys.append(fingerprint.code_key())
+    assert keys[0] == keys[1] and keys[5] == keys[6] == keys[7], "neither time nor what stands above moves it"
+    assert len(set(keys)) == 6
+
+
+def test_sweeping_keeps_what_is_in_use(tmp_path: Path) -> None:
+    new, old = work(tmp_path), replace(work(tmp_path), key="old")
+    for one in (new, old, replace(new, study="another")):
+        write_seed(one, 1, {"a/b": 1.0})
+    (new.folder / ".3.json.half").write_text("{")
+    sweep_seeds(new)
+    left = {
+        path.relative_to(tmp_path / ".seeds").as_posix() for path in tmp_path.rglob("*") if path.is_file()
+    }
+    assert left == {f"study/{new.key}/1.json", f"another/{new.key}/1.json"}
+
+
+def test_the_table_has_the_drawn_flight_first(tmp_path: Path) -> None:
+    one = work(tmp_path)
+    for seed in one.seeds:
+        write_seed(one, seed, {"a/b": seed / 3})
+    table = trials_table(
+        "static-point", 4, study="study", seed=2, drawn={("a", "b"): 9.0, ("a", "c"): 1.0},
+        out=str(tmp_path / ".study.part"), twin="static-antenna",
+    )  # fmt: skip
+    assert list(table.index) == [2, 1, 3, 4] and list(table["a", "b"]) == [9.0, 1 / 3, 1.0, 4 / 3]
+    assert list(table["a", "c"].isna()) == [False, True, True, True]
+
+
+@pytest.mark.slow
+def test_a_notebook_opened_by_hand_computes_what_is_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def table(seeds: int, twin: str) -> Any:
+        return trials_table(
+            "static-point", seeds, study="study", seed=2, drawn={}, out=str(tmp_path / "study"), twin=twin,
+        )  # fmt: skip
+
+    with pytest.raises(RunFailed, match=r"Seed 1 failed \(so did 1 more: 3\).*twin"):
+        table(3, "no-such-twin")
+    capsys.readouterr()
+    assert table(2, "static-antenna")["pixhawk-autopilot", "mae"].iloc[1] > 0
+    assert "study: 1 of 1 seeds" in capsys.readouterr().out
+    fresh = protocol.run_trial("static-point", 1, {"twin": "static-antenna"})
+    assert read_seed(replace(work(tmp_path), seeds=(1,)), 1) == fresh
+
+
+def test_other_code_is_not_mixed_in() -> None:
+    kind, content = answer("static-point", 1, {}, "another")
+    assert kind == "failed" and "are not those that the run began with" in content[0]
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: protocol.find_case("static-pont"), "there is no case 'static-pont'"),
+        (
+            lambda: make_work(Path(), "s", "slow-vessel", 1, 3, {"twin": "x"}),
+            "needs the parameter 'first'",
+        ),
+        (lambda: make_work(Path(), "s", "static-point", 1, 3, {"twin": None}), "Name the study's twin"),
+        (lambda: cluster.Cluster("127.0.0.1:8786"), "is no address of a scheduler.*tcp://127.0.0.1:8786"),
+        (lambda: cluster.Cluster("tcp://127.0.0.1:1; ls"), "is no address of a scheduler"),
+    ],
+)
+def test_wrong_use_is_a_sentence(call: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(WildlabError, match=sentence):
+        call()
+
+
+@pytest.mark.parametrize("given", [{}, {("a/b", "c"): 1.0}])
+def test_a_function_that_gives_no_numbers_is_refused(monkeypatch: pytest.MonkeyPatch, given: Any) -> None:
+    empty = protocol.Study("static-point", (), lambda seed: given)
+    monkeypatch.setattr("wildlab.studies.static_point.STUDY", empty)
+    with pytest.raises(WildlabError, match="Give numbers by"):
+        protocol.run_trial("static-point", 1, {})
+
+
+def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="needs dask.distributed (the extra `cluster`)")
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    with pytest.raises(WildlabError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9") as caught:
+        cluster.Cluster("tcp://127.0.0.1:9")
+    assert caught.value.exit_code == 2
+
+
+def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *more: Any) -> Any:
+        if name == "distributed":
+            raise ImportError(name)
+        return real(name, *more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(WildlabError, match=r"not installed here.*pip install -e '\.\[cluster\]'"):
+        cluster.Cluster("tcp://127.0.0.1:8786")
+
+
+def test_another_python_or_dask_on_the_cluster_is_refused() -> None:
+    def about(python: str = "3.11.7", dask: str = "2026.8.0") -> dict[str, Any]:
+        return {"host": {"python": f"{python}.final.0"}, "packages": {"distributed": dask}}
+
+    same = {"client": about(), "scheduler": about("3.11.2"), "workers": {"tcp://b": about()}}
+    cluster._check_versions(same, "tcp://a")
+    with pytest.raises(WildlabError, match=r"tcp://b has Python 3\.12, and here it is 3\.11"):
+        cluster._check_versions(same | {"workers": {"tcp://b": about("3.12.1")}}, "tcp://a")
+    with pytest.raises(WildlabError, match=r"the scheduler has distributed 1\.0, and here it is 2026\.8\.0"):
+        cluster._check_versions(same | {"scheduler": about(dask="1.0")}, "tcp://a")
+
+
+def test_what_has_no_effect_is_said() -> None:
+    studies = load_studies(NOTEBOOKS / "studies.toml")
+    chosen = [studies["static-point"], studies["sensitivity"]]
+    assert _notes(chosen, None, None) == [] == _notes(chosen[:1], 5, "tcp://a:1")
+    seeds, scheduler = _notes(chosen, 5, "tcp://a:1")
+    assert seeds.startswith("--seeds has no effect on sensitivity:")
+    assert scheduler.startswith("--scheduler has no effect on sensitivity:")
+
+
+@pytest.mark.parametrize(
+    ("entry", "sentence"),
+    [
+        ('case = "nothing"\nseeds = 3', "there is no case 'nothing'; use one of: autoferry, "),
+        ("seeds = 3\n[s.parameters]\nseeds = 4", "the number of seeds is given twice"),
+    ],
+)
+def test_a_study_that_contradicts_itself_is_refused(tmp_path: Path, entry: str, sentence: str) -> None:
+    path = tmp_path / "studies.toml"
+    path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
+    with pytest.raises(WildlabError, match=sentence):
+        load_studies(path)
+
+
+def test_failures_in_words() -> None:
+    assert failed_seeds([(7, "It rains.")]) == "seed 7 failed: It rains"
+    assert failed_seeds([(7, "b."), (3, "a.")]) == "seed 3 failed (so did 1 more: 7): a"
+    assert "so did 10 more: 1, 2, 3, 4, 5, 6, 7, 8, ...)" in failed_seeds([(k, "a.") for k in range(11)])
+
+
+def test_an_idle_pool_has_no_processes() -> None:
+    with WorkerPool() as pool:
+        assert (pool.size, pool.pipes, pool.places(2), pool.collect()) == (0, [], 2, [])
+
+
+def test_one_bar_counts_seeds_and_cells() -> None:
+    text = StringIO()
+    console = Console(file=text, force_terminal=True, width=160)
+    with shown(console) as tell:
+        tell("", "plan", 4 + 3)
+        tell("one", "start", None)
+        tell("one", "seeds", (4, 10))
+        for done in (1, 2, 3, 4):
+            tell("one", "seed", (done, 4))
+        for cell in (0, 1, 2):
+            tell("one", "cell", (cell, 3))
+        tell("one", "stage", ("page",))
+        tell("two", "start", None)
+        tell("one", "end", Outcome("one", "done", 3.0))
+    assert "7 of 7 seeds and cells" in text.getvalue() and text.getvalue().count("done") == 1

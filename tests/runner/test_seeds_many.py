@@ -1,0 +1,294 @@
+"""Seeds over processes and over a cluster: the same numbers, nothing twice, nothing left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from tests.notebooks import OPEN, notebook, write
+from wildlab.paths import ROOT
+
+pytestmark = pytest.mark.slow
+
+PROGRAM = Path(__file__).with_name("flights_for_seeds.py")
+#: A notebook that reads the table and records what is in it, to the last digit.
+TABLE = (
+    "import flights_for_seeds\nfrom wildlab.runner.trials import trials_table\n"
+    "drawn = {('walk', name): 1.0 for name in ('end', 'spread', 'none', 'beyond')}\n"
+    "spread = trials_table(case, seeds, study=study, seed=seed, drawn=drawn, out=out, steps=steps, "
+    "seconds=seconds)\n"
+    'report.head("A report")\n'
+    "assert list(spread.index) == [seed, *(k for k in range(1, seeds + 1) if k != seed)][:seeds]\n"
+    "assert spread['walk', 'none'].isna().sum() == seeds - 1\n"
+    "for k, row in spread.iterrows():\n"
+    "    report.metric('end', str(k), row['walk', 'end'], '1')\n"
+    "    report.metric('spread', str(k), row['walk', 'spread'], '1')\n"
+    "report.save()"
+)
+
+
+def make(folder: Path, seconds: float = 0.0, seeds: int = 8) -> Path:
+    """Notebooks and studies over seeds in ``folder``."""
+    entries = []
+    for study, each in (("walks", "walk"), ("more-walks", "walk"), ("troubled", "trouble")):
+        more = f'seeds = 0\nsteps = 0\nseconds = 0.0\ncase = "{each}"'
+        write(folder / "notebooks", f"{study}.ipynb", notebook(OPEN, TABLE, more=more))
+        entries.append(
+            f'[{study}]\ntitle = "Study {study}"\nnotebook = "{study}.ipynb"\nseed = 4\nseeds = {seeds}\n'
+            f'case = "{each}"\n[{study}.parameters]\nsteps = 3000\nseconds = {seconds}\n'
+        )
+    write(folder / "notebooks", "once.ipynb", notebook(OPEN, 'report.head("One")\nreport.save()'))
+    entries.append('[once]\ntitle = "Once"\nnotebook = "once.ipynb"\n')
+    (folder / "notebooks" / "studies.toml").write_text("".join(entries))
+    return folder
+
+
+def environment(folder: Path) -> dict[str, str]:
+    paths = [str(ROOT), str(PROGRAM.parent)]
+    return os.environ | {"SEEDS_TEST_LOG": str(folder / "flown"), "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, str(PROGRAM), str(folder), *arguments],
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(folder: Path, *arguments: str) -> str:
+    """What it prints."""
+    return start(folder, *arguments).communicate(timeout=240)[0]
+
+
+def flown(folder: Path) -> list[tuple[int, int]]:
+    """(seed, process) of each flight that began."""
+    log = folder / "flown"
+    return [(int(a), int(b)) for a, b in map(str.split, log.read_text().splitlines())] if log.exists() else []
+
+
+def numbers(folder: Path, out: str, study: str = "walks") -> Any:
+    return json.loads((folder / out / study / "metrics.json").read_text())["metrics"]
+
+
+def kept(folder: Path, out: str, study: str = "walks") -> dict[str, bytes]:
+    """Content of each seed's file, by key and seed."""
+    store = folder / out / ".seeds" / study
+    return {f"{path.parent.name}/{path.stem}": path.read_bytes() for path in sorted(store.glob("*/*.json"))}
+
+
+def wait_for(true: Callable[[], bool], seconds: float = 60.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, "it never came"
+        time.sleep(0.05)
+
+
+def alive(pids: set[int]) -> set[int]:
+    return {
+        pid for pid in pids if psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    }
+
+
+def test_the_same_numbers_for_any_number_of_processes(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    text = run(folder, "walks", "--out", "one", "--jobs", "1")
+    assert "seeds walks: 7 to compute, 0 are there" in text and "done  walks" in text, text
+    assert len({process for _, process in flown(folder)}) == 1
+    assert "done  walks" in run(folder, "walks", "--out", "three", "--jobs", "3")
+    assert len({process for _, process in flown(folder)[7:]}) > 1, "it was spread"
+    assert sorted(seed for seed, _ in flown(folder)) == sorted(2 * [1, 2, 3, 5, 6, 7, 8])
+    assert numbers(folder, "one") == numbers(folder, "three")
+    assert kept(folder, "one") == kept(folder, "three") and len(kept(folder, "one")) == 7
+    about = json.loads((folder / "one" / "walks" / "provenance.json").read_text())["seeds"]
+    assert about["seeds"] == [1, 2, 3, 5, 6, 7, 8] and about["function"] == "walk"
+    assert {key.partition("/")[0] for key in kept(folder, "one")} == {about["key"]}
+    assert about["parameters"] == {"steps": 3000, "seconds": 0.0}
+
+
+def test_jobs_bounds_notebooks_and_seeds_together(tmp_path: Path) -> None:
+    folder = make(tmp_path, seconds=0.2)
+    program = start(folder, "walks", "once", "more-walks", "--jobs", "2")
+    most = 0
+    while program.poll() is None:
+        try:
+            below = [
+                p
+                for p in psutil.Process(program.pid).children()
+                if "resource_tracker" not in str(p.cmdline())
+            ]
+        except psutil.Error:
+            continue
+        most = max(most, len(below))
+        time.sleep(0.02)
+    text = program.communicate()[0]
+    assert all(f"done  {study}" in text for study in ("walks", "once", "more-walks")), text
+    assert most == 2
+
+
+def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    run(folder, "walks", "--seeds", "4")
+    assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3]
+    text = run(folder, "walks", "once", "--seeds", "6", "--jobs", "2")
+    assert "--seeds has no effect on once" in text and "seeds walks: 2 to compute, 3 are there" in text
+    assert sorted(seed for seed, _ in flown(folder)) == [1, 2, 3, 5, 6]
+    assert len(numbers(folder, "reports")) == 2 * 6
+    studies = folder / "notebooks" / "studies.toml"
+    studies.write_text(studies.read_text().replace("steps = 3000", "steps = 2000"))
+    assert len(kept(folder, "reports")) == 5
+    before = {key.partition("/")[0] for key in kept(folder, "reports")}
+    run(folder, "walks", "--seeds", "3")
+    assert len(flown(folder)) == 5 + 2
+    after = {key.partition("/")[0] for key in kept(folder, "reports")}
+    assert len(after) == 1 and after != before, "what the old parameters left is swept"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path: Path, number: signal.Signals) -> None:
+    folder = make(tmp_path, seconds=0.4, seeds=12)
+    program = start(folder, "walks", "--jobs", "2")
+    wait_for(lambda: len(kept(folder, "reports")) >= 3)
+    processes = {process for _, process in flown(folder)}
+    os.killpg(program.pid, number)
+    assert program.wait(20) != 0
+    wait_for(lambda: not alive(processes), 20)
+    first = {path: path.stat().st_mtime_ns for path in folder.glob("reports/.seeds/walks/*/*.json")}
+    assert 3 <= len(first) < 11
+    assert not (folder / "reports" / "walks" / "status.json").exists()
+    begun = len(flown(folder))
+    text = run(folder, "walks", "--jobs", "2")
+    assert f"{11 - len(first)} to compute, {len(first)} are there" in text and "done  walks" in text
+    again = {seed for seed, _ in flown(folder)[begun:]}
+    assert again == {1, 2, 3, *range(5, 13)} - {int(path.stem) for path in first}
+    assert {path: path.stat().st_mtime_ns for path in first} == first, "finished seeds were not written again"
+    if number == signal.SIGINT:
+        run(folder, "walks", "--out", "whole", "--jobs", "2")
+        assert numbers(folder, "reports") == numbers(folder, "whole")
+
+
+def test_seeds_that_fail_are_named_and_the_others_kept(tmp_path: Path) -> None:
+    folder = make(tmp_path, seeds=7)
+    text = run(folder, "troubled", "once", "--jobs", "2", "--timeout", "25")
+    status = json.loads((folder / "reports" / "troubled" / "status.json").read_text())
+    assert status["state"] == "failed", text
+    reason = "Seed 2 failed (so did 2 more: 3, 5): The flight of seed 2 has no solution. Look at it."
+    assert status["reason"] == reason and reason in " ".join(text.split())
+    page = (folder / "reports" / "troubled" / "report.html").read_text()
+    assert "This study failed" in page and "wildlab run troubled" in page and "no solution" in page
+    assert sorted(int(key.partition("/")[2]) for key in kept(folder, "reports", "troubled")) == [1, 6, 7]
+    assert "done  once" in text
+
+
+# -- a cluster
+# ------------------------------------------------------------------------------------
+
+
+class Cluster:
+    """A scheduler and workers on this machine."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.workers: list[subprocess.Popen[bytes]] = []
+        options = ("--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+        self.scheduler = self._start("scheduler", *options)
+        wait_for(lambda: socket.socket().connect_ex(("127.0.0.1", port)) == 0)
+
+    def add_worker(self) -> None:
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        self.workers.append(self._start("worker", self.address, *options, "--preload", str(PROGRAM)))
+
+    def wait_for_workers(self, count: int) -> None:
+        from distributed import Client
+
+        with Client(self.address, timeout=30, set_as_default=False) as client:
+            client.wait_for_workers(count, timeout=60)
+
+    def _start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        return subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments],
+            env=environment(self._folder) | one_thread,
+            cwd=self._folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def end(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait(20)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    pytest.importorskip("distributed", reason="needs dask.distributed (the extra `cluster`)")
+    one = Cluster(tmp_path)
+    yield one
+    one.end()
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path: Path, cluster: Cluster) -> None:
+    folder = make(tmp_path, seconds=0.4, seeds=12)
+    for _ in range(2):
+        cluster.add_worker()
+    cluster.wait_for_workers(2)
+    program = start(folder, "walks", "--out", "cluster", "--scheduler", cluster.address)
+    wait_for(lambda: 2 <= len(kept(folder, "cluster")) < 8)
+    victim = cluster.workers[0]
+    assert {process for _, process in flown(folder)} == {worker.pid for worker in cluster.workers}
+    victim.kill()
+    begun = len(flown(folder))
+    text = program.communicate(timeout=120)[0]
+    assert "done  walks" in text, text
+    assert {process for _, process in flown(folder)[begun:]} == {cluster.workers[1].pid}
+    assert {seed for seed, _ in flown(folder)} == {1, 2, 3, *range(5, 13)}
+    run(folder, "walks", "--out", "here", "--jobs", "2")
+    assert numbers(folder, "cluster") == numbers(folder, "here")
+    assert kept(folder, "cluster") == kept(folder, "here")
+
+
+def test_a_seed_that_fails_on_a_cluster_is_named(tmp_path: Path, cluster: Cluster) -> None:
+    folder = make(tmp_path, seeds=3)
+    cluster.add_worker()
+    cluster.wait_for_workers(1)
+    text = run(folder, "troubled", "once", "--scheduler", cluster.address)
+    assert "Seed 2 failed: The flight of seed 2 has no solution. Look at it." in text
+    assert "--scheduler has no effect on once" in text and "done  once" in text
+    assert len(kept(folder, "reports", "troubled")) == 1
+
+
+def test_a_scheduler_that_goes_away_is_a_sentence(tmp_path: Path, cluster: Cluster) -> None:
+    folder = make(tmp_path, seconds=0.4, seeds=50)
+    cluster.add_worker()
+    cluster.wait_for_workers(1)
+    program = start(folder, "walks", "--scheduler", cluster.address, "--timeout", "8")
+    wait_for(lambda: len(kept(folder, "reports")) >= 2)
+    cluster.end()
+    text = program.communicate(timeout=120)[0]
+    assert program.returncode == 1 and "--scheduler" in text and "run it again" in text, text
+    assert len(kept(folder, "reports")) >= 2
+
+
+def test_a_cluster_without_workers_is_refused(tmp_path: Path, cluster: Cluster) -> None:
+    text = run(make(tmp_path), "walks", "--scheduler", cluster.address)
+    assert "has no workers" in text and f"dask worker {cluster.address}" in text
+    assert not (tmp_path / "flown").exists()

@@ -1,0 +1,237 @@
+"""Every study, run as a user runs it: its promised metrics, its figures, its page in a browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wildlab.flight.recipe.importing import import_flight
+from wildlab.paths import DATA
+from wildlab.runner.evaluate import evaluate_flight
+from wildlab.runner.run import run_studies
+
+pytestmark = pytest.mark.slow
+
+Faults = Callable[[Path], list[str]]
+ACCURACY = {
+    "horizontal_error_mean",
+    "horizontal_error_median",
+    "horizontal_error_p90",
+    "horizontal_error_max",
+    "bias_north",
+    "bias_east",
+    "sd_north",
+    "sd_east",
+    "ellipse_coverage_90",
+}
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("reports")
+
+
+def values(folder: Path | None) -> dict[tuple[str, str], dict[str, Any]]:
+    """The metrics of a report by (name, subject)."""
+    assert folder is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    return {(m["name"], m["subject"]): m for m in content["metrics"]}
+
+
+def run(name: str, reports: Path, **kwargs: Any) -> Path:
+    (outcome,) = run_studies([name], reports=reports, **kwargs)
+    assert outcome.state == "done", outcome.reason
+    assert outcome.folder is not None
+    return outcome.folder
+
+
+def test_sensitivity_meets_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("sensitivity", reports)
+    metrics = [m for (name, _), m in values(folder).items() if name == "horizontal_error"]
+    assert len(metrics) == 42
+    assert all(abs(m["value"] - m["published"]) <= 0.15 for m in metrics)
+    assert {m["subject"].split("/")[0] for m in metrics} == {"level", "turn", "ascent"}
+    assert {m["subject"].split("/")[2] for m in metrics} == {"100m", "400m"}
+    assert faults(folder / "report.html") == []
+
+
+def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("consistency-bounds", reports)
+    printed = [m for m in values(folder).values() if m["published"] is not None]
+    assert len(printed) == 6
+    assert faults(folder / "report.html") == []
+
+
+def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
+    folder = run("static-point", reports, seeds=4, parallel=2)
+    found = values(folder)
+    for column in (
+        "observer",
+        "pixhawk-autopilot",
+        "without-time-synchronization",
+        "without-misalignment-calibration",
+    ):
+        for name in ("mean_north", "mean_east", "sd_north", "sd_east", "mae"):
+            metric = found[name, column]
+            assert metric["low"] <= metric["value"] <= metric["high"]
+            assert metric["published"] is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 7)
+    assert json.loads((folder / "provenance.json").read_text())["seeds"]["seeds"] == [1, 2, 3]
+    for figure in ("02", "03a", "03b", "04a", "04b", "05a", "05b", "06", "07"):
+        assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
+        assert (folder / "figures" / f"fig-5-{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
+def test_survey_markers_beside_the_published_accuracy(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("georeferencing", "openathena")
+    import_flight(DATA / "recipes" / "openathena.toml", raw, tmp_path / "flight")
+    folder = run("survey-markers", reports, flight=tmp_path / "flight")
+    found = values(folder)
+    for subject in ("logged-pose", "calibrated-pose"):
+        assert {name for name, other in found if other == subject} == ACCURACY
+    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 5.6
+    assert found["horizontal_error_median", "logged-pose"]["value"] <= 5.2
+    assert found["horizontal_error_p90", "logged-pose"]["value"] <= 9.1
+    assert found["horizontal_error_mean", "recorded-answers"]["value"] == pytest.approx(9.05, abs=0.05)
+    assert faults(folder / "report.html") == []
+
+
+def test_a_flight_with_labelled_markers_is_evaluated(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("georeferencing", "openathena-f1")
+    import_flight(DATA / "recipes" / "openathena-f1.toml", raw, tmp_path / "flight")
+    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
+    found = values(outcome.folder)
+    assert found["horizontal_error_mean", "logged-pose"]["value"] <= 3.0
+    assert found["horizontal_error_mean", "logged-pose"]["n"] == 103
+    before, after = (
+        found["ellipse_coverage_90", subject]["value"]
+        for subject in ("logged-pose", "logged-pose/estimated-noise")
+    )
+    assert 0.8 <= after <= before <= 1.0
+    assert outcome.folder is not None
+    assert faults(outcome.folder / "report.html") == []
+
+
+def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("logs", "umn_thor75")
+    import_flight(DATA / "recipes" / "umn-thor75.toml", raw, tmp_path / "flight")
+    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
+    assert outcome.name == "umn-thor75-navigation"
+    found = values(outcome.folder)
+    # In the air, which nobody had to point out: rotations about the axes of the body, in degrees.
+    for axis, most in (("roll", 1.0), ("pitch", 1.0), ("yaw", 2.0)):
+        assert found[f"rms_{axis}", "mekf"]["value"] < most
+        assert found[f"rms_{axis}", "observer"]["value"] < 2 * most
+    assert outcome.folder is not None
+    assert faults(outcome.folder / "report.html") == []
+
+
+def test_sensors_of_a_ferry_judged_on_one_scenario(
+    reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("tracking", "autoferry")
+    import_flight(DATA / "recipes" / "autoferry-17.toml", raw, tmp_path / "flight")
+    folder = run("autoferry", reports, flight=tmp_path / "flight")
+    found = values(folder)
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert len(content["claims"]) == 7
+    names = {name for name, subject in found if subject == "radar/havfruen/scenario-17/coloured"}
+    assert {"rmse", "anees", "anis", "lag1_autocorrelation_north", "fraction_nees_inside"} <= names
+    assert "lag1_autocorrelation" in {
+        name for name, subject in found if subject == "eo/jet-boat/scenario-17/ekf"
+    }
+    assert (folder / "figures" / "map-scenario-17.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
+def test_gating_beside_the_print(reports: Path, faults: Faults) -> None:
+    folder = run("gating", reports)
+    found = values(folder)
+    for form in ("position", "pixels", "angles"):
+        assigned, own = (found["success_rate", f"{form}{fed}"] for fed in ("", "/updated-with-own"))
+        assert assigned["published"] is not None and assigned["n"] == own["n"] == 10_000
+        assert assigned["value"] < own["value"]
+        assert abs(own["value"] - assigned["published"]) <= 2.0
+        assert found["success_rate_standard_error", form]["value"] < 0.5
+    for figure in ("17a", "17b", "18a", "18b", "19a", "19b"):
+        assert (folder / "figures" / f"fig-6-{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
+TRACKED = {
+    "linear-vs-nonlinear-fast": {"kf", "ekf"},
+    "linear-vs-nonlinear-slow": {"kf", "ekf"},
+    "coloured-noise-fast": {"cv", "singer", "coloured"},
+    "coloured-noise-drifting": {"cv", "singer", "coloured"},
+    "schmidt-fast-vessel": {"ekf", "schmidt"},
+    "schmidt-slow-vessel-eight": {"ekf", "schmidt"},
+    "schmidt-drifting-vessel-eight": {"ekf", "schmidt"},
+}
+
+
+@pytest.mark.parametrize("study", TRACKED)
+def test_tracks_of_a_vessel_over_a_few_flights(study: str, reports: Path, faults: Faults) -> None:
+    folder = run(study, reports, seeds=3, parallel=2)
+    found = values(folder)
+    for subject in TRACKED[study]:
+        for name in ("mean_north", "mean_east", "mae", "nees", "nis"):
+            metric = found[name, subject]
+            assert metric["low"] <= metric["value"] <= metric["high"]
+            assert metric["published"] is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert content["seeds"] == 3
+    assert content["claims"]
+    assert faults(folder / "report.html") == []
+
+
+@pytest.mark.parametrize(
+    "study", ["navigation-fast-vessel", "navigation-slow-vessel-eight", "navigation-drifting-vessel-eight"]
+)
+def test_navigation_beside_the_published_deviations(study: str, reports: Path, faults: Faults) -> None:
+    folder = run(study, reports, seeds=2, parallel=2)
+    found = values(folder)
+    for axis in ("north", "east", "down", "roll", "pitch", "yaw"):
+        assert found[f"mean_sd_{axis}", "mekf-published-like"]["published"] is not None
+    assert {"nees_position", "nees_attitude", "rms_yaw"} <= {name for name, who in found if who == "mekf"}
+    assert faults(folder / "report.html") == []
+
+
+@pytest.mark.parametrize(
+    ("dataset", "study"), [("umn_thor75", "navigation-thor75"), ("inertialnav_x8", "navigation-x8")]
+)
+def test_navigation_of_a_logged_flight(
+    dataset: str, study: str, reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
+) -> None:
+    raw = shared_data("logs", dataset)
+    import_flight(DATA / "recipes" / f"{dataset.replace('_', '-')}.toml", raw, tmp_path / "flight")
+    folder = run(study, reports, flight=tmp_path / "flight")
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert content["kind"] == "logged"
+    assert {metric["subject"].split("/")[0] for metric in content["metrics"]} >= {"mekf", "observer"}
+    assert faults(folder / "report.html") == []
+
+
+def test_slow_vessel_over_a_few_flights(reports: Path, faults: Faults) -> None:
+    folder = run("slow-vessel", reports, seeds=3, parallel=2)
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert sum(metric["published"] is not None for metric in content["metrics"]) == 20
+    assert content["claims"]
+    assert faults(folder / "report.html") == []
+
+
+def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
+    page = reports / "index.html"
+    assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")
+    assert faults(page) == []

@@ -1,0 +1,68 @@
+"""The ferry's five scenarios: tuned on the first, judged on all, against what is known from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.store import Flight, load_flight
+from wildlab.paths import DATA
+from wildlab.pipeline.sensor_tracks import FILTERS, follow_flight, table
+from wildlab.pipeline.sensor_tuning import Tuning, tune
+from wildlab.studies.autoferry.comparison import gains, pooled
+
+pytestmark = pytest.mark.slow
+SCENARIOS = (2, 3, 5, 13, 17)
+
+
+@pytest.fixture(scope="module")
+def flights(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> dict[int, Flight]:
+    source, into = shared_data("tracking", "autoferry"), tmp_path_factory.mktemp("autoferry")
+    for number in SCENARIOS:
+        import_flight(DATA / "recipes" / f"autoferry-{number}.toml", source, into / str(number))
+    return {number: load_flight(into / str(number)) for number in SCENARIOS}
+
+
+@pytest.fixture(scope="module")
+def tunings(flights: dict[int, Flight]) -> dict[str, Tuning]:
+    return {sensor: tune(flights[2], sensor) for sensor in ("lidar", "radar", "ir", "eo")}
+
+
+@pytest.fixture(scope="module")
+def tracks(flights: dict[int, Flight], tunings: dict[str, Tuning]) -> pd.DataFrame:
+    return pd.concat(
+        [table(follow_flight(flight, tunings)).assign(case=number) for number, flight in flights.items()]
+    )
+
+
+def test_radar_stamps_are_late_by_one_to_three_seconds(tunings: dict[str, Tuning]) -> None:
+    # So says who prepared the data set; the sensor stamps what it has finished, not what it has begun.
+    assert -3.0 <= tunings["radar"].offset_s <= -1.0
+    assert tunings["radar"].offset_low_s <= tunings["radar"].offset_s <= tunings["radar"].offset_high_s
+
+
+def test_errors_are_coloured(tunings: dict[str, Tuning]) -> None:
+    for tuning in tunings.values():
+        assert tuning.next_correlation > 0.5
+        assert tuning.correlation_time_s > 2 * tuning.interval_s
+
+
+def test_every_sensor_boat_scenario_and_filter_has_a_row(tracks: pd.DataFrame) -> None:
+    sensors = {"lidar": "position", "radar": "position", "ir": "bearing", "eo": "bearing"}
+    for sensor, kind in sensors.items():
+        rows = tracks[tracks["sensor"] == sensor]
+        assert len(rows) == len(SCENARIOS) * 2 * len(FILTERS[kind])
+        assert set(rows["kind"]) == {kind}
+
+
+def test_a_filter_that_knows_that_errors_last_is_more_consistent(tracks: pd.DataFrame) -> None:
+    found = gains(pooled(tracks, ["sensor", "case"]), ["sensor", "case"])
+    for sensor in ("lidar", "radar"):
+        rows = found[found["sensor"] == sensor]
+        assert len(rows) == len(SCENARIOS)
+        assert rows["gained"].sum() >= 4
+        assert (rows["rmse_ratio"] <= 1.1).all()

@@ -1,0 +1,290 @@
+"""Association by Monte Carlo: against filters written out for one run, and where the answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from filterpy.kalman import KalmanFilter
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.gating import monte_carlo as gating
+from wildlab.studies.gating.monte_carlo import (
+    IMAGES,
+    Choices,
+    Overflight,
+    draw_scene,
+    gate,
+    overflight,
+    streams,
+)
+from wildlab.studies.gating.variations import (
+    chosen_parts,
+    claim_margins,
+    standard_error,
+    variations,
+    vary,
+    verdict,
+)
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    return simulate_twin("large-ship", 1)
+
+
+@pytest.fixture(scope="module")
+def over(flight: Flight) -> Overflight:
+    return overflight(flight)
+
+
+def motion(dt: float, sd: float) -> tuple[Array, Array]:
+    """H (6.1), (6.2), typed from the print."""
+    F = np.eye(4)
+    F[0, 2] = F[1, 3] = dt
+    G = np.array([[dt**2 / 2, 0], [0, dt**2 / 2], [dt, 0], [0, dt]])
+    return F, sd**2 * G @ G.T
+
+
+def warmed_up(scene: gating.Scene, run: int) -> KalmanFilter:
+    kf = KalmanFilter(dim_x=4, dim_z=2)
+    kf.F, kf.Q = motion(0.1, 0.01)
+    kf.H, kf.R, kf.P = np.eye(2, 4), 100.0 * np.eye(2), np.diag([100.0, 100.0, 20.0, 20.0])
+    kf.x = np.append(scene.start[run], [0.0, 0.0])
+    for z in scene.warm_up[run]:
+        kf.predict()
+        kf.update(z)
+    return kf
+
+
+def test_positions_as_another_filter_gates_them(over: Overflight) -> None:
+    runs = streams(7, 4)
+    scene, gated = draw_scene(over, runs), gate(over, Choices(), runs)
+    for run in range(4):
+        kf = warmed_up(scene, run)
+        for t in range(IMAGES):
+            kf.predict()
+            S = kf.P[:2, :2] + kf.R
+            nis = [v @ np.linalg.inv(S) @ v for v in gated.measured[run, t] - kf.x[:2]]
+            np.testing.assert_allclose(gated.nis[0, run, t], nis, rtol=1e-8)
+            assert gated.right[0, run, t] == (nis[0] < nis[1])
+            kf.update(gated.measured[run, t, int(np.argmin(nis))])
+            np.testing.assert_allclose(gated.estimate[0, run, t], kf.x[:2], atol=1e-7)
+
+
+def seen_angles(p_c: Array) -> Array:
+    x, y, z = p_c
+    return np.array([np.arctan2(y, x), np.arctan(z / np.hypot(x, y))])
+
+
+@pytest.mark.parametrize("form", ["pixels", "angles"])
+def test_pixels_and_angles_as_written_out(over: Overflight, form: str) -> None:
+    """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
+    runs = streams(11, 2)
+    scene, gated = draw_scene(over, runs), gate(over, Choices(), runs)
+    f = over.camera.fx
+    middle = np.array([over.camera.cx, over.camera.cy])
+    R_uv, R_angles = np.diag([360.0, 160.0]), np.diag(np.radians([6.0, 3.0]) ** 2)
+
+    for run in range(2):
+        kf = warmed_up(scene, run)
+        x, P = kf.x, kf.P
+        for t in range(IMAGES):
+            R_cn, p_nc = scene.R_nc[run, t].T, scene.p_nc[run, t]
+
+            def in_camera(position: Array, R_cn: Array = R_cn, p_nc: Array = p_nc) -> Array:
+                return np.asarray(R_cn @ (np.append(position, 0.0) - p_nc))
+
+            def pixel(position: Array) -> Array:
+                x_c, y_c, z_c = in_camera(position)
+                return middle + f / z_c * np.array([x_c, y_c])
+
+            def angles(position: Array) -> Array:
+                return seen_angles(in_camera(position))
+
+            def slope(h, position: Array) -> Array:  # type: ignore[no-untyped-def]
+                steps = 1e-4 * np.eye(2)
+                H = np.array([(h(position + s) - h(position - s)) / 2e-4 for s in steps]).T
+                return np.hstack([H, np.zeros((2, 2))])
+
+            x, P = kf.F @ x, kf.F @ P @ kf.F.T + kf.Q
+            uv = scene.pixels[run, t]
+            H = slope(pixel, x[:2])
+            if form == "pixels":
+                gaps, S = uv - pixel(x[:2]), H @ P @ H.T + R_uv
+            else:
+                measured = np.array([seen_angles(np.append((z - middle) / f, 1.0)) for z in uv])
+                gaps = measured - angles(x[:2])
+                gaps[:, 0] = np.angle(np.exp(1j * gaps[:, 0]))
+                H_angles = slope(angles, x[:2])
+                S = H_angles @ P @ H_angles.T + R_angles
+            nis = [v @ np.linalg.inv(S) @ v for v in gaps]
+            np.testing.assert_allclose(gated.nis[gating.FORMS.index(form), run, t], nis, rtol=1e-4)
+            K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_uv)
+            x = x + K @ (uv[int(np.argmin(nis))] - pixel(x[:2]))
+            P = P - K @ H @ P
+
+
+def test_without_noise_and_far_apart_nothing_goes_wrong(
+    over: Overflight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gating, "POSE_SD", np.zeros(8))
+    monkeypatch.setattr(gating, "PIXEL_SD", 0.0)
+    monkeypatch.setattr(gating, "APART", (0.0, 120.0))
+    gated = gate(over, Choices(), streams(1, 20))
+    np.testing.assert_allclose(gated.measured, gated.targets[:, None].repeat(IMAGES, 1), atol=1e-6)
+    assert gated.right.all()
+
+
+def test_two_targets_in_one_place_are_a_toss_up(over: Overflight, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing but the noise of the detector tells them apart, and it favours neither."""
+    monkeypatch.setattr(gating, "APART", (0.0, 0.0))
+    monkeypatch.setattr(gating, "DISPLACED_M", 0.0)
+    rates = gating.success_rates(over, Choices(), 200, 5)
+    for form in rates:
+        assert abs(form.mean() - 50) < 5 * standard_error(form)
+    assert rates.std(axis=1, ddof=1) == pytest.approx(100 * np.sqrt(0.25 / IMAGES), rel=0.3)
+
+
+def test_a_run_does_not_depend_on_the_others(over: Overflight) -> None:
+    many = gating.success_rates(over, Choices(), 7, 3, chunk=3)
+    assert many.shape == (3, 7)
+    np.testing.assert_array_equal(many[:, :4], gating.success_rates(over, Choices(), 4, 3))
+    assert (gating.success_rates(over, Choices(), 4, 4) != many[:, :4]).any()
+
+
+def test_the_noise_is_that_of_the_tables(over: Overflight) -> None:
+    scene = draw_scene(over, streams(2, 3000))
+    apart = scene.targets[:, 1] - scene.targets[:, 0]
+    se = np.sqrt(200 / 3000)
+    np.testing.assert_allclose(apart.mean(axis=0), (10, 15), atol=5 * se)
+    np.testing.assert_allclose(apart.std(axis=0), np.sqrt(200), rtol=0.07)
+    np.testing.assert_allclose((scene.p_nc - over.p_nb).std(axis=(0, 1)), (2, 2, 5), rtol=0.02)
+    np.testing.assert_allclose((scene.warm_up - scene.targets[:, :1]).std(axis=(0, 1)), 10, rtol=0.02)
+    # The lens: roll and gimbal pan, pitch and gimbal tilt, each by one degree, yaw by two.
+    _, true = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
+    turned = np.swapaxes(true, -1, -2) @ scene.R_nc
+    about = np.degrees([turned[..., 2, 1].std(), turned[..., 0, 2].std(), turned[..., 1, 0].std()])
+    assert np.sqrt((about**2).sum()) == pytest.approx(np.sqrt(1 + 1 + 4 + 1 + 1), rel=0.1)
+
+
+def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight: Flight, over: Overflight) -> None:
+    np.testing.assert_allclose(np.diff(over.time_s), 0.1)
+    assert len(over.time_s) == IMAGES
+    nav = flight.nav["truth"]
+    every = nav.iloc[::5]
+    away = np.hypot(every["north_m"], every["east_m"]).to_numpy()
+    farthest = np.array([away[i : i + IMAGES].max() for i in range(len(away) - IMAGES + 1)])
+    assert np.hypot(*over.p_nb[:, :2].T).max() == pytest.approx(farthest[round(10 * over.time_s[0])])
+    # Hardly any stretch is nearer, and what is has the origin out of view at one of its ends.
+    assert (farthest < farthest[round(10 * over.time_s[0])]).mean() < 0.02
+    p_nc, R_nc = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
+    uv = ground_to_pixel(over.camera, np.append(over.place, 0.0), p_nc, R_nc)
+    np.testing.assert_allclose(uv[:, 1], over.camera.cy, atol=1e-6)
+    assert np.all((uv[:, 0] > 0) & (uv[:, 0] < over.camera.width))
+    assert gating.share_in_image(over, 50, 1) > gating.share_in_image(
+        overflight(flight, gimbal="down"), 50, 1
+    )
+
+
+def test_what_is_printed_of_the_angles(over: Overflight) -> None:
+    c = over.camera
+    uv = np.array([[c.cx + 100, c.cy + 60], [c.cx - 100, c.cy + 60], [c.cx - 100, c.cy - 60]])
+    u, v = (uv - (c.cx, c.cy)).T
+    azimuth = np.arctan((v / c.fy) / (u / c.fx))
+    printed = np.column_stack([azimuth, np.arctan(c.fx / u * np.cos(azimuth))])
+    found = gating._measured_angles(c, uv, Choices(azimuth="printed"))
+    np.testing.assert_allclose(found, printed, atol=1e-12)
+    mended = gating._measured_angles(c, uv, Choices(azimuth="arctan"))
+    np.testing.assert_allclose(mended, np.abs(printed) * [[1, 1], [-1, 1], [1, 1]], atol=1e-12)
+    sound = gating._measured_angles(c, uv, Choices())
+    np.testing.assert_allclose(sound[0], printed[0], atol=1e-12)  # right half: the same
+    np.testing.assert_allclose(sound[:, 0], np.arctan2(v, u), atol=1e-12)
+
+
+def test_what_feeds_the_track(over: Overflight) -> None:
+    runs = streams(1, 60)
+    fed = {name: gate(over, Choices(updated_with=name), runs) for name in ("assigned", "own", "nothing")}  # type: ignore[arg-type]
+    own, nothing = fed["own"], fed["nothing"]
+    # Gated by angles and updated by pixels, the track fed with its own is that of the pixels.
+    np.testing.assert_allclose(own.estimate[2], own.estimate[1])
+    # Without updates the track goes straight on, whatever the form.
+    np.testing.assert_allclose(np.diff(nothing.estimate, 2, axis=2), 0, atol=1e-8)
+    np.testing.assert_allclose(nothing.estimate[0], nothing.estimate[2])
+    # Until the first mistake, it is the same track.
+    same = np.cumprod(fed["assigned"].right, axis=2).astype(bool)
+    np.testing.assert_allclose(fed["assigned"].estimate[same], own.estimate[same])
+    assert same.any() and not same.all()
+
+
+def test_images_that_do_not_show_both_can_be_left_out(flight: Flight) -> None:
+    aside = overflight(flight, right=25.0)
+    gated = gate(aside, Choices(in_image_only=True), streams(1, 30))
+    assert 0 < gated.counted.mean() < 1
+    assert not gated.right[:, ~gated.counted].any()
+    left_out = np.broadcast_to(~gated.counted[None, :, 1:], gated.right[..., 1:].shape)
+    step = np.linalg.norm(np.diff(gated.estimate, axis=2), axis=-1)
+    assert np.median(step[left_out]) < np.median(step[~left_out])  # the track is only carried on
+
+
+def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> None:
+    named = variations(flight, Choices())
+    first = next(iter(named.values()))
+    for name, (other, choices) in list(named.items())[1:]:
+        same_flight = all(np.array_equal(getattr(other, a), getattr(first[0], a)) for a in ("p_nb", "tilt"))
+        same_flight &= other.camera == over.camera
+        assert same_flight != (choices == first[1]), name
+    aside = overflight(flight, right=30.0).place
+    along = over.p_nb[-1, :2] - over.p_nb[0, :2]
+    assert np.hypot(*aside) == pytest.approx(30) and aside @ along == pytest.approx(0, abs=1e-9)
+    assert along[0] * aside[1] - along[1] * aside[0] > 0  # north to east is clockwise: right
+
+
+def test_a_table_of_variations(flight: Flight) -> None:
+    table = vary(flight, "own", 12, 1)
+    assert list(table["variation"]) == list(variations(flight, Choices()))
+    first = table.iloc[0]
+    assert first[[f"{form}_change" for form in gating.FORMS]].abs().max() == 0
+    assert np.isfinite(table.drop(columns="variation").to_numpy(float)).all()
+    changed = table.set_index("variation")["angles_change"]
+    assert changed["(6.10) to the letter"] == pytest.approx(
+        table.set_index("variation").loc["(6.10) to the letter", "angles"] - first["angles"]
+    )
+
+
+def test_standard_error_leaves_out_what_is_missing() -> None:
+    assert standard_error(np.array([1.0, 3.0, np.nan])) == pytest.approx(1.0)
+
+
+def test_a_flight_without_truth_or_too_short(flight: Flight) -> None:
+    with pytest.raises(WildlabError, match="no true poses"):
+        overflight(Flight(flight.manifest, {"autopilot": flight.nav["autopilot"]}, flight.tables))
+    with pytest.raises(WildlabError, match="in view for 14 s"):
+        overflight(Flight(flight.manifest, {"truth": flight.nav["truth"].head(200)}, flight.tables))
+    with pytest.raises(WildlabError, match="in view for 14 s"):
+        far = flight.nav["truth"].assign(north_m=lambda nav: nav["north_m"] + 2000)
+        overflight(Flight(flight.manifest, {"truth": far}, flight.tables))
+
+
+def test_claims_are_decided_run_by_run() -> None:
+    wobble = np.tile([-5.0, 5.0], 500)
+    level = np.array([[96.6], [96.8], [96.0]]) + wobble  # what the runs share does not blur the differences
+    margins = claim_margins(level)
+    assert {name: verdict(margin) for name, margin in margins.items()} == {
+        "forms-agree": "holds",
+        "angles-least-accurate": "holds",
+    }
+    np.testing.assert_allclose(margins["forms-agree"], 0.2)
+    apart = claim_margins(level[[2, 1, 0]] * [[0.9], [1], [1]])
+    assert {verdict(margin) for margin in apart.values()} == {"does not hold"}
+    assert verdict(np.array([-1.0, 1.0, 0.5])) == "cannot be decided"
+
+
+def test_every_choice_has_its_reason(over: Overflight) -> None:
+    table = chosen_parts(over, 0.93)
+    assert (table.map(len) > 0).all(axis=None) and table["part"].is_unique
+    assert "93 %" in table.set_index("part").loc["beyond the edge", "chosen"]

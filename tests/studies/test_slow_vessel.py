@@ -1,0 +1,107 @@
+"""The vessel's points, its filter, and the numbers that stand for them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.published import load_claims, load_published
+from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.slow_vessel import trial as slow_vessel
+from wildlab.studies.slow_vessel.trial import (
+    METRICS,
+    SD_MEASUREMENT,
+    SUBJECTS,
+    check_claims,
+    first_case,
+    follow,
+    judge_sources,
+    navigate_vessel,
+    subset_of,
+    summarise_vessel,
+    true_positions,
+)
+
+
+def judged_points(times, errors, truth):
+    """A judged table, in no order."""
+    xy = truth + errors
+    table = pd.DataFrame(
+        {"time_s": times, "north_m": xy[:, 0], "east_m": xy[:, 1], "error_north_m": errors[:, 0],
+         "error_east_m": errors[:, 1], "error_m": np.hypot(*errors.T)}
+    )  # fmt: skip
+    return table.sample(frac=1.0, random_state=4)
+
+
+def test_the_filter_is_a_straight_line_through_the_first_points_where_nothing_accelerates(monkeypatch):
+    """Without process noise a constant-velocity filter is weighted least squares with its start as prior."""
+    monkeypatch.setattr(slow_vessel, "SD_ACCELERATION", 0.0)
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.1, 20.0, 30))
+    truth = np.array([50.0, -20.0]) + np.outer(times, [0.3, -0.1])
+    errors = rng.normal(0, 5, (30, 2))
+    got = follow(judged_points(times, errors, truth))
+    t, z = times - times[0], truth + errors
+    for axis in range(2):
+        A = np.column_stack([np.ones(30), t])
+        weight = np.full(30, SD_MEASUREMENT**-2)
+        # The start is the first measurement, which has the same deviation, and a speed of 0 +- 1 m/s.
+        A, b = np.vstack([A, [0.0, 1.0]]), np.append(z[:, axis], 0.0)
+        W = np.append(weight, 1.0)
+        line = np.linalg.solve(A.T * W @ A, A.T * W @ b)
+        assert got.error[-1, axis] == pytest.approx(line[0] + line[1] * t[-1] - truth[-1, axis], abs=1e-8)
+    assert np.allclose(got.measured, errors) and np.all(np.diff(got.times) > 0)
+
+
+def test_long_steps_state_more_and_are_the_same_without_pauses():
+    rng = np.random.default_rng(5)
+    even, errors = np.arange(40) / 7.5, rng.normal(0, 4, (40, 2))
+    points = judged_points(even, errors, np.zeros((40, 2)))
+    assert np.allclose(follow(points).error, follow(points, np.inf).error)
+    paused = judged_points(np.where(even > 3, even + 60, even), errors, np.zeros((40, 2)))
+    long, short = follow(paused, np.inf).stated, follow(paused).stated
+    assert np.all(long >= short) and np.all(long[even > 3] > short[even > 3])
+
+
+def test_claims_are_decided_flight_by_flight():
+    """Two flights, one on which every claim is true and one on which none is."""
+    good = {(subject, name): 1.0 for subject in SUBJECTS for name in ("mean_north", "mean_east")}
+    good |= {("observer", "mae"): 10.0, ("pixhawk-autopilot", "mae"): 9.0, ("observer-subset", "mae"): 7.0,
+             ("pixhawk-autopilot-subset", "mae"): 7.1, ("first-case", "mae"): 6.0,
+             ("observer-exact", "mae"): 5.9, ("observer", "largest"): 39.0, ("observer", "below_20"): 0.6,
+             ("observer", "5_to_10"): 0.6, ("filter", "beginning"): 9.0, ("filter-subset", "beginning"): 8.0,
+             ("filter", "at_end"): 4.0}  # fmt: skip
+    bad = {**good, ("observer", "mae"): 5.0, ("pixhawk-autopilot-subset", "mae"): 5.0,
+           ("observer", "mean_north"): -3.0, ("observer", "largest"): 41.0, ("observer", "below_20"): 0.4,
+           ("observer", "5_to_10"): 0.4, ("filter", "beginning"): 7.0, ("filter", "at_end"): 6.0}  # fmt: skip
+    checks = check_claims(pd.DataFrame([good, bad]))
+    assert all(list(true) == [True, False] for true in checks.values())
+    assert set(checks) == {claim["id"] for claim in load_claims("slow-vessel")}
+    assert set(good) <= set(METRICS)
+
+
+def test_every_published_number_has_a_metric():
+    published = load_published("slow-vessel")
+    assert set(zip(published["name"], published["subject"], strict=True)) <= {
+        (name, subject) for name, subject, _ in METRICS.values()
+    }
+
+
+def test_where_a_logged_vessel_truly_was_nobody_knows(make_flight):
+    with pytest.raises(WildlabError, match="Only of a simulated vessel is it known"):
+        true_positions(make_flight(), pd.DataFrame({"time_s": [0.0]}))
+
+
+@pytest.mark.slow
+def test_a_simulated_flight_gives_every_number():
+    flight = simulate_twin("slow-vessel", 2)
+    navigate_vessel(flight)
+    judged = judge_sources(flight, np.random.default_rng(2))
+    found = summarise_vessel(flight, judged) | {("first-case", "mae"): first_case(2, "static-antenna")}
+    assert set(found) == set(METRICS)
+    table = judged["observer"]
+    assert (len(table), len(subset_of(table))) == (3635, 1250)
+    assert np.allclose(table["down_m"], 0.0, atol=1e-9), "points lie on the sea, not at the receiver"
+    assert found["observer", "mae"] == pytest.approx(table["error_m"].mean())
+    # The receiver is metres off, and a metre behind the middle: that is all that lies between the two truths.
+    assert abs(found["observer", "mae"] - found["observer-exact", "mae"]) < found["reference", "mae"] < 5.0

@@ -1,0 +1,232 @@
+"""Is this flight usable, and for what: sentences for people, made from a loaded flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wildlab.flight.checks import camera as findings_seen
+from wildlab.flight.checks import findings
+from wildlab.flight.checks import inertial as findings_inertial
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.clocks import covariances
+from wildlab.flight.store import Flight
+
+__all__ = ["Finding", "Use", "check_flight", "find", "usable_for"]
+
+#: Parts of [uncertainty] without which a detection on the ground has no error ellipse.
+ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg")
+
+
+@dataclass(frozen=True)
+class Use:
+    """Whether a flight can serve a purpose, and why (not)."""
+
+    purpose: str
+    usable: bool
+    why: str
+
+
+def check_flight(flight: Flight) -> list[Finding]:
+    """Everything that is wrong, doubtful or good to know about a flight, worst first, in whole sentences.
+
+    Structural faults (missing columns, wrong types) are errors of `load_flight` and never come this far.
+    """
+    return [
+        replace(
+            one,
+            sentence=f"{', '.join(filter(None, (one.table, one.field)))}: {one.sentence}.",
+            fix=f"{one.fix[:1].upper()}{one.fix[1:]}.",
+        )
+        for one in find(flight)
+    ]
+
+
+def find(flight: Flight) -> list[Finding]:
+    """The same in clauses, for those who make sentences of their own."""
+    found = [
+        *findings.values(flight),
+        *findings.order(flight),
+        *findings.overlap(flight),
+        *findings_seen.truth_place(flight),
+        *findings_seen.identity(flight),
+        *findings_seen.image(flight),
+        *findings_inertial.inertial(flight),
+        *_missing(flight),
+        *_uncertainty(flight),
+        *_clocks(flight),
+    ]
+    return sorted(found, key=lambda finding: ("problem", "warning", "note").index(finding.level))
+
+
+def usable_for(flight: Flight) -> list[Use]:
+    """What the flight can be used for: georeferencing accuracy, tracking, navigation."""
+    broken = {finding.table for finding in find(flight) if finding.level == "problem"}
+    good_nav = [name for name in flight.nav if f"nav/{name}" not in broken and len(flight.nav[name])]
+    kinds = _kinds(flight)
+    scored = flight.truth is not None and len(flight.truth) > 0
+
+    lacks = []
+    if not good_nav:
+        lacks.append("poses without a problem")
+    if "pixel" not in kinds:
+        lacks.append("detections of kind pixel")
+    if flight.frames is None or len(flight.frames) == 0:
+        lacks.append("frames")
+    if not scored:
+        lacks.append("truth")
+    lacks += [f"{name} without a problem" for name in ("frames", "detections", "truth") if name in broken]
+    if lacks:
+        georeferencing = f"it lacks {_and(lacks)}"
+    else:
+        pixels = int((flight.table("detections")["kind"] == "pixel").sum())
+        targets = flight.table("truth")["target_id"].nunique()
+        georeferencing = (
+            f"{_some(pixels, 'pixel')}, poses from {_and(good_nav)}, {_some(targets, 'true target')}"
+        )
+
+    times = flight.manifest.time.kind == "utc"
+    if not times:
+        tracking = "the photos carry no time, and a track is over time"
+    elif not kinds or "detections" in broken or "frames" in broken:
+        tracking = "it lacks detections without a problem"
+    elif kinds == {"pixel"} and not good_nav:
+        tracking = "pixels need poses, and there are none without a problem"
+    else:
+        tracking = "" if scored else "without truth only the filter's own consistency can be judged"
+    tracks = times and not tracking.startswith(("it lacks", "pixels need"))
+
+    imu = flight.imu is not None and len(flight.imu) > 0 and "imu" not in broken
+    gnss = flight.gnss is not None and len(flight.gnss) > 0 and "gnss" not in broken
+    navigation = [
+        *([] if imu else ["inertial measurements (imu)"]),
+        *([] if gnss else ["satellite positions (gnss)"]),
+    ]
+    return [
+        Use("georeferencing accuracy", not lacks, georeferencing),
+        Use("tracking", tracks, tracking or "detections with times, and truth to judge by"),
+        Use(
+            "navigation",
+            not navigation,
+            f"it lacks {_and(navigation)}" if navigation else "imu and gnss are there",
+        ),
+    ]
+
+
+def _kinds(flight: Flight) -> set[str]:
+    return set() if flight.detections is None else set(flight.detections["kind"])
+
+
+def _missing(flight: Flight) -> Iterator[Finding]:
+    if not flight.nav:
+        yield Finding(
+            "warning", "nav", "", "there are no poses", "add the log of the autopilot as a nav source"
+        )
+    for name, nav in flight.nav.items():
+        if len(nav) == 0:
+            yield Finding(
+                "problem", f"nav/{name}", "", "there is no pose in it", "add rows, or remove the table"
+            )
+    if flight.manifest.camera is None and flight.detections is None and flight.frames is None:
+        yield Finding(
+            "note",
+            "flight.toml",
+            "camera",
+            "there is no camera and there are no images: the flight is for navigation only",
+            "add frames, detections and the camera if there are any",
+        )
+        return
+    if flight.detections is None or len(flight.detections) == 0:
+        fix = "add detections, or use the flight for navigation only"
+        yield Finding("warning", "detections", "", "nothing was detected in this flight", fix)
+    elif flight.frames is None and "pixel" in _kinds(flight):
+        fix = "add the table of frames"
+        yield Finding("problem", "frames", "", "there are pixels, but no frames they could be in", fix)
+    if flight.truth is None or len(flight.truth) == 0:
+        yield Finding(
+            "warning",
+            "truth",
+            "",
+            "there is no truth: positions can be computed and tracked, but their errors cannot be judged",
+            "add surveyed points, or the GPS track of a target",
+        )
+    elif flight.manifest.scoring.rule == "labelled" and flight.detections is not None:
+        labelled = "target_id" in flight.detections and (flight.detections["target_id"] != "").any()
+        if not labelled and flight.truth["target_id"].nunique() > 1:
+            yield Finding(
+                "warning",
+                "detections",
+                "target_id",
+                "detections are scored by the target they name, and none names one",
+                'fill target_id, or set [scoring] rule = "nearest"',
+            )
+
+
+def _uncertainty(flight: Flight) -> Iterator[Finding]:
+    assumed = flight.manifest.uncertainty
+    lacking = [name for name in ASSUMED if getattr(assumed, name) is None]
+    if flight.manifest.camera is None:
+        return  # no point on the ground is computed
+    for name, nav in flight.nav.items():
+        P = covariances(nav)
+        if P is not None and np.isfinite(P).any():
+            continue
+        if lacking:
+            yield Finding(
+                "warning",
+                f"nav/{name}",
+                "cov_00",
+                "the poses have no covariance, and the manifest assumes nothing for "
+                f"{_and(lacking)}: there will be no error ellipses, or too small ones",
+                "state in [uncertainty] what the data sheets promise",
+            )
+        else:
+            yield Finding(
+                "note",
+                f"nav/{name}",
+                "cov_00",
+                "the poses have no covariance: the standard deviations of [uncertainty] are assumed instead",
+                "compare them with the errors that the report finds",
+            )
+
+
+def _clocks(flight: Flight) -> Iterator[Finding]:
+    manifest = flight.manifest
+    if manifest.time.kind == "sequence":
+        yield Finding(
+            "note",
+            "flight.toml",
+            "time.kind",
+            "the photos carry no time, time_s merely numbers them: nothing that takes time can be judged",
+            "import with times if the photos have any",
+        )
+    elif manifest.clocks.camera_offset_s == 0 and _interpolated(flight) and manifest.kind == "logged":
+        yield Finding(
+            "note",
+            "flight.toml",
+            "clocks.camera_offset_s",
+            "the clock of the camera is taken to agree with that of the poses",
+            "estimate the offset from known points: at 20 m/s a tenth of a second is 2 m",
+        )
+    if manifest.vertical.reference != "ellipsoid" and manifest.vertical.correction_m == 0:
+        yield Finding(
+            "warning",
+            "flight.toml",
+            "vertical.reference",
+            f"heights are said to be {manifest.vertical.reference!r}, and nothing was taken off them",
+            "state correction_m in the recipe and import again: inside, heights are ellipsoidal",
+        )
+
+
+def _interpolated(flight: Flight) -> bool:
+    return flight.frames is not None and any("frame_id" not in nav for nav in flight.nav.values())
+
+
+def _some(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"
+
+
+def _and(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

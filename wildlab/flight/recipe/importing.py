@@ -1,0 +1,311 @@
+"""Import: plain tables and a recipe become a flight.
+
+What a recipe may say is in `recipe_model`; how its writers should say it, in `data/recipes/README.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.checks.check import find
+from wildlab.flight.clocks import poses_at
+from wildlab.flight.files import check_model
+from wildlab.flight.manifest import (
+    CameraPart,
+    GnssPart,
+    ImuPart,
+    MagnetometerPart,
+    Manifest,
+    make_manifest,
+)
+from wildlab.flight.recipe.model import Recipe, read_recipe
+from wildlab.flight.recipe.poses import Fixes, Places, PoseRows, read_poses
+from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers
+from wildlab.flight.recipe.sensors import SensorRows, read_sensors
+from wildlab.flight.recipe.tables import (
+    FrameRows,
+    frames_of_rows,
+    read_detections,
+    read_frames,
+    read_truth,
+)
+from wildlab.flight.store import Flight, save_flight
+
+
+def import_flight(
+    recipe_path: Path | str, source: Path | str | None, into: Path | str, overwrite: bool = False
+) -> Flight:
+    """Make a flight folder from plain tables, whole or not at all. The tables are only read.
+
+    Parameters
+    ----------
+    recipe_path
+        The recipe (TOML).
+    source
+        Folder of the tables; by default that of the recipe.
+    into
+        Folder of the flight.
+    overwrite
+        Whether a flight that is there already may be replaced.
+
+    Raises
+    ------
+    WildlabError
+        Naming the file, the column and the part of the recipe where something is missing or wrong, or what
+        `check_flight` calls a problem.
+    """
+    recipe_path = Path(recipe_path)
+    recipe = read_recipe(recipe_path)
+    folder = recipe_path.parent if source is None else Path(source)
+    if not folder.is_dir():
+        raise WildlabError("there is no such folder to import from", "check the source folder", file=folder)
+    flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
+    _refuse_problems(flight, recipe, folder)
+    return save_flight(flight, into, overwrite=overwrite)
+
+
+def _build(recipe: Recipe, raw: RawFiles) -> Flight:
+    camera = _camera(recipe, raw)
+    frames = read_frames(recipe, raw)
+    poses: dict[str, PoseRows] = {}
+    for name, block in recipe.poses.items():
+        part = f"poses.{name}"
+        table = raw.series(block, part)
+        ids = None
+        if block.time is None:
+            ids = frames_of_rows(frames, recipe, block, block.frame, table, part)
+        poses[name] = read_poses(recipe, block, table, part, ids)
+    sensors = read_sensors(recipe, raw)
+    places = _places(recipe, poses, sensors)
+    stamps = [frames.stamps, *(one.stamps for one in poses.values())]
+    epoch = _epoch(recipe, stamps + [one.stamps for one in sensors.values()])
+    start = 0 if epoch is None else nanoseconds(epoch)
+
+    time_s = np.arange(len(frames.table), dtype=float)
+    if frames.stamps is not None:
+        time_s = (frames.stamps - start) / 1e9
+    tables = {} if recipe.frames is None else {"frames": frames.table.assign(time_s=time_s)}
+    tables |= {name: one.table(start, places) for name, one in sensors.items()}
+    fixes = _fixes(recipe, tables)
+    flight_time = time_s + recipe.clocks.camera_offset_s
+    nav = {
+        name: one.nav(_pose_times(one, start, flight_time, frames, recipe, raw, name), places, fixes)
+        for name, one in poses.items()
+    }
+    if recipe.truth:
+        truth = [
+            read_truth(one, raw, recipe, f"truth[{i}]", places, start) for i, one in enumerate(recipe.truth)
+        ]
+        tables["truth"] = pd.concat(truth, ignore_index=True)
+    for name in recipe.files:
+        if name not in raw.hashes:
+            raw.read(name, "files")
+    notes = [recipe.description, *(one.note for one in poses.values())]
+    manifest = _manifest(recipe, raw, camera, places, epoch, " ".join(filter(None, notes)))
+    if recipe.detections:
+        _refuse_problems(Flight(manifest, nav, tables), recipe, raw.folder)
+        of_frame = pd.DataFrame(np.full((len(frames.table), 3), np.nan), index=frames.table["frame_id"])
+        if nav:
+            lens, _, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
+            of_frame = pd.DataFrame(lens, index=frames.table["frame_id"])
+        image = (math.nan, math.nan) if camera is None else (float(camera.width_px), float(camera.height_px))
+        detections = [
+            read_detections(one, raw, recipe, f"detections[{i}]", frames, places, image, of_frame)
+            for i, one in enumerate(recipe.detections)
+        ]
+        tables["detections"] = pd.concat(detections, ignore_index=True)
+        # Files of detections are read last; the manifest names them too.
+        manifest = _manifest(recipe, raw, camera, places, epoch, manifest.description)
+    return Flight(manifest, nav, tables)
+
+
+def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
+    """The camera, numbers that stand in columns filled in; None where the recipe has none.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or does not hold one constant, or a number makes no camera.
+    """
+    block = recipe.camera
+    if block is None:
+        return None
+    data: dict[str, object] = {name: getattr(block, name) for name in CameraPart.model_fields}
+    path = raw.recipe
+    if block.file is not None:
+        rows = raw.table(block.file, block.separator, "camera")
+        for name, column in block.columns.items():
+            found = plain_numbers(rows, column, f"camera.{name}")
+            if (found != found[0]).any():
+                row = int(np.argmax(found != found[0]))
+                raise rows.fail(
+                    f"the camera changes: {found[row]:g} here, {found[0]:g} before",
+                    "import the photos of each camera or zoom as a flight of their own",
+                    column,
+                    f"camera.{name}",
+                    row,
+                )
+            data[name] = float(found[0])
+    try:
+        return check_model(CameraPart, data, path)
+    except WildlabError as error:
+        name = error.field or ""
+        named = block.columns.get(name)
+        if named is None or block.file is None:
+            raise WildlabError(error.problem, error.fix, file=path, field=f"camera.{name}") from None
+        rows = raw.table(block.file, block.separator, "camera")
+        raise rows.fail(error.problem, error.fix, named, f"camera.{name}", 0) from None
+
+
+def _places(recipe: Recipe, poses: dict[str, PoseRows], sensors: dict[str, SensorRows]) -> Places:
+    """What takes positions to frame n; without an origin in the recipe, the first pose is it, or the first
+    satellite position where there are no poses."""
+    vertical = recipe.vertical
+    if recipe.origin is not None:
+        o = recipe.origin
+        origin = (math.radians(o.latitude_deg), math.radians(o.longitude_deg), o.height_m)
+    else:
+        known = [("poses", one.position) for one in poses.values() if one.position is not None]
+        known += [("gnss", one.position) for one in sensors.values() if one.position is not None]
+        what, first = known[0]
+        latitude, longitude, height = first.values[0]
+        off = vertical.correction_m if what in vertical.taken_off else 0.0
+        origin = (float(latitude), float(longitude), float(height) - off)
+    return Places(origin, vertical.correction_m, vertical.taken_off)
+
+
+def _fixes(recipe: Recipe, tables: dict[str, pd.DataFrame]) -> Fixes | None:
+    """Where the receiver was, for poses without positions of their own."""
+    if recipe.gnss is None:
+        return None
+    table = tables["gnss"]
+    times = table["time_s"].to_numpy() + recipe.clocks.gnss_offset_s - recipe.gnss.latency_s
+    return Fixes(times, table[["north_m", "east_m", "down_m"]].to_numpy())
+
+
+def _epoch(recipe: Recipe, stamps: list[Nanoseconds | None]) -> datetime | None:
+    """The epoch of the recipe, else the last whole second before anything happens."""
+    if recipe.time.epoch is not None:
+        return recipe.time.epoch.astimezone(UTC)
+    if recipe.time.kind == "sequence":
+        return None
+    first = min(int(one.min()) for one in stamps if one is not None)
+    return datetime.fromtimestamp(first // 1_000_000_000, UTC)
+
+
+def _pose_times(
+    poses: PoseRows,
+    start: int,
+    flight_time: NDArray[np.float64],
+    frames: FrameRows,
+    recipe: Recipe,
+    raw: RawFiles,
+    name: str,
+) -> NDArray[np.float64]:
+    """Flight time of each pose: its own stamp, or that of its frame."""
+    if poses.stamps is not None:
+        return np.asarray((poses.stamps - start) / 1e9)
+    of_frame = pd.Series(flight_time, index=frames.table["frame_id"])
+    of_frame = of_frame[~of_frame.index.duplicated()]
+    strange = [frame for frame in poses.ids if frame not in of_frame.index] if poses.ids is not None else []
+    if strange:
+        block = recipe.frames
+        raise WildlabError(
+            f"{strange[0]!r} is not one of the frames" + (f" of {block.file}" if block else ""),
+            "add it there, or mend its name",
+            file=raw.folder / _file(recipe, recipe.poses[name].file),
+            field=f"{recipe.poses[name].frame} (in [poses.{name}.frame])",
+        )
+    return np.asarray(of_frame.reindex(poses.ids), np.float64)
+
+
+def _manifest(
+    recipe: Recipe,
+    raw: RawFiles,
+    camera: CameraPart | None,
+    places: Places,
+    epoch: datetime | None,
+    description: str,
+) -> Manifest:
+    latitude, longitude, height = places.origin
+    origin = (
+        recipe.origin.model_dump()
+        if recipe.origin is not None
+        else {
+            "latitude_deg": math.degrees(latitude),
+            "longitude_deg": math.degrees(longitude),
+            "height_m": height,
+        }
+    )
+    vertical = recipe.vertical
+    return make_manifest(
+        {
+            "name": recipe.name,
+            "kind": "logged",
+            "description": description,
+            "locations": recipe.locations,
+            "origin": origin,
+            "platform": recipe.platform,
+            "camera": camera,
+            "mount": recipe.mount,
+            "imu": {} if recipe.imu is None else {k: getattr(recipe.imu, k) for k in ImuPart.model_fields},
+            "gnss": {}
+            if recipe.gnss is None
+            else {k: getattr(recipe.gnss, k) for k in GnssPart.model_fields},
+            "magnetometer": {}
+            if recipe.magnetometer is None
+            else {k: getattr(recipe.magnetometer, k) for k in MagnetometerPart.model_fields},
+            "time": {"kind": recipe.time.kind, "epoch": epoch},
+            "clocks": recipe.clocks,
+            "vertical": {
+                "reference": vertical.reference,
+                "correction_m": vertical.correction_m,
+                "note": vertical.note,
+            },
+            "uncertainty": recipe.uncertainty,
+            "scoring": recipe.scoring,
+            "sources": [
+                {"file": name, "sha256": digest, "what": recipe.files.get(name, "")}
+                for name, digest in raw.hashes.items()
+            ],
+        },
+        raw.recipe,
+    )
+
+
+def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
+    """Raise the first problem that `check_flight` finds, in terms of the raw file it comes from."""
+    for finding in find(flight):
+        if finding.level != "problem":
+            continue
+        sensor = recipe.sensors.get(finding.table)
+        if sensor is not None:
+            part, files = finding.table, [sensor.file]
+        elif finding.table.startswith("nav/"):
+            name = finding.table.removeprefix("nav/")
+            part, files = f"poses.{name}", [recipe.poses[name].file]
+        elif finding.table == "frames":
+            part, files = "frames", [recipe.frames.file] if recipe.frames else []
+        else:
+            blocks = recipe.truth if finding.table == "truth" else recipe.detections
+            part, files = finding.table, [block.file for block in blocks]
+        raise WildlabError(
+            finding.sentence,
+            finding.fix,
+            file=" and ".join(dict.fromkeys(str(folder / _file(recipe, name)) for name in files)),
+            field=f"{finding.field} (from [{part}])",
+        )
+
+
+def _file(recipe: Recipe, name: str) -> str:
+    """The file a block reads, also where it names one of the tables or logs."""
+    if name in recipe.logs:
+        return recipe.logs[name].file
+    return recipe.tables[name].file if name in recipe.tables else name

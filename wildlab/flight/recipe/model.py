@@ -1,0 +1,270 @@
+"""What may stand in a recipe: the models that a `recipe.toml` is checked by.
+
+A recipe says where in plain tables the parts of a flight are. It is data, not a program: columns, units,
+signs, constants, and the few operations named here. `data/recipes/README.md` explains it to its writers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import AwareDatetime, Field, field_validator, model_validator
+
+from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
+from wildlab.flight.manifest import (
+    CameraPart,
+    ClocksPart,
+    LocationsPart,
+    MountPart,
+    OriginPart,
+    PlatformPart,
+    ScoringPart,
+    UncertaintyPart,
+)
+from wildlab.flight.recipe.camera_detections import Detections, Frames, Truth
+from wildlab.flight.recipe.parts import (
+    Attitude,
+    Position,
+    Spreads,
+    Stamp,
+    Velocity,
+    Zone,
+)
+from wildlab.flight.recipe.series import (
+    Gimbal,
+    Inertial,
+    LogTable,
+    Magnetometer,
+    MatlabTable,
+    Satellite,
+    Separator,
+    Series,
+    check_table_names,
+)
+
+
+class Poses(Series):
+    """A nav source: by time, or one pose per frame (by the column `frame`, or of this very file).
+
+    `position_from` is for logs of attitude alone: their positions are linear between those of the receiver.
+    """
+
+    time: Stamp | None = None
+    frame: str | None = None
+    position: Position | None = None
+    position_from: Literal["gnss"] | None = None
+    attitude: Attitude
+    velocity: Velocity | None = None
+    spreads: Spreads | None = None
+
+    @model_validator(mode="after")
+    def _one_position(self) -> Self:
+        if (self.position is None) == (self.position_from is None):
+            raise ValueError("poses have either a position or position_from; give one of both")
+        if self.position_from and self.time is None:
+            raise ValueError("position_from is for poses over time; add the time, or give a position")
+        return self
+
+
+Number = float | str
+
+
+class RecipeCamera(Strict):
+    """As in the manifest; a text instead of a number names a column of `file` that holds one constant."""
+
+    name: str
+    file: str | None = None
+    separator: Separator = ","
+    width_px: Number
+    height_px: Number
+    fx_px: Number
+    fy_px: Number
+    cx_px: Number
+    cy_px: Number
+    skew_px: Number = 0.0
+    k1: Number = 0.0
+    k2: Number = 0.0
+    p1: Number = 0.0
+    p2: Number = 0.0
+    k3: Number = 0.0
+
+    @model_validator(mode="after")
+    def _file(self) -> Self:
+        if self.columns and self.file is None:
+            column = next(iter(self.columns))
+            raise ValueError(f"{column} names a column, and there is no file; add the file, or give a number")
+        return self
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Those of the numbers that stand in a column: name of the number -> name of the column."""
+        numbers = [name for name in CameraPart.model_fields if name != "name"]
+        return {name: value for name in numbers if isinstance(value := getattr(self, name), str)}
+
+
+class RecipeTime(Strict):
+    """As in the manifest; without an epoch, it is the first whole second. `zone` is of stamps without one."""
+
+    kind: Literal["utc", "sequence"]
+    epoch: AwareDatetime | None = None
+    zone: Zone | None = None
+
+
+class RecipeVertical(Strict):
+    """What the heights are, and a constant to take off where a source is wrong.
+
+    `taken_off` names which heights: ``poses``, ``gnss``, ``ground`` (of detections), ``positions``
+    (detections that are positions), ``truth``.
+    """
+
+    reference: str = "ellipsoid"
+    correction_m: float = 0.0
+    taken_off: tuple[Literal["poses", "gnss", "ground", "positions", "truth"], ...] = ()
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _says_why(self) -> Self:
+        if self.correction_m and not self.taken_off:
+            raise ValueError(
+                "there is a correction, and taken_off does not say which heights to take it off; "
+                "name some of poses, gnss, ground, positions, truth"
+            )
+        if self.correction_m and not self.note:
+            raise ValueError("there is a correction, and no note says why; add the note")
+        return self
+
+
+class Recipe(Strict):
+    """The whole of a recipe."""
+
+    name: str
+    description: str = ""
+    locations: LocationsPart = LocationsPart()
+    origin: OriginPart | None = None
+    platform: PlatformPart
+    camera: RecipeCamera | None = None
+    mount: MountPart = MountPart()
+    time: RecipeTime
+    clocks: ClocksPart = ClocksPart()
+    vertical: RecipeVertical = RecipeVertical()
+    uncertainty: UncertaintyPart = UncertaintyPart()
+    scoring: ScoringPart = ScoringPart()
+    files: dict[str, str] = Field(default_factory=dict)
+    tables: dict[str, MatlabTable] = Field(default_factory=dict)
+    logs: dict[str, LogTable] = Field(default_factory=dict)
+    frames: Frames | None = None
+    poses: dict[str, Poses] = Field(default_factory=dict)
+    imu: Inertial | None = None
+    gnss: Satellite | None = None
+    magnetometer: Magnetometer | None = None
+    gimbal: Gimbal | None = None
+    detections: tuple[Detections, ...] = ()
+    truth: tuple[Truth, ...] = ()
+
+    @property
+    def sensors(self) -> dict[str, Inertial | Satellite | Magnetometer | Gimbal]:
+        """Those on board, by the names of their tables."""
+        every = {"imu": self.imu, "gnss": self.gnss, "magnetometer": self.magnetometer, "gimbal": self.gimbal}
+        return {name: one for name, one in every.items() if one is not None}
+
+    @field_validator("name")
+    @classmethod
+    def _safe_name(cls, value: str) -> str:
+        if not is_safe_name(value):
+            raise ValueError(f"{value!r} cannot be the name of a flight; use letters, digits, - and _ only")
+        return value
+
+    @field_validator("poses")
+    @classmethod
+    def _safe_sources(cls, value: dict[str, Poses]) -> dict[str, Poses]:
+        for name in value:
+            if not is_safe_name(name):
+                raise ValueError(f"{name!r} cannot name a nav source; use letters, digits, - and _ only")
+        return value
+
+    @model_validator(mode="after")
+    def _safe_tables(self) -> Self:
+        check_table_names({**self.tables, **self.logs})
+        twice = sorted(set(self.tables) & set(self.logs))
+        if twice:
+            raise ValueError(f"{twice[0]!r} names a table and a log; give each its own name")
+        return self
+
+    @model_validator(mode="after")
+    def _enough(self) -> Self:
+        for name, poses in self.poses.items():
+            if poses.position_from and self.gnss is None:
+                raise ValueError(
+                    f"[poses.{name}] takes its positions from gnss, and there is none; add the part [gnss]"
+                )
+        if not self.poses and self.gnss is None:
+            raise ValueError("there are no poses; add a part such as [poses.autopilot], or at least [gnss]")
+        images = self.frames is not None and self.frames.sensor is None
+        if self.camera is None and (images or any(one.pixel for one in self.detections)):
+            raise ValueError("there are images, and no camera; add the part [camera]")
+        return self
+
+    @model_validator(mode="after")
+    def _times(self) -> Self:
+        times = {} if self.frames is None else {"frames": self.frames.time}
+        times |= {name: one.time for name, one in self.sensors.items()}
+        times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
+        times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
+        if self.time.kind == "utc" and self.frames is not None and self.frames.time is None:
+            raise ValueError('time.kind is "utc" and [frames] has no time; add it, or set kind = "sequence"')
+        for name, time in times.items():
+            if self.time.kind == "sequence" and time is not None:
+                raise ValueError(f'time.kind is "sequence" and [{name}] has a time; set kind = "utc"')
+            if time is not None and time.format == "elapsed" and self.time.epoch is None:
+                raise ValueError(
+                    f"[{name}] counts the time elapsed since an epoch, and [time] has no epoch; add the epoch"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _poses_belong(self) -> Self:
+        for name, poses in self.poses.items():
+            if poses.time is not None and poses.frame is not None:
+                raise ValueError(f"[poses.{name}] has a time and a frame; take one out")
+            of_frames = self.frames is not None and (poses.frame or poses.file == self.frames.file)
+            if poses.time is None and not of_frames:
+                raise ValueError(
+                    f"[poses.{name}] has neither a time nor a frame; "
+                    "add the time, or name the column of the frame"
+                )
+            if poses.time is None and (poses.where or poses.changed):
+                raise ValueError(
+                    f"[poses.{name}] has no time, and where and changed are for logs over time; take them out"
+                )
+            bearing = poses.attitude.yaw_from_bearing is not None
+            local = poses.position is None or poses.position.form != "wgs84"
+            if bearing and (poses.time is not None or local):
+                raise ValueError(
+                    f"[poses.{name}] has yaw_from_bearing, which is for poses of frames with latitude and "
+                    "longitude; give a yaw instead"
+                )
+        positions = {f"poses.{name}": one.position for name, one in self.poses.items() if one.position}
+        positions |= {f"truth[{i}]": one.position for i, one in enumerate(self.truth)}
+        positions |= {} if self.gnss is None else {"gnss": self.gnss.position}
+        positions |= {
+            f"detections[{i}]": one.position for i, one in enumerate(self.detections) if one.position
+        }
+        for name, position in positions.items():
+            if position.form != "wgs84" and self.origin is None:
+                raise ValueError(
+                    f"[{name}] has local positions, and there is no origin; "
+                    "add [origin] with latitude_deg, longitude_deg and height_m"
+                )
+        return self
+
+
+def read_recipe(path: Path) -> Recipe:
+    """Read a recipe.
+
+    Raises
+    ------
+    WildlabError
+        Where it is missing, not TOML, or a key is unknown, missing or wrong.
+    """
+    return check_model(Recipe, read_toml(path, "a recipe"), path)

@@ -1,0 +1,369 @@
+"""Plain tables as they come: text, numbers with units, times. Read once, hashed, never written.
+
+Every error names the file, the column, the line, and the part of the recipe that asked.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+import re
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import did_you_mean, inside, printable
+from wildlab.flight.readers.autoferry import read_part
+from wildlab.flight.recipe.matlab import read_matlab, table_of
+from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
+from wildlab.flight.recipe.series import LogTable, MatlabTable, Series
+from wildlab.flight.recipe.units import Dimension, factor
+
+Array = NDArray[np.float64]
+Text = NDArray[np.object_]
+Nanoseconds = NDArray[np.int64]
+
+#: Stamps that end so carry their own zone.
+_ZONED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d.*(?:[Zz]|[+-]\d\d(?::?\d\d)?)")
+#: Nanoseconds since 1970 fit 64 bits from 1678 to 2262.
+_LATEST_S = 9.2e9
+
+
+@dataclass(frozen=True)
+class RawTable:
+    """One table: its columns of text or (out of a MATLAB file) numbers, and for each row the line it ends on,
+    or its number."""
+
+    path: Path
+    header: tuple[str, ...]
+    cells: dict[str, Text | Array]
+    lines: NDArray[np.int64]
+    counted_in: str = "line"
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def rows(self, chosen: NDArray[np.intp]) -> RawTable:
+        """Some of the rows."""
+        cells = {name: column[chosen] for name, column in self.cells.items()}
+        return RawTable(self.path, self.header, cells, self.lines[chosen], self.counted_in)
+
+    def fail(self, problem: str, fix: str, column: str, part: str, row: int | None = None) -> WildlabError:
+        """An error about this table, to be raised."""
+        where = "" if row is None else f"{self.counted_in} {self.lines[row]}: "
+        return WildlabError(where + problem, fix, file=self.path, field=f"{printable(column)} (in [{part}])")
+
+
+@dataclass
+class RawFiles:
+    """The files below a source folder that a recipe has asked for, each read and hashed once."""
+
+    folder: Path
+    recipe: Path
+    matlab: dict[str, MatlabTable] = field(default_factory=dict)
+    logs: dict[str, LogTable] = field(default_factory=dict)
+    hashes: dict[str, str] = field(default_factory=dict)
+    _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
+    _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def read(self, name: str, part: str) -> bytes:
+        """The bytes of a file.
+
+        Raises
+        ------
+        WildlabError
+            Where the name leaves the folder, or there is no such file.
+        """
+        path = inside(self.folder, name, file=self.recipe, field=f"{part}.file")
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            raise WildlabError(
+                f"there is no such file, and [{part}] of {self.recipe.name} asks for it",
+                "check the name in the recipe, and the source folder",
+                file=path,
+                field=f"{part}.file",
+            ) from None
+        except OSError as error:
+            fix = "check that it is a file, and its permissions"
+            raise WildlabError(
+                f"cannot be read ({error.strerror})", fix, file=path, field=f"{part}.file"
+            ) from None
+        self.hashes[name] = hashlib.sha256(data).hexdigest()
+        return data
+
+    def table(self, name: str, separator: str, part: str) -> RawTable:
+        """A file as a table of text, its first line the names of the columns; or one of the tables that the
+        recipe makes of MATLAB files and logs.
+
+        Raises
+        ------
+        WildlabError
+            Where it cannot be read, is not UTF-8, is empty, or a row has more or fewer cells than the first;
+            or where it is no MATLAB file or log of that format, or does not hold what the recipe says.
+        """
+        if name in self.logs:
+            return self._log_table(name)
+        if name in self.matlab:
+            return self._matlab_table(name)
+        if (name, separator) not in self._tables:
+            data = self.read(name, part)
+            self._tables[name, separator] = _parse(self.folder / name, data, separator)
+        return self._tables[name, separator]
+
+    def _matlab_table(self, name: str) -> RawTable:
+        block, part = self.matlab[name], f"tables.{name}"
+        if (name, "") not in self._tables:
+            path = self.folder / block.file
+            if block.file not in self._variables:
+                self._variables[block.file] = read_matlab(path, self.read(block.file, part))
+            cells = table_of(self._variables[block.file], block, path, part)
+            count = len(next(iter(cells.values())))
+            self._tables[name, ""] = RawTable(path, tuple(cells), cells, np.arange(1, count + 1), "row")
+        return self._tables[name, ""]
+
+    def _log_table(self, name: str) -> RawTable:
+        block = self.logs[name]
+        if (name, "") not in self._tables:
+            path = self.folder / block.file
+            cells, frames = read_part(path, self.read(block.file, f"logs.{name}"), block.part)
+            self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
+        return self._tables[name, ""]
+
+    def series(self, block: Series, part: str) -> RawTable:
+        """The rows of a table that count.
+
+        Raises
+        ------
+        WildlabError
+            As `table`; and where a column of a condition is missing or not of numbers, or no row counts.
+        """
+        table = self.table(block.file, block.separator, part)
+        if not block.changed and not block.where:
+            return table
+        counts = np.ones(len(table), bool)
+        if block.changed:
+            columns = [texts(table, one, f"{part}.changed", may_be_empty=True) for one in block.changed]
+            counts[1:] = np.any([column[1:] != column[:-1] for column in columns], axis=0)
+        for i, one in enumerate(block.where):
+            value = plain_numbers(table, one.column, f"{part}.where[{i}]", may_be_empty=True)
+            if one.equals is not None:
+                counts &= value == one.equals
+            if one.differs is not None:
+                counts &= (value != one.differs) & ~np.isnan(value)
+            if one.above is not None:
+                counts &= value > one.above
+            if one.below is not None:
+                counts &= value < one.below
+        if not counts.any():
+            problem = f"none of the {len(table)} rows counts"
+            columns_named = ", ".join([*block.changed, *(one.column for one in block.where)])
+            raise table.fail(problem, "check the conditions in where and changed", columns_named, part)
+        return table.rows(np.flatnonzero(counts))
+
+
+def _parse(path: Path, data: bytes, separator: str) -> RawTable:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise WildlabError(f"line {line} is not UTF-8 text", "save the file as UTF-8", file=path) from None
+    rows, lines = [], []
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
+    try:
+        header = tuple(name.strip() for name in next(reader, []))
+        for row in reader:
+            if not row:
+                continue
+            if len(row) != len(header):
+                raise WildlabError(
+                    f"line {reader.line_num} has {len(row)} cells, and the first line has {len(header)}",
+                    "mend that line, or check the separator in the recipe",
+                    file=path,
+                )
+            rows.append(row)
+            lines.append(reader.line_num)
+    except csv.Error as error:
+        raise WildlabError(f"line {reader.line_num}: {error}", "mend that line", file=path) from None
+    if not rows:
+        raise WildlabError("there are no rows in it", "give it a line of column names and rows", file=path)
+    cells: dict[str, Text | Array] = {
+        name: np.array([cell.strip() for cell in column], dtype=object)
+        for name, column in zip(header, zip(*rows, strict=True), strict=True)
+    }
+    return RawTable(path, header, cells, np.array(lines))
+
+
+def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Text:
+    """A column as text, blanks at both ends removed. (N,)
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such column, or a cell is empty that may not be.
+    """
+    if column not in table.header:
+        fix = did_you_mean(column, table.header)
+        if len(table.header) == 1:
+            fix = "the first line is read as a single name: check the separator in the recipe"
+        raise table.fail("this column is missing", fix, column, part)
+    if table.header.count(column) > 1:
+        raise table.fail("two columns have this name", "rename one of them", column, part)
+    found = table.cells[column]
+    if found.dtype == object:
+        cells = np.asarray(found, dtype=object)
+    else:  # numbers, as a name or a label: without a needless fraction
+        cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
+    empty = cells == ""
+    if empty.any() and not may_be_empty:
+        row = int(np.argmax(empty))
+        raise table.fail("this cell is empty", "fill it, or take out the row", column, part, row)
+    return cells
+
+
+def numbers(
+    table: RawTable,
+    quantity: Quantity,
+    dimension: Dimension,
+    part: str,
+    *,
+    may_be_empty: bool = False,
+    image: tuple[float, float] = (math.nan, math.nan),
+) -> Array:
+    """A quantity in radians, metres, seconds or pixels. (N,); NaN where a cell is empty and may be.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such column, or a cell is not a finite number.
+    """
+    scale = factor(quantity.unit, dimension, *image) * (-1 if quantity.negate else 1)
+    if quantity.column is None:
+        return np.full(len(table), scale * (0.0 if quantity.value is None else quantity.value))
+    found = plain_numbers(table, quantity.column, part, may_be_empty=may_be_empty)
+    if quantity.plus is not None:
+        found = found + plain_numbers(table, quantity.plus, f"{part}.plus", may_be_empty=may_be_empty)
+    return scale * found
+
+
+def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Array:
+    """A column as numbers, whatever their unit. (N,)
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such column, or a cell is not a finite number.
+    """
+    cells = table.cells.get(column)
+    if cells is not None and cells.dtype != object:
+        found = np.asarray(cells, float)
+        bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
+    else:
+        cells = texts(table, column, part, may_be_empty=may_be_empty)
+        found = pd.to_numeric(pd.Series(cells), errors="coerce").to_numpy(dtype=float)
+        bad = ~np.isfinite(found) & (cells != "")
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise table.fail(
+            f"{_short(str(cells[row]))} is not a finite number",
+            "mend the cell (a point before the decimals, no unit behind them), or take out the row",
+            column,
+            part,
+            row,
+        )
+    return np.asarray(found)
+
+
+def times(table: RawTable, stamp: Stamp, part: str, zone: str | None, epoch: datetime | None) -> Nanoseconds:
+    """Stamps as nanoseconds since 1970 in UTC. (N,)
+
+    `zone` is that of stamps which carry none, unless `stamp` names its own; `epoch` is for elapsed times.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such column, a cell is not a time, or no zone is known.
+    """
+    if stamp.format in ("unix", "elapsed"):
+        return _counted(table, stamp, part, epoch)
+    name = " + ".join(stamp.names)
+    columns = [texts(table, column, part) for column in stamp.names]
+    cells = np.array([" ".join(parts) for parts in zip(*columns, strict=True)], dtype=object)
+    own = "%z" in stamp.format
+    if stamp.format == "iso":
+        zoned = np.array([bool(_ZONED.fullmatch(cell)) for cell in cells])
+        own = bool(zoned.all())
+        if zoned.any() and not own:
+            row = int(np.argmin(zoned))
+            problem = f"{_short(cells[row])} has no time zone, and others in this column have"
+            raise table.fail(problem, "write all of them alike", name, part, row)
+    pattern = "ISO8601" if stamp.format == "iso" else stamp.format
+    try:
+        found = pd.DatetimeIndex(pd.to_datetime(cells, format=pattern, errors="coerce", utc=own))
+    except ValueError as error:
+        raise table.fail(f"the format {pattern!r} cannot be used ({error})", "mend it", name, part) from None
+    lost = np.asarray(pd.isna(found))
+    if lost.any():
+        row = int(np.argmax(lost))
+        raise table.fail(
+            f"{_short(cells[row])} is not a time of the format {stamp.format!r}",
+            "mend the cell, or the format in the recipe",
+            name,
+            part,
+            row,
+        )
+    if not own:
+        zone = stamp.zone or zone
+        if zone is None:
+            raise table.fail(
+                f"{_short(cells[0])} has no time zone, and the recipe names none",
+                'add zone to [time], such as zone = "UTC" or "Europe/Oslo"',
+                name,
+                part,
+                0,
+            )
+        found = found.tz_localize(parse_zone(zone), ambiguous="NaT", nonexistent="NaT")
+        lost = np.asarray(pd.isna(found))
+        if lost.any():
+            row = int(np.argmax(lost))
+            raise table.fail(
+                f"{_short(cells[row])} does not exist or exists twice in {zone}, where the clocks change",
+                "give the zone as an offset such as +02:00",
+                name,
+                part,
+                row,
+            )
+    return found.tz_convert(None).to_numpy("datetime64[ns]").astype(np.int64)
+
+
+def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -> Nanoseconds:
+    name = stamp.names[0]
+    if len(stamp.names) > 1:
+        raise table.fail(
+            "counted times stand in one column", "name one column", " + ".join(stamp.names), part
+        )
+    seconds = plain_numbers(table, name, part) * factor(stamp.unit, "time")
+    start = 0 if stamp.format == "unix" or epoch is None else nanoseconds(epoch)
+    far = np.abs(seconds) + abs(start) / 1e9 > _LATEST_S
+    if far.any():
+        row = int(np.argmax(far))
+        problem = f"{_short(str(table.cells[name][row]))} {stamp.unit} is centuries away"
+        raise table.fail(problem, "check the unit of the time in the recipe (s, ms or us)", name, part, row)
+    return np.asarray(start + np.round(seconds * 1e9).astype(np.int64))
+
+
+def nanoseconds(when: datetime) -> int:
+    """Nanoseconds since 1970 of a time that has a zone."""
+    return int(pd.Timestamp(when).as_unit("ns").value)
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + "...")

@@ -1,0 +1,225 @@
+"""Frames, detections and truth of a recipe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from wildlab.flight.recipe.camera_detections import Detections, Frames, Ground, Truth
+from wildlab.flight.recipe.model import Recipe
+from wildlab.flight.recipe.poses import Places, read_position
+from wildlab.flight.recipe.raw import (
+    Array,
+    Nanoseconds,
+    RawFiles,
+    RawTable,
+    Text,
+    numbers,
+    plain_numbers,
+    texts,
+    times,
+)
+from wildlab.flight.recipe.series import Block
+from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
+
+
+@dataclass(frozen=True)
+class FrameRows:
+    """The frames (without time_s), their stamps, and for each row of their file the frame it belongs to."""
+
+    table: pd.DataFrame
+    stamps: Nanoseconds | None
+    of_row: Text
+
+
+def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
+    """The images: one per row with its id, or one per unique combination of columns, numbered as they come.
+    None at all where the recipe has no frames.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing, a cell cannot be read, or rows of one frame differ.
+    """
+    block = recipe.frames
+    if block is None:
+        return FrameRows(pd.DataFrame({"frame_id": np.empty(0, object)}), None, np.empty(0, object))
+    rows = raw.table(block.file, block.separator, "frames")
+    if block.id is not None:
+        of_row = texts(rows, block.id, "frames.id")
+        first = np.arange(len(rows))
+    else:
+        keys = [texts(rows, column, "frames.unique") for column in block.unique]
+        frame, found = pd.factorize(pd.MultiIndex.from_arrays([*keys, np.zeros(len(rows))]))
+        _, first = np.unique(frame, return_index=True)
+        of_row = np.array(_numbered(block.prefix, len(found)), dtype=object)[frame]
+    columns: dict[str, Text | Array | Nanoseconds] = {"frame_id": of_row}
+    if block.group is not None:
+        columns["group"] = _groups(rows, block)
+    if block.sensor is not None:
+        columns["sensor"] = texts(rows, block.sensor, "frames.sensor")
+    if block.pan is not None and block.tilt is not None:
+        columns["pan_rad"] = numbers(rows, block.pan, "angle", "frames.pan")
+        columns["tilt_rad"] = numbers(rows, block.tilt, "angle", "frames.tilt")
+    stamps = None
+    if block.time is not None:
+        stamps = times(rows, block.time, "frames.time", recipe.time.zone, recipe.time.epoch)
+        columns["stamp"] = stamps
+    table = pd.DataFrame(columns)
+    if block.id is None:
+        differs = (table != table.iloc[first[frame]].reset_index(drop=True)).to_numpy().any(axis=1)
+        if differs.any():
+            row = int(np.argmax(differs))
+            raise rows.fail(
+                f"this row of frame {of_row[row]!r} says something else than line "
+                f"{rows.lines[first[frame[row]]]}",
+                "name more columns in unique",
+                ", ".join(block.unique),
+                "frames",
+                row,
+            )
+    table = table.iloc[first].reset_index(drop=True).drop(columns="stamp", errors="ignore")
+    return FrameRows(table, None if stamps is None else stamps[first], of_row)
+
+
+def _groups(rows: RawTable, block: Frames) -> Text:
+    group = block.group
+    if group is None or not group.edges:
+        return texts(rows, group.column if group else "", "frames.group")
+    value = plain_numbers(rows, group.column, "frames.group")
+    edges = np.array(group.edges)
+    nearest = np.abs(value[:, None] - edges).min(axis=1)
+    if (nearest < group.clear).any():
+        row = int(np.argmin(nearest))
+        raise rows.fail(
+            f"{value[row]:g} is closer than {group.clear:g} to the edge between two groups",
+            "look at how the numbers are spread, and move the edges",
+            group.column,
+            "frames.group",
+            row,
+        )
+    return np.array(group.labels, dtype=object)[np.searchsorted(edges, value)]
+
+
+def _numbered(prefix: str, n: int) -> list[str]:
+    width = len(str(max(n - 1, 0)))
+    return [f"{prefix}{i:0{width}d}" for i in range(n)]
+
+
+def frames_of_rows(
+    frames: FrameRows, recipe: Recipe, block: Block, column: str | None, table: RawTable, part: str
+) -> Text | None:
+    """For each row of a file the frame it belongs to: by a column, or because the frames are of that file.
+
+    None where neither is the case.
+    """
+    if column is not None:
+        return texts(table, column, f"{part}.frame")
+    if recipe.frames is None:
+        return None
+    same = (block.file, block.separator) == (recipe.frames.file, recipe.frames.separator)
+    return frames.of_row if same else None
+
+
+def read_detections(
+    block: Detections,
+    raw: RawFiles,
+    recipe: Recipe,
+    part: str,
+    frames: FrameRows,
+    places: Places,
+    image: tuple[float, float],
+    lens: pd.DataFrame,
+) -> pd.DataFrame:
+    """Detections of one source.
+
+    Parameters
+    ----------
+    image
+        Width and height in pixels.
+    lens
+        Position of the platform (north, east, down) by frame_id.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or a cell cannot be read, or pixels belong to no frame.
+    """
+    rows = raw.table(block.file, block.separator, part)
+    frame = frames_of_rows(frames, recipe, block, block.frame, rows, part)
+    if frame is None and block.kind == "pixel":
+        raise rows.fail(
+            "nothing says which frame a pixel is in", "name the column of the frame", "frame", part
+        )
+    columns: dict[str, Text | Array | str] = {
+        "detection_id": np.array(_numbered(block.prefix, len(rows)), dtype=object)
+        if block.id is None
+        else texts(rows, block.id, f"{part}.id"),
+        "frame_id": np.full(len(rows), "", dtype=object) if frame is None else frame,
+        "source": np.full(len(rows), block.source, dtype=object),
+        "kind": np.full(len(rows), block.kind, dtype=object),
+        "target_id": np.full(len(rows), "", dtype=object)
+        if block.target is None
+        else texts(rows, block.target, f"{part}.target", may_be_empty=True),
+    }
+    if block.pixel is not None:
+        columns["u_px"] = numbers(rows, block.pixel.u, "pixel", f"{part}.pixel.u", image=image)
+        columns["v_px"] = numbers(rows, block.pixel.v, "pixel", f"{part}.pixel.v", image=image)
+    elif block.position is not None:
+        position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
+        columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
+    elif block.azimuth is not None:
+        columns["azimuth_rad"] = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
+        if block.elevation is not None:
+            columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
+        if block.range is not None:
+            columns["range_m"] = numbers(rows, block.range, "length", f"{part}.range")
+    if block.ground is not None:
+        under = np.full((len(rows), 3), np.nan) if frame is None else lens.reindex(frame).to_numpy()
+        columns["plane_down_m"] = _ground(rows, block.ground, f"{part}.ground", places, under)
+    return pd.DataFrame(columns)
+
+
+def _ground(rows: RawTable, ground: Ground, part: str, places: Places, under: Array) -> Array:
+    """Down coordinate of the ground at each detection; `under` (N, 3) is the platform above it."""
+    off = places.off("ground")
+    if ground.down is not None:
+        return numbers(rows, ground.down, "length", f"{part}.down", may_be_empty=True) + off
+    if ground.height is None:
+        raise ValueError("ground without down and height")
+    height = numbers(rows, ground.height, "length", f"{part}.height", may_be_empty=True) - off
+    if ground.latitude is not None and ground.longitude is not None:
+        latitude = numbers(rows, ground.latitude, "angle", f"{part}.latitude")
+        longitude = numbers(rows, ground.longitude, "angle", f"{part}.longitude")
+    else:
+        latitude, longitude, _ = ned_to_geodetic(under, places.origin).T
+    return geodetic_to_ned(latitude, longitude, height, places.origin)[:, 2]
+
+
+def read_truth(
+    block: Truth, raw: RawFiles, recipe: Recipe, part: str, places: Places, start: int
+) -> pd.DataFrame:
+    """Where targets were; `start` is the epoch in nanoseconds since 1970.
+
+    Raises
+    ------
+    WildlabError
+        Where a column is missing or a cell cannot be read.
+    """
+    rows = raw.series(block, part)
+    names = np.full(len(rows), block.target, dtype=object)
+    if block.id is not None:
+        names = texts(rows, block.id, f"{part}.id")
+    time_s = np.full(len(rows), np.nan)
+    if block.time is not None:
+        time_s = (times(rows, block.time, f"{part}.time", recipe.time.zone, recipe.time.epoch) - start) / 1e9
+    position = places.ned(read_position(rows, block.position, f"{part}.position"), "truth")
+    columns: dict[str, Text | Array] = {"target_id": names, "time_s": time_s}
+    columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
+    for name, quantity in (("sd_horizontal_m", block.sd_horizontal), ("sd_vertical_m", block.sd_vertical)):
+        if quantity is not None:
+            part_of = f"{part}.{name.removesuffix('_m')}"
+            columns[name] = numbers(rows, quantity, "length", part_of, may_be_empty=True)
+    return pd.DataFrame(columns)

@@ -1,0 +1,129 @@
+"""Ground points against surveyed truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import truth_at
+from wildlab.flight.store import Flight
+from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.pipeline.georeference import Observations, covariances_of, truth_of
+
+Array = NDArray[np.float64]
+
+
+def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
+    """Errors of ground points against the truth, by the flight's scoring rule.
+
+    ``labelled``: the target that the detection names; points without one are left out. ``nearest``: the
+    target nearest to the point, horizontally, among those whose position is known at that time.
+
+    Returns
+    -------
+    DataFrame
+        The points that can be judged, with ``truth_id``, ``error_north_m``, ``error_east_m``, ``error_m``
+        (NaN where the ray missed the ground) and ``inside_90`` (whether the truth lies in the 90 % ellipse;
+        NaN where there is no ellipse).
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no truth, or none of its points can be judged.
+    """
+    truth = flight.table("truth")
+    xy = points[["north_m", "east_m"]].to_numpy(float)
+    if flight.manifest.scoring.rule == "labelled":
+        where, names = truth_of(flight, points), points["target_id"].to_numpy(str)
+    else:
+        offset = flight.manifest.clocks.truth_offset_s
+        targets, positions = truth_at(truth, points["time_s"].to_numpy(float), offset_s=offset)
+        distance = np.linalg.norm(positions[:, :, :2] - xy, axis=2)
+        nearest = np.where(np.isnan(distance), np.inf, distance).argmin(axis=0)
+        where, names = positions[nearest, np.arange(len(points))], np.asarray(targets)[nearest]
+    known = np.isfinite(where[:, :2]).all(axis=1)
+    if not known.any():
+        raise WildlabError(
+            "no detection can be compared with the truth",
+            "name the targets in the detections' target_id, or set the scoring rule to 'nearest'",
+            file=flight.folder,
+            field="detections.target_id",
+        )
+    error = (xy - where[:, :2])[known]
+    judged = points.iloc[np.flatnonzero(known)]
+    covariance = covariances_of(judged)
+    inside = inside_ellipse(error, covariance).astype(float)
+    inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
+    judged = judged.assign(
+        truth_id=names[known],
+        error_north_m=error[:, 0],
+        error_east_m=error[:, 1],
+        error_m=np.hypot(*error.T),
+        inside_90=inside,
+    )
+    return judged.reset_index(drop=True)
+
+
+def errors_of(judged: pd.DataFrame) -> Array:
+    """The errors (N, 2) north-east of a judged table."""
+    return judged[["error_north_m", "error_east_m"]].to_numpy(float)
+
+
+def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
+    """Positions that other programs gave for the same detections, judged like ours, by program."""
+    detections = flight.table("detections")
+    frames = flight.table("frames")
+    answers = {}
+    for program, rows in detections[detections["kind"] == "position"].groupby("source", sort=False):
+        at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
+        points = pd.DataFrame(
+            {
+                "detection_id": rows["detection_id"].to_numpy(),
+                "frame_id": rows["frame_id"].to_numpy(),
+                "target_id": rows["target_id"].fillna("").to_numpy() if "target_id" in rows else "",
+                "time_s": frames["time_s"].to_numpy(float)[at],
+                "north_m": rows["north_m"].to_numpy(float),
+                "east_m": rows["east_m"].to_numpy(float),
+                "cov_nn": np.nan,
+                "cov_ne": np.nan,
+                "cov_ee": np.nan,
+            }
+        )
+        answers[str(program)] = judge(flight, points)
+    return answers
+
+
+#: Images nearer in time than this (seconds) may share their pose error, which wanders over tens of seconds.
+DRAW_S = 60.0
+#: Fewer draws than this leave nothing to halve; then each image counts as one.
+FEWEST_DRAWS = 4
+
+
+def draws_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.str_]:
+    """Which detections (N,) are to be taken for one draw of the flight's errors, as labels.
+
+    Where the flight has times: all of a minute, for images that follow each other share more than images
+    show. Where it has none, or is over too soon for that: all of an image.
+    """
+    images = table["frame_id"].to_numpy(str)
+    times = table["time_s"].to_numpy(float)
+    if flight.manifest.time.kind == "sequence" or not np.isfinite(times).any():
+        return images
+    minutes = np.floor((times - np.nanmin(times)) / DRAW_S)
+    labels = np.where(np.isfinite(minutes), np.char.mod("minute %d", np.nan_to_num(minutes)), images)
+    return images if len(np.unique(labels)) < FEWEST_DRAWS else labels
+
+
+def known_points(
+    flight: Flight, observations: Observations, judged: pd.DataFrame
+) -> tuple[Observations, Array]:
+    """The observations that were judged, and the points (N, 3) they should have met.
+
+    North and east are those of the truth, down is the ground that the ray was cut with.
+    """
+    chosen = observations.take(observations.table["detection_id"].isin(judged["detection_id"]).to_numpy())
+    names = judged.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
+    where = truth_of(flight, chosen.table.assign(target_id=names))
+    return chosen, np.column_stack([where[:, :2], chosen.plane_down])

@@ -1,0 +1,66 @@
+"""How noisy a flight's poses were, from the errors of its known points, and ellipses that know it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
+from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import split_images
+from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
+from wildlab.geometry.uncertainty import ground_jacobians
+from wildlab.pipeline.evaluate import draws_of, errors_of, judge, known_points
+from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
+
+
+def estimate_noise(flight: Flight, observations: Observations, judged: pd.DataFrame) -> PoseNoise:
+    """Standard deviations of the poses behind the errors of known points: see ``evaluation.pose_noise``."""
+    o, _ = known_points(flight, observations, judged)
+    errors = errors_of(judged.set_index("detection_id").loc[o.table["detection_id"]])
+    camera = flight.manifest.geometry_camera()
+    J = ground_jacobians(camera, o.mount, o.uv, o.p_nb, o.R_nb, o.plane_down, o.pan, o.tilt)
+    roll, pitch, _ = matrix_to_euler(o.R_nb).T
+    derivatives = J.pose.copy()
+    derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(roll, pitch)
+    sd = assumed_deviations(flight)
+    plane = sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
+    assumed = {
+        "position_horizontal": sd["position_horizontal_m"],
+        "position_vertical": sd["position_vertical_m"],
+        "roll_pitch": float(np.radians((sd["roll_deg"] + sd["pitch_deg"]) / 2)),
+        "yaw": float(np.radians(sd["yaw_deg"])),
+        "pixel": sd["pixel_px"],
+    }
+    images = o.table["frame_id"].to_numpy()
+    return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed)
+
+
+def as_deviations(noise: PoseNoise) -> dict[str, float]:
+    """Estimated deviations under the names that ``pose_errors`` takes."""
+    roll_pitch = float(np.degrees(noise.sd["roll_pitch"]))
+    return {
+        "position_horizontal_m": noise.sd["position_horizontal"],
+        "position_vertical_m": noise.sd["position_vertical"],
+        "roll_deg": roll_pitch,
+        "pitch_deg": roll_pitch,
+        "yaw_deg": float(np.degrees(noise.sd["yaw"])),
+        "pixel_px": noise.sd["pixel"],
+    }
+
+
+def judge_with_estimated_noise(
+    flight: Flight, observations: Observations, judged: pd.DataFrame, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Points judged again with ellipses from pose noise estimated on the other half of the images."""
+    half = split_images(draws_of(flight, judged), rng)
+    parts = []
+    for seen in (half, ~half):
+        deviations = as_deviations(estimate_noise(flight, observations, judged[seen]))
+        chosen = observations.take(
+            observations.table["detection_id"].isin(judged["detection_id"][~seen]).to_numpy()
+        )
+        parts.append(
+            judge(flight, georeference(flight, chosen, rng, pose_errors(flight, chosen, deviations)))
+        )
+    return pd.concat(parts, ignore_index=True)

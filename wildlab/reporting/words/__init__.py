@@ -1,1 +1,0 @@
-"""What reports say in sentences and tables, one file for each study."""

@@ -1,0 +1,145 @@
+"""``notebooks/studies.toml``: each study, the notebook that does it, and what the notebook is given.
+
+::
+
+    [static-point]
+    title = "How well is one point on the ground located?"
+    case = "static-point"                # what it shows: a folder in wildlab/studies
+    section = "H 5.6.1"                  # of the thesis it answers to
+    notebook = "static-point.ipynb"
+    twin = "static-antenna"              # flight simulated from data/twins/static-antenna.toml, or ...
+    # dataset = "openathena"             # ... imported from a public data set
+    # recipe = "openathena.toml"         # ... by data/recipes/openathena.toml
+    # beside = ["second.toml"]           # further flights of the data set; the notebook gets them as `others`
+    seed = 1                             # of the flight that the figures show
+    seeds = 100                          # over how many flights; handed to the notebook as `seeds`. The
+                                         # case's trial is computed for each before the notebook starts
+    timeout_minutes = 30                 # for the notebook, and for each seed
+    [static-point.parameters]            # handed to the notebook besides the five every notebook gets
+    steps = 60
+    [static-point.missing]               # published numbers not reproduced yet: subject or name -> reason
+    observer = "it follows with the navigation filters"
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from wildlab.errors import WildlabError
+from wildlab.paths import NOTEBOOKS
+from wildlab.studies.protocol import Study, case_names, find_case
+
+#: What the runner gives to every notebook; a study's own parameters may not use these names.
+STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
+
+#: What a study with further flights gets besides: a list of their folders, in the order of `beside`.
+OTHERS = "others"
+
+_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
+
+
+class StudyEntry(BaseModel):
+    """One entry of ``studies.toml``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    name: str
+    title: str
+    case: str | None = None
+    section: str = ""
+    notebook: str
+    twin: str | None = None
+    dataset: str | None = None
+    recipe: str | None = None
+    beside: list[str] = Field(default_factory=list)
+    seed: int = Field(default=1, ge=0, lt=2**32)
+    seeds: int | None = Field(default=None, ge=1, le=1_000_000)
+    timeout_minutes: float = Field(default=30.0, gt=0, allow_inf_nan=False)
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    missing: dict[str, str] = Field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """``twin``, ``logged``, or ``computed`` where no flight is involved."""
+        return "twin" if self.twin else "logged" if self.recipe else "computed"
+
+    def shown_case(self) -> Study | None:
+        """The case whose trial is to be computed for each seed; None where there is none."""
+        if self.case is None or self.seeds is None:
+            return None
+        case = find_case(self.case)
+        return None if case.trial is None else case
+
+    @model_validator(mode="after")
+    def _consistent(self) -> StudyEntry:
+        if not _NAME.fullmatch(self.name):
+            raise ValueError("a study's name is made of a-z, 0-9 and hyphens")
+        for file in (self.notebook, self.recipe, *self.beside):
+            if file is not None and (PurePosixPath(file).is_absolute() or ".." in PurePosixPath(file).parts):
+                raise ValueError(f"the path {file!r} leaves its folder")
+        if self.twin and (self.dataset or self.recipe):
+            raise ValueError("a study has either a twin or a recipe")
+        if self.dataset and not self.recipe:
+            raise ValueError("a data set needs a recipe that imports it")
+        if self.case is not None and self.case not in case_names():
+            raise ValueError(f"there is no case {self.case!r}; use one of: {', '.join(case_names())}")
+        if self.seeds is not None and "seeds" in self.parameters:
+            raise ValueError("the number of seeds is given twice")
+        if self.beside and not self.recipe:
+            raise ValueError("flights beside the first need a recipe of the first")
+        taken = sorted(set(self.parameters) & {*STANDARD_PARAMETERS, OTHERS})
+        if taken:
+            raise ValueError(f"the parameter {taken[0]!r} is set by the runner")
+        return self
+
+
+def load_studies(path: Path = NOTEBOOKS / "studies.toml") -> dict[str, StudyEntry]:
+    """All studies by name, in the order of the file.
+
+    Raises
+    ------
+    WildlabError
+        If the file cannot be read or an entry is wrong.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise WildlabError(f"it cannot be read ({error})", "mend the file", file=path.name) from error
+    studies: dict[str, StudyEntry] = {}
+    for name, entry in content.items():
+        try:
+            studies[name] = StudyEntry.model_validate(
+                {"name": name, **entry} if isinstance(entry, dict) else entry
+            )
+        except ValidationError as error:
+            first = error.errors()[0]
+            field = ".".join(str(part) for part in first["loc"])
+            raise WildlabError(
+                first["msg"].removeprefix("Value error, "),
+                "mend this entry",
+                file=path.name,
+                field=f"[{name}] {field}".strip(),
+            ) from error
+    return studies
+
+
+def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
+    """The study of that name.
+
+    Raises
+    ------
+    WildlabError
+        If there is none; names the nearest one.
+    """
+    if name in studies:
+        return studies[name]
+    near = difflib.get_close_matches(name, studies, n=1)
+    raise WildlabError(
+        f"there is no study {name!r}", f"did you mean {near[0]!r}" if near else "see: wildlab list"
+    )

@@ -1,0 +1,115 @@
+"""Reports on one flight of whoever asks: a report for each thing that its data can be judged by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from wildlab.errors import WildlabError
+from wildlab.flight.checks.check import Use, usable_for
+from wildlab.flight.store import Flight, load_flight
+from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.navigation_errors import reference_of
+from wildlab.pipeline.navigation_inputs import imu_noise
+from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.job import Job
+from wildlab.runner.run import make_job, run_all
+from wildlab.runner.scheduling import Outcome
+
+
+def evaluate_flight(
+    folder: Path,
+    *,
+    source: str | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    timeout_s: float | None = None,
+    console: Console | None = None,
+) -> list[Outcome]:
+    """Judge a flight folder by all that it has the data for.
+
+    Its georeferencing goes to ``<reports>/<name of the flight>/``, its navigation (inertial unit and GNSS
+    against the attitude found on board) to ``<name>-navigation``.
+
+    Parameters
+    ----------
+    source
+        Which of the flight's poses to judge the georeferencing of; not needed where it has one navigation
+        source, or one named ``logged``.
+
+    Returns
+    -------
+    list of Outcome
+        One for each report, also where it failed or, some of its data being there, was skipped.
+
+    Raises
+    ------
+    WildlabError
+        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, or
+        its name is that of a study.
+    """
+    flight = load_flight(folder)
+    studies = load_studies(notebooks / "studies.toml")
+    uses = {use.purpose: use for use in usable_for(flight)}
+    jobs: list[Job] = []
+    skipped: list[Outcome] = []
+
+    def prepare(name: str, notebook: str, parameters: dict[str, Any], again: str) -> None:
+        if name in studies:
+            raise WildlabError(
+                f"the flight is named {flight.name!r} like a study, whose report it would replace",
+                "give the flight another name in flight.toml, or the report another folder with --out",
+            )
+        study = StudyEntry(name="evaluate", title=f"Flight {name}", notebook=notebook, parameters=parameters)
+        jobs.append(
+            make_job(
+                study,
+                flight=folder,
+                reports=reports,
+                notebooks=notebooks,
+                timeout_s=timeout_s,
+                name=name,
+                again=again,
+            )
+        )
+
+    places = uses["georeferencing accuracy"]
+    again = f"wildlab evaluate {folder.name}"
+    if places.usable:
+        found, _ = flight.pose_source(source)
+        prepare(flight.name, "georeferencing.ipynb", {"source": found}, f"{again} --source {found}")
+    elif source is not None:
+        raise WildlabError(
+            f"poses are named, and the georeferencing cannot be judged: {places.why}",
+            "see what is amiss: wildlab check; or leave --source out",
+            file=folder,
+            field="--source",
+        )
+    lacking = lacking_for_navigation(flight, uses["navigation"])
+    if not lacking:
+        prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
+    elif flight.imu is not None and flight.manifest.twin is None:
+        skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
+    if not jobs:
+        raise WildlabError(
+            f"nothing of this flight can be judged. Georeferencing: {places.why}. Navigation: {lacking}",
+            "see what is amiss: wildlab check",
+            file=folder,
+        )
+    return run_all(jobs, skipped, studies, reports, console)
+
+
+def lacking_for_navigation(flight: Flight, use: Use) -> str:
+    """Why the navigation of a flight cannot be judged, or nothing; ``use`` is what the checks say of it."""
+    if flight.manifest.twin is not None:
+        return "on simulated flights it has studies of its own"
+    if not use.usable:
+        return use.why
+    try:
+        reference_of(flight)
+        imu_noise(flight)
+    except WildlabError as error:
+        return str(error).rstrip(".")
+    return ""

@@ -1,0 +1,68 @@
+"""What kept numbers depend on: two machines with the same fingerprint compute the same thing."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from wildlab.paths import DATA, ROOT
+
+#: A change in any of these rooms can change a number.
+ROOMS = (
+    "geometry",
+    "flight",
+    "simulation",
+    "navigation",
+    "detection",
+    "tracking",
+    "planning",
+    "evaluation",
+    "pipeline",
+)
+#: Of the studies their trials can; how they are shown and said cannot.
+TRIALS = "studies/*/trial.py"
+#: Packages below them whose version can.
+PACKAGES = (
+    "filterpy",
+    "numba",
+    "numpy",
+    "opencv-python-headless",
+    "pandas",
+    "pyarrow",
+    "pymap3d",
+    "pyproj",
+    "rasterio",
+    "scipy",
+)
+
+
+def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
+    """What a trial's numbers depend on besides the seed, as 64 hexadecimal digits. ``code``: `code_key`."""
+    text = json.dumps([case, dict(parameters), code], sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def code_key() -> str:
+    """The code of all trials and below them, the twins' parameters and the packages' versions, as 64
+    hexadecimal digits."""
+    package = ROOT / "wildlab"
+    code = [path for room in ROOMS for path in (package / room).rglob("*.py")]
+    # Twins share parts, so a change of any of their files may be a change of each.
+    files = sorted([*code, *package.glob(TRIALS), *(DATA / "twins").rglob("*.toml")])
+    versions = [f"{package} {_version(package)}" for package in PACKAGES]
+    digest = hashlib.sha256(" ".join([*platform.python_version_tuple()[:2], *versions]).encode())
+    for path in files:
+        digest.update(path.relative_to(ROOT).as_posix().encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "absent"

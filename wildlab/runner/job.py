@@ -1,0 +1,43 @@
+"""What a process that runs a notebook is told, and what is left to say where it failed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from wildlab.runner.seeds import SeedWork
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a process needs to know. Folders are absolute."""
+
+    name: str
+    title: str
+    notebook: str
+    work: str
+    runtime: str
+    reports: str
+    seed: int = 1
+    flight: str = ""
+    twin: str | None = None
+    dataset: str | None = None
+    recipe: str | None = None
+    #: Recipes of further flights of the data set.
+    beside: tuple[str, ...] = ()
+    parameters: dict[str, Any] = field(default_factory=dict)
+    #: What to type to run it again.
+    again: str = ""
+    timeout_s: float = 1800.0
+    #: How many cells the notebook has, and what is to be computed for each seed before it starts.
+    cells: int = 0
+    seeds: SeedWork | None = None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a job failed: a sentence, the step, and the traceback for whoever mends it."""
+
+    reason: str
+    step: str = ""
+    details: str = ""

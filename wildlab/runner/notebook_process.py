@@ -1,0 +1,249 @@
+"""One study in a process of its own: flight, notebook, page. `wildlab.runner.run` starts, watches and
+ends it.
+
+A process each, because papermill changes the working directory of the whole process, and because only a
+process can be ended for certain. It gets its own session, so that Ctrl-C reaches the runner alone, which
+then ends everything below this process, kernel included.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import sys
+import threading
+import time
+from multiprocessing import connection, parent_process
+from pathlib import Path
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.paths import ROOT
+from wildlab.runner.job import Failure, Job
+from wildlab.runner.processes import end_below
+
+#: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
+_LONGEST_SOCKET_FOLDER = 95
+
+#: The cells begun in this process, in order.
+_STARTED: list[int] = []
+
+
+def run_notebook(pipe: connection.Connection, job: Job) -> None:
+    """Body of the process. Sends ``("stage", text)``, ``("cell", index, count)`` and at last ``("done",)`` or
+    ``("failed", Failure)``."""
+    os.setsid()
+    threading.Thread(target=_end_with_parent, args=(job,), daemon=True).start()
+    _keep_to_ourselves(job)
+    try:
+        _work(pipe, job)
+    except BaseException as error:  # whatever it is, the runner must hear of it
+        pipe.send(("failed", _explain(error, Path(job.work))))
+    else:
+        pipe.send(("done",))
+
+
+def _end_with_parent(job: Job) -> None:
+    """A runner that was killed outright must leave neither kernels nor folders behind."""
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        end_below(os.getpid())
+        for folder in (job.work, job.runtime):
+            shutil.rmtree(folder, ignore_errors=True)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _keep_to_ourselves(job: Job) -> None:
+    """Leave the reader's own settings, history and terminal out of it: the same run everywhere."""
+    runtime = Path(job.runtime)
+    os.environ.update(
+        # First place to look for the kernel `python3`: this environment, whatever else is installed.
+        JUPYTER_PATH=str(Path(sys.prefix) / "share" / "jupyter"),
+        JUPYTER_PREFER_ENV_PATH="1",
+        JUPYTER_NO_CONFIG="1",
+        JUPYTER_RUNTIME_DIR=str(runtime),
+        JUPYTER_CONFIG_DIR=str(runtime / "config"),
+        JUPYTER_DATA_DIR=str(runtime / "data"),
+        JUPYTER_PLATFORM_DIRS="1",
+        IPYTHONDIR=str(runtime / "ipython"),
+        # Figures are shown by Report, with alt text, and not a second time by pyplot.
+        MPLBACKEND="agg",
+        PYDEVD_DISABLE_FILE_VALIDATION="1",
+        PYTHONHASHSEED="0",
+        TZ="UTC",
+    )
+    log = os.open(Path(job.work) / ".log", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    for stream in (1, 2):
+        os.dup2(log, stream)
+    os.close(log)
+
+
+def _work(pipe: connection.Connection, job: Job) -> None:
+    from wildlab.files import write_atomic, write_json
+    from wildlab.reporting import html, metrics, privacy
+    from wildlab.runner import provenance
+    from wildlab.runner.catalogue import OTHERS
+
+    started = time.monotonic()
+    folder = Path(job.work)
+    pipe.send(("stage", "flight"))
+    flight, others = _flight(job), _others(job)
+    given: dict[str, Any] = {**job.parameters, "study": job.name, "seed": job.seed}
+    origin = provenance.collect(
+        study=job.name,
+        notebook=Path(job.notebook),
+        flight=flight,
+        parameters=job.parameters,
+        seed=job.seed,
+        others=others,
+    )
+    if job.seeds is not None:
+        origin["seeds"] = job.seeds.provenance()
+    write_json(folder / "provenance.json", origin)
+    pipe.send(("stage", "notebook"))
+    shown = {**given, "flight": _relative(flight, job), "out": ".", "expected_prefix": ""}
+    if others:
+        given[OTHERS] = [str(other) for other in others]
+        shown[OTHERS] = [_relative(other, job) for other in others]
+    executed = folder / "notebook.ipynb"
+    try:
+        _papermill(
+            pipe,
+            job,
+            {**given, "flight": str(flight or ""), "out": str(folder), "expected_prefix": sys.prefix},
+            executed,
+        )
+    finally:
+        if executed.is_file():
+            cleaned = privacy.clean_notebook(html.read_notebook(executed), shown, {str(folder): "."})
+            write_atomic(executed, json.dumps(cleaned, indent=1, ensure_ascii=False) + "\n")
+    pipe.send(("stage", "page"))
+    if not (folder / "metrics.json").is_file():
+        raise WildlabError(
+            "the notebook wrote no metrics.json", "end it with report.save()", file=Path(job.notebook).name
+        )
+    metrics.read_metrics(folder / "metrics.json")
+    origin["seconds"] = round(time.monotonic() - started, 1)
+    write_json(folder / "provenance.json", origin)
+    page = html.report_page(cleaned, study=job.name, footer=provenance.footer(origin))
+    write_atomic(folder / "report.html", page)
+
+
+def _flight(job: Job) -> Path | None:
+    from wildlab.runner.flights import dataset_flight, twin_flight
+
+    if job.flight:
+        return Path(job.flight)
+    if job.twin:
+        return twin_flight(job.twin, job.seed, Path(job.reports))
+    if job.recipe:
+        return dataset_flight(job.dataset, job.recipe, Path(job.reports))
+    return None
+
+
+def _others(job: Job) -> list[Path]:
+    """The further flights of a study."""
+    from wildlab.runner.flights import dataset_flight
+
+    return [dataset_flight(job.dataset, recipe, Path(job.reports)) for recipe in job.beside]
+
+
+def _relative(flight: Path | None, job: Job) -> str:
+    """The flight's folder as seen from the report's, where both lie in the project; else its name."""
+    if flight is None:
+        return ""
+    flight, reports = flight.resolve(), Path(job.reports).resolve()
+    if flight.is_relative_to(reports) or (flight.is_relative_to(ROOT) and reports.is_relative_to(ROOT)):
+        return Path(os.path.relpath(flight, reports / job.name)).as_posix()
+    return flight.name
+
+
+def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any], executed: Path) -> None:
+    import papermill
+    from traitlets.config import Config
+
+    from wildlab.reporting.html import read_notebook
+
+    config = Config()
+    if len(job.runtime) <= _LONGEST_SOCKET_FOLDER and sys.platform != "win32":
+        # Sockets in a folder of our own instead of ports that another kernel may take at the same moment.
+        # They are named here: left to itself, Jupyter puts them into the working directory, under the same
+        # names for every kernel.
+        config.KernelManager.transport = "ipc"
+        config.KernelManager.ip = str(Path(job.runtime) / "k")
+    config.KernelManager.connection_file = str(Path(job.runtime) / "kernel.json")
+    notebook = read_notebook(Path(job.notebook))
+    # Whatever kernel the notebook was last saved with: this one is meant.
+    notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
+    count = len(notebook.cells) + 1
+
+    def on_cell(cell: Any, cell_index: int) -> None:
+        _STARTED.append(cell_index)
+        pipe.send(("cell", cell_index, count))
+
+    papermill.execute_notebook(
+        notebook,
+        # papermill reads braces in a path as placeholders.
+        str(executed).replace("{", "{{").replace("}", "}}"),
+        parameters=parameters,
+        kernel_name="python3",
+        language="python",
+        progress_bar=False,
+        cwd=str(Path(job.notebook).parent),
+        config=config,
+        on_cell_execute=on_cell,
+    )
+
+
+def _explain(error: BaseException, folder: Path) -> Failure:
+    import traceback
+
+    from wildlab.reporting.failure import step_of
+    from wildlab.reporting.html import read_notebook
+    from wildlab.reporting.privacy import clean_text
+
+    kind = type(error).__name__
+    details = "".join(traceback.format_exception(error))
+    if kind == "PapermillExecutionError":
+        name, message = str(getattr(error, "ename", "")), str(getattr(error, "evalue", ""))
+        details = "\n".join(getattr(error, "traceback", []))
+        ours = name in ("WildlabError", "RunFailed")
+        reason = (
+            message
+            if ours
+            else f"The computation raised {name}: {message}"
+            if message
+            else f"It raised {name}."
+        )
+    elif isinstance(error, WildlabError):
+        reason = str(error)
+    elif kind == "DeadKernelError":
+        reason = (
+            "The process that ran the notebook crashed or was ended from outside; the usual cause is too "
+            "little memory. Close other programs, or run with `--jobs 1`."
+        )
+    elif kind == "NoSuchKernel":
+        reason = (
+            "This environment has no Jupyter kernel named python3. Make the environment again: make reports."
+        )
+    else:
+        reason = f"It ended with {kind}: {error}"
+    step = ""
+    if (folder / "notebook.ipynb").is_file():
+        notebook = read_notebook(folder / "notebook.ipynb")
+        failed = _failed_cell(notebook)
+        step = step_of(notebook, failed if failed is not None else (_STARTED or [0])[-1])
+    hidden = {str(folder): "."}
+    reason = reason.strip()
+    reason += "" if reason.endswith((".", "!", "?")) else "."
+    return Failure(clean_text(reason, hidden), step, clean_text(details, hidden))
+
+
+def _failed_cell(notebook: Any) -> int | None:
+    for index, cell in enumerate(notebook.cells):
+        if any(output.get("output_type") == "error" for output in cell.get("outputs", [])):
+            return index
+    return None

@@ -1,0 +1,110 @@
+"""How a run is shown while it goes: one bar over everything on a terminal, some lines elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Column
+
+_STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
+_ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
+
+
+def outcome_line(outcome: Any) -> str:
+    """One line about how a study went, with rich's markup."""
+    took = f"  {outcome.seconds:.0f} s" if outcome.state != "skipped" else ""
+    why = f"  {escape(outcome.reason)}" if outcome.reason else ""
+    return f"{_ENDS[outcome.state]}  [bold]{escape(outcome.name)}[/]{took}{why}"
+
+
+@contextmanager
+def shown(console: Console) -> Iterator[Callable[[str, str, Any], None]]:
+    """Yields the listener for `wildlab.runner.scheduling.run_jobs`."""
+    if not console.is_terminal:
+        yield _in_lines(console)
+        return
+    columns = (
+        SpinnerColumn(),
+        BarColumn(bar_width=20),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} seeds and cells"),
+        TimeElapsedColumn(),
+        # Whatever does not fit is cut off: the line must not wrap.
+        TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
+    )
+    with Progress(*columns, console=console, transient=True, expand=True) as progress:
+        task = progress.add_task("", total=0)
+        tally = Tally()
+
+        def tell(name: str, event: str, what: Any) -> None:
+            tally.note(name, event, what)
+            progress.update(task, completed=tally.completed, total=tally.total, description=tally.now())
+            if event == "end":
+                progress.console.print(outcome_line(what), highlight=False, soft_wrap=True)
+
+        yield tell
+
+
+@dataclass
+class Tally:
+    """How many seeds and cells are done, and what is under way, from what the listener is told."""
+
+    total: int = 0
+    #: Of each study, by name.
+    seeds: dict[str, int] = field(default_factory=dict)
+    cells: dict[str, int] = field(default_factory=dict)
+    steps: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def completed(self) -> int:
+        return sum(self.seeds.values()) + sum(self.cells.values())
+
+    def note(self, name: str, event: str, what: Any) -> None:
+        """One event: see `wildlab.runner.scheduling.Listener`."""
+        if event == "plan":
+            self.total = what
+        elif event == "start":
+            self.steps[name] = ""
+        elif event == "seed":
+            self.seeds[name], count = what
+            self.steps[name] = f"seed {what[0]} of {count}"
+        elif event == "stage":
+            self.steps[name] = _STAGES.get(what[0], str(what[0]))
+            if what[0] == "page":
+                self.cells[name] = self.cells.get(name, -1) + 1
+        elif event == "cell":
+            self.cells[name], count = what
+            self.steps[name] = f"cell {what[0] + 1} of {count}"
+        elif event == "end":
+            del self.steps[name]
+
+    def now(self) -> str:
+        """What is under way, with rich's markup."""
+        return " · ".join(f"[bold]{escape(name)}[/] {step}" for name, step in self.steps.items())
+
+
+def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
+    """A line where a study starts and ends, and one for each quarter of its seeds."""
+
+    def say(line: str) -> None:
+        console.print(line, highlight=False, soft_wrap=True)
+
+    def tell(name: str, event: str, what: Any) -> None:
+        if event == "start":
+            say(f"start {escape(name)}")
+        elif event == "seeds":
+            missing, count = what
+            say(f"seeds {escape(name)}: {missing} to compute, {count - missing} are there")
+        elif event == "seed":
+            done, count = what
+            if 4 * done // count > 4 * (done - 1) // count:
+                say(f"seeds {escape(name)}: {done} of {count}")
+        elif event == "end":
+            say(outcome_line(what))
+
+    return tell

@@ -1,0 +1,148 @@
+"""Where a report's numbers come from: code, lock, notebook, data, parameters, seed; never who ran it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import tomllib
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from wildlab import __version__
+from wildlab.files import sha256
+from wildlab.paths import LOCK, ROOT
+from wildlab.reporting.text import escape
+
+#: The packages whose version can move a number.
+PACKAGES = [
+    "numpy",
+    "scipy",
+    "pandas",
+    "numba",
+    "filterpy",
+    "pymap3d",
+    "pyproj",
+    "opencv-python-headless",
+    "matplotlib",
+    "papermill",
+]
+
+
+def git_state(root: Path = ROOT) -> dict[str, Any]:
+    """``{"commit": 40 hex digits or None, "dirty": bool or None, "note": "" or why there is none}``."""
+    git = shutil.which("git")
+    if git is None:
+        return {"commit": None, "dirty": None, "note": "git is not installed"}
+
+    def ask(*arguments: str) -> str:
+        return subprocess.run(  # noqa: S603 - a fixed program, found above, with fixed arguments
+            [git, *arguments],
+            cwd=root,
+            env=os.environ | {"GIT_OPTIONAL_LOCKS": "0"},
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=True,
+        ).stdout.strip()
+
+    try:
+        top = Path(ask("rev-parse", "--show-toplevel")).resolve()
+        # A copy without its history may lie inside somebody else's repository, whose commit says nothing
+        # about it.
+        if top != root.resolve():
+            return {"commit": None, "dirty": None, "note": "not a git checkout"}
+        return {"commit": ask("rev-parse", "HEAD"), "dirty": bool(ask("status", "--porcelain")), "note": ""}
+    except (subprocess.SubprocessError, OSError):
+        return {"commit": None, "dirty": None, "note": "not a git checkout"}
+
+
+def collect(
+    *,
+    study: str,
+    notebook: Path,
+    flight: Path | None,
+    parameters: dict[str, Any],
+    seed: int,
+    others: Sequence[Path] = (),
+) -> dict[str, Any]:
+    """Everything ``provenance.json`` says.
+
+    Parameters
+    ----------
+    flight
+        Folder of the flight, or None. Of its manifest only name, kind and how sensitive its locations are
+        get in: never the origin.
+    parameters
+        The study's own parameters, without folders.
+    others
+        Folders of further flights, of which the same gets in.
+    """
+    further = {"others": [_flight(other) for other in others]} if others else {}
+    return {
+        "study": study,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wildlab": {"version": __version__, **git_state()},
+        "lock": {"file": LOCK.name, "sha256": sha256(LOCK) if LOCK.is_file() else None},
+        "notebook": {"file": notebook.name, "sha256": sha256(notebook)},
+        "flight": _flight(flight) if flight is not None else None,
+        **further,
+        "parameters": parameters,
+        "seed": seed,
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+    }
+
+
+def _flight(folder: Path) -> dict[str, Any]:
+    try:
+        manifest = tomllib.loads((folder / "flight.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        manifest = {}
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
+    return {
+        "name": str(manifest.get("name", folder.name)),
+        "kind": str(manifest.get("kind", "unknown")),
+        "locations": str(manifest.get("locations", {}).get("sensitivity", "withheld")),
+        "files": {path.relative_to(folder).as_posix(): sha256(path) for path in files},
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def footer(
+    provenance: dict[str, Any], *, beside: tuple[str, ...] = ("provenance.json", "notebook.ipynb")
+) -> str:
+    """The provenance in one plain line of HTML for the foot of a page."""
+    wildlab = provenance["wildlab"]
+    if wildlab["commit"]:
+        changed = ", <b>with changes not committed</b>" if wildlab["dirty"] else ""
+        commit = f"<code>{escape(wildlab['commit'][:10])}</code>{changed}"
+        code = f"wildlab {escape(wildlab['version'])} at commit {commit}"
+    else:
+        code = f"wildlab {escape(wildlab['version'])} ({escape(wildlab['note'])})"
+    parts = [code]
+    for one in [provenance["flight"], *provenance.get("others", ())] if provenance["flight"] else ():
+        files = one["files"]
+        hashes = ", ".join(f"{escape(name)} <code>{digest[:8]}</code>" for name, digest in files.items())
+        parts.append(f"flight {escape(one['name'])}: {hashes}" if files else "flight without files")
+    lock = provenance["lock"]["sha256"]
+    parts.append(f"lock <code>{lock[:8]}</code>" if lock else "no lock file")
+    parts.append(f"notebook <code>{provenance['notebook']['sha256'][:8]}</code>")
+    parts.append(f"seed {escape(provenance['seed'])}")
+    parts.append(f"made {escape(provenance['made'].replace('T', ' ').replace('+00:00', ' UTC'))}")
+    links = " and ".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in beside)
+    return (
+        f"<p>{' · '.join(parts)}.</p>"
+        f"<p>Code, parameters and all hashes (SHA-256) are in {links} beside this page.</p>"
+    )

@@ -1,0 +1,254 @@
+"""Run studies: one process per notebook, a time limit, and outputs that appear whole or not at all.
+
+A run works in a folder beside its report's. Only when it is over are the files moved into
+``reports/<name>/``, and ``status.json`` comes last: as long as it is not there, nothing beside it is to be
+trusted. A failed run leaves a page that says so; a run that is broken off (Ctrl-C) leaves the former report
+as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from wildlab.errors import WildlabError
+from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_study, load_studies
+from wildlab.runner.front_page import build_ledger
+from wildlab.runner.job import Job
+from wildlab.runner.notebooks import check_notebook, plain_parameters
+from wildlab.runner.progress import outcome_line, shown
+from wildlab.runner.scheduling import Outcome, run_jobs
+from wildlab.runner.seeds import SeedWork, make_work
+
+
+def make_job(
+    study: StudyEntry,
+    *,
+    seed: int | None = None,
+    seeds: int | None = None,
+    flight: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    timeout_s: float | None = None,
+    name: str | None = None,
+    again: str | None = None,
+) -> Job:
+    """The job that runs a study, checked as far as it can be before it starts.
+
+    Parameters
+    ----------
+    seeds
+        Over how many simulated flights, in place of the study's own number; nothing to a study without one.
+    flight
+        A flight folder to use in place of the study's own.
+    name
+        Name of the report's folder; the study's if not given.
+    again
+        What to type to run it again, where that is not `wildlab run STUDY`.
+
+    Raises
+    ------
+    WildlabError
+        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.make_work`.
+    """
+    notebook = notebooks / study.notebook
+    parameters = plain_parameters(study.parameters)
+    again = again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}")
+    if study.seeds is not None:
+        parameters["seeds"] = study.seeds if seeds is None else seeds
+        again += "" if seeds is None else f" --seeds {seeds}"
+    others = [OTHERS] if study.beside else []
+    cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])
+    seed = study.seed if seed is None else seed
+    reports = reports.resolve()
+    name = name or study.name
+    own = flight is None
+    return Job(
+        name=name,
+        title=study.title,
+        notebook=str(notebook.resolve()),
+        work=str(reports / f".{name}.{os.getpid()}.part"),
+        runtime=str(_socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
+        reports=str(reports),
+        seed=seed,
+        flight="" if flight is None else str(flight.resolve()),
+        twin=study.twin if own else None,
+        dataset=study.dataset if own else None,
+        recipe=study.recipe if own else None,
+        beside=tuple(study.beside) if own else (),
+        parameters=parameters,
+        again=again,
+        timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,
+        cells=cells + 1,  # papermill adds one with the parameters
+        seeds=_seed_work(study, name, seed, flight, reports, parameters),
+    )
+
+
+def _seed_work(
+    study: StudyEntry, name: str, seed: int, flight: Path | None, reports: Path, parameters: dict[str, Any]
+) -> SeedWork | None:
+    """What is to be computed for each seed before the notebook starts; None where nothing is."""
+    case = study.shown_case()
+    if case is None:
+        return None
+    twin = study.twin if flight is None else _twin_of(flight)
+    if flight is not None and twin is None:
+        return None  # a logged flight is the only one of its kind
+    given = {**parameters, "twin": twin}
+    return make_work(reports, name, case.case, seed, parameters["seeds"], given)
+
+
+def run_studies(
+    names: Sequence[str] = (),
+    *,
+    everything: bool = False,
+    seed: int | None = None,
+    seeds: int | None = None,
+    flight: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    parallel: int = 1,
+    scheduler: str | None = None,
+    timeout_s: float | None = None,
+    console: Console | None = None,
+) -> list[Outcome]:
+    """Run studies by name, or all, and rebuild the ledger.
+
+    Parameters
+    ----------
+    everything
+        Run all studies. One whose public data are not here is skipped, and says so; asked for by name, it
+        is an error.
+    seeds
+        Over how many simulated flights, in place of each study's own number.
+    flight
+        A flight folder for the one study named, in place of its own; its report is then named
+        ``<study>-<flight>``.
+    parallel
+        How many processes at a time, for notebooks and seeds together.
+    scheduler
+        Address of a `dask.distributed` scheduler whose workers compute the seeds.
+    timeout_s
+        How long a notebook may take, and each seed.
+    console
+        Where progress is shown; nowhere if not given.
+
+    Returns
+    -------
+    list of Outcome
+        One per study, also of those that failed: a study that fails does not stop the others.
+
+    Raises
+    ------
+    WildlabError
+        Before anything runs, if a study is not known or cannot be run as it is written, or the cluster cannot
+        be used; and if the cluster is lost on the way.
+    """
+    studies = load_studies(notebooks / "studies.toml")
+    chosen = (
+        list(studies.values()) if everything else [find_study(name, studies) for name in dict.fromkeys(names)]
+    )
+    if not chosen:
+        raise WildlabError("no study was named", "name one (see: wildlab list), or say --all")
+    report = None
+    if flight is not None:
+        if len(chosen) != 1:
+            raise WildlabError("a flight goes with one study", "name one study", field="--flight")
+        report = f"{chosen[0].name}-{_flight_name(flight)}"
+    jobs, skipped = [], []
+    for study in chosen:
+        absent = _absent_data(study) if flight is None else None
+        if absent is not None and everything:
+            skipped.append(Outcome(study.name, "skipped", 0.0, str(absent)))
+            continue
+        if absent is not None:
+            raise absent
+        job = make_job(
+            study,
+            seed=seed,
+            seeds=seeds,
+            flight=flight,
+            reports=reports,
+            notebooks=notebooks,
+            timeout_s=timeout_s,
+            name=report,
+        )
+        jobs.append(job)
+    notes = _notes(chosen, seeds, scheduler)
+    return run_all(
+        jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
+    )
+
+
+def _notes(chosen: Sequence[StudyEntry], seeds: int | None, scheduler: str | None) -> list[str]:
+    """What was asked for and has no effect, in sentences."""
+    notes = []
+    once = ", ".join(study.name for study in chosen if study.seeds is None)
+    if seeds is not None and once:
+        notes.append(f"--seeds has no effect on {once}: not computed over simulated flights.")
+    here = ", ".join(study.name for study in chosen if study.shown_case() is None)
+    if scheduler is not None and here:
+        notes.append(f"--scheduler has no effect on {here}: nothing is computed for each seed.")
+    return notes
+
+
+def run_all(
+    jobs: list[Job],
+    skipped: list[Outcome],
+    studies: dict[str, StudyEntry],
+    reports: Path,
+    console: Console | None,
+    *,
+    notes: Sequence[str] = (),
+    parallel: int = 1,
+    scheduler: str | None = None,
+) -> list[Outcome]:
+    """Run what was made ready, show how it goes, and rebuild the ledger; outcomes as of `run_studies`."""
+    if console is not None:
+        for note in notes:
+            console.print(note, highlight=False, soft_wrap=True)
+        for outcome in skipped:
+            console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
+    with shown(console) if console is not None else nullcontext() as listen:
+        outcomes = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=listen)
+    build_ledger(reports, studies)
+    return [*outcomes, *skipped]
+
+
+def _flight_name(folder: Path) -> str:
+    from wildlab.flight.store import load_flight
+
+    return str(load_flight(folder).name)
+
+
+def _twin_of(folder: Path) -> str | None:
+    """Name of the twin that a flight folder was simulated from; None for a logged flight."""
+    from wildlab.flight.store import load_flight
+
+    twin = load_flight(folder).manifest.twin
+    return None if twin is None else str(twin.name)
+
+
+def _absent_data(study: StudyEntry) -> WildlabError | None:
+    from wildlab.runner.flights import dataset_source
+
+    if study.dataset is None:
+        return None
+    try:
+        dataset_source(study.dataset)
+    except WildlabError as error:
+        return error
+    return None
+
+
+def _socket_folder() -> Path:
+    """Where sockets may lie: their paths must be short, and macOS's temporary folder is not."""
+    short = Path("/tmp")  # noqa: S108 - a folder of our own is made in it, readable by us alone
+    return short if os.access(short, os.W_OK | os.X_OK) else Path(tempfile.gettempdir())

@@ -1,0 +1,128 @@
+"""Where each study stands: what its last run left behind, beside the published numbers and claims."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.metrics import read_metrics
+from wildlab.reporting.published import FOLDER, load_claims, load_published
+from wildlab.reporting.status import MISSING, Claim, Number, StudyStatus, verdict_on
+from wildlab.runner.catalogue import StudyEntry
+
+
+def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> StudyStatus:
+    """Where one study stands, from ``reports/<study>/`` and the published numbers.
+
+    A report folder that cannot be read counts as one to be run again; it never raises.
+    """
+    folder = reports / study.name
+    status = _status(folder)
+    state = str(status["state"])
+    metrics: dict[str, Any] | None = None
+    reason = str(status.get("reason", ""))
+    if state == "done":
+        try:
+            metrics = read_metrics(folder / "metrics.json")
+        except WildlabError:
+            state, reason = "broken off", ""
+    return StudyStatus(
+        study=study,
+        state=state,
+        reason=reason,
+        seconds=status.get("seconds"),
+        finished=str(status.get("finished", "")),
+        flight=metrics["flight"] if metrics else "",
+        seeds=metrics["seeds"] if metrics else None,
+        has_report=state in ("done", "failed") and (folder / "report.html").is_file(),
+        numbers=_numbers(study, metrics, state, published),
+        claims=_claims(study, metrics, published),
+    )
+
+
+def as_plain(one: StudyStatus) -> dict[str, Any]:
+    """A status for JSON: what `wildlab list --json` prints."""
+    return {
+        "study": one.study.name,
+        "title": one.study.title,
+        "section": one.study.section,
+        "kind": one.study.kind,
+        "state": one.state,
+        "reason": one.reason,
+        "seconds": one.seconds,
+        "finished": one.finished or None,
+        "published": [asdict(number) | {"difference": number.difference} for number in one.numbers],
+        "claims": [asdict(claim) for claim in one.claims],
+    }
+
+
+def _status(folder: Path) -> dict[str, Any]:
+    path = folder / "status.json"
+    if not path.is_file():
+        # A report without a status was being replaced when the machine stopped.
+        return {"state": "broken off" if (folder / "report.html").exists() else "not run"}
+    try:
+        status = json.loads(path.read_text(encoding="utf-8"))
+        seconds = status.get("seconds")
+        if status["state"] not in ("done", "failed") or not isinstance(seconds, (int, float)):
+            raise ValueError
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {"state": "broken off"}
+    return dict(status)
+
+
+def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Number]:
+    ours = {(entry["name"], entry["subject"]): entry for entry in metrics["metrics"]} if metrics else {}
+    numbers = []
+    for row in load_published(study.name, published).to_dict(orient="records"):
+        found = ours.get((row["name"], row["subject"]), {})
+        within = None if math.isnan(row["within"]) else float(row["within"])
+        number = {
+            "name": row["name"],
+            "subject": row["subject"],
+            "unit": row["unit"],
+            "source": row["source"],
+            "published": float(row["value"]),
+            "digits": int(row["digits"]),
+            "here": found.get("value"),
+            "low": found.get("low"),
+            "high": found.get("high"),
+            "within": within,
+        }
+        verdict = verdict_on(number["here"], number["published"], within, number["low"], number["high"])
+        reason = _reason(study, row["name"], row["subject"], state) if verdict == MISSING else ""
+        numbers.append(Number(**number, verdict=verdict, reason=reason))
+    return numbers
+
+
+def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:
+    for pattern, reason in study.missing.items():
+        if any(
+            fnmatchcase(text, pattern) for text in (subject, name, f"{name}/{subject}", *subject.split("/"))
+        ):
+            return reason
+    return "" if state != "done" else "the study does not give it yet"
+
+
+def _claims(study: StudyEntry, metrics: dict[str, Any] | None, published: Path) -> list[Claim]:
+    typed = {entry["id"]: entry for entry in load_claims(study.name, published)}
+    decided = {entry["id"]: entry for entry in metrics["claims"]} if metrics else {}
+    claims = []
+    for key in [*typed, *(key for key in decided if key not in typed)]:
+        ours, theirs = decided.get(key, {}), typed.get(key, {})
+        claims.append(
+            Claim(
+                id=key,
+                text=theirs.get("text") or ours["text"],
+                source=theirs.get("source", ""),
+                verdict=ours.get("verdict", "not tested yet"),
+                fraction=ours.get("fraction"),
+                seeds=ours.get("seeds"),
+            )
+        )
+    return claims

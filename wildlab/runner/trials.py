@@ -1,0 +1,83 @@
+"""The trials of all flights as a table, for the notebook that shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from wildlab.errors import RunFailed
+from wildlab.paths import REPORTS
+from wildlab.runner.seeds import SeedWork, failed_seeds, make_work, missing_seeds, read_seed
+from wildlab.runner.worker_pool import WorkerPool
+
+
+def trials_table(
+    case: str,
+    seeds: int,
+    *,
+    study: str,
+    seed: int,
+    drawn: Mapping[tuple[str, str], float],
+    out: str = "",
+    **parameters: Any,
+) -> pd.DataFrame:
+    """The numbers of all flights: columns (subject, name), one row for each seed, the flight drawn first.
+
+    `wildlab run` has computed them before the notebook starts. In a notebook opened by hand, those that are
+    not there yet are computed now, in a process beside the kernel, and kept.
+
+    Parameters
+    ----------
+    case
+        Whose trial it is (``case`` in ``studies.toml``).
+    seeds
+        How many flights, the one drawn included.
+    seed, drawn
+        Seed of the flight that the figures show, and what the notebook has computed on it.
+    out
+        The notebook's parameter: the report's folder, beside which the store is.
+    parameters
+        The trial's.
+
+    Raises
+    ------
+    WildlabError
+        If a parameter is missing, or a seed fails; it names the seed.
+    """
+    reports = Path(out).parent if out else REPORTS
+    work = make_work(reports, study, case, seed, seeds, parameters)
+    missing = missing_seeds(work)
+    if missing:
+        _compute(work, missing)
+    rows = {one: read_seed(work, one) for one in work.seeds}
+    unread = [one for one, values in rows.items() if values is None]
+    if unread:
+        raise RunFailed(f"the numbers of seed {unread[0]} have gone while they were read", "run it again")
+    tables = [dict(drawn), *(split_keys(values) for values in rows.values() if values is not None)]
+    return pd.DataFrame(tables, index=pd.Index([seed, *work.seeds], name="seed"))
+
+
+def split_keys(values: Mapping[str, float]) -> dict[tuple[str, str], float]:
+    """Keys "subject/name" as (subject, name)."""
+    result = {}
+    for key, value in values.items():
+        subject, _, name = key.partition("/")
+        result[subject, name] = value
+    return result
+
+
+def _compute(work: SeedWork, missing: Sequence[int]) -> None:
+    failures: list[tuple[int, str]] = []
+    with WorkerPool() as pool:
+        for done, one in enumerate(missing):
+            print(f"\r{work.study}: {done} of {len(missing)} seeds", end="", flush=True)
+            pool.submit(work, one)
+            while not (results := pool.collect(wait_s=0.25)):
+                pass
+            failures += [(result.seed, result.failure.reason) for result in results if result.failure]
+    print(f"\r{work.study}: {len(missing) - len(failures)} of {len(missing)} seeds", flush=True)
+    if failures:
+        raise RunFailed(failed_seeds(failures), "mend that; the seeds that are finished are kept")

@@ -1,0 +1,191 @@
+"""Processes of this machine that compute seeds, one seed at a time each.
+
+They are started when there is work, kept while there is more, and ended with their runner, whatever ends
+that. Like a notebook's process, each is a session of its own, so that Ctrl-C reaches the runner alone. Each
+computes on one thread: several would take the place of other processes, and a sum over threads is not always
+added up in the same order.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import threading
+import time
+import traceback
+from dataclasses import dataclass
+from multiprocessing import connection, parent_process
+from multiprocessing.context import SpawnProcess
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from wildlab.errors import WildlabError
+from wildlab.runner.fingerprint import code_key
+from wildlab.runner.job import Failure
+from wildlab.runner.processes import end_tree, one_thread
+from wildlab.runner.seeds import SeedWork, write_seed
+
+
+class SeedResult(NamedTuple):
+    """A seed that is over: its numbers are in the store, or it failed."""
+
+    study: str
+    seed: int
+    failure: Failure | None = None
+
+
+def answer(case: str, seed: int, parameters: dict[str, Any], code: str) -> tuple[str, Any]:
+    """``("done", values)`` or ``("failed", (reason, "", details))`` for one seed, here or on a cluster.
+
+    ``code`` is the runner's `code_key`: numbers of other code are not mixed in.
+    """
+    from wildlab.reporting.privacy import clean_text
+    from wildlab.studies.protocol import run_trial
+
+    try:
+        _same_code(code)
+        return "done", run_trial(case, seed, parameters)
+    except Exception as error:  # whatever it is, the runner must hear of it
+        known = isinstance(error, WildlabError)
+        reason = str(error) if known else f"The computation raised {type(error).__name__}: {error}."
+        return "failed", (clean_text(reason), "", clean_text(traceback.format_exc()))
+
+
+def keep(work: SeedWork, seed: int, said: tuple[str, Any]) -> Failure | None:
+    """Put an answer's numbers into the store; the failure where there are none."""
+    kind, content = said
+    if kind == "failed":
+        return Failure(*content)
+    write_seed(work, seed, content)
+    return None
+
+
+#: The code that this process runs; looked up once, because modules are imported once.
+_CODE: list[str] = []
+
+
+def _same_code(code: str) -> None:
+    if not _CODE:
+        _CODE.append(code_key())
+    if _CODE[0] != code:
+        raise WildlabError(
+            "the code, the twins' parameters or the packages here are not those that the run began with",
+            "run it again; on a cluster, give every worker the same checkout and environment",
+        )
+
+
+def serve(pipe: connection.Connection) -> None:
+    """Body of a process: a seed comes in, an answer goes out; ends when the pipe does."""
+    os.setsid()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # a warning would break the runner's display
+        os.dup2(nowhere, stream)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            pipe.send(answer(*pipe.recv()))
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        end_tree(os.getpid())
+
+
+@dataclass
+class _Worker:
+    process: SpawnProcess
+    pipe: connection.Connection
+    work: SeedWork | None = None
+    seed: int = 0
+    ends: float = 0.0
+
+    def end(self) -> None:
+        self.pipe.close()
+        if self.process.pid is not None and self.process.is_alive():
+            end_tree(self.process.pid)
+        self.process.join()
+
+
+class WorkerPool:
+    """The processes of one run. Use it in a ``with``: leaving it ends them all."""
+
+    def __init__(self) -> None:
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> WorkerPool:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.shutdown(len(self._workers), idle=False)
+
+    @property
+    def size(self) -> int:
+        """How many processes there are."""
+        return len(self._workers)
+
+    @property
+    def pipes(self) -> list[connection.Connection]:
+        """What to wait for: something can be read here when a seed is over."""
+        return [worker.pipe for worker in self._workers if worker.work is not None]
+
+    def places(self, room: int) -> int:
+        """How many seeds it can take now, if it may start ``room`` more processes."""
+        return self.size - len(self.pipes) + max(0, room)
+
+    def submit(self, work: SeedWork, seed: int, timeout_s: float = float("inf")) -> None:
+        """Hand a seed to an idle process, or to a new one where none is idle."""
+        worker = next((one for one in self._workers if one.work is None), None) or self._start()
+        worker.work, worker.seed, worker.ends = work, seed, time.monotonic() + timeout_s
+        with contextlib.suppress(OSError):  # its end is noticed by `collect`
+            worker.pipe.send((work.case, seed, work.parameters, work.code))
+
+    def collect(self, wait_s: float = 0.0) -> list[SeedResult]:
+        """The seeds that are over since the last time; their numbers are in the store."""
+        if wait_s:
+            connection.wait(self.pipes, timeout=wait_s)
+        return [result for worker in list(self._workers) if (result := self._result(worker)) is not None]
+
+    def shutdown(self, count: int, *, idle: bool = True) -> None:
+        """End up to ``count`` processes; only such as have nothing to do, unless told otherwise."""
+        for worker in [one for one in self._workers if one.work is None or not idle][: max(0, count)]:
+            self._workers.remove(worker)
+            worker.end()
+
+    def _start(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=serve, args=(theirs,), name="wildlab seeds")
+        with one_thread():
+            process.start()
+        theirs.close()
+        self._workers.append(_Worker(process, ours))
+        return self._workers[-1]
+
+    def _result(self, worker: _Worker) -> SeedResult | None:
+        work, seed, gone = worker.work, worker.seed, not worker.process.is_alive()
+        if work is None:
+            return None
+        said = None
+        try:
+            said = worker.pipe.recv() if worker.pipe.poll() else None
+        except (EOFError, OSError):
+            gone = True
+        if said is not None:
+            worker.work = None
+            return SeedResult(work.study, seed, keep(work, seed, said))
+        if not gone and time.monotonic() < worker.ends:
+            return None
+        worker.process.join(5 if gone else 0)
+        code = worker.process.exitcode
+        self._workers.remove(worker)
+        worker.end()
+        reason = f"its process ended without a word (exit code {code})" if gone else "it took too long"
+        fix = (
+            "the usual cause is too little memory: run with fewer --jobs" if gone else "--timeout gives more"
+        )
+        return SeedResult(work.study, seed, Failure(f"{reason}; {fix}.", "", ""))
