@@ -18,13 +18,13 @@ from filterpy.kalman import KalmanFilter
 
 from benchmarks.timing import best_of
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose, camera_rotation
+from wildlab.geometry.mount import Mount
 from wildlab.tracking import measurement
 from wildlab.tracking.batch import View, run_batch
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.measurement import CameraPoses
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.run import Start, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
@@ -94,7 +94,7 @@ def scene() -> tuple[Array, Array, Array, CameraPoses, PoseUncertainty]:
     truth = np.column_stack([1.0 * times, -0.5 * times, np.zeros(UPDATES)])
     p_nb = np.column_stack([60 * np.sin(0.1 * times), 60 * np.cos(0.1 * times), np.full(UPDATES, -300.0)])
     R_nb = euler_to_matrix(0.02 * np.sin(times), 0.03 * np.cos(times), 0.1 * times)
-    poses = CameraPoses(*camera_pose(Mount(), p_nb, R_nb), camera_rotation(Mount()))
+    poses = CameraPoses(CAMERA, Mount(), p_nb, R_nb)
     exact = ground_to_pixel(CAMERA, truth, poses.p_nc, poses.R_nc)
     size = np.repeat([1.0, 0.02], 3) ** 2 * (1 + 0.1 * np.sin(times))[:, None]
     covariance = np.einsum("ni,ij->nij", size, np.eye(6))
@@ -130,8 +130,8 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     last = best_of(lambda: run_batch(times, gaps, R, MOTION, START, rows=[-1]), repeats=5)
     rows.append(("KF, wildlab, the same, last estimates kept", last, last / theirs, ""))
 
-    noise, view = 4.0 * np.eye(2), View(CAMERA, poses, 0.0)
-    sensor = measurement.pixels(CAMERA, poses, 0.0)
+    noise, view = 4.0 * np.eye(2), View(poses, 0.0)
+    sensor = measurement.pixels(poses, 0.0)
     for name, uncertainty in (("pixel EKF", None), ("pixel Schmidt", pose)):
 
         def loop(uncertainty: PoseUncertainty | None = uncertainty) -> object:

@@ -8,7 +8,7 @@ import pytest
 from filterpy.kalman import EKF, KalmanFilter, UnscentedKalmanFilter
 from filterpy.kalman import MerweScaledSigmaPoints as SigmaPoints
 
-from tests.tracking.poses import CAMERA, overflight
+from tests.tracking.poses import overflight
 from wildlab.tracking import measurement as m
 from wildlab.tracking.batch import run_batch
 from wildlab.tracking.motion import constant_velocity, singer
@@ -54,7 +54,7 @@ def test_whole_runs_agree_with_filterpy_over_random_models(seed):
 
 def test_pixels_agree_with_filterpys_extended_filter():
     times, uv, poses, _ = overflight()
-    sensor, R = m.pixels(CAMERA, poses, 0.0), 4.0 * np.eye(2)
+    sensor, R = m.pixels(poses, 0.0), 4.0 * np.eye(2)
     motion = partial(singer, alpha=0.1, variance=0.04)
     start = Start(0.0, np.zeros(6), np.diag([25.0, 25, 9, 9, 0.04, 0.04]))
     track = run_filter(times, uv, R, sensor, motion, start)
@@ -76,7 +76,7 @@ def test_pixels_agree_with_filterpys_extended_filter():
 
 def test_the_unscented_wrapper_adds_nothing():
     times, uv, poses, _ = overflight()
-    sensor, R = m.pixels(CAMERA, poses, 0.0), 4.0 * np.eye(2)
+    sensor, R = m.pixels(poses, 0.0), 4.0 * np.eye(2)
     start = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     track = run_unscented(times, uv, R, sensor, CV, start)
     then = 0.0

@@ -95,7 +95,7 @@ def test_a_log_s_own_covariance_is_used_and_can_be_overridden(make_flight):
     assert np.allclose(pose_errors(flight, observations).pose, own)
     overridden = pose_errors(flight, observations, {"roll_deg": 2.0, "pitch_deg": 2.0, "yaw_deg": 2.0}).pose
     # Errors of the angles are not those about the axes once the airframe is tilted.
-    E = euler_errors_to_body(*matrix_to_euler(observations.R_nb)[:, :2].T)
+    E = euler_errors_to_body(*matrix_to_euler(observations.poses.R_nb)[:, :2].T)
     assert np.allclose(overridden[:, 3:, 3:], E @ np.swapaxes(E, 1, 2) * np.radians(2.0) ** 2)
 
 

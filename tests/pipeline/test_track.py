@@ -52,8 +52,8 @@ def test_a_detection_seen_from_the_true_pose_lies_on_the_target(flight: Flight) 
 
 def test_the_compiled_filters_are_the_readable_ones(seen: Sighting) -> None:
     begin, pixel_noise = start(seen, TUNING), np.eye(2) * TUNING.pixel**2
-    assert seen.pose_covariance is not None
-    pose = PoseUncertainty(seen.pose_covariance)
+    assert seen.poses.covariance is not None
+    pose = PoseUncertainty(seen.poses.covariance)
     pairs = [
         (
             follow_positions(seen, TUNING),

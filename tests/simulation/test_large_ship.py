@@ -15,7 +15,7 @@ from wildlab.simulation.settings import true_mount
 from wildlab.simulation.targets import target_outline, target_path
 from wildlab.simulation.trajectory import move
 from wildlab.simulation.twins import simulate, simulate_twin
-from wildlab.simulation.view import View
+from wildlab.simulation.view import Exposures
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_blobs_are_of_the_ship_seen_through_the_true_mount(twin):
     exact = simulate(with_values(twin, camera__marking_sd=0.0), 4).detections
     path, attitude = trajectory(twin, stream(4, "trajectory"))
     true = move(path, attitude, exposure_times(twin))
-    view = View(twin, true)
+    view = Exposures(twin, true)
     image = exact["frame_id"].str[1:].astype(int).to_numpy() - 1
     corners = target_outline(twin.target, 4)(true.times)
     polygon = np.stack([view.pixels(corners[:, i]) for i in range(4)], axis=1)[image]

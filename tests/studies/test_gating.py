@@ -8,9 +8,8 @@ from filterpy.kalman import KalmanFilter
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.gating import monte_carlo as gating
 from wildlab.studies.gating.monte_carlo import (
@@ -86,15 +85,15 @@ def test_pixels_and_angles_as_written_out(over: Overflight, form: str) -> None:
     """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
     runs = streams(11, 2)
     scene, gated = draw_scene(over, runs), gate(over, Choices(), runs)
-    f = over.camera.fx
-    middle = np.array([over.camera.cx, over.camera.cy])
+    f = over.poses.camera.fx
+    middle = np.array([over.poses.camera.cx, over.poses.camera.cy])
     R_uv, R_angles = np.diag([360.0, 160.0]), np.diag(np.radians([6.0, 3.0]) ** 2)
 
     for run in range(2):
         kf = warmed_up(scene, run)
         x, P = kf.x, kf.P
         for t in range(IMAGES):
-            R_cn, p_nc = scene.R_nc[run, t].T, scene.p_nc[run, t]
+            R_cn, p_nc = scene.poses.R_nc[run, t].T, scene.poses.p_nc[run, t]
 
             def in_camera(position: Array, R_cn: Array = R_cn, p_nc: Array = p_nc) -> Array:
                 return np.asarray(R_cn @ (np.append(position, 0.0) - p_nc))
@@ -163,11 +162,10 @@ def test_the_noise_is_that_of_the_tables(over: Overflight) -> None:
     se = np.sqrt(200 / 3000)
     np.testing.assert_allclose(apart.mean(axis=0), (10, 15), atol=5 * se)
     np.testing.assert_allclose(apart.std(axis=0), np.sqrt(200), rtol=0.07)
-    np.testing.assert_allclose((scene.p_nc - over.p_nb).std(axis=(0, 1)), (2, 2, 5), rtol=0.02)
+    np.testing.assert_allclose((scene.poses.p_nc - over.poses.p_nb).std(axis=(0, 1)), (2, 2, 5), rtol=0.02)
     np.testing.assert_allclose((scene.warm_up - scene.targets[:, :1]).std(axis=(0, 1)), 10, rtol=0.02)
     # The lens: roll and gimbal pan, pitch and gimbal tilt, each by one degree, yaw by two.
-    _, true = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
-    turned = np.swapaxes(true, -1, -2) @ scene.R_nc
+    turned = np.swapaxes(over.poses.R_nc, -1, -2) @ scene.poses.R_nc
     about = np.degrees([turned[..., 2, 1].std(), turned[..., 0, 2].std(), turned[..., 1, 0].std()])
     assert np.sqrt((about**2).sum()) == pytest.approx(np.sqrt(1 + 1 + 4 + 1 + 1), rel=0.1)
 
@@ -179,20 +177,20 @@ def test_the_stretch_is_the_nearest_and_the_gimbal_follows(flight: Flight, over:
     every = nav.iloc[::5]
     away = np.hypot(every["north_m"], every["east_m"]).to_numpy()
     farthest = np.array([away[i : i + IMAGES].max() for i in range(len(away) - IMAGES + 1)])
-    assert np.hypot(*over.p_nb[:, :2].T).max() == pytest.approx(farthest[round(10 * over.time_s[0])])
+    assert np.hypot(*over.poses.p_nb[:, :2].T).max() == pytest.approx(farthest[round(10 * over.time_s[0])])
     # Hardly any stretch is nearer, and what is has the origin out of view at one of its ends.
     assert (farthest < farthest[round(10 * over.time_s[0])]).mean() < 0.02
-    p_nc, R_nc = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
-    uv = ground_to_pixel(over.camera, np.append(over.place, 0.0), p_nc, R_nc)
-    np.testing.assert_allclose(uv[:, 1], over.camera.cy, atol=1e-6)
-    assert np.all((uv[:, 0] > 0) & (uv[:, 0] < over.camera.width))
+    camera, p_nc, R_nc = over.poses.camera, over.poses.p_nc, over.poses.R_nc
+    uv = ground_to_pixel(camera, np.append(over.place, 0.0), p_nc, R_nc)
+    np.testing.assert_allclose(uv[:, 1], camera.cy, atol=1e-6)
+    assert np.all((uv[:, 0] > 0) & (uv[:, 0] < camera.width))
     assert gating.share_in_image(over, 50, 1) > gating.share_in_image(
         overflight(flight, gimbal="down"), 50, 1
     )
 
 
 def test_what_is_printed_of_the_angles(over: Overflight) -> None:
-    c = over.camera
+    c = over.poses.camera
     uv = np.array([[c.cx + 100, c.cy + 60], [c.cx - 100, c.cy + 60], [c.cx - 100, c.cy - 60]])
     u, v = (uv - (c.cx, c.cy)).T
     azimuth = np.arctan((v / c.fy) / (u / c.fx))
@@ -236,10 +234,10 @@ def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> N
     first = next(iter(named.values()))
     for name, (other, choices) in list(named.items())[1:]:
         same_flight = all(np.array_equal(getattr(other, a), getattr(first[0], a)) for a in ("p_nb", "tilt"))
-        same_flight &= other.camera == over.camera
+        same_flight &= other.poses.camera == over.poses.camera
         assert same_flight != (choices == first[1]), name
     aside = overflight(flight, right=30.0).place
-    along = over.p_nb[-1, :2] - over.p_nb[0, :2]
+    along = over.poses.p_nb[-1, :2] - over.poses.p_nb[0, :2]
     assert np.hypot(*aside) == pytest.approx(30) and aside @ along == pytest.approx(0, abs=1e-9)
     assert along[0] * aside[1] - along[1] * aside[0] > 0  # north to east is clockwise: right
 

@@ -1,5 +1,7 @@
 """The Schmidt filter against the extended one: what each subject is, the claims' logic, whole flights."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -112,7 +114,7 @@ def test_position_uncertainty_of_centimetres_changes_next_to_nothing(seen: Sight
 
 def test_poses_without_covariance_are_refused(seen: Sighting) -> None:
     with pytest.raises(WildlabError, match="the poses have no covariance"):
-        compare(seen._replace(pose_covariance=None))
+        compare(seen._replace(poses=replace(seen.poses, covariance=None)))
 
 
 @pytest.mark.slow

@@ -1,13 +1,15 @@
 """Poses and targets for the tests of sensors and filters: a camera over a plane, looking roughly down."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.camera import Camera, project
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
-from wildlab.geometry.mount import Mount, camera_pose, camera_rotation
-from wildlab.tracking.measurement import CameraPoses
+from wildlab.geometry.mount import Mount
 
 CAMERA = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0)
 CROOKED = Camera(640, 512, 1100.0, 1120.0, 318.0, 250.0, 1.5, (-0.2, 0.05, 1e-3, -2e-3, 0.01))
@@ -20,20 +22,25 @@ POSE = st.tuples(
 PIXEL = st.tuples(st.floats(0.05, 0.95), st.floats(0.05, 0.95))
 
 
-def posed(pose):
-    """Body pose, mount and `CameraPoses` of one drawn pose."""
+def posed(pose, camera=CAMERA):
+    """`CameraPoses` of one drawn pose."""
     north, east, height, roll, pitch, yaw, misalignment, lever = pose
     p_nb, R_nb = np.array([north, east, -height]), euler_to_matrix(roll, pitch, yaw)
     mount = Mount(misalignment=misalignment, lever_arm=lever)
-    return p_nb, R_nb, mount, CameraPoses(*camera_pose(mount, p_nb, R_nb), camera_rotation(mount), lever)
+    return CameraPoses(camera, mount, p_nb, R_nb)
 
 
-def disturbed(p_nb, R_nb, mount, error):
+def disturbed(poses, error):
     """The camera's pose with errors dp, da (four times MRP) of the body: q = q_hat * dq."""
     turn = Rotation.from_mrp(np.asarray(error[3:]) / 4).as_matrix()
-    return CameraPoses(
-        *camera_pose(mount, p_nb + error[:3], R_nb @ turn), camera_rotation(mount), mount.lever_arm
-    )
+    return replace(poses, p_nb=poses.p_nb + error[:3], R_nb=poses.R_nb @ turn)
+
+
+def turned(poses, rows, turn=(1.0, -1.0, -1.0)):
+    """The same with the cameras of some rows turned over, to look away from the ground."""
+    R_nc = poses.R_nc.copy()
+    R_nc[rows] = R_nc[rows] @ np.diag(turn)
+    return CameraPoses.at_lens(poses.camera, poses.p_nc, R_nc, poses.R_bc, poses.lever_arm)
 
 
 def overflight(n=60, seed=0, sd_pixel=2.0, velocity=(1.5, -0.8), period=0.3):
@@ -45,8 +52,7 @@ def overflight(n=60, seed=0, sd_pixel=2.0, velocity=(1.5, -0.8), period=0.3):
     p_nb = np.column_stack([60 * np.sin(course), 60 * np.cos(course), np.full(n, -300.0)])
     attitude = rng.normal(0, 0.03, (n, 2))
     R_nb = euler_to_matrix(attitude[:, 0], attitude[:, 1], course)
-    mount = Mount()
-    poses = CameraPoses(*camera_pose(mount, p_nb, R_nb), camera_rotation(mount))
+    poses = CameraPoses(CAMERA, Mount(), p_nb, R_nb)
     target = np.column_stack([truth[:, :2], np.zeros(n)])
     p_c = np.einsum("nji,nj->ni", poses.R_nc, target - poses.p_nc)
     return times, project(CAMERA, p_c) + rng.normal(0, sd_pixel, (n, 2)), poses, truth

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from tests.tracking.poses import CAMERA, overflight
+from tests.tracking.poses import overflight, turned
 from wildlab.tracking import measurement as m
 from wildlab.tracking.association import distances, gate_threshold, innovation_squared, nearest_within
 
@@ -21,7 +21,7 @@ def expected(kind, position, poses):
         shape = (*np.shape(position)[:-1], 1, 1)
         return m.Prediction(np.asarray(position), np.tile(np.eye(2), shape), np.zeros((*shape[:-2], 2, 6)))
     if kind == "pixel":
-        return m.predict_pixel(CAMERA, position, poses, 0.0)
+        return m.predict_pixel(position, poses, 0.0)
     return m.predict_azimuth_elevation(position, poses, 0.0)
 
 
@@ -31,7 +31,7 @@ def test_many_tracks_at_once_are_as_one_after_the_other(kind):
     rng = np.random.default_rng(0)
     there = truth[:, :2] + rng.normal(0, 3, (30, 2))
     both = np.stack([truth[:, :2], truth[:, :2] + [10.0, 15.0]], axis=1)
-    each = m.CameraPoses(poses.p_nc[:, None], poses.R_nc[:, None], poses.R_bc)
+    each = poses.take((slice(None), None))
     z = expected(kind, both, each).z
     z[3, 1] = np.nan
     seen = expected(kind, there, poses)
@@ -54,7 +54,7 @@ def test_many_tracks_at_once_are_as_one_after_the_other(kind):
 @pytest.mark.parametrize("kind", ["pixel", "azimuth and elevation"])
 def test_who_is_not_in_sight_has_no_detection(kind):
     _, _, poses, truth = overflight(1)
-    up = poses._replace(R_nc=poses.R_nc @ np.diag([1.0, -1.0, -1.0]))
+    up = turned(poses, slice(None))
     nis = distances(expected(kind, truth[:, :2], up), ANGLES[kind], P, np.zeros((1, 3, 2)), NOISE[kind])
     assert np.isnan(nis).all()
     assert nearest_within(nis, None, 2).tolist() == [-1]

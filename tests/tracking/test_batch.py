@@ -1,5 +1,6 @@
 """The compiled filters of many runs against the readable filter, run by run."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from tests.tracking.poses import CAMERA, CROOKED, overflight
 from tests.tracking.test_schmidt import hard_flight, random_pose_covariance
 from wildlab.errors import WildlabError
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
 from wildlab.tracking.batch import View, run_batch
@@ -42,11 +44,7 @@ def flight(runs, seed=0):
     z = uv + rng.normal(0, 2, (runs, N, 2))
     z[rng.random((runs, N)) < 0.1, 0] = np.nan
     z[1, 12] += 300
-    return times, z, m.CameraPoses(p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
-
-
-def one(poses, run):
-    return m.CameraPoses(poses.p_nc[run], poses.R_nc[run], poses.R_bc, poses.lever_arm)
+    return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
 
 
 @pytest.mark.parametrize("gate", [None, 0.99])
@@ -99,9 +97,9 @@ def test_pixels(gate):
     plane = np.linspace(0, 1, N)
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
-    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, plane), gate=gate)
+    batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate=gate)
     for run in (0, 1, 33, 63, 64, 66):
-        sensor = m.pixels(CAMERA, one(poses, run), plane)
+        sensor = m.pixels(poses.take(run), plane)
         agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate=gate))
     assert not batch.used[33, 5]
 
@@ -118,11 +116,11 @@ def test_schmidt(correlation_time):
     start = Start(0.0, np.zeros(4), np.tile(np.diag([25.0, 25, 9, 9]), (runs, 1, 1)))
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     pose = PoseUncertainty(covariance, correlation_time)
-    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, 0.0), pose=pose, gate=0.999)
+    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose, gate=0.999)
     for run in (0, 1, 3, 4, 5, 33, 63, 65):
         own = start._replace(P=start.P[run])
         track = run_filter(
-            times, z[run], R, m.pixels(CAMERA, one(poses, run), 0.0), CV, own,
+            times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
             pose=pose._replace(covariance=covariance[run]), gate=0.999,
         )  # fmt: skip
         agree(batch, run, track)
@@ -136,9 +134,9 @@ def test_schmidt_with_poses_of_any_uncertainty(change):
     start = Start(0.0, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     z = np.stack([uv, uv + 3.0])
     R = 4.0 * np.eye(2)
-    batch = run_batch(times, z, R, CV, start, view=View(CAMERA, poses, 0.0), pose=pose)
+    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose)
     for run in range(2):
-        track = run_filter(times, z[run], R, m.pixels(CAMERA, poses, 0.0), CV, start, pose=pose)
+        track = run_filter(times, z[run], R, m.pixels(poses, 0.0), CV, start, pose=pose)
         agree(batch, run, track)
 
 
@@ -164,7 +162,7 @@ def test_the_cross_covariance_is_limited_alike():
 def test_only_the_rows_asked_for_are_kept():
     times, z, poses, _ = flight(66)
     start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
-    arguments = dict(view=View(CAMERA, poses, 0.0), gate=0.99)
+    arguments = dict(view=View(poses, 0.0), gate=0.99)
     full = run_batch(times, z, np.eye(2), CV, start, **arguments)
     rows = [0, 1, 17, N - 1]
     some = run_batch(times, z, np.eye(2), CV, start, rows=rows, **arguments)
@@ -184,7 +182,7 @@ def test_bad_input_is_named():
     with pytest.raises(WildlabError, match=r"give \(runs, times, 2\)|Give \(runs, times, 2\)"):
         run_batch(times, z[0], R, CV, start)
     with pytest.raises(WildlabError, match="camera distorts"):
-        run_batch(times, z, R, CV, start, view=View(CROOKED, poses, 0.0))
+        run_batch(times, z, R, CV, start, view=View(replace(poses, camera=CROOKED), 0.0))
     with pytest.raises(WildlabError, match="row 3 at"):
         run_batch(np.where(np.arange(N) == 3, -1.0, times), z, R, CV, start)
     bad = np.tile(R, (3, N, 1, 1))

@@ -1,12 +1,16 @@
 """Sensors: their predictions against geometry's, and every derivative against finite differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, disturbed, posed
-from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import wrap
+from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import measurement as m
 from wildlab.tracking.noise import constant_noise, noise_by_altitude
 
@@ -25,9 +29,10 @@ def slope(function, k, step):
 POSE_STEP = np.repeat([0.05, 1e-4], 3)
 
 
-def target_at(camera, poses, share, plane):
+def target_at(poses, share, plane):
+    camera = poses.camera
     uv = np.array([share[0] * camera.width, share[1] * camera.height])
-    target = pixel_to_plane(camera, uv, poses.p_nc, poses.R_nc, plane)
+    target = georeference_pixels(poses, uv, plane)
     assume(np.isfinite(target).all() and np.linalg.norm(target - poses.p_nc) < 3000)
     return uv, target
 
@@ -35,22 +40,25 @@ def target_at(camera, poses, share, plane):
 @pytest.mark.parametrize("camera", [CAMERA, CROOKED], ids=["pinhole", "distorting"])
 @given(pose=POSE, share=PIXEL, plane=st.floats(-3, 3))
 def test_pixel_and_its_derivatives(camera, pose, share, plane):
-    p_nb, R_nb, mount, poses = posed(pose)
-    uv, target = target_at(camera, poses, share, plane)
-    seen = m.predict_pixel(camera, target[:2], poses, plane)
+    poses = posed(pose, camera)
+    uv, target = target_at(poses, share, plane)
+    seen = m.predict_pixel(target[:2], poses, plane)
     assert np.allclose(seen.z, uv, atol=1e-6)
-    by_position = slope(lambda d: m.predict_pixel(camera, target[:2] + d, poses, plane).z, 2, [0.05, 0.05])
+    by_position = slope(lambda d: m.predict_pixel(target[:2] + d, poses, plane).z, 2, [0.05, 0.05])
     assert np.allclose(seen.H_position, by_position, rtol=1e-5, atol=1e-6)
-    by_pose = slope(
-        lambda d: ground_to_pixel(camera, target, *disturbed(p_nb, R_nb, mount, d)[:2]), 6, POSE_STEP
-    )
+
+    def pixel(d):
+        wrong = disturbed(poses, d)
+        return ground_to_pixel(camera, target, wrong.p_nc, wrong.R_nc)
+
+    by_pose = slope(pixel, 6, POSE_STEP)
     assert np.allclose(seen.H_pose, by_pose, rtol=1e-5, atol=1e-3)
 
 
 @given(pose=POSE, share=PIXEL, plane=st.floats(-3, 3))
 def test_azimuth_and_elevation_and_their_derivatives(pose, share, plane):
-    p_nb, R_nb, mount, poses = posed(pose)
-    uv, target = target_at(CROOKED, poses, share, plane)
+    poses = posed(pose, CROOKED)
+    uv, target = target_at(poses, share, plane)
     assume(np.hypot(*(uv - [318, 250])) > 20)  # near the axis the azimuth turns faster than differences see
     seen = m.predict_azimuth_elevation(target[:2], poses, plane)
     assert np.allclose(seen.z, m.azimuth_elevation_of_pixel(CROOKED, uv), atol=1e-8)
@@ -63,7 +71,7 @@ def test_azimuth_and_elevation_and_their_derivatives(pose, share, plane):
     )
     assert np.allclose(seen.H_position, by_position, rtol=1e-5, atol=1e-8)
     by_pose = slope(
-        lambda d: away(m.predict_azimuth_elevation(target[:2], disturbed(p_nb, R_nb, mount, d), plane)),
+        lambda d: away(m.predict_azimuth_elevation(target[:2], disturbed(poses, d), plane)),
         6, POSE_STEP / 5,
     )  # fmt: skip
     assert np.allclose(seen.H_pose, by_pose, rtol=1e-5, atol=1e-4)
@@ -96,28 +104,28 @@ def test_range_and_bearing_and_their_derivatives(target, platform, yaw):
 @given(pose=POSE, share=PIXEL)
 def test_behind_the_camera_nothing_is_seen(pose, share):
     """The point opposite has the same quotients x/z, y/z: only its depth gives it away."""
-    *_, poses = posed(pose)
-    _, target = target_at(CAMERA, poses, share, 0.0)
+    poses = posed(pose)
+    _, target = target_at(poses, share, 0.0)
     opposite = 2 * poses.p_nc - target
     for seen in (
-        m.predict_pixel(CAMERA, opposite[:2], poses, opposite[2]),
+        m.predict_pixel(opposite[:2], poses, opposite[2]),
         m.predict_azimuth_elevation(opposite[:2], poses, opposite[2]),
     ):
         assert np.isnan(seen.z).all()
         assert np.isnan(seen.H_position).all()
-    below = m.predict_pixel(CAMERA, poses.p_nc[:2], poses, poses.p_nc[2])  # the lens itself
+    below = m.predict_pixel(poses.p_nc[:2], poses, poses.p_nc[2])  # the lens itself
     assert np.isnan(below.z).all()
 
 
 def test_where_an_angle_is_not_defined_there_is_none():
-    poses = m.CameraPoses(np.array([0.0, 0.0, -100.0]), np.eye(3), np.eye(3))
+    poses = CameraPoses.at_lens(CAMERA, [0.0, 0.0, -100.0], np.eye(3), np.eye(3))
     assert np.isnan(m.predict_azimuth_elevation([0.0, 0.0], poses, 0.0).z).all()
     assert np.isnan(m.azimuth_elevation_of_pixel(CAMERA, [318.0, 250.0])).all()
     assert np.isnan(m.predict_range_bearing([3.0, 4.0], [3.0, 4.0], 0.0).z).all()
 
 
 def test_angles_differ_by_the_short_way_round():
-    assert np.allclose(m.wrap([np.pi, 3 * np.pi, -np.pi, 0.1]), [-np.pi, -np.pi, -np.pi, 0.1])
+    assert np.allclose(wrap([np.pi, 3 * np.pi, -np.pi, 0.1]), [-np.pi, -np.pi, -np.pi, 0.1])
     gap = m.difference([3.1, 3.1], [-3.1, -3.1], (True, False))
     assert np.allclose(gap, [6.2 - 2 * np.pi, 6.2])
 
@@ -125,14 +133,14 @@ def test_angles_differ_by_the_short_way_round():
 def test_rows_of_a_run_have_their_own_poses():
     drawn = [(10.0, 20.0, 100.0, 0.1, -0.2, 1.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0)),
              (-10.0, 5.0, 120.0, -0.1, 0.1, 2.0, (0.0, 0.1, 0.0), (0.5, 0.0, 0.0))]  # fmt: skip
-    singles = [posed(one)[3] for one in drawn]
-    together = m.CameraPoses(
-        *(np.stack(part) for part in list(zip(*singles, strict=True))[:2]), *singles[0][2:]
+    singles = [posed(one) for one in drawn]
+    together = replace(
+        singles[0], p_nb=np.stack([one.p_nb for one in singles]), R_nb=np.stack([one.R_nb for one in singles])
     )
     planes, position = np.array([0.0, 2.0]), np.array([3.0, 4.0])
     for row, one in enumerate(singles):
         for sensor, expected in (
-            (m.pixels(CAMERA, together, planes), m.predict_pixel(CAMERA, position, one, planes[row])),
+            (m.pixels(together, planes), m.predict_pixel(position, one, planes[row])),
             (
                 m.azimuths_elevations(together, planes),
                 m.predict_azimuth_elevation(position, one, planes[row]),
@@ -140,8 +148,8 @@ def test_rows_of_a_run_have_their_own_poses():
         ):
             for ours, theirs in zip(sensor.predict(row, position), expected, strict=True):
                 assert np.allclose(ours, theirs)
-    batch = m.predict_pixel(CAMERA, np.tile(position, (2, 1)), together, planes)
-    assert np.allclose(batch.z[1], m.predict_pixel(CAMERA, position, singles[1], 2.0).z)
+    batch = m.predict_pixel(np.tile(position, (2, 1)), together, planes)
+    assert np.allclose(batch.z[1], m.predict_pixel(position, singles[1], 2.0).z)
     platform, yaw = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([0.0, 0.5])
     both = m.ranges_bearings(platform, yaw).predict(1, position)
     alone = m.bearings(platform, yaw).predict(1, position)

@@ -5,8 +5,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.tracking.poses import CAMERA, overflight
+from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import wrap
 from wildlab.tracking import measurement as m
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.others import run_imm, run_unscented
@@ -53,7 +54,7 @@ def test_on_a_linear_model_all_are_the_kalman_filter(gate):
 
 def test_on_pixels_they_come_close_to_the_extended_filter():
     times, uv, poses, truth = overflight()
-    sensor = m.pixels(CAMERA, poses, 0.0)
+    sensor = m.pixels(poses, 0.0)
     plain = run_filter(times, uv, PIXELS, sensor, CV, START)
     bent = run_unscented(times, uv, PIXELS, sensor, CV, START)
     twice = run_imm(times, uv, PIXELS, sensor, [CV, CV], [5.0, 2.0], START)
@@ -89,8 +90,8 @@ def test_bearings_are_averaged_across_the_wrap():
     sensor, R = m.bearings(own, 0.0), 4e-4 * np.eye(1)
     start = Start(0.0, np.array([10.0, 10, 0, 0]), np.diag([400.0, 400, 1, 1]))
     for track in (
-        run_unscented(times, m.wrap(z), R, sensor, CALM, start),
-        run_imm(times, m.wrap(z), R, sensor, [CALM, CV], [10, 10], start).track,
+        run_unscented(times, wrap(z), R, sensor, CALM, start),
+        run_imm(times, wrap(z), R, sensor, [CALM, CV], [10, 10], start).track,
     ):
         assert track.used.all()
         assert np.abs(track.innovation).max() < 0.5
@@ -99,9 +100,7 @@ def test_bearings_are_averaged_across_the_wrap():
 
 def test_behind_the_camera_there_is_no_update():
     times, uv, poses, _ = overflight(20)
-    R_nc = poses.R_nc.copy()
-    R_nc[7] = R_nc[7] @ np.diag([1.0, -1.0, -1.0])
-    sensor = m.pixels(CAMERA, poses._replace(R_nc=R_nc), 0.0)
+    sensor = m.pixels(turned(poses, 7), 0.0)
     for track in (
         run_unscented(times, uv, PIXELS, sensor, CV, START),
         run_imm(times, uv, PIXELS, sensor, [CALM, WILD], [10, 10], START).track,

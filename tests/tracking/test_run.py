@@ -1,12 +1,14 @@
 """Whole flights: the extended filter is the linear one on a linear model, and bad input is answered."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
-from tests.tracking.poses import CAMERA, overflight
+from tests.tracking.poses import CAMERA, overflight, turned
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.tracking import measurement as m
 from wildlab.tracking.kalman import predict, update
@@ -65,7 +67,7 @@ def test_a_vessel_is_found_from_its_pixels_and_the_filter_knows_how_well():
         times, uv, poses, truth = overflight(seed=seed)
         ground = pixel_to_plane(CAMERA, uv, poses.p_nc, poses.R_nc, 0.0)
         start = start_from_first(times, ground, 5.0, 3.0)
-        track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, start)
+        track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, start)
         error = track.x[-1] - truth[-1]
         nees.append(error @ np.linalg.solve(track.P[-1], error))
         assert track.used.all()
@@ -85,7 +87,7 @@ def test_other_sensors_find_it_too(only):
         z = m.azimuth_elevation_of_pixel(CAMERA, uv)
     elif only == "bearing":
         sensor, R = m.bearings(ship, yaw), np.eye(1) * 0.01**2
-        z = m.wrap(exact[:, 1:] + rng.normal(0, 0.01, (120, 1)))
+        z = wrap(exact[:, 1:] + rng.normal(0, 0.01, (120, 1)))
     else:
         sensor, R = m.ranges_bearings(ship, yaw), np.diag([5.0, 0.01]) ** 2
         z = exact + rng.normal(0, [5.0, 0.01], (120, 2))
@@ -166,13 +168,11 @@ def test_detections_that_are_missing_change_nothing():
 
 def test_a_target_behind_the_camera_is_not_updated():
     times, uv, poses, _ = overflight(20)
-    R_nc = poses.R_nc.copy()
-    R_nc[7] = R_nc[7] @ np.diag([1.0, -1.0, -1.0])  # looks up
-    turned = poses._replace(R_nc=R_nc)
-    p_nc = poses.p_nc.copy()
-    p_nc[9] = np.nan  # and here nobody knows where the camera is
+    p_nb = poses.p_nb.copy()
+    p_nb[9] = np.nan  # here nobody knows where the camera is
+    poses = turned(replace(poses, p_nb=p_nb), 7)  # and here it looks up
     start = Start(times[0], np.zeros(4), np.diag([25.0, 25, 4, 4]))
-    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, turned._replace(p_nc=p_nc), 0.0), CV, start)
+    track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, start)
     assert not track.used[[7, 9]].any()
     assert np.isnan(track.nis[[7, 9]]).all()
     assert track.used.sum() == 18
@@ -203,7 +203,7 @@ def test_of_several_detections_the_nearest_is_used():
     order = rng.integers(0, 2, 30)
     both = np.take_along_axis(both, np.stack([order, 1 - order], axis=1)[..., None], axis=1)
     start = Start(times[0], np.zeros(4), np.diag([9.0, 9, 4, 4]))
-    sensor = m.pixels(CAMERA, poses, 0.0)
+    sensor = m.pixels(poses, 0.0)
     track = run_filter(times, both, PIXELS, sensor, CV, start)
     assert np.array_equal(track.chosen, 1 - order)
     alone = run_filter(times, uv, PIXELS, sensor, CV, start)

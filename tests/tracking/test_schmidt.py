@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tracking.poses import CAMERA, overflight
+from tests.tracking.poses import overflight
 from wildlab.errors import WildlabError
 from wildlab.tracking import measurement as m
 from wildlab.tracking import schmidt
@@ -58,8 +58,7 @@ def dense(times, uv, R, poses, covariances, start, motion, fade=lambda dt: 1.0, 
         P = F @ P @ F.T + Q
         P[4:, 4:] = covariances[k]  # process noise of the pose's error
         x[:4] = F[:4, :4] @ x[:4]
-        one = m.CameraPoses(poses.p_nc[k], poses.R_nc[k], poses.R_bc)
-        seen = m.predict_pixel(CAMERA, x[:2], one, 0.0)
+        seen = m.predict_pixel(x[:2], poses.take(k), 0.0)
         H = np.zeros((2, 10))
         H[:, :2], H[:, 4:] = seen.H_position, seen.H_pose
         S = H @ P @ H.T + R
@@ -89,7 +88,7 @@ def test_it_is_the_full_filter_with_no_gain_for_the_pose(change, correlation_tim
     if change == "bias":
         covariances[:] = covariances[20]
     pose = PoseUncertainty(covariances, correlation_time, change)
-    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     full = dense(times, uv, PIXELS, poses, covariances, START, CV, lambda dt: np.exp(-dt / correlation_time))
     for row, (x, P, S) in enumerate(full):
         assert np.allclose(track.x[row], x, rtol=1e-9, atol=1e-9)
@@ -116,7 +115,7 @@ def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function
     rng = np.random.default_rng(4)
     covariances = np.array([random_pose_covariance(rng, 0.3) for _ in times])
     pose = PoseUncertainty(covariances, change=change)
-    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     full = dense(times, uv, PIXELS, poses, covariances, START, CV, carry=by_eigenvectors(function))
     for row, (x, P, S) in enumerate(full):
         assert np.allclose(track.x[row], x, rtol=1e-7, atol=1e-7)
@@ -128,7 +127,7 @@ def test_it_is_the_full_filter_whose_pose_error_changes_as_said(change, function
 @pytest.mark.parametrize("change", ["bias", "navigated"])
 def test_with_a_perfect_pose_it_is_the_extended_filter(change):
     times, uv, poses, _ = overflight(50)
-    sensor = m.pixels(CAMERA, poses, 0.0)
+    sensor = m.pixels(poses, 0.0)
     plain = run_filter(times, uv, PIXELS, sensor, CV, START)
     pose = PoseUncertainty(np.zeros((50, 6, 6)), change=change)
     track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=pose)
@@ -164,7 +163,7 @@ def test_without_memory_it_is_the_inflated_filter():
     """H (7.40)-(7.41): the pose's covariance counts as more noise."""
     times, uv, poses, _ = overflight(40)
     covariances = growing(40)
-    sensor = m.pixels(CAMERA, poses, 0.0)
+    sensor = m.pixels(poses, 0.0)
     track = run_filter(times, uv, PIXELS, sensor, CV, START, pose=PoseUncertainty(covariances, 0.0))
     x, P, then = START.x, START.P, 0.0
     for row, t in enumerate(times):
@@ -190,14 +189,12 @@ def test_a_standing_error_of_the_pose_is_owned_up_to():
         error = rng.multivariate_normal(np.zeros(6), covariance)
         # The true pose is off by the error from the one that the filter is told.
         seen = [
-            m.predict_pixel(
-                CAMERA, truth[k, :2], m.CameraPoses(poses.p_nc[k], poses.R_nc[k], poses.R_bc), 0.0
-            )
+            m.predict_pixel(truth[k, :2], poses.take(k), 0.0)
             for k in range(60)
         ]
         shifted = uv + np.array([one.H_pose @ error for one in seen])
         for pose, nees in ((None, plain), (PoseUncertainty(np.tile(covariance, (60, 1, 1))), aware)):
-            track = run_filter(times, shifted, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+            track = run_filter(times, shifted, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
             off = (track.x[-1] - truth[-1])[:2]
             nees.append(off @ np.linalg.solve(track.P[-1][:2, :2], off))
     assert np.mean(plain) > 10
@@ -294,7 +291,7 @@ def test_each_knows_its_errors_when_the_pose_errs_as_it_believes(change):
     n, runs = 150, 400
     rng = np.random.default_rng(0)
     times, exact, poses, truth = overflight(n, sd_pixel=0.0)
-    seen = m.predict_pixel(CAMERA, truth[:, :2], m.CameraPoses(poses.p_nc, poses.R_nc, poses.R_bc), 0.0)
+    seen = m.predict_pixel(truth[:, :2], poses, 0.0)
     sizes, gains = swinging(n)
     if change == "bias":
         sizes = 1 + 0.4 * np.sin(3 * times)
@@ -312,7 +309,7 @@ def test_each_knows_its_errors_when_the_pose_errs_as_it_believes(change):
     start = Start(0.0, truth[0] + sd * rng.normal(size=(runs, 4)), np.diag(sd**2))
     pose = PoseUncertainty(sizes[:, None, None] * np.diag(UNITS**2), change=change)
     calm = partial(constant_velocity, sd_acceleration=0.01)
-    tracks = run_batch(times, z, PIXELS, calm, start, view=View(CAMERA, poses, 0.0), pose=pose)
+    tracks = run_batch(times, z, PIXELS, calm, start, view=View(poses, 0.0), pose=pose)
     error = (tracks.x - truth)[..., :2]
     nees = np.einsum("bni,bnij,bnj->bn", error, np.linalg.inv(tracks.P[..., :2, :2]), error)
     assert 1.7 < nees[:, n // 3 :].mean() < 2.3  # 2 in the mean
@@ -336,7 +333,7 @@ def hard_flight(n, seed=0):
     period = 200
     _, uv, poses, _ = overflight(period, sd_pixel=1.0)
     rows = np.arange(n) % period
-    repeated = m.CameraPoses(poses.p_nc[rows], poses.R_nc[rows], poses.R_bc)
+    repeated = poses.take(rows)
     steps = rng.uniform(0, 0.3, n)
     A = rng.normal(size=(n, 6, 7)) * UNITS[:, None] * np.exp(2.0 * rng.normal(size=(n, 6, 1)))
     covariances = A @ np.swapaxes(A, 1, 2) / 7
@@ -356,7 +353,7 @@ def test_the_print_alone_does_not_stay_sound():
 def test_covariance_stays_one_with_a_new_pose_in_every_frame(change, n):
     times, uv, poses, covariances = hard_flight(n)
     pose = PoseUncertainty(covariances, change=change)
-    track = run_filter(times, uv, PIXELS, m.pixels(CAMERA, poses, 0.0), CV, START, pose=pose)
+    track = run_filter(times, uv, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)
     assert track.used.mean() > 0.9
     assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
     sd = np.sqrt(np.diagonal(track.P, axis1=1, axis2=2))

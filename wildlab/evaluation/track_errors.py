@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.frames import wrap
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,8 @@ def track_errors(truth: ArrayLike, estimate: ArrayLike) -> TrackErrors:
     along = np.sum(position * ahead, axis=1)
     across = position[:, 1] * ahead[:, 0] - position[:, 0] * ahead[:, 1]
     estimated_speed = np.hypot(x[:, 2], x[:, 3])
-    course = wrap(np.arctan2(t[:, 3], t[:, 2]) - np.arctan2(x[:, 3], x[:, 2]))
+    # `wrap` gives [-pi, pi); the negative of the negative is in (-pi, pi].
+    course = -wrap(np.arctan2(x[:, 3], x[:, 2]) - np.arctan2(t[:, 3], t[:, 2]))
     course[~(moves & (estimated_speed > 0))] = np.nan
     return TrackErrors(
         position,
@@ -76,11 +78,6 @@ def track_errors(truth: ArrayLike, estimate: ArrayLike) -> TrackErrors:
         ~np.isfinite(t[:, :2]).all(axis=1),
         ~np.isfinite(x[:, :2]).all(axis=1),
     )
-
-
-def wrap(angle: ArrayLike) -> Array:
-    """Angles in (-pi, pi]."""
-    return np.pi - np.mod(np.pi - np.asarray(angle, float), 2 * np.pi)
 
 
 class TrackSummary(NamedTuple):

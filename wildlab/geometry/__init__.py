@@ -1,7 +1,173 @@
 """Geometry of a flying camera: frames, camera, mount, pixel <-> ground with uncertainty, and calibration.
 
-Stands on the ground: imports nothing else of wildlab. Arrays in, arrays out, one row per item, SI units and
-radians. Frames as in H 5.2.2: ``n`` north-east-down with a fixed origin, ``b`` body (x forward, y right,
-z down), ``m`` mount, ``c`` camera (x right in the image, y down in the image, z out of the lens), ``e`` ECEF.
-``R_nb`` takes a vector from b to n; ``p_nc`` is the position of c relative to n, in n.
+Stands on the ground: imports nothing else of wildlab but its errors. Sections and equations are those of the
+theses: H is Helgesen (2019), who tracks vessels with the camera of an unmanned aircraft; F is Flodell and
+Christensson (2016), who look for animals with one. Where a print has a slip, the function says so.
+
+Arrays in, arrays out, one row per item, SI units and radians, pixels for what is in the image; a single value
+may stand for all rows. What cannot be had (a ray over the horizon, a point behind the camera) is NaN in its
+row. Frames as in H 5.2.2: ``n`` north-east-down with a fixed origin, ``b`` body (x forward, y right, z down),
+``m`` mount, ``c`` camera (x right in the image, y down in the image, z out of the lens), ``e`` ECEF. ``R_nb``
+takes a vector from b to n; ``p_nc`` is the position of c relative to n, in n.
+
+`CameraPoses` brings a camera, its mount and N poses of the airframe together, and most else takes it:
+
+>>> import numpy as np
+>>> from wildlab.geometry import Camera, CameraPoses, Mount, euler_to_matrix, georeference_pixels
+>>> camera = Camera(640, 512, fx=1000.0, fy=1000.0, cx=320.0, cy=256.0)
+>>> R_nb = euler_to_matrix(0.0, np.radians([-45.0, -30.0]), 0.0)
+>>> poses = CameraPoses(camera, Mount("forward"), np.array([0.0, 0.0, -100.0]), R_nb)
+>>> print(np.round(georeference_pixels(poses, np.tile([320.0, 256.0], (2, 1)), plane_down=0.0), 1))
+[[100.    0.    0. ]
+ [173.2   0.    0. ]]
 """
+
+from wildlab.geometry.calibration import (
+    BORESIGHT,
+    PARAMETERS,
+    Calibration,
+    PosesAt,
+    apply_calibration,
+    calibrate,
+    calibrated_poses,
+    georeference_calibrated,
+    split_images,
+)
+from wildlab.geometry.camera import (
+    NO_DISTORTION,
+    Camera,
+    camera_from_data_sheet,
+    camera_from_matrix,
+    distort,
+    distortion_jacobian,
+    in_image,
+    normalise,
+    normalise_jacobian,
+    project,
+    undistort,
+    undistort_approximately,
+)
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
+from wildlab.geometry.frames import (
+    Array,
+    Origin,
+    ecef_to_geodetic,
+    enu_to_ned,
+    euler_errors_to_body,
+    euler_to_matrix,
+    geodetic_to_ecef,
+    geodetic_to_ned,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    matrix_to_rotation_vector,
+    ned_to_enu,
+    ned_to_geodetic,
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+    skew,
+    wrap,
+)
+from wildlab.geometry.georeference import (
+    georeference_pixels,
+    ground_to_pixel,
+    intersect_plane,
+    pixel_rays,
+    pixel_to_plane,
+)
+from wildlab.geometry.gravity import (
+    EARTH_RATE,
+    Earth,
+    attraction,
+    flat_earth,
+    local_earth,
+    normal_gravity,
+)
+from wildlab.geometry.mount import (
+    Mount,
+    camera_pose,
+    camera_rotation,
+    helgesen_misalignment,
+    mount_rotation,
+)
+from wildlab.geometry.uncertainty import (
+    GroundCovariance,
+    GroundJacobians,
+    PoseErrors,
+    ellipse_axes,
+    ground_covariance,
+    ground_jacobians,
+    inside_ellipse,
+    ray_flatness,
+    sample_ground,
+)
+
+__all__ = [
+    "BORESIGHT",
+    "EARTH_RATE",
+    "NO_DISTORTION",
+    "PARAMETERS",
+    "Array",
+    "Calibration",
+    "Camera",
+    "CameraPoses",
+    "Earth",
+    "GroundCovariance",
+    "GroundJacobians",
+    "Mount",
+    "Origin",
+    "PoseErrors",
+    "PosesAt",
+    "apply_calibration",
+    "attraction",
+    "calibrate",
+    "calibrated_poses",
+    "camera_from_data_sheet",
+    "camera_from_matrix",
+    "camera_pose",
+    "camera_rotation",
+    "distort",
+    "distortion_jacobian",
+    "ecef_to_geodetic",
+    "ellipse_axes",
+    "enu_to_ned",
+    "euler_errors_to_body",
+    "euler_to_matrix",
+    "flat_earth",
+    "geodetic_to_ecef",
+    "geodetic_to_enu_linear",
+    "geodetic_to_ned",
+    "georeference_calibrated",
+    "georeference_pixels",
+    "ground_covariance",
+    "ground_jacobians",
+    "ground_to_pixel",
+    "helgesen_misalignment",
+    "in_image",
+    "inside_ellipse",
+    "intersect_plane",
+    "linear_enu_error",
+    "local_earth",
+    "matrix_to_euler",
+    "matrix_to_quaternion",
+    "matrix_to_rotation_vector",
+    "metres_per_degree",
+    "mount_rotation",
+    "ned_to_enu",
+    "ned_to_geodetic",
+    "normal_gravity",
+    "normalise",
+    "normalise_jacobian",
+    "pixel_rays",
+    "pixel_to_plane",
+    "project",
+    "quaternion_to_matrix",
+    "ray_flatness",
+    "rotation_vector_to_matrix",
+    "sample_ground",
+    "skew",
+    "split_images",
+    "undistort",
+    "undistort_approximately",
+    "wrap",
+]

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
-from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
-from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.mount import Mount
 
 #: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
 #: with the size an error of it would usually have (radians, seconds, metres). A parameter, or a combination,
@@ -36,8 +35,8 @@ BORESIGHT = ("roll", "tilt", "pan")
 #: Smallest singular value of the normalised derivatives: 0.1 is two columns with a correlation of 0.99.
 PARALLEL = 0.1
 
-#: Poses of the airframe at the images' times shifted by so many seconds: ``p_nb`` (N, 3), ``R_nb`` (N, 3, 3).
-PosesAt = Callable[[float], tuple[Array, Array]]
+#: Poses at the times of N pixels, shifted by so many seconds.
+PosesAt = Callable[[float], CameraPoses]
 
 
 @dataclass(frozen=True)
@@ -80,33 +79,75 @@ class Calibration:
 
 
 def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:
-    """The mount with the estimated angles on top of its own misalignment."""
+    """The mount with the estimated angles on top of its own misalignment.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    mount
+        The one it was estimated with.
+
+    Returns
+    -------
+    The mount, otherwise unchanged.
+    """
     angles = [calibration.value(name) for name in BORESIGHT]
     turned = euler_to_matrix(*angles) @ euler_to_matrix(*mount.misalignment)
     roll, tilt, pan = matrix_to_euler(turned)
     return replace(mount, misalignment=(float(roll), float(tilt), float(pan)))
 
 
-def georeference_calibrated(
-    calibration: Calibration,
-    camera: Camera,
-    mount: Mount,
-    uv: ArrayLike,
-    poses_at: PosesAt,
-    plane_down: ArrayLike,
-) -> Array:
-    """Ground points (N, 3) with a calibration applied to mount, position and clock."""
-    p_nb, R_nb = poses_at(calibration.value("clock"))
+def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses:
+    """Poses with a calibration applied to clock, position and mount.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    poses_at
+        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
+
+    Returns
+    -------
+    The poses; their covariance is that of the logged ones.
+    """
+    poses = poses_at(calibration.value("clock"))
     shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
-    pose = camera_pose(apply_calibration(calibration, mount), p_nb + shift, R_nb)
-    return pixel_to_plane(camera, uv, *pose, plane_down)
+    return replace(poses, p_nb=poses.p_nb + shift, mount=apply_calibration(calibration, poses.mount))
+
+
+def georeference_calibrated(
+    calibration: Calibration, poses_at: PosesAt, uv: ArrayLike, plane_down: ArrayLike
+) -> Array:
+    """Ground points with a calibration applied to clock, position and mount.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    poses_at
+        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
+    uv
+        (N, 2) pixels.
+    plane_down
+        Down coordinate of the plane in n, metres, scalar or (N,).
+
+    Returns
+    -------
+    (N, 3) metres in n; NaN where a ray misses the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
+    """
+    return georeference_pixels(calibrated_poses(calibration, poses_at), uv, plane_down)
 
 
 def calibrate(
-    camera: Camera,
-    mount: Mount,
-    uv: ArrayLike,
     poses_at: PosesAt,
+    uv: ArrayLike,
     known_points: ArrayLike,
     image: Sequence[object] | np.ndarray,
     estimate: Sequence[str] = BORESIGHT,
@@ -117,10 +158,10 @@ def calibrate(
 
     Parameters
     ----------
+    poses_at
+        Gives the poses, as logged, at the times of the N pixels shifted by an offset in seconds.
     uv
         (N, 2) pixels of the points.
-    poses_at
-        Gives the airframe's poses at the times of the N pixels, shifted by an offset in seconds.
     known_points
         (N, 3) metres in n; their down coordinate is the plane each pixel is cut with.
     image
@@ -141,7 +182,11 @@ def calibrate(
     ------
     ValueError
         Unknown parameter, or no usable point.
+    WildlabError
+        Where there is another number of poses, or of points, than of pixels.
     """
+    from scipy.optimize import least_squares  # as long to import as all the rest of geometry
+
     unknown = set(estimate) - PARAMETERS.keys()
     if unknown:
         raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
@@ -151,7 +196,7 @@ def calibrate(
 
     def residuals(names: tuple[str, ...], scaled: Array) -> Array:
         trial = _unscaled(names, scaled)
-        ground = georeference_calibrated(trial, camera, mount, uv, poses_at, known[:, 2])
+        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])
         return np.asarray(np.einsum("nij,nj->ni", whiten, ground[:, :2] - known[:, :2]))
 
     wanted = tuple(name for name in PARAMETERS if name in estimate)
@@ -210,9 +255,20 @@ def calibrate(
 
 
 def split_images(image: Sequence[object] | np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Halves for cross-validation: for each point (N,) whether its image fell into the first half.
+    """Halves for cross-validation.
 
     Whole images move together, for their points share one pose error.
+
+    Parameters
+    ----------
+    image
+        (N,) which image each point belongs to.
+    rng
+        Shuffles the images.
+
+    Returns
+    -------
+    (N,) bool, whether the image of each point fell into the first half.
     """
     labels, index = np.unique(np.asarray(image), return_inverse=True)
     first = np.zeros(len(labels), bool)

@@ -24,6 +24,13 @@ class Camera:
 
     ``distortion`` is ``(k1, k2, p1, p2, k3)``. Pixel (0, 0) is the centre of the upper left pixel or its
     corner, as the calibration had it: the difference of half a pixel is inside ``cx`` and ``cy``.
+
+    Examples
+    --------
+    >>> Camera(640, 512, fx=1000.0, fy=1000.0, cx=320.0, cy=256.0).matrix
+    array([[1000.,    0.,  320.],
+           [   0., 1000.,  256.],
+           [   0.,    0.,    1.]])
     """
 
     width: int
@@ -49,7 +56,27 @@ class Camera:
 def camera_from_data_sheet(
     width: int, height: int, focal_length: float, sensor_width: float, sensor_height: float
 ) -> Camera:
-    """The theoretical camera of H (2.2): lengths in metres, principal point in the middle of the image."""
+    """The theoretical camera of H (2.2), with the principal point in the middle of the image.
+
+    Parameters
+    ----------
+    width, height
+        Of the image, pixels.
+    focal_length
+        Metres.
+    sensor_width, sensor_height
+        Of the chip, metres.
+
+    Returns
+    -------
+    The camera.
+
+    Examples
+    --------
+    >>> camera = camera_from_data_sheet(640, 512, 0.019, 0.01088, 0.008704)
+    >>> round(camera.fx, 1), camera.cx
+    (1117.6, 320.0)
+    """
     return Camera(
         width,
         height,
@@ -66,13 +93,39 @@ def camera_from_matrix(
     height: int,
     distortion: tuple[float, float, float, float, float] = NO_DISTORTION,
 ) -> Camera:
-    """A camera from a calibrated intrinsic matrix (3, 3), for instance OpenCV's."""
+    """A camera from a calibrated intrinsic matrix, for instance OpenCV's.
+
+    Parameters
+    ----------
+    matrix
+        (3, 3), H (2.1).
+    width, height
+        Of the image, pixels.
+    distortion
+        ``(k1, k2, p1, p2, k3)``.
+
+    Returns
+    -------
+    The camera.
+    """
     A = np.asarray(matrix, float)
     return Camera(width, height, A[0, 0], A[1, 1], A[0, 2], A[1, 2], A[0, 1], distortion)
 
 
 def distort(xy: ArrayLike, distortion: ArrayLike) -> Array:
-    """Distorted normalised coordinates of ideal ones, F (2.16). (N, 2) -> (N, 2)."""
+    """Distorted normalised coordinates of ideal ones, F (2.16).
+
+    Parameters
+    ----------
+    xy
+        (N, 2), no unit.
+    distortion
+        ``(k1, k2, p1, p2, k3)``.
+
+    Returns
+    -------
+    (N, 2), no unit.
+    """
     k1, k2, p1, p2, k3 = np.asarray(distortion, float)
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     r2 = x * x + y * y
@@ -87,7 +140,19 @@ def distort(xy: ArrayLike, distortion: ArrayLike) -> Array:
 
 
 def distortion_jacobian(xy: ArrayLike, distortion: ArrayLike) -> Array:
-    """Derivative of :func:`distort` with respect to the ideal coordinates. (N, 2) -> (N, 2, 2)."""
+    """Derivative of :func:`distort` with respect to the ideal coordinates.
+
+    Parameters
+    ----------
+    xy
+        Ideal coordinates, (N, 2), no unit.
+    distortion
+        ``(k1, k2, p1, p2, k3)``.
+
+    Returns
+    -------
+    (N, 2, 2), no unit.
+    """
     k1, k2, p1, p2, k3 = np.asarray(distortion, float)
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     r2 = x * x + y * y
@@ -149,9 +214,20 @@ def undistort(xy_distorted: ArrayLike, distortion: ArrayLike, tolerance: float =
 
 
 def undistort_approximately(xy_distorted: ArrayLike, k1: float) -> Array:
-    """F's approximate inverse (2.19) of the one-parameter model (2.18). (N, 2) -> (N, 2).
+    """F's approximate inverse (2.19) of the one-parameter model (2.18).
 
     Good for a narrow field of view only; :func:`undistort` with ``(k1, 0, 0, 0, 0)`` is the exact one.
+
+    Parameters
+    ----------
+    xy_distorted
+        (N, 2), no unit.
+    k1
+        The one coefficient.
+
+    Returns
+    -------
+    (N, 2), no unit.
     """
     xy = np.asarray(xy_distorted, float)
     r2 = np.sum(xy * xy, axis=-1, keepdims=True)
@@ -159,7 +235,25 @@ def undistort_approximately(xy_distorted: ArrayLike, k1: float) -> Array:
 
 
 def normalise(camera: Camera, uv: ArrayLike) -> Array:
-    """Ideal normalised coordinates ``x/z, y/z`` in c of pixels. (N, 2) pixels -> (N, 2); F (2.21), exact."""
+    """Ideal normalised coordinates ``x/z, y/z`` in c of pixels, F (2.21), exact.
+
+    Parameters
+    ----------
+    camera
+        The intrinsic parameters.
+    uv
+        (N, 2) pixels.
+
+    Returns
+    -------
+    (N, 2), no unit; NaN where no direction is seen at that pixel (see :func:`undistort`).
+
+    Examples
+    --------
+    >>> normalise(Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0), [[320.0, 256.0], [420.0, 256.0]])
+    array([[0. , 0. ],
+           [0.1, 0. ]])
+    """
     xy = np.asarray(uv, float) - (camera.cx, camera.cy)
     xy /= (camera.fx, camera.fy)
     if camera.skew:
@@ -168,9 +262,18 @@ def normalise(camera: Camera, uv: ArrayLike) -> Array:
 
 
 def normalise_jacobian(camera: Camera, xy: ArrayLike) -> Array:
-    """Derivative of :func:`normalise` with respect to the pixel, at ideal coordinates ``xy`` (N, 2).
+    """Derivative of :func:`normalise` with respect to the pixel.
 
-    Returns (N, 2, 2), per pixel.
+    Parameters
+    ----------
+    camera
+        The intrinsic parameters.
+    xy
+        Ideal normalised coordinates, (N, 2).
+
+    Returns
+    -------
+    (N, 2, 2), per pixel.
     """
     xy = np.asarray(xy, float)
     scale = camera.matrix[:2, :2]
@@ -185,9 +288,24 @@ def normalise_jacobian(camera: Camera, xy: ArrayLike) -> Array:
 
 
 def project(camera: Camera, p_c: ArrayLike) -> Array:
-    """Pixels of points in c. (N, 3) metres -> (N, 2) pixels; H (5.6), F (2.20).
+    """Pixels of points in c, H (5.6), F (2.20).
 
-    Points in or behind the plane of the lens are NaN. Pixels may lie outside the image.
+    Parameters
+    ----------
+    camera
+        The intrinsic parameters.
+    p_c
+        (N, 3) metres in c.
+
+    Returns
+    -------
+    (N, 2) pixels, which may lie outside the image; NaN for points in or behind the plane of the lens.
+
+    Examples
+    --------
+    >>> project(Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0), [[1.0, 0.0, 10.0], [1.0, 0.0, -10.0]])
+    array([[420., 256.],
+           [ nan,  nan]])
     """
     p = np.asarray(p_c, float)
     z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
@@ -201,7 +319,21 @@ def project(camera: Camera, p_c: ArrayLike) -> Array:
 
 
 def in_image(camera: Camera, uv: ArrayLike, border: float = 0.0) -> np.ndarray:
-    """Which pixels lie inside the image, at least ``border`` pixels from its edge. (N, 2) -> (N,) bool."""
+    """Which pixels lie inside the image.
+
+    Parameters
+    ----------
+    camera
+        The intrinsic parameters.
+    uv
+        (N, 2) pixels.
+    border
+        How far from the edge they must be, pixels.
+
+    Returns
+    -------
+    (N,) bool; NaN is outside.
+    """
     u, v = np.moveaxis(np.asarray(uv, float), -1, 0)
     with np.errstate(invalid="ignore"):
         return np.asarray(

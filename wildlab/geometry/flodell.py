@@ -1,4 +1,4 @@
-"""F's conventions, converted where they enter.
+"""The conventions of Flodell and Christensson (F), converted where they enter.
 
 F works in east-north-up, and its camera looks along x with y right and z down (F table 2.1). Everything
 inside wildlab is north-east-down with the camera looking along z. F also replaces the exact conversion of
@@ -19,7 +19,14 @@ R_CAMERA: Array = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 def metres_per_degree(latitude: float) -> tuple[float, float]:
     """``k_phi`` and ``k_lambda`` of F (2.3): metres per degree of latitude and of longitude.
 
-    ``latitude`` in radians.
+    Parameters
+    ----------
+    latitude
+        Radians.
+
+    Returns
+    -------
+    Metres per degree of latitude, and of longitude.
     """
     k_phi = (
         111132.92
@@ -48,7 +55,7 @@ def geodetic_to_enu_linear(latitude: ArrayLike, longitude: ArrayLike, origin: tu
 
     Returns
     -------
-    (N, 2): east, north.
+    (N, 2): east, north, metres.
     """
     k_phi, k_lambda = metres_per_degree(origin[0])
     east = k_lambda * np.degrees(np.asarray(longitude, float) - origin[1])
@@ -57,7 +64,19 @@ def geodetic_to_enu_linear(latitude: ArrayLike, longitude: ArrayLike, origin: tu
 
 
 def linear_enu_error(latitude: ArrayLike, longitude: ArrayLike, origin: tuple[float, float]) -> Array:
-    """Horizontal distance (metres, (N,)) between F's linear conversion and the exact one at zero height."""
+    """Horizontal distance between F's linear conversion and the exact one at zero height.
+
+    Parameters
+    ----------
+    latitude, longitude
+        Radians, (N,).
+    origin
+        Latitude and longitude of the origin, radians.
+
+    Returns
+    -------
+    (N,) metres.
+    """
     exact_origin: Origin = (*origin, 0.0)
     exact = ned_to_enu(geodetic_to_ned(latitude, longitude, np.zeros(np.shape(latitude)), exact_origin))
     linear = geodetic_to_enu_linear(latitude, longitude, origin)
@@ -67,6 +86,13 @@ def linear_enu_error(latitude: ArrayLike, longitude: ArrayLike, origin: tuple[fl
 def camera_rotation(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
     """``R_nc`` from the Euler angles of F's camera (F 2.9-2.10), which looks along its own x axis.
 
-    Radians, (N,) each -> (N, 3, 3).
+    Parameters
+    ----------
+    roll, pitch, yaw
+        Radians, (N,) or scalars.
+
+    Returns
+    -------
+    (N, 3, 3), or (3, 3) where all three are scalars; takes a vector from c to n.
     """
     return np.asarray(euler_to_matrix(roll, pitch, yaw) @ R_CAMERA.T)

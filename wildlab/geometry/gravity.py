@@ -40,6 +40,7 @@ class Earth(NamedTuple):
     rate: tuple[float, float, float]
 
     def as_array(self) -> Array:
+        """Gravity, gradient, curvature and the three parts of the rate, (6,), as compiled code takes them."""
         return np.array([self.gravity, self.gradient, self.curvature, *self.rate])
 
 
@@ -50,6 +51,15 @@ def normal_gravity(latitude: ArrayLike, height: ArrayLike = 0.0) -> Array:
     ----------
     latitude, height
         Radians, and metres above the ellipsoid; (N,) or scalars.
+
+    Returns
+    -------
+    (N,) m/s^2.
+
+    Examples
+    --------
+    >>> print(f"{normal_gravity(np.radians(45.0)):.4f} m/s^2")
+    9.8062 m/s^2
     """
     s2 = np.sin(np.asarray(latitude, float)) ** 2
     h = np.asarray(height, float) / _A
@@ -59,6 +69,17 @@ def normal_gravity(latitude: ArrayLike, height: ArrayLike = 0.0) -> Array:
 
 def local_earth(latitude: float, height: float = 0.0) -> Earth:
     """The Earth at a place: normal gravity that falls with height and leans with distance, and its rotation.
+
+    Parameters
+    ----------
+    latitude
+        Radians.
+    height
+        Metres above the ellipsoid.
+
+    Returns
+    -------
+    The Earth as n sees it.
 
     Raises
     ------
@@ -77,12 +98,34 @@ def local_earth(latitude: float, height: float = 0.0) -> Earth:
 
 
 def flat_earth(gravity: float = 9.81) -> Earth:
-    """Frame n as an inertial one with the same gravity everywhere, as in H 7.3.2."""
+    """Frame n as an inertial one with the same gravity everywhere, as in H 7.3.2.
+
+    Parameters
+    ----------
+    gravity
+        m/s^2.
+
+    Returns
+    -------
+    An Earth that neither turns nor curves.
+    """
     return Earth(gravity, 0.0, 0.0, (0.0, 0.0, 0.0))
 
 
 def attraction(earth: Earth, p_n: ArrayLike) -> Array:
-    """Gravity at positions (N, 3) m in n, as (N, 3) m/s^2 in n."""
+    """Gravity at positions in n.
+
+    Parameters
+    ----------
+    earth
+        As n sees it.
+    p_n
+        (N, 3) metres in n.
+
+    Returns
+    -------
+    (N, 3) m/s^2 in n.
+    """
     p = np.asarray(p_n, float)
     down = earth.gravity + earth.gradient * p[..., 2]
     return np.asarray(

@@ -35,6 +35,12 @@ class Mount:
         x, y and z of the body in zyx order (H 5.3.2).
     lever_arm
         Position of the lens in b, metres (H 5.8).
+
+    Examples
+    --------
+    A camera in the nose that looks forward and 30 deg down:
+
+    >>> mount = Mount("forward", tilt=np.radians(-30.0), lever_arm=(0.5, 0.0, 0.1))
     """
 
     looks: Looks = "down"
@@ -49,6 +55,15 @@ def helgesen_misalignment(roll: float, tilt: float, pan: float) -> tuple[float, 
 
     H does not print how the three angles are combined. Tables 5.1-5.3 decide: all 42 numbers come out
     to better than 0.15 m when roll and pan count positive the other way round, as in axes with y to the left.
+
+    Parameters
+    ----------
+    roll, tilt, pan
+        As printed, radians.
+
+    Returns
+    -------
+    Roll, tilt and pan of a :class:`Mount`, radians.
     """
     return -roll, tilt, -pan
 
@@ -56,8 +71,16 @@ def helgesen_misalignment(roll: float, tilt: float, pan: float) -> tuple[float, 
 def mount_rotation(mount: Mount, pan: ArrayLike | None = None, tilt: ArrayLike | None = None) -> Array:
     """``R_bm``: misalignment, then the gimbal's pan and tilt, H (5.11) transposed.
 
-    ``pan`` and ``tilt`` (radians, (N,)) take the place of the mount's own where a gimbal moves.
-    Returns (3, 3), or (N, 3, 3).
+    Parameters
+    ----------
+    mount
+        Of the camera.
+    pan, tilt
+        Gimbal angles, (N,) radians, in place of the mount's own where the gimbal moves.
+
+    Returns
+    -------
+    (3, 3), or (N, 3, 3); takes a vector from the mount to b.
     """
     roll, lean, turn = mount.misalignment
     base = euler_to_matrix(roll, lean, turn)
@@ -66,7 +89,28 @@ def mount_rotation(mount: Mount, pan: ArrayLike | None = None, tilt: ArrayLike |
 
 
 def camera_rotation(mount: Mount, pan: ArrayLike | None = None, tilt: ArrayLike | None = None) -> Array:
-    """``R_bc`` (H 5.9): (3, 3), or (N, 3, 3) where ``pan`` or ``tilt`` are arrays."""
+    """``R_bc``, H (5.9).
+
+    Parameters
+    ----------
+    mount
+        Of the camera.
+    pan, tilt
+        Gimbal angles, (N,) radians, in place of the mount's own where the gimbal moves.
+
+    Returns
+    -------
+    (3, 3), or (N, 3, 3); takes a vector from c to b.
+
+    Examples
+    --------
+    A camera that looks down has its z, out of the lens, along z of the airframe, and its y backward:
+
+    >>> camera_rotation(Mount("down"))
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
+    """
     R_mc = R_MC_DOWN if mount.looks == "down" else R_MC_FORWARD
     return np.asarray(mount_rotation(mount, pan, tilt) @ R_mc)
 
@@ -80,18 +124,20 @@ def camera_pose(
 ) -> tuple[Array, Array]:
     """Pose of the camera from the pose of the airframe, H (5.8) and (5.9).
 
+    :class:`~wildlab.geometry.camera_poses.CameraPoses` keeps both together, with the camera.
+
     Parameters
     ----------
-    p_nb
-        (N, 3) metres.
-    R_nb
-        (N, 3, 3).
+    mount
+        Of the camera.
+    p_nb, R_nb
+        Pose of the airframe, (N, 3) metres and (N, 3, 3), or one.
     pan, tilt
-        Gimbal angles, radians, (N,), where the gimbal moves.
+        Gimbal angles, (N,) radians, in place of the mount's own where the gimbal moves.
 
     Returns
     -------
-    ``p_nc`` (N, 3) and ``R_nc`` (N, 3, 3).
+    ``p_nc`` (N, 3), metres, and ``R_nc`` (N, 3, 3).
     """
     R = np.asarray(R_nb, float)
     p_nc = np.asarray(p_nb, float) + R @ np.asarray(mount.lever_arm)

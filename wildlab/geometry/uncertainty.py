@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
-from wildlab.geometry.camera import Camera, normalise, normalise_jacobian
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import normalise, normalise_jacobian
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
-from wildlab.geometry.georeference import intersect_plane, pixel_to_plane
-from wildlab.geometry.mount import R_MC_DOWN, R_MC_FORWARD, Mount, camera_pose, mount_rotation
+from wildlab.geometry.georeference import georeference_pixels, intersect_plane, matching
 
 #: Ratio of the second-order to the first-order term above which the linear ellipse is not trusted.
 FLAT = 0.1
@@ -72,46 +73,40 @@ class GroundJacobians(NamedTuple):
     plane: Array  # (N, 2)
 
 
-def ground_jacobians(
-    camera: Camera,
-    mount: Mount,
-    uv: ArrayLike,
-    p_nb: ArrayLike,
-    R_nb: ArrayLike,
-    plane_down: ArrayLike,
-    pan: ArrayLike | None = None,
-    tilt: ArrayLike | None = None,
-) -> GroundJacobians:
-    """Derivatives of :func:`~wildlab.geometry.georeference.pixel_to_plane`, north and east.
+def ground_jacobians(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> GroundJacobians:
+    """Derivatives of :func:`~wildlab.geometry.georeference.georeference_pixels`, north and east.
 
     A small shift of the ray's foot or direction moves the ground point along the ray's own projection onto
     the plane: ``[I, -d_h / d_z]`` times the shift in n. All derivatives follow from that.
 
     Parameters
     ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
     uv
         (N, 2) pixels.
-    p_nb, R_nb
-        Pose of the airframe (N, 3), (N, 3, 3).
     plane_down
-        Down coordinate of the plane, scalar or (N,).
-    pan, tilt
-        Gimbal angles (N,), where the gimbal moves.
+        Down coordinate of the plane in n, metres, scalar or (N,).
 
     Returns
     -------
     Derivatives with respect to the pixel, the pose (position in n, rotation vector in b), the mount
     (rotation vector in m) and the plane's down coordinate. Rows of rays that miss the plane are NaN.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
     """
-    R = np.asarray(R_nb, float)
-    p_nc, R_nc = camera_pose(mount, p_nb, R, pan, tilt)
-    xy = normalise(camera, uv)
+    pixels, planes = matching(poses, uv, plane_down)
+    camera, R, R_nc = poses.camera, poses.R_nb, poses.R_nc
+    xy = normalise(camera, pixels)
     d_c = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
-    R_nm = R @ mount_rotation(mount, pan, tilt)
-    d_m = d_c @ (R_MC_DOWN if mount.looks == "down" else R_MC_FORWARD).T
+    R_nm = R @ poses.R_bm
+    d_m = d_c @ poses.R_mc.T
     d_n = np.einsum("...ij,...j->...i", R_nc, d_c)
     d_b = np.einsum("...ji,...j->...i", R, d_n)
-    drop = np.broadcast_to(np.asarray(plane_down, float) - p_nc[..., 2], d_n.shape[:-1])
+    drop = np.broadcast_to(planes - poses.p_nc[..., 2], d_n.shape[:-1])
     hits = (d_n[..., 2] > 0) & (drop > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = np.where(hits[..., None], d_n[..., :2] / d_n[..., 2:], np.nan)
@@ -119,10 +114,9 @@ def ground_jacobians(
     onto_plane = np.concatenate([np.broadcast_to(np.eye(2), (*slope.shape, 2)), -slope[..., None]], axis=-1)
     along = onto_plane * depth[..., None, None]
 
-    lever = np.asarray(mount.lever_arm, float)
     pose = np.empty((*slope.shape, 6))
     pose[..., :3] = onto_plane
-    pose[..., 3:] = -along @ R @ skew(d_b) - onto_plane @ R @ skew(lever)
+    pose[..., 3:] = -along @ R @ skew(d_b) - onto_plane @ R @ skew(poses.lever_arm)
     return GroundJacobians(
         pixel=along @ R_nc[..., :, :2] @ normalise_jacobian(camera, xy),
         pose=pose,
@@ -143,23 +137,32 @@ def _linear(jacobians: GroundJacobians, errors: PoseErrors) -> Array:
     )
 
 
-def ray_flatness(
-    camera: Camera,
-    mount: Mount,
-    uv: ArrayLike,
-    R_nb: ArrayLike,
-    errors: PoseErrors,
-    pan: ArrayLike | None = None,
-    tilt: ArrayLike | None = None,
-) -> Array:
-    """``s cot(a)`` of each ray (N,): its depression's standard deviation times the cotangent of it.
+def ray_flatness(poses: CameraPoses, uv: ArrayLike, errors: PoseErrors) -> Array:
+    """How flat each ray is against its own uncertainty: ``s cot(a)``.
 
-    Infinite at and above the horizon.
+    That is the standard deviation of its depression ``a`` times the cotangent of it.
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    uv
+        (N, 2) pixels.
+    errors
+        Covariances of the sources; those of position and plane play no part.
+
+    Returns
+    -------
+    (N,), no unit; infinite at and above the horizon.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses than of pixels.
     """
-    R = np.asarray(R_nb, float)
-    R_bm = mount_rotation(mount, pan, tilt)
-    R_nc = camera_pose(mount, np.zeros(3), R, pan, tilt)[1]
-    xy = normalise(camera, uv)
+    pixels, _ = matching(poses, uv)
+    camera, R, R_nc = poses.camera, poses.R_nb, poses.R_nc
+    xy = normalise(camera, pixels)
     d_c = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
     length = np.linalg.norm(d_c, axis=-1, keepdims=True)
     d_n = np.einsum("...ij,...j->...i", R_nc, d_c) / length
@@ -173,7 +176,7 @@ def ray_flatness(
     # The ray turns by a rotation vector r (in n) through r x d; its depression changes by (d x steeper) . r.
     axis = np.cross(d_n, steeper)
     on_body = np.einsum("...ji,...j->...i", R, axis)
-    on_mount = np.einsum("...ji,...j->...i", np.asarray(R_bm), on_body)
+    on_mount = np.einsum("...ji,...j->...i", poses.R_bm, on_body)
     on_pixel = (
         np.einsum("...i,...ij->...j", steeper, R_nc[..., :, :2] @ normalise_jacobian(camera, xy)) / length
     )
@@ -187,16 +190,11 @@ def ray_flatness(
 
 
 def ground_covariance(
-    camera: Camera,
-    mount: Mount,
+    poses: CameraPoses,
     uv: ArrayLike,
-    p_nb: ArrayLike,
-    R_nb: ArrayLike,
     plane_down: ArrayLike,
     errors: PoseErrors,
     rng: np.random.Generator,
-    pan: ArrayLike | None = None,
-    tilt: ArrayLike | None = None,
 ) -> GroundCovariance:
     """Covariance of each ground point (north, east), by linearisation or, for flat rays, by sampling.
 
@@ -205,80 +203,105 @@ def ground_covariance(
 
     Parameters
     ----------
-    uv, p_nb, R_nb, plane_down, pan, tilt
-        As in :func:`ground_jacobians`, one row per detection.
+    poses
+        The camera, with a pose for each pixel or one for all.
+    uv
+        (N, 2) or (2,) pixels, one row per detection.
+    plane_down
+        Down coordinate of the plane in n, metres, scalar or (N,).
     errors
         Covariances of the sources, see :class:`PoseErrors`.
     rng
         Drawn from only where a ray is sampled.
+
+    Returns
+    -------
+    The covariances (N, 2, 2), metres squared, and how each was found.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, of planes or of errors than of pixels.
     """
-    uv, p_nb, R_nb = (
-        np.atleast_2d(uv).astype(float),
-        np.atleast_2d(p_nb).astype(float),
-        np.asarray(R_nb, float),
-    )
-    R_nb = np.broadcast_to(R_nb, (len(uv), 3, 3))
-    p_nb = np.broadcast_to(p_nb, (len(uv), 3))
-    plane = np.broadcast_to(np.asarray(plane_down, float), len(uv))
-    covariance = _linear(ground_jacobians(camera, mount, uv, p_nb, R_nb, plane, pan, tilt), errors)
+    uv = np.atleast_2d(uv).astype(float)
+    n = len(uv)
+    for name, axes in (("pixel", 2), ("pose", 2), ("plane", 0)):
+        shape = np.shape(getattr(errors, name))
+        lead = shape[: len(shape) - axes]
+        if lead not in ((), (n,)):
+            raise WildlabError(
+                f"errors of the rows {lead} for {n} pixels", "give one for each, or one for all", field=name
+            )
+    covariance = _linear(ground_jacobians(poses, uv, plane_down), errors)
     method = np.where(np.isfinite(covariance).all(axis=(1, 2)), "linear", "none").astype("<U9")
-    flat = (method == "linear") & (ray_flatness(camera, mount, uv, R_nb, errors, pan, tilt) > FLAT)
+    flat = (method == "linear") & (ray_flatness(poses, uv, errors) > FLAT)
+    planes = np.broadcast_to(np.asarray(plane_down, float), n)
     for i in np.flatnonzero(flat):
         one = PoseErrors(
-            pixel=np.broadcast_to(errors.pixel, (len(uv), 2, 2))[i],
-            pose=np.broadcast_to(errors.pose, (len(uv), 6, 6))[i],
+            pixel=np.broadcast_to(errors.pixel, (n, 2, 2))[i],
+            pose=np.broadcast_to(errors.pose, (n, 6, 6))[i],
             mount=errors.mount,
-            plane=float(np.broadcast_to(errors.plane, len(uv))[i]),
+            plane=float(np.broadcast_to(errors.plane, n)[i]),
         )
-        gimbal = [
-            None if angle is None else float(np.broadcast_to(angle, len(uv))[i]) for angle in (pan, tilt)
-        ]
-        covariance[i] = _sampled(camera, mount, uv[i], p_nb[i], R_nb[i], plane[i], one, rng, gimbal)
+        covariance[i] = _sampled(poses.take(int(i)), uv[i], float(planes[i]), one, rng)
         method[i] = "sampled" if np.isfinite(covariance[i]).all() else "unbounded"
     return GroundCovariance(covariance, method)
 
 
 def sample_ground(
-    camera: Camera,
-    mount: Mount,
-    uv: Array,
-    p_nb: Array,
-    R_nb: Array,
+    pose: CameraPoses,
+    uv: ArrayLike,
     plane_down: float,
     errors: PoseErrors,
     rng: np.random.Generator,
     n: int,
-    pan: float | None = None,
-    tilt: float | None = None,
 ) -> Array:
-    """Ground points (n, 2) of one detection with its errors drawn from their covariances; misses are NaN."""
-    pose = rng.multivariate_normal(np.zeros(6), errors.pose, n)
-    R = R_nb @ rotation_vector_to_matrix(pose[:, 3:])
+    """Ground points of one detection with its errors drawn from their covariances.
+
+    Parameters
+    ----------
+    pose
+        The camera, with one pose.
+    uv
+        (2,) pixel.
+    plane_down
+        Down coordinate of the plane in n, metres.
+    errors
+        Covariances of the sources, each given once.
+    rng
+        Drawn from.
+    n
+        How many draws.
+
+    Returns
+    -------
+    (n, 2) metres, north and east; misses are NaN.
+
+    Raises
+    ------
+    WildlabError
+        Where there is more than one pose.
+    """
+    pixel, plane = matching(pose, uv, plane_down)
+    off = rng.multivariate_normal(np.zeros(6), errors.pose, n)
+    R = pose.R_nb @ rotation_vector_to_matrix(off[:, 3:])
     turn = rotation_vector_to_matrix(rng.multivariate_normal(np.zeros(3), errors.mount, n))
-    pixels = uv + rng.multivariate_normal(np.zeros(2), errors.pixel, n)
-    planes = plane_down + np.sqrt(errors.plane) * rng.standard_normal(n)
-    xy = normalise(camera, pixels)
+    pixels = pixel + rng.multivariate_normal(np.zeros(2), errors.pixel, n)
+    planes = plane + np.sqrt(errors.plane) * rng.standard_normal(n)
+    xy = normalise(pose.camera, pixels)
     d_c = np.concatenate([xy, np.ones((n, 1))], axis=1)
-    d_m = d_c @ (R_MC_DOWN if mount.looks == "down" else R_MC_FORWARD).T
-    rays = np.einsum("nij,nj->ni", R @ mount_rotation(mount, pan, tilt) @ turn, d_m)
-    p_nc = p_nb + pose[:, :3] + R @ np.asarray(mount.lever_arm)
+    d_m = d_c @ pose.R_mc.T
+    rays = np.einsum("nij,nj->ni", R @ pose.R_bm @ turn, d_m)
+    p_nc = pose.p_nb + off[:, :3] + R @ pose.lever_arm
     return intersect_plane(rays, p_nc, planes)[:, :2]
 
 
 def _sampled(
-    camera: Camera,
-    mount: Mount,
-    uv: Array,
-    p_nb: Array,
-    R_nb: Array,
-    plane_down: float,
-    errors: PoseErrors,
-    rng: np.random.Generator,
-    gimbal: list[float | None],
+    pose: CameraPoses, uv: Array, plane_down: float, errors: PoseErrors, rng: np.random.Generator
 ) -> Array:
     """Covariance (2, 2) of one flat ray from samples; NaN where too many miss the ground."""
-    ground = sample_ground(camera, mount, uv, p_nb, R_nb, plane_down, errors, rng, SAMPLES, *gimbal)
-    centre = pixel_to_plane(camera, uv, *camera_pose(mount, p_nb, R_nb, *gimbal), plane_down)[:2]
+    ground = sample_ground(pose, uv, plane_down, errors, rng, SAMPLES)
+    centre = georeference_pixels(pose, uv, plane_down)[:2]
     offsets = ground - centre
     hit = np.isfinite(offsets).all(axis=1)
     if hit.mean() < 1 - UNBOUNDED:
@@ -290,29 +313,62 @@ def _sampled(
     squared = np.where(
         hit, np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(shape), offsets, optimize=True), np.inf
     )
-    return np.asarray(shape * np.quantile(squared, 0.9, method="lower") / chi2.ppf(0.9, 2))
+    return np.asarray(shape * np.quantile(squared, 0.9, method="lower") / _chi2(0.9))
 
 
 def ellipse_axes(covariance: ArrayLike, probability: float = 0.9) -> tuple[Array, Array, Array]:
-    """Half axes (metres) and bearing of the long one (radians from north) of covariance ellipses.
+    """Half axes and bearing of covariance ellipses.
 
-    (N, 2, 2) north-east -> three arrays (N,). ``probability`` of the content of a normal distribution.
-    NaN covariances give NaN.
+    Parameters
+    ----------
+    covariance
+        (N, 2, 2) or (2, 2), north-east, metres squared.
+    probability
+        Share of a normal distribution that the ellipse holds.
+
+    Returns
+    -------
+    Long and short half axis (metres) and the bearing of the long one (radians from north), each (N,). NaN
+    covariances give NaN.
+
+    Examples
+    --------
+    Twice as uncertain to the east as to the north:
+
+    >>> long_axis, short_axis, bearing = ellipse_axes([[1.0, 0.0], [0.0, 4.0]])
+    >>> print(f"{long_axis:.2f} m by {short_axis:.2f} m, {np.degrees(bearing):.0f} deg from north")
+    4.29 m by 2.15 m, 90 deg from north
     """
     C = np.asarray(covariance, float)
     mean = (C[..., 0, 0] + C[..., 1, 1]) / 2
     half = (C[..., 0, 0] - C[..., 1, 1]) / 2
     spread = np.hypot(half, C[..., 0, 1])
-    scale = chi2.ppf(probability, 2)
+    scale = _chi2(probability)
     long_axis = np.sqrt(scale * (mean + spread))
     short_axis = np.sqrt(scale * np.maximum(mean - spread, 0))
     return long_axis, short_axis, np.arctan2(C[..., 0, 1], half) / 2
 
 
 def inside_ellipse(offset: ArrayLike, covariance: ArrayLike, probability: float = 0.9) -> np.ndarray:
-    """Which offsets (N, 2) from the truth lie inside the ellipse of their covariance (N, 2, 2). (N,) bool.
+    """Which offsets from the truth lie inside the ellipse of their covariance.
 
-    NaN rows are outside.
+    Parameters
+    ----------
+    offset
+        (N, 2) metres, north and east.
+    covariance
+        (N, 2, 2), or (2, 2) for all, metres squared.
+    probability
+        Share of a normal distribution that the ellipse holds.
+
+    Returns
+    -------
+    (N,) bool; NaN rows are outside.
+
+    Examples
+    --------
+    >>> inside_ellipse([[2.0, 0.0], [2.2, 0.0]], np.eye(2))
+    array([ True, False])
     """
     e, C = np.asarray(offset, float), np.asarray(covariance, float)
     determinant = C[..., 0, 0] * C[..., 1, 1] - C[..., 0, 1] * C[..., 1, 0]
@@ -322,4 +378,12 @@ def inside_ellipse(offset: ArrayLike, covariance: ArrayLike, probability: float 
             - 2 * C[..., 0, 1] * e[..., 0] * e[..., 1]
             + C[..., 0, 0] * e[..., 1] ** 2
         ) / determinant
-        return np.asarray(squared <= chi2.ppf(probability, 2))
+        return np.asarray(squared <= _chi2(probability))
+
+
+def _chi2(probability: float) -> float:
+    """Quantile of the chi-square distribution with two degrees of freedom.
+
+    As scipy.stats computes it, whose import alone takes longer than that of all of geometry.
+    """
+    return float(2 * gammaincinv(1.0, probability))

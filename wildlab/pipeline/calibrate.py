@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -55,10 +56,8 @@ def fit_flight(
     ids = observations.table["detection_id"]
     weights = covariances_of(judged.set_index("detection_id").loc[ids].reset_index())
     return calibrate(
-        flight.manifest.geometry_camera(),
-        observations.mount,
+        partial(shifted_poses, flight, source, observations),
         observations.uv,
-        lambda shift: shifted_poses(flight, source, observations, shift),
         known,
         observations.table["frame_id"].to_numpy(),
         estimate,

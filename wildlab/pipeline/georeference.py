@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import Calibration, apply_calibration
+from wildlab.geometry.calibration import Calibration, calibrated_poses
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
-from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 Array = NDArray[np.float64]
@@ -42,40 +43,25 @@ class Observations:
         ``detection_id``, ``frame_id``, ``group``, ``target_id``, ``time_s`` (flight time).
     uv
         (N, 2) pixels.
-    p_nb, R_nb
-        Pose of the airframe, (N, 3) and (N, 3, 3); NaN where the log has none.
-    pan, tilt
-        Gimbal angles, (N,) radians.
+    poses
+        The camera's, one a detection; NaN where the log has none, a covariance where it states one. The mount
+        is calibrated or not.
     plane_down
         Down coordinate of the ground at each detection, (N,); NaN where it is not known.
-    pose_covariance
-        (N, 6, 6) where the log states one.
-    mount
-        The mount, calibrated or not.
     """
 
     table: pd.DataFrame
     uv: Array
-    p_nb: Array
-    R_nb: Array
-    pan: Array
-    tilt: Array
+    poses: CameraPoses
     plane_down: Array
-    pose_covariance: Array | None
-    mount: Mount
 
     def take(self, rows: NDArray[np.bool_]) -> Observations:
         """The observations of some rows."""
         return Observations(
             self.table[rows].reset_index(drop=True),
             self.uv[rows],
-            self.p_nb[rows],
-            self.R_nb[rows],
-            self.pan[rows],
-            self.tilt[rows],
+            self.poses.take(rows),
             self.plane_down[rows],
-            None if self.pose_covariance is None else self.pose_covariance[rows],
-            self.mount,
         )
 
 
@@ -135,29 +121,27 @@ def observe(
             "time_s": np.where(lost, np.nan, times),
         }
     )
+    manifest = flight.manifest
     return Observations(
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
-        p_nb,
-        R_nb,
-        pan,
-        tilt,
+        CameraPoses(
+            manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance
+        ),
         _ground_heights(flight, table, pixels),
-        covariance,
-        flight.manifest.geometry_mount(),
     )
 
 
 def shifted_poses(
     flight: Flight, source: str | None, observations: Observations, shift: float
-) -> tuple[Array, Array]:
-    """The poses ``p_nb``, ``R_nb`` of observations whose camera stamps are ``shift`` seconds later.
+) -> CameraPoses:
+    """The poses of observations whose camera stamps are ``shift`` seconds later.
 
-    A moving gimbal keeps the angles it had at the unshifted stamps.
+    A moving gimbal keeps the angles it had at the unshifted stamps, and the poses their covariance.
     """
     times = observations.table["time_s"].to_numpy(float) + shift
     p_nb, R_nb, _ = poses_at(flight.pose_source(source)[1], times, observations.table["frame_id"])
-    return p_nb, R_nb
+    return replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
 
 
 def heights_left_in(flight: Flight, observations: Observations) -> Observations:
@@ -167,10 +151,11 @@ def heights_left_in(flight: Flight, observations: Observations) -> Observations:
     the heights of the aircraft, and rises with them.
     """
     raised = flight.manifest.vertical.correction_m
-    p_nb = observations.p_nb - np.array([0.0, 0.0, raised])
+    poses = observations.poses
+    poses = replace(poses, p_nb=poses.p_nb - np.array([0.0, 0.0, raised]))
     surveyed = np.isfinite(truth_of(flight, observations.table)[:, 2])
     return replace(
-        observations, p_nb=p_nb, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)
+        observations, poses=poses, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)
     )
 
 
@@ -178,10 +163,8 @@ def calibrated(
     flight: Flight, source: str | None, observations: Observations, calibration: Calibration
 ) -> Observations:
     """The observations with estimated mount angles, position and clock offset applied."""
-    p_nb, R_nb = shifted_poses(flight, source, observations, calibration.value("clock"))
-    offset = np.array([calibration.value(name) for name in ("north", "east", "down")])
-    mount = apply_calibration(calibration, observations.mount)
-    return replace(observations, p_nb=p_nb + offset, R_nb=R_nb, mount=mount)
+    poses = calibrated_poses(calibration, partial(shifted_poses, flight, source, observations))
+    return replace(observations, poses=poses)
 
 
 def pose_errors(
@@ -194,9 +177,9 @@ def pose_errors(
     """
     sd = assumed_deviations(flight) | (assumed or {})
     n = len(observations.uv)
-    pose = observations.pose_covariance
+    pose = observations.poses.covariance
     if pose is None or assumed is not None:
-        roll, pitch, _ = matrix_to_euler(observations.R_nb).T
+        roll, pitch, _ = matrix_to_euler(observations.poses.R_nb).T
         E = euler_errors_to_body(roll, pitch)
         attitude = (
             E * np.radians([sd["roll_deg"], sd["pitch_deg"], sd["yaw_deg"]]) ** 2 @ np.swapaxes(E, 1, 2)
@@ -235,15 +218,11 @@ def georeference(
         The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
         ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found).
     """
-    camera = flight.manifest.geometry_camera()
     o = observations
-    pose = camera_pose(o.mount, o.p_nb, o.R_nb, o.pan, o.tilt)
-    ground = pixel_to_plane(camera, o.uv, *pose, o.plane_down)
+    ground = georeference_pixels(o.poses, o.uv, o.plane_down)
     if errors is None:
         errors = pose_errors(flight, o)
-    covariance, method = ground_covariance(
-        camera, o.mount, o.uv, o.p_nb, o.R_nb, o.plane_down, errors, rng, o.pan, o.tilt
-    )
+    covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
     return o.table.assign(
         north_m=ground[:, 0],
         east_m=ground[:, 1],

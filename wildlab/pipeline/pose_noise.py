@@ -18,9 +18,8 @@ def estimate_noise(flight: Flight, observations: Observations, judged: pd.DataFr
     """Standard deviations of the poses behind the errors of known points: see ``evaluation.pose_noise``."""
     o, _ = known_points(flight, observations, judged)
     errors = errors_of(judged.set_index("detection_id").loc[o.table["detection_id"]])
-    camera = flight.manifest.geometry_camera()
-    J = ground_jacobians(camera, o.mount, o.uv, o.p_nb, o.R_nb, o.plane_down, o.pan, o.tilt)
-    roll, pitch, _ = matrix_to_euler(o.R_nb).T
+    J = ground_jacobians(o.poses, o.uv, o.plane_down)
+    roll, pitch, _ = matrix_to_euler(o.poses.R_nb).T
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(roll, pitch)
     sd = assumed_deviations(flight)

@@ -19,12 +19,11 @@ from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.camera import Camera
-from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import camera_pose, camera_rotation
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
 from wildlab.tracking.batch import View, run_batch
-from wildlab.tracking.measurement import CameraPoses, Sensor, pixels
+from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.run import Start, Track, start_from_first
 from wildlab.tracking.schmidt import Change, PoseUncertainty
@@ -50,10 +49,10 @@ class Sighting(NamedTuple):
         (N, 2) pixels.
     positions
         (N, 2) the same on the ground: north and east, m.
-    camera, poses, plane_down
-        What `wildlab.tracking.measurement.pixels` takes; ``plane_down`` (N,) is filled in between detections.
-    pose_covariance
-        (N, 6, 6) where the source states one: position in n, attitude in b.
+    poses
+        The camera's, one a frame, with their covariance where the source states one.
+    plane_down
+        (N,) m, filled in between detections.
     truth
         (N, 4) north, east, and velocity; NaN where it is not known.
     """
@@ -61,10 +60,8 @@ class Sighting(NamedTuple):
     times: Array
     uv: Array
     positions: Array
-    camera: Camera
     poses: CameraPoses
     plane_down: Array
-    pose_covariance: Array | None
     truth: Array
 
     @property
@@ -75,7 +72,7 @@ class Sighting(NamedTuple):
     @property
     def sensor(self) -> Sensor:
         """For the readable filters of `wildlab.tracking.run`."""
-        return pixels(self.camera, self.poses, self.plane_down)
+        return pixels(self.poses, self.plane_down)
 
 
 class CvTuning(NamedTuple):
@@ -132,8 +129,10 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
     times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
     p_nb, R_nb, covariance = poses_at(flight.pose_source(source)[1], times, ids)
     pan, tilt = (angle[order][first:last] for angle in gimbal_angles(flight))
-    mount = flight.manifest.geometry_mount()
-    p_nc, R_nc = camera_pose(mount, p_nb, R_nb, pan, tilt)
+    manifest = flight.manifest
+    poses = CameraPoses(
+        manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance
+    )
     uv = np.full((len(times), 2), np.nan)
     uv[row - first] = seen.uv
     plane = np.full(len(times), np.nan)
@@ -144,22 +143,12 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
             "how high the target lies is not known", "give plane_down_m", field="detections.plane_down_m"
         )
     plane = np.interp(times, times[known], plane[known])
-    camera = flight.manifest.geometry_camera()
-    positions = pixel_to_plane(camera, uv, p_nc, R_nc, plane)[:, :2]
+    positions = georeference_pixels(poses, uv, plane)[:, :2]
     if not np.isfinite(positions).any():
         raise WildlabError(
             "none of the detections lies on the ground", "does the source cover the flight?", field="nav"
         )
-    return Sighting(
-        times,
-        uv,
-        positions,
-        camera,
-        CameraPoses(p_nc, R_nc, camera_rotation(mount, pan, tilt), mount.lever_arm),
-        plane,
-        covariance,
-        truth_states(flight, name, times),
-    )
+    return Sighting(times, uv, positions, poses, plane, truth_states(flight, name, times))
 
 
 def truth_states(flight: Flight, target: str, times: ArrayLike) -> Array:
@@ -191,7 +180,7 @@ def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
 
 def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:
     """The extended Kalman filter on pixels, H 6.3; poses are taken as true."""
-    view = View(seen.camera, seen.poses, seen.plane_down)
+    view = View(seen.poses, seen.plane_down)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
 
 
@@ -216,12 +205,12 @@ def follow_schmidt(
     WildlabError
         Where there is no covariance of the poses.
     """
-    own = seen.pose_covariance if covariance is None else np.asarray(covariance, float)
+    own = seen.poses.covariance if covariance is None else np.asarray(covariance, float)
     if own is None:
         raise WildlabError(
             "the poses have no covariance", "use those of the MEKF: navigate_mekf(flight)", field="nav"
         )
-    view = View(seen.camera, seen.poses, seen.plane_down)
+    view = View(seen.poses, seen.plane_down)
     pose = PoseUncertainty(own, correlation_time, change)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
 

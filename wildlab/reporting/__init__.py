@@ -1,1 +1,1 @@
-"""From numbers to one offline page: the report, its figures, metrics, and the ledger. It starts no process."""
+"""From numbers to one offline page: report, figures, metrics, and the ledger. It starts no process."""

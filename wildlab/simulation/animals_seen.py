@@ -11,11 +11,11 @@ from wildlab.simulation.animals import herd
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.sensors import stream
 from wildlab.simulation.subjects import Animals
-from wildlab.simulation.view import View, marks, numbered
+from wildlab.simulation.view import Exposures, marks, numbered
 
 
 def animal_detections(
-    twin: TwinParameters, animals: Animals, view: View, frames: pd.DataFrame, seed: int
+    twin: TwinParameters, animals: Animals, view: Exposures, frames: pd.DataFrame, seed: int
 ) -> pd.DataFrame:
     """Animals as they are marked. What is known of the ground is where it is, not how high a body is above.
 
@@ -28,7 +28,8 @@ def animal_detections(
     for name, path in herd(twin, seed).items():
         uv = view.pixels(path(view.times))
         rng = stream(seed, f"marking of {name}")
-        found = in_image(view.camera, uv, animals.border.si) & (rng.random(len(uv)) < animals.detected.number)
+        inside = in_image(view.poses.camera, uv, animals.border.si)
+        found = inside & (rng.random(len(uv)) < animals.detected.number)
         images = np.flatnonzero(found)
         marked = view.marked(uv[images], rng)
         tables.append(marks(frames, images, marked, animals.marked_by.text, name, 0.0))

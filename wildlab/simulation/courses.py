@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import camera_pose
+from wildlab.geometry.georeference import georeference_pixels
 from wildlab.simulation.models import Loiter
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.routes import Shape, fly, headings, lap_times, outline, shape_corners
@@ -175,10 +175,10 @@ def loiter_centre(twin: TwinParameters) -> Array:
     if twin.loiter is None or twin.target is None:
         raise ValueError("this twin flies no loiter")
     there = move(*_circle(twin, np.zeros(2), 0.0), np.zeros(1))
-    manifest = twin_manifest(twin, 0)
+    camera = twin_manifest(twin, 0).geometry_camera()
     middle = [[twin.camera.width.number / 2, twin.camera.height.number / 2]]
-    p_nc, R_nc = camera_pose(true_mount(twin), there.position, there.R_nb)
-    ground = pixel_to_plane(manifest.geometry_camera(), middle, p_nc, R_nc, -twin.target.height.si)[0]
+    poses = CameraPoses(camera, true_mount(twin), there.position, there.R_nb)
+    ground = georeference_pixels(poses, middle, -twin.target.height.si)[0]
     if np.isnan(ground).any():
         raise WildlabError(
             "the camera does not look down at the target's height where it should pass over it",

@@ -11,13 +11,13 @@ from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.sensors import stream
 from wildlab.simulation.subjects import Segments, Target
 from wildlab.simulation.targets import target_outline
-from wildlab.simulation.view import Numbers, View, marks, numbered
+from wildlab.simulation.view import Exposures, Numbers, marks, numbered
 
 _APART = 5.0  # s without the target in view, after which it is another segment
 
 
 def seen_in_part(
-    twin: TwinParameters, target: Target, view: View, frames: pd.DataFrame, seed: int
+    twin: TwinParameters, target: Target, view: Exposures, frames: pd.DataFrame, seed: int
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The images of the segments, and the visible part of the target where most of it shows.
 
@@ -51,11 +51,11 @@ def seen_in_part(
     return frames.iloc[images].assign(group=groups).reset_index(drop=True), numbered([table])
 
 
-def _visible(view: View, target: Target, seed: int) -> list[Blob]:
+def _visible(view: Exposures, target: Target, seed: int) -> list[Blob]:
     """Of every image what it shows of the target."""
     corners = target_outline(target, seed)(view.times)
     pixels = np.stack([view.pixels(corners[:, i]) for i in range(corners.shape[1])], axis=1)
-    size = [view.camera.width, view.camera.height]
+    size = [view.poses.camera.width, view.poses.camera.height]
     beside = (pixels.max(axis=1) < 0) | (pixels.min(axis=1) > size)
     blobs = []
     for polygon, out in zip(pixels, beside.any(axis=1), strict=True):
@@ -63,7 +63,7 @@ def _visible(view: View, target: Target, seed: int) -> list[Blob]:
     return blobs
 
 
-def _kept(segments: Segments, view: View, blobs: list[Blob]) -> tuple[Numbers, Numbers]:
+def _kept(segments: Segments, view: Exposures, blobs: list[Blob]) -> tuple[Numbers, Numbers]:
     """Numbers of the images that are kept, the first ones that show the target, and of their segments."""
     seen = np.flatnonzero([blob.area > 0 for blob in blobs])
     wanted, count = int(segments.images.number), int(segments.count.number)

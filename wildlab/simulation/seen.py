@@ -15,7 +15,7 @@ from wildlab.simulation.sensors import computer_stamps, stream
 from wildlab.simulation.subjects import Target
 from wildlab.simulation.targets import target_path
 from wildlab.simulation.trajectory import Motion
-from wildlab.simulation.view import Numbers, View, marks, numbered
+from wildlab.simulation.view import Exposures, Numbers, marks, numbered
 
 #: Column of the frames that holds the on-board computer's stamps.
 ONBOARD_STAMP = "time_onboard_s"
@@ -43,7 +43,7 @@ def frames_and_detections(twin: TwinParameters, true: Motion, seed: int) -> tupl
         Where a target is not in view often enough.
     """
     frames = frames_table(twin, true.times, seed)
-    view = View(twin, true)
+    view = Exposures(twin, true)
     if twin.animals is not None:
         return frames, animal_detections(twin, twin.animals, view, frames, seed)
     if twin.target is not None and twin.target.outline is not None:
@@ -66,7 +66,7 @@ def frames_table(twin: TwinParameters, exposures: Array, seed: int) -> pd.DataFr
     return frames.assign(time_s=stamps, **{ONBOARD_STAMP: onboard})
 
 
-def detections_table(twin: TwinParameters, view: View, frames: pd.DataFrame, seed: int) -> pd.DataFrame:
+def detections_table(twin: TwinParameters, view: Exposures, frames: pd.DataFrame, seed: int) -> pd.DataFrame:
     """Targets as they are marked in the images, in the order of the images.
 
     Raises
@@ -98,9 +98,9 @@ def with_subset(twin: TwinParameters, frames: pd.DataFrame, detections: pd.DataF
     return frames.assign(group=np.where(inside, SUBSET, "").astype(object))
 
 
-def _in_view(twin: TwinParameters, view: View, target: Target, uv: Array) -> Numbers:
+def _in_view(twin: TwinParameters, view: Exposures, target: Target, uv: Array) -> Numbers:
     """Numbers of the images that show the target, (K,)."""
-    seen = np.flatnonzero(in_image(view.camera, uv, target.border.si))
+    seen = np.flatnonzero(in_image(view.poses.camera, uv, target.border.si))
     wanted = int(target.observations.number)
     if len(seen) < wanted:
         group = "target" if target is twin.target else "second_target"

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.gimbal import gimbal_angles
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.settings import true_mount, twin_manifest
@@ -20,25 +20,25 @@ from wildlab.simulation.trajectory import Motion
 Numbers = NDArray[np.intp]
 
 
-class View:
-    """The camera at N exposures: ``times`` (N,) s, ``camera``, and its true pose ``p_nc``, ``R_nc``."""
+class Exposures:
+    """The camera at N exposures: their ``times`` (N,) s, and its true ``poses``."""
 
     def __init__(self, twin: TwinParameters, true: Motion) -> None:
         self.times = true.times
-        self.camera = twin_manifest(twin, 0).geometry_camera()
+        camera = twin_manifest(twin, 0).geometry_camera()
         angles = (None, None) if twin.gimbal is None else gimbal_angles(twin.gimbal, true.times)
-        self.p_nc, self.R_nc = camera_pose(true_mount(twin), true.position, true.R_nb, *angles)
+        self.poses = CameraPoses(camera, true_mount(twin), true.position, true.R_nb, *angles)
         self._marking_sd = twin.camera.marking_sd.si
 
     def pixels(self, points: ArrayLike) -> Array:
         """Where points in n, (N, 3) m, one for each exposure, are in the images: (N, 2) px; NaN behind."""
-        return ground_to_pixel(self.camera, points, self.p_nc, self.R_nc)
+        return ground_to_pixel(self.poses.camera, points, self.poses.p_nc, self.poses.R_nc)
 
     def marked(self, pixels: ArrayLike, rng: np.random.Generator) -> Array:
         """Pixels (K, 2) as they are marked, with noise; nobody marks outside of the image."""
         uv = np.asarray(pixels, float)
         noisy = uv + self._marking_sd * rng.standard_normal(uv.shape)
-        return np.clip(noisy, 0.0, [self.camera.width, self.camera.height])
+        return np.clip(noisy, 0.0, [self.poses.camera.width, self.poses.camera.height])
 
 
 def marks(

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
-from wildlab.tracking.measurement import CameraPoses
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
@@ -42,11 +41,10 @@ class BatchTracks(NamedTuple):
 class View(NamedTuple):
     """The camera of all runs: what `wildlab.tracking.measurement.pixels` takes.
 
-    ``poses`` holds arrays for all runs alike, (N, 3) and (N, 3, 3), or for each its own, (B, N, 3) and
-    (B, N, 3, 3); ``R_bc`` may be (3, 3). ``plane_down`` is a scalar or (N,).
+    The rows of ``poses`` are those of all runs alike, (N,), or (B, N): each has its own. ``plane_down`` is a
+    scalar or (N,).
     """
 
-    camera: Camera
     poses: CameraPoses
     plane_down: ArrayLike
 
@@ -137,7 +135,7 @@ def run_batch(
     if alike and view is None and pose is None and gate is None:
         x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
         return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
-    poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
+    poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, B, N)
     singular = run_lanes(
         F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
         np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
@@ -205,13 +203,15 @@ def _singular(row: int) -> WildlabError:
     )
 
 
-def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
+def _camera_arrays(view: View | None, runs: int, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
     """Poses, R_bc, lever arm, planes and intrinsics for the kernel; zeros where there is no camera."""
     if view is None:
         return (
             np.zeros((1, n_rows, 12)), np.zeros((1, n_rows, 9)), np.zeros(3), np.zeros(n_rows), np.zeros(5)
         )  # fmt: skip
-    camera, poses = view.camera, view.poses
+    poses = view.poses
+    camera = poses.camera
+    poses.require_rows((n_rows,) if len(poses.rows) == 1 else (runs, n_rows), "measurements")
     if camera.distorts:
         raise WildlabError(
             "the camera distorts, and the batch filter knows none that does",
@@ -219,12 +219,10 @@ def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array,
             field="camera",
         )
     p_nc, R_nc = _per_run(poses.p_nc, 1, n_rows), _per_run(poses.R_nc, 2, n_rows)
-    runs = max(len(p_nc), len(R_nc))
-    parts = [np.broadcast_to(a, (runs, *a.shape[1:])) for a in (p_nc, R_nc)]
     return (
-        np.ascontiguousarray(np.concatenate(parts, axis=2)),
+        np.ascontiguousarray(np.concatenate([p_nc, R_nc], axis=2)),
         _per_run(poses.R_bc, 2, n_rows),
-        np.array(poses.lever_arm, float),
+        poses.lever_arm,
         np.array(np.broadcast_to(np.asarray(view.plane_down, float), n_rows)),
         np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew]),
     )

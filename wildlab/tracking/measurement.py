@@ -18,8 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, distortion_jacobian, normalise, project
-from wildlab.geometry.frames import Array, skew
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, skew, wrap
 
 
 class Prediction(NamedTuple):
@@ -33,36 +35,13 @@ class Prediction(NamedTuple):
 class Sensor(NamedTuple):
     """A sensor on its way: ``predict(row, position)`` for a row of the run and the target's (2,) north, east.
 
-    ``angles`` (m,) says which elements are angles, whose differences are wrapped.
+    ``angles`` (m,) says which elements are angles, whose differences are wrapped. ``rows`` is for how many
+    rows it was made; None: for any number.
     """
 
     predict: Callable[[int, Array], Prediction]
     angles: tuple[bool, ...]
-
-
-class CameraPoses(NamedTuple):
-    """Poses of a camera at each of N measurements.
-
-    Attributes
-    ----------
-    p_nc, R_nc
-        (N, 3) metres and (N, 3, 3), as `wildlab.geometry.mount.camera_pose` gives them.
-    R_bc
-        (3, 3), or (N, 3, 3) where a gimbal moves: `wildlab.geometry.mount.camera_rotation`. The attitude
-        error lives in b.
-    lever_arm
-        (3,) position of the lens in b, metres; H (7.43) has zero.
-    """
-
-    p_nc: Array
-    R_nc: Array
-    R_bc: Array
-    lever_arm: Array | tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-def wrap(angle: ArrayLike) -> Array:
-    """Angles (radians) brought into [-pi, pi)."""
-    return np.asarray((np.asarray(angle, float) + np.pi) % (2 * np.pi) - np.pi)
+    rows: int | None = None
 
 
 def difference(z: ArrayLike, predicted: ArrayLike, angles: tuple[bool, ...]) -> Array:
@@ -87,13 +66,13 @@ def target_in_camera(position: ArrayLike, poses: CameraPoses, plane_down: ArrayL
     ``plane_down`` is the down coordinate of the target, scalar or (...).
     """
     p = np.asarray(position, float)
-    R_nc, R_bc = np.asarray(poses.R_nc, float), np.asarray(poses.R_bc, float)
+    R_nc, R_bc = poses.R_nc, poses.R_bc
     down = np.broadcast_to(np.asarray(plane_down, float), p.shape[:-1])[..., None]
-    offset = np.concatenate([p, down], axis=-1) - np.asarray(poses.p_nc, float)
+    offset = np.concatenate([p, down], axis=-1) - poses.p_nc
     R_cn = np.swapaxes(R_nc, -1, -2)
     p_c = np.einsum("...ij,...j->...i", R_cn, offset)
     # Seen from b the target stands at R_bc p_c + lever, and b turns about its own origin: H (7.45).
-    from_body = np.einsum("...ij,...j->...i", R_bc, p_c) + np.asarray(poses.lever_arm, float)
+    from_body = np.einsum("...ij,...j->...i", R_bc, p_c) + poses.lever_arm
     by_attitude = np.swapaxes(R_bc, -1, -2) @ skew(from_body)
     R_cn = np.broadcast_to(R_cn, (*p_c.shape, 3))
     return Prediction(p_c, R_cn[..., :2], np.concatenate([-R_cn, by_attitude], axis=-1))
@@ -104,14 +83,12 @@ def _through(outer: Array, z: Array, inner: Prediction) -> Prediction:
     return Prediction(z, outer @ inner.H_position, outer @ inner.H_pose)
 
 
-def predict_pixel(
-    camera: Camera, position: ArrayLike, poses: CameraPoses, plane_down: ArrayLike
-) -> Prediction:
+def predict_pixel(position: ArrayLike, poses: CameraPoses, plane_down: ArrayLike) -> Prediction:
     """Pixel of a target, H (6.4), (7.42), distortion and skew included; behind the camera NaN.
 
     Derivatives H (6.7) and those of (7.45).
     """
-    inner = target_in_camera(position, poses, plane_down)
+    camera, inner = poses.camera, target_in_camera(position, poses, plane_down)
     z = np.where(inner.z[..., 2] > 0, inner.z[..., 2], np.nan)
     xy = inner.z[..., :2] / z[..., None]
     J = np.zeros((*xy.shape, 3))
@@ -196,33 +173,70 @@ def positions() -> Sensor:
     return Sensor(predict, (False, False))
 
 
+def require_rows(sensor: Sensor, rows: int) -> None:
+    """Refuse a sensor that was made for another number of rows than there are measurements.
+
+    Raises
+    ------
+    WildlabError
+        Where the numbers differ.
+    """
+    if sensor.rows not in (None, rows):
+        raise WildlabError(
+            f"{sensor.rows} poses for {rows} rows of measurements",
+            "give one pose for each row, or one for all",
+            field="sensor",
+        )
+
+
 def _row(values: ArrayLike, row: int, base: int) -> Array:
     """Row of (N, ...), or the one value of all rows; ``base`` is the number of axes of a single value."""
     a = np.asarray(values, float)
     return np.asarray(a[row] if a.ndim > base else a)
 
 
-def _pose_of(poses: CameraPoses, row: int) -> CameraPoses:
-    p_nc, R_nc, R_bc, lever = poses
-    return CameraPoses(_row(p_nc, row, 1), _row(R_nc, row, 2), _row(R_bc, row, 2), lever)
+def _camera_rows(poses: CameraPoses, plane_down: ArrayLike) -> int | None:
+    """How many rows a camera over a plane has; None where both are the same for all rows."""
+    planes = np.shape(plane_down)
+    if planes:
+        poses.require_rows(planes, "plane_down")
+    rows = poses.rows or planes
+    return rows[0] if rows else None
 
 
-def pixels(camera: Camera, poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
-    """Pixels (u, v) of a target on the plane (scalar or (N,) down coordinate), one pose per row."""
+def _platform_rows(platform: ArrayLike, yaw: ArrayLike) -> int | None:
+    """How many rows a platform has; None where it is the same for all rows."""
+    numbers = {len(np.asarray(a)) for a, base in ((platform, 1), (yaw, 0)) if np.ndim(a) > base}
+    if len(numbers) > 1:
+        raise WildlabError(
+            f"{np.shape(platform)} positions and {np.shape(yaw)} yaws", "give one of each for each row",
+            field="yaw",
+        )  # fmt: skip
+    return numbers.pop() if numbers else None
+
+
+def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
+    """Pixels (u, v) of a target on the plane (scalar or (N,) down coordinate), one pose per row.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of planes than of poses.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
-        return predict_pixel(camera, position, _pose_of(poses, row), _row(plane_down, row, 0))
+        return predict_pixel(position, poses.take(row), _row(plane_down, row, 0))
 
-    return Sensor(predict, (False, False))
+    return Sensor(predict, (False, False), _camera_rows(poses, plane_down))
 
 
 def azimuths_elevations(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
-    """Azimuth and elevation in c (radians), as `azimuth_elevation_of_pixel` gives them."""
+    """Azimuth and elevation in c (radians), as `azimuth_elevation_of_pixel` gives them; else as `pixels`."""
 
     def predict(row: int, position: Array) -> Prediction:
-        return predict_azimuth_elevation(position, _pose_of(poses, row), _row(plane_down, row, 0))
+        return predict_azimuth_elevation(position, poses.take(row), _row(plane_down, row, 0))
 
-    return Sensor(predict, (True, False))
+    return Sensor(predict, (True, False), _camera_rows(poses, plane_down))
 
 
 def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
@@ -231,7 +245,7 @@ def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))
 
-    return Sensor(predict, (False, True))
+    return Sensor(predict, (False, True), _platform_rows(platform, yaw))
 
 
 def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
@@ -241,4 +255,4 @@ def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
         both = predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))
         return Prediction(both.z[1:], both.H_position[1:], both.H_pose[1:])
 
-    return Sensor(predict, (True,))
+    return Sensor(predict, (True,), _platform_rows(platform, yaw))

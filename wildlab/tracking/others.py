@@ -18,7 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Prediction, Sensor, difference, on_state
+from wildlab.tracking.measurement import Prediction, Sensor, difference, on_state, require_rows
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Inputs, Start, State, Track, by_motion, checked, note, walk
 
@@ -52,6 +52,7 @@ def run_unscented(
     behind the camera.
     """
     given = _one_detection(checked(times, measurements, R, gate, output_times))
+    require_rows(sensor, len(given.times))
     n, m = len(start.x), given.z.shape[2]
     angles = np.array(sensor.angles)
 
@@ -155,6 +156,7 @@ def run_imm(
         As `run_filter`; fewer than two models, or not one ``mean_stay`` above zero for each.
     """
     given = _one_detection(checked(times, measurements, R, gate, output_times))
+    require_rows(sensor, len(given.times))
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(

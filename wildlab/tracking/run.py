@@ -19,7 +19,7 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Sensor, on_state
+from wildlab.tracking.measurement import Sensor, on_state, require_rows
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.schmidt import PoseUncertainty
 
@@ -173,9 +173,11 @@ def run_filter(
     Raises
     ------
     WildlabError
-        Naming the row: times out of order, an ``R`` or an ``S`` that is not positive definite.
+        Naming the row: times out of order, an ``R`` or an ``S`` that is not positive definite; a sensor with
+        another number of poses than there are rows.
     """
     given = checked(times, measurements, R, gate, output_times)
+    require_rows(sensor, len(given.times))
     n = len(start.x)
     C = np.zeros((n, 6))
     covariances = np.zeros((len(given.times), 6, 6)) if pose is None else np.asarray(pose.covariance, float)

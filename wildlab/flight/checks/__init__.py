@@ -1,1 +1,1 @@
-"""Is a flight usable, for what, and does it make sense? One file for each kind of finding; `check` asks all."""
+"""Is a flight usable, for what, and does it make sense? A file for each kind of finding; `check` asks all."""

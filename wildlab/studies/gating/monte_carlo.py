@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, in_image
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.mount import Mount
 from wildlab.tracking.association import distances, nearest_within
 from wildlab.tracking.kalman import correct, predict
 from wildlab.tracking.measurement import (
-    CameraPoses,
     Prediction,
     azimuth_elevation_of_pixel,
     difference,
@@ -62,22 +62,19 @@ class Overflight:
 
     Attributes
     ----------
+    poses
+        T rows; the camera looks down where pan and tilt are zero.
     time_s
         (T,).
-    p_nb, euler
-        (T, 3) metres and roll, pitch, yaw in radians.
-    pan, tilt
-        (T,) rad, of a gimbal whose camera looks down at zero.
+    euler
+        (T, 3) rad, roll, pitch, yaw of the poses, to which the noise is added.
     place
         (2,) north and east of the middle between the targets' mean positions, on the plane ``down = 0``.
     """
 
-    camera: Camera
+    poses: CameraPoses
     time_s: Array
-    p_nb: Array
     euler: Array
-    pan: Array
-    tilt: Array
     place: Array
 
 
@@ -131,8 +128,7 @@ class Scene(NamedTuple):
     start: Array  # (N, 2)
     warm_up: Array  # (N, WARM_UP, 2)
     pixels: Array  # (N, T, 2, 2)
-    p_nc: Array  # (N, T, 3)
-    R_nc: Array  # (N, T, 3, 3)
+    poses: CameraPoses  # (N, T) rows
 
 
 def overflight(
@@ -179,13 +175,15 @@ def overflight(
     p = p * (1.0, 1.0, height_scale)
     tilt = _tilt_after(place, p, R_nb) if gimbal == "follows" else np.zeros(IMAGES)
     camera = replace(camera, fx=camera.fx * focal_scale, fy=camera.fy * focal_scale)
-    return Overflight(camera, ticks[part], p, matrix_to_euler(R_nb), np.zeros(IMAGES), tilt, place)
+    euler = matrix_to_euler(R_nb)
+    poses = CameraPoses(camera, Mount(), p, euler_to_matrix(*euler.T), np.zeros(IMAGES), tilt)
+    return Overflight(poses, ticks[part], euler, place)
 
 
 def _stretch(camera: Camera, p: Array, R_nb: Array) -> slice:
     """See `overflight`."""
-    seen = camera_pose(Mount(), p, R_nb, np.zeros(len(p)), _tilt_after(np.zeros(2), p, R_nb))
-    shown = in_image(camera, ground_to_pixel(camera, np.zeros(3), *seen))
+    seen = CameraPoses(camera, Mount(), p, R_nb, np.zeros(len(p)), _tilt_after(np.zeros(2), p, R_nb))
+    shown = in_image(camera, ground_to_pixel(camera, np.zeros(3), seen.p_nc, seen.R_nc))
     away = np.where(shown, np.hypot(p[:, 0], p[:, 1]), np.inf)
     windows = np.lib.stride_tricks.sliding_window_view(away, min(IMAGES, len(away)))
     first = int(np.argmin(windows.max(axis=1)))
@@ -214,16 +212,17 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
     half = np.array(APART) / 2
     targets = over.place + np.stack([-half, half]) + DISPLACED_M * around.reshape(N, 2, 2)
     at_sea = np.concatenate([targets, np.zeros((N, 2, 1))], axis=-1)
-    p_nc, R_nc = camera_pose(Mount(), over.p_nb, euler_to_matrix(*over.euler.T), over.pan, over.tilt)
-    true = ground_to_pixel(over.camera, at_sea[:, None], p_nc[:, None], R_nc[:, None])
+    exact = over.poses
+    true = ground_to_pixel(exact.camera, at_sea[:, None], exact.p_nc[:, None], exact.R_nc[:, None])
     off = POSE_SD * pose.reshape(N, T, 8)
     euler = over.euler + off[..., 3:6]
-    known = camera_pose(
-        Mount(),
-        over.p_nb + off[..., :3],
-        euler_to_matrix(*np.moveaxis(euler, -1, 0)),
-        over.pan + off[..., 6],
-        over.tilt + off[..., 7],
+    pan, tilt = (0.0 if angle is None else angle for angle in (exact.pan, exact.tilt))
+    known = replace(
+        exact,
+        p_nb=exact.p_nb + off[..., :3],
+        R_nb=euler_to_matrix(*np.moveaxis(euler, -1, 0)),
+        pan=pan + off[..., 6],
+        tilt=tilt + off[..., 7],
     )
     main = targets[:, 0]
     return Scene(
@@ -231,25 +230,24 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
         main + np.sqrt(START_P[0, 0]) * start,
         main[:, None] + WARM_UP_M * warm_up.reshape(N, WARM_UP, 2),
         true + PIXEL_SD * pixel.reshape(N, T, 2, 2),
-        *known,
+        known,
     )
 
 
 def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence]) -> Gated:
     """Every image of every run, associated in the three forms. Keeps everything: for some 1000 runs."""
     scene = draw_scene(over, runs)
-    ground = pixel_to_plane(over.camera, scene.pixels, scene.p_nc[:, :, None], scene.R_nc[:, :, None], 0.0)[
-        ..., :2
-    ]
+    camera, p_nc, R_nc = scene.poses.camera, scene.poses.p_nc, scene.poses.R_nc
+    ground = pixel_to_plane(camera, scene.pixels, p_nc[:, :, None], R_nc[:, :, None], 0.0)[..., :2]
     detections = {
         "position": ground,
         "pixels": scene.pixels,
-        "angles": _measured_angles(over.camera, scene.pixels, choices),
+        "angles": _measured_angles(camera, scene.pixels, choices),
     }
-    inside = np.asarray(in_image(over.camera, scene.pixels).all(axis=-1), bool)
+    inside = np.asarray(in_image(camera, scene.pixels).all(axis=-1), bool)
     counted = inside if choices.in_image_only else np.ones_like(inside)
     start = _warm_up(scene, choices)
-    steps = [_associate(form, over.camera, scene, choices, detections, counted, start) for form in FORMS]
+    steps = [_associate(form, scene, choices, detections, counted, start) for form in FORMS]
     chosen, nis, estimate = (np.stack(parts) for parts in zip(*steps, strict=True))
     return Gated((chosen == 0) & counted, counted, nis, estimate, ground, scene.pixels, scene.targets)
 
@@ -272,7 +270,7 @@ def success_rates(over: Overflight, choices: Choices, runs: int, seed: int, chun
 def share_in_image(over: Overflight, runs: int, seed: int) -> float:
     """Share of the images of some runs that have both detections inside the edge."""
     pixels = draw_scene(over, streams(seed, runs)).pixels
-    return float(in_image(over.camera, pixels).all(axis=-1).mean())
+    return float(in_image(over.poses.camera, pixels).all(axis=-1).mean())
 
 
 def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
@@ -290,7 +288,6 @@ def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
 
 def _associate(
     form: str,
-    camera: Camera,
     scene: Scene,
     choices: Choices,
     detections: dict[str, Array],
@@ -308,9 +305,8 @@ def _associate(
     every = np.arange(N)
     for t in range(T):
         x, P = predict(x, P, F, Q)
-        # The derivatives with respect to the pose, which R_bc is for, are not used here.
-        poses = CameraPoses(scene.p_nc[:, t], scene.R_nc[:, t], np.eye(3))
-        seen = _expected(form, camera, x[:, :2], poses)
+        poses = scene.poses.take((slice(None), t))
+        seen = _expected(form, x[:, :2], poses)
         compared = _printed(seen, choices) if form == "angles" else seen
         angles = IS_ANGLE[form] if choices.azimuth == "atan2" else (False, False)
         nis[:, t] = distances(compared, angles, P, detections[form][:, t], R_FORM[form])
@@ -318,7 +314,7 @@ def _associate(
         if choices.updated_with != "nothing":
             used = taken[:, t] if choices.updated_with == "assigned" else np.zeros(N, np.int64)
             if by != form:
-                seen = _expected(by, camera, x[:, :2], poses)
+                seen = _expected(by, x[:, :2], poses)
             gap = difference(detections[by][every, t, used], seen.z, IS_ANGLE[by])
             step = correct(x, P, gap, on_state(seen.H_position, 4), R_FORM[by])
             fine = counted[:, t] & (used >= 0) & np.isfinite(gap).all(axis=-1)
@@ -331,11 +327,11 @@ def _associate(
     return taken, nis, estimate
 
 
-def _expected(form: str, camera: Camera, position: Array, poses: CameraPoses) -> Prediction:
+def _expected(form: str, position: Array, poses: CameraPoses) -> Prediction:
     if form == "position":
         return Prediction(position, np.eye(2), np.zeros((2, 6)))
     if form == "pixels":
-        return predict_pixel(camera, position, poses, 0.0)
+        return predict_pixel(position, poses, 0.0)
     return predict_azimuth_elevation(position, poses, 0.0)
 
 

@@ -106,9 +106,10 @@ def verdict(margin: Array) -> str:
 
 def chosen_parts(over: Overflight, shown: float) -> pd.DataFrame:
     """What H 6.4.3 does not print, what stands in its place, and why; ``shown`` as by `share_in_image`."""
-    camera, twice = over.camera, "; with the main object's own beside it"
+    camera, twice = over.poses.camera, "; with the main object's own beside it"
+    height = -over.poses.p_nb[:, 2].mean()
     rows = [
-        ("flight", f"14 s of the twin from {over.time_s[0]:.1f} s, {-over.p_nb[:, 2].mean():.0f} m high",
+        ("flight", f"14 s of the twin from {over.time_s[0]:.1f} s, {height:.0f} m high",
          "the poses were never published; the twin is that of H 6.4.1, with the same airframe and payload. "
          "Of all stretches with the middle between the targets in every image, the one that stays nearest"),
         ("gimbal", "pan zero, tilt after the targets",

@@ -32,7 +32,7 @@ from wildlab.pipeline.track import (
     start,
 )
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.measurement import CameraPoses, Sensor, pixels
+from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
 from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, Track
@@ -149,13 +149,7 @@ def as_in_frames(seen: Sighting, motion: Motion) -> Motion:
 def detections_of(seen: Sighting) -> tuple[NDArray[np.bool_], Sensor]:
     """The rows with a detection, and the camera at these rows alone."""
     rows = seen.seen
-    poses = CameraPoses(
-        seen.poses.p_nc[rows],
-        seen.poses.R_nc[rows],
-        seen.poses.R_bc[rows] if np.ndim(seen.poses.R_bc) == 3 else seen.poses.R_bc,
-        seen.poses.lever_arm,
-    )
-    return rows, pixels(seen.camera, poses, seen.plane_down[rows])
+    return rows, pixels(seen.poses.take(rows), seen.plane_down[rows])
 
 
 def _unscented(seen: Sighting, tuning: CvTuning) -> Track:

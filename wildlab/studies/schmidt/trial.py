@@ -22,7 +22,7 @@ from wildlab.pipeline.track import (
     sighting,
 )
 from wildlab.simulation.twins import simulate_twin
-from wildlab.tracking.measurement import CameraPoses, pixels
+from wildlab.tracking.measurement import pixels
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
 from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, Track, start_from_first
@@ -99,7 +99,7 @@ def compare(seen: Sighting) -> Compared:
     WildlabError
         Where the poses have no covariance.
     """
-    P = seen.pose_covariance
+    P = seen.poses.covariance
     if P is None:
         raise WildlabError(
             "the poses have no covariance", "use those of the MEKF: navigated_sighting(flight)", field="nav"
@@ -157,9 +157,8 @@ def follow_others(seen: Sighting) -> dict[str, Track]:
         return motion
 
     rows = seen.seen
-    R_bc = seen.poses.R_bc if seen.poses.R_bc.ndim == 2 else seen.poses.R_bc[rows]
-    poses = CameraPoses(seen.poses.p_nc[rows], seen.poses.R_nc[rows], R_bc, seen.poses.lever_arm)
-    sensor, times, uv = pixels(seen.camera, poses, seen.plane_down[rows]), seen.times[rows], seen.uv[rows]
+    sensor = pixels(seen.poses.take(rows), seen.plane_down[rows])
+    times, uv = seen.times[rows], seen.uv[rows]
     begin: Start = start_from_first(times, seen.positions[rows], TUNING.position_0, TUNING.velocity_0)
     R = np.eye(2) * TUNING.pixel**2
     calm, brisk = stepped(TUNING.acceleration), stepped(10 * TUNING.acceleration)
