@@ -47,7 +47,7 @@ def test_examines_this_checkout_quickly() -> None:
     start = time.perf_counter()
     findings = doctor.examine()
     assert time.perf_counter() - start < 2
-    assert len({finding.name for finding in findings}) == len(findings) == 10
+    assert len({finding.name for finding in findings}) == len(findings) == 11
     for finding in findings:
         assert finding.found
         assert finding.ok or finding.fix

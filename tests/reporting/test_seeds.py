@@ -99,7 +99,7 @@ def test_the_code_key_follows_code_twins_and_versions(
     for name in files:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("1")
-    monkeypatch.setattr(flown, "ROOT", tmp_path)
+    monkeypatch.setattr(flown, "PACKAGE", tmp_path / "wildlab")
     monkeypatch.setattr(flown, "DATA", tmp_path / "data")
     keys = [flown.code_key(), flown.code_key()]
     for name in files:

@@ -31,7 +31,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.paths import DATA, ROOT
+from wildlab.paths import DATA, PACKAGE
 
 
 class Flown(NamedTuple):
@@ -127,13 +127,15 @@ def work_key(name: str, parameters: Mapping[str, Any], code: str) -> str:
 def code_key() -> str:
     """The code below `wildlab.reporting`, the twins' parameters and the packages' versions, as 64 hexadecimal
     digits. Two machines on which it is the same compute the same thing."""
-    rooms = [path for room in ROOMS for path in (ROOT / "wildlab" / room).rglob("*.py")]
+    # Named as in a checkout, so that an installed wildlab of the same code has the same key.
+    modules = (path for room in ROOMS for path in (PACKAGE / room).rglob("*.py"))
+    code = {"wildlab" / path.relative_to(PACKAGE): path for path in modules}
     # Twins share parts, so a change of any of their files may be a change of each.
-    files = sorted([*rooms, *(DATA / "twins").rglob("*.toml")])
+    twins = {"data" / path.relative_to(DATA): path for path in (DATA / "twins").rglob("*.toml")}
     versions = [f"{package} {_version(package)}" for package in PACKAGES]
     digest = hashlib.sha256(" ".join([*platform.python_version_tuple()[:2], *versions]).encode())
-    for path in files:
-        digest.update(path.relative_to(ROOT).as_posix().encode())
+    for name, path in sorted((code | twins).items()):
+        digest.update(name.as_posix().encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
