@@ -101,7 +101,7 @@ def check_environment(root: Path | None, prefix: str = sys.prefix) -> Finding:
     slipped = [variable for variable in ("PYTHONPATH", "PYTHONHOME") if os.environ.get(variable)]
     if slipped:
         found = f"{slipped[0]} is set and may bring in foreign packages"
-        fix = f"Unset it: 'unset {slipped[0]}' (make does so itself)."
+        fix = f"Unset it: 'unset {slipped[0]}'."
         return Finding(False, name, found, fix)
     return Finding(True, name, str(wanted))
 
@@ -260,7 +260,7 @@ def check_kernel() -> Finding:
     # Not resolved: the interpreter in .venv/bin is a link to the one that it was made from.
     if Path(program).absolute() == Path(sys.executable).absolute():
         return Finding(True, name, f"python3 is {program}")
-    fix = "Set JUPYTER_PREFER_ENV_PATH=1 (make does), or run 'jupyter kernelspec remove python3'."
+    fix = "Set JUPYTER_PREFER_ENV_PATH=1, or run 'jupyter kernelspec remove python3'."
     return Finding(False, name, f"python3 in {spec.resource_dir} starts {program}, not {sys.executable}", fix)
 
 

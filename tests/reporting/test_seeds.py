@@ -213,7 +213,7 @@ def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPa
         return real(name, *more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(WildlabError, match=r"not installed here.*pip install -e '\.\[cluster\]'"):
+    with pytest.raises(WildlabError, match=r"not installed here.*pip install distributed.*make environment"):
         cluster.Cluster("tcp://127.0.0.1:8786")
 
 
