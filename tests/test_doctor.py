@@ -47,11 +47,46 @@ def test_examines_this_checkout_quickly() -> None:
     start = time.perf_counter()
     findings = doctor.examine()
     assert time.perf_counter() - start < 2
-    assert len({finding.name for finding in findings}) == len(findings) == 10
+    assert len({finding.name for finding in findings}) == len(findings) == 11
     for finding in findings:
         assert finding.found
         assert finding.ok or finding.fix
         assert not finding.fix or finding.fix.endswith(".")
+
+
+def test_examines_an_installed_wildlab(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Without a checkout there is no make, no git and no lock that the environment has to follow."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    monkeypatch.setattr(paths, "REPORTS", Path("reports"))
+    findings = {finding.name: finding for finding in doctor.examine(None)}
+    assert findings["environment"] == doctor.Finding(True, "environment", sys.prefix)
+    assert findings["packages"].ok and findings["notebooks and data"].ok
+    assert findings["reports folder"].found.startswith(str(tmp_path))
+    assert not {"lock", "git", "browser for tests"} & set(findings)
+    assert not [finding for finding in findings.values() if "make " in finding.found + finding.fix]
+
+
+def test_what_an_installed_wildlab_asks_for() -> None:
+    wishes = ["Affine>=3", "numpy>=2", "polars", "ruff; extra == 'dev'", "colorama; python_version < '3'"]
+    finding = doctor.check_requirements(wishes, INSTALLED | {"affine": "2.4"})
+    assert not finding.ok and finding.found == "wildlab asks for Affine>=3, polars"
+    assert finding.fix == "Run 'python -m pip install' with 'Affine>=3' 'polars'."
+    assert doctor.check_requirements(wishes[:2], INSTALLED).ok
+
+
+def test_other_versions_than_those_tested_are_a_note(lock: Path, tmp_path: Path) -> None:
+    assert doctor.check_tested_versions(lock, {"affine": "3.0.1"}).fix == ""
+    finding = doctor.check_tested_versions(lock, {"numpy": "2.4.7"})
+    assert finding.ok and "numpy 2.4.7 instead of 2.4.6" in finding.found
+    assert f"pip install -r {lock}" in finding.fix
+    assert not doctor.check_tested_versions(tmp_path / "gone", {}).ok
+
+
+def test_notebooks_and_data_that_are_missing_are_named(tmp_path: Path) -> None:
+    assert doctor.check_resources(paths.RESOURCES).ok
+    finding = doctor.check_resources(tmp_path)
+    assert not finding.ok and "notebooks/studies.toml" in finding.found
 
 
 def test_this_environment_is_what_its_lock_says() -> None:

@@ -238,9 +238,11 @@ def check(flight: Path, as_json: bool) -> None:
 def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> None:
     """Make a flight folder from raw logs, as RECIPE says. The raw files are not changed.
 
+    How to write one is in data/recipes/README.md; `wildlab doctor` says where that data folder is.
+
     \b
     Example:
-      wildlab import data/recipes/openathena-f1.toml --source raw --into flights/f1
+      wildlab import recipe.toml --source logs --into flights/mine
     """
     from wildlab.flight.recipe.importing import import_flight
 
@@ -282,7 +284,7 @@ def fetch(dataset: str | None, as_json: bool) -> None:
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
 @click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
 def simulate(twin: str, into: Path, seed: int, overwrite: bool) -> None:
-    """Simulate a twin as a flight folder. TWIN is a name in data/twins, or a parameter file.
+    """Simulate a twin as a flight folder. TWIN is one that comes with wildlab, or a parameter file.
 
     \b
     Example:

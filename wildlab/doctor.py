@@ -10,7 +10,7 @@ import os
 import shutil
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -41,24 +41,38 @@ class Finding:
     fix: str = ""
 
 
-def examine(root: Path = paths.ROOT) -> list[Finding]:
+def examine(root: Path | None = paths.ROOT) -> list[Finding]:
     """Look at the Python, its packages, the Jupyter kernel, the disk and the tools around them.
 
     Parameters
     ----------
     root
-        The checkout to look at, with ``environment.lock`` and ``pyproject.toml`` in it.
+        The checkout to look at, with ``environment.lock`` and ``pyproject.toml`` in it; None where wildlab
+        was installed from a wheel, into an environment that is its owner's business.
 
     Returns
     -------
     list of Finding
         In the order in which they should be mended.
     """
+    if root is None:
+        return [
+            check_python(),
+            check_environment(None),
+            check_requirements(metadata.requires("wildlab") or []),
+            check_tested_versions(paths.LOCK),
+            check_resources(paths.RESOURCES),
+            check_kernel(),
+            check_reports_folder(paths.REPORTS.absolute()),
+            check_disk(Path.cwd()),
+            check_mirror(),
+        ]
     return [
         check_python(),
         check_environment(root),
         check_packages(root / "environment.lock"),
         check_lock(root / "environment.lock", root / "pyproject.toml"),
+        check_resources(root),
         check_kernel(),
         check_reports_folder(root / "reports"),
         check_disk(root),
@@ -72,22 +86,22 @@ def check_python(version: tuple[int, ...] = sys.version_info[:3]) -> Finding:
     """Is this Python new enough?"""
     found = ".".join(str(part) for part in version)
     if version[:2] < OLDEST_PYTHON:
-        fix = "Name a newer one, as in 'make PYTHON=python3.12 environment'."
+        fix = "Install wildlab with a newer one (in a checkout: 'make PYTHON=python3.12 environment')."
         return Finding(False, "Python", found, fix)
     return Finding(True, "Python", found)
 
 
-def check_environment(root: Path, prefix: str = sys.prefix) -> Finding:
+def check_environment(root: Path | None, prefix: str = sys.prefix) -> Finding:
     """Does wildlab run in the checkout's own ``.venv``, and is nothing slipped in from outside?"""
     name = "environment"
-    wanted = root / ".venv"
+    wanted = Path(prefix) if root is None else root / ".venv"
     if Path(prefix).resolve() != wanted.resolve():
         fix = f"Run it as {wanted / 'bin' / 'wildlab'}, or through make."
         return Finding(False, name, f"running in {prefix}, not in {wanted}", fix)
     slipped = [variable for variable in ("PYTHONPATH", "PYTHONHOME") if os.environ.get(variable)]
     if slipped:
         found = f"{slipped[0]} is set and may bring in foreign packages"
-        fix = f"Unset it ('unset {slipped[0]}'), or run through make, which does."
+        fix = f"Unset it: 'unset {slipped[0]}'."
         return Finding(False, name, found, fix)
     return Finding(True, name, str(wanted))
 
@@ -134,13 +148,8 @@ def check_packages(lock: Path, installed: Mapping[str, str] | None = None) -> Fi
         restore = "Restore it: 'git checkout environment.lock'."
         return Finding(False, name, f"{lock} cannot be read: {error}", restore)
     here = _installed() if installed is None else installed
-    missing, different = [], []
-    for pin in pins:
-        version = here.get(canonicalize_name(pin.name))
-        if version is None:
-            missing.append(pin.name)
-        elif not pin.specifier.contains(version, prereleases=True):
-            different.append(f"{pin.name} {version} instead of {str(pin.specifier).removeprefix('==')}")
+    missing = [pin.name for pin in pins if canonicalize_name(pin.name) not in here]
+    different = _different(pins, here)
     wrong = []
     if missing:
         wrong.append(f"missing: {_few(missing)}")
@@ -151,6 +160,54 @@ def check_packages(lock: Path, installed: Mapping[str, str] | None = None) -> Fi
     return Finding(True, name, f"{len(pins)}, as environment.lock says")
 
 
+def _different(pins: Iterable[Requirement], versions: Mapping[str, str]) -> list[str]:
+    """What is there in another version than its pin's, in words."""
+    found = [(pin, versions.get(canonicalize_name(pin.name))) for pin in pins]
+    return [
+        f"{pin.name} {version} instead of {str(pin.specifier).removeprefix('==')}"
+        for pin, version in found
+        if version is not None and not pin.specifier.contains(version, prereleases=True)
+    ]
+
+
+def check_requirements(wishes: Iterable[str], installed: Mapping[str, str] | None = None) -> Finding:
+    """Is everything here that an installed wildlab asks for, in versions that it can use?"""
+    name = "packages"
+    unmet = _unmet(wishes, _installed() if installed is None else installed)
+    if unmet:
+        packages = " ".join(f"'{wish}'" for wish in unmet)
+        fix = f"Run 'python -m pip install' with {packages}."
+        return Finding(False, name, f"wildlab asks for {_few(unmet)}", fix)
+    return Finding(True, name, "all that wildlab asks for")
+
+
+def check_tested_versions(lock: Path, installed: Mapping[str, str] | None = None) -> Finding:
+    """Are the packages those that the numbers were tested with? Others may do, so this is a note."""
+    name = "tested versions"
+    try:
+        pins = read_lock(lock)
+    except (OSError, ValueError) as error:
+        return Finding(False, name, f"{lock} cannot be read: {error}", "Install the wheel again.")
+    different = _different(pins, _installed() if installed is None else installed)
+    if different:
+        found = f"different from environment.lock: {_few(different)}"
+        fix = f"Last digits may differ; 'python -m pip install -r {lock}' takes what was tested."
+        return Finding(True, name, found, fix)
+    return Finding(True, name, "as environment.lock says")
+
+
+def _unmet(wishes: Iterable[str], versions: Mapping[str, str]) -> list[str]:
+    """The requirements that ``versions`` (by canonical name) does not meet, extras left out."""
+    unmet = []
+    for wish in map(Requirement, wishes):
+        if wish.marker is not None and not wish.marker.evaluate({"extra": ""}):
+            continue
+        version = versions.get(canonicalize_name(wish.name))
+        if version is None or not wish.specifier.contains(version, prereleases=True):
+            unmet.append(f"{wish.name}{wish.specifier}")
+    return unmet
+
+
 def check_lock(lock: Path, pyproject: Path) -> Finding:
     """Does the lock hold everything that ``pyproject.toml`` asks for?
 
@@ -158,26 +215,32 @@ def check_lock(lock: Path, pyproject: Path) -> Finding:
     """
     name = "lock"
     try:
-        pins = {canonicalize_name(pin.name): pin for pin in read_lock(lock)}
+        pins = {
+            canonicalize_name(pin.name): next((item.version for item in pin.specifier), "")
+            for pin in read_lock(lock)
+        }
         project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
         texts = [*project.get("dependencies", [])]
         for extra in project.get("optional-dependencies", {}).values():
             texts += extra
-        wishes = [Requirement(text) for text in texts]
+        behind = _unmet(texts, {name: version for name, version in pins.items() if version})
     except (OSError, ValueError, KeyError) as error:
         return Finding(False, name, f"cannot be compared with {pyproject}: {error}", "Restore both from git.")
-    behind = []
-    for wish in wishes:
-        if wish.marker is not None and not wish.marker.evaluate({"extra": ""}):
-            continue
-        pin = pins.get(canonicalize_name(wish.name))
-        version = next((item.version for item in pin.specifier), "") if pin else ""
-        if not version or not wish.specifier.contains(version, prereleases=True):
-            behind.append(str(wish))
     if behind:
         found = f"older than pyproject.toml, which asks for {_few(behind)}"
         return Finding(False, name, found, "Run 'make lock'.")
     return Finding(True, name, "environment.lock answers pyproject.toml")
+
+
+def check_resources(folder: Path) -> Finding:
+    """Is there what wildlab reads: studies, twins, recipes, published numbers?"""
+    name = "notebooks and data"
+    needed = ("notebooks/studies.toml", "data/catalog.toml", "data/twins", "data/recipes", "data/published")
+    missing = [entry for entry in needed if not (folder / entry).exists()]
+    if missing:
+        fix = "Install wildlab again (in a checkout: 'git checkout notebooks data')."
+        return Finding(False, name, f"{_few(missing)} not in {folder}", fix)
+    return Finding(True, name, f"in {folder}")
 
 
 def check_kernel() -> Finding:
@@ -188,7 +251,8 @@ def check_kernel() -> Finding:
     try:
         spec = KernelSpecManager().get_kernel_spec("python3")
     except NoSuchKernel:
-        return Finding(False, name, "Jupyter finds no kernel named python3", "Run 'make clean environment'.")
+        fix = f"Run '{sys.executable} -m ipykernel install --sys-prefix'."
+        return Finding(False, name, "Jupyter finds no kernel named python3", fix)
     program = spec.argv[0] if spec.argv else ""
     # Jupyter itself replaces a bare "python" by the interpreter it runs in.
     if program.startswith("python") and "/" not in program and "\\" not in program:
@@ -196,7 +260,7 @@ def check_kernel() -> Finding:
     # Not resolved: the interpreter in .venv/bin is a link to the one that it was made from.
     if Path(program).absolute() == Path(sys.executable).absolute():
         return Finding(True, name, f"python3 is {program}")
-    fix = "Set JUPYTER_PREFER_ENV_PATH=1 (make does), or run 'jupyter kernelspec remove python3'."
+    fix = "Set JUPYTER_PREFER_ENV_PATH=1, or run 'jupyter kernelspec remove python3'."
     return Finding(False, name, f"python3 in {spec.resource_dir} starts {program}, not {sys.executable}", fix)
 
 

@@ -203,6 +203,17 @@ def test_without_git_provenance_says_so(tmp_path: Path, monkeypatch: pytest.Monk
     assert "git is not installed" in provenance.footer(found)
 
 
+def test_an_installed_wildlab_is_known_by_its_version() -> None:
+    state = provenance.git_state(None)
+    assert state == {"commit": None, "dirty": None, "note": "installed from a wheel"}
+
+
+def test_text_loses_where_an_installed_wildlab_lies(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(privacy, "ROOT", None)
+    monkeypatch.setattr(privacy, "PACKAGE", Path("/srv/someone/wildlab"))
+    assert privacy.clean_text("/srv/someone/wildlab/cli.py") == "[wildlab]/cli.py"
+
+
 def test_the_step_is_the_heading_above() -> None:
     node = notebook("# First\n\n## Second", "1", "# Third", "2")
     output = nbformat.v4.new_output("display_data", {"text/html": '<h2 id="x">Shown &amp; <b>told</b></h2>'})

@@ -99,7 +99,7 @@ def test_the_code_key_follows_code_twins_and_versions(
     for name in files:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("1")
-    monkeypatch.setattr(fingerprint, "ROOT", tmp_path)
+    monkeypatch.setattr(fingerprint, "PACKAGE", tmp_path / "wildlab")
     monkeypatch.setattr(fingerprint, "DATA", tmp_path / "data")
     keys = [fingerprint.code_key(), fingerprint.code_key()]
     for name in files:
@@ -201,7 +201,7 @@ def test_without_dask_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPa
         return real(name, *more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(WildlabError, match=r"not installed here.*pip install -e '\.\[cluster\]'"):
+    with pytest.raises(WildlabError, match=r"not installed here.*pip install distributed.*make environment"):
         cluster.Cluster("tcp://127.0.0.1:8786")
 
 

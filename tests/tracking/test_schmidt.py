@@ -188,10 +188,7 @@ def test_a_standing_error_of_the_pose_is_owned_up_to():
         times, uv, poses, truth = overflight(60, seed)
         error = rng.multivariate_normal(np.zeros(6), covariance)
         # The true pose is off by the error from the one that the filter is told.
-        seen = [
-            m.predict_pixel(truth[k, :2], poses.take(k), 0.0)
-            for k in range(60)
-        ]
+        seen = [m.predict_pixel(truth[k, :2], poses.take(k), 0.0) for k in range(60)]
         shifted = uv + np.array([one.H_pose @ error for one in seen])
         for pose, nees in ((None, plain), (PoseUncertainty(np.tile(covariance, (60, 1, 1))), aware)):
             track = run_filter(times, shifted, PIXELS, m.pixels(poses, 0.0), CV, START, pose=pose)

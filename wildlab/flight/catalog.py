@@ -27,7 +27,7 @@ from wildlab.flight.files import (
     leaves_folder,
     read_toml,
 )
-from wildlab.paths import DATA
+from wildlab.paths import DATA, fetched
 
 MIRROR_VARIABLE = "WILDLAB_DATA_MIRROR"
 
@@ -99,7 +99,7 @@ def find_dataset(name: str) -> DataSet:
 
 
 def dataset_folder(name: str, into: Path | None = None) -> Path:
-    """Folder of a data set below `into` (default ``data/fetched``), whether it has been fetched or not.
+    """Folder of a data set below `into` (by default `wildlab.paths.fetched`), fetched or not.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def dataset_folder(name: str, into: Path | None = None) -> Path:
         Where there is no data set of that name.
     """
     find_dataset(name)
-    return (DATA / "fetched" if into is None else into) / name
+    return (fetched() if into is None else into) / name
 
 
 def is_fetched(name: str, into: Path | None = None) -> bool:
@@ -132,7 +132,7 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
     name
         Of the catalog.
     into
-        Folder to put the folder of the data set in, by default ``data/fetched``.
+        Folder to put the folder of the data set in, by default `wildlab.paths.fetched`.
     progress
         Called before each file that has to be fetched.
 

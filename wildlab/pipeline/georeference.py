@@ -125,9 +125,7 @@ def observe(
     return Observations(
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
-        CameraPoses(
-            manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance
-        ),
+        CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance),
         _ground_heights(flight, table, pixels),
     )
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import nbformat
 
-from wildlab.paths import ROOT
+from wildlab.paths import PACKAGE, ROOT
 
 _KERNEL_CELL = re.compile(r"(/[\w.+@-]+)*/ipykernel_\d+/\d+\.py")
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
@@ -34,7 +34,7 @@ def clean_text(text: str, folders: dict[str, str] | None = None) -> str:
     if "ipykernel_" in text:
         text = _KERNEL_CELL.sub("[cell]", text)
     known = dict(folders or {})
-    known |= {sys.prefix: "[environment]", sys.base_prefix: "[python]", str(ROOT): "[wildlab]"}
+    known |= {sys.prefix: "[environment]", sys.base_prefix: "[python]", str(ROOT or PACKAGE): "[wildlab]"}
     home = str(Path.home())
     known |= {tempfile.gettempdir(): "[temporary]"} | ({home: "~"} if len(home) > 1 else {})
     # Longest first: the environment may lie inside the project, and the project inside the home folder.

@@ -73,7 +73,7 @@ def open_report(
     if expected_prefix and here != Path(expected_prefix).resolve():
         raise WildlabError(
             f"the notebook's kernel runs in another Python environment ({here.name}) than wildlab",
-            "run `make reports`, or register the kernel again: python -m ipykernel install --sys-prefix",
+            "register the kernel again: python -m ipykernel install --sys-prefix",
         )
     if kind not in TAGS:
         raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(TAGS)}", field="kind")

@@ -1,6 +1,6 @@
 """Seeds on a cluster of `dask.distributed` (the extra ``cluster``) in place of processes of this machine.
 
-Every worker needs the same checkout and the same environment; whether it has them is looked at before it
+Every worker needs the same wildlab and the same environment; whether it has them is looked at before it
 computes. It sends numbers and nothing else, and this process puts them into the same store. A worker that is
 lost costs its seeds under way, which another one computes again.
 """
@@ -141,7 +141,7 @@ def _connect(address: str) -> Any:
     except ImportError as error:
         raise WildlabError(
             "a cluster needs dask.distributed, which is not installed here",
-            "install it: make reports, or in the checkout's folder python -m pip install -e '.[cluster]'",
+            "install it: python -m pip install distributed (in a checkout: make environment)",
             field="--scheduler",
         ) from error
     if not _ADDRESS.fullmatch(address):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from wildlab.paths import DATA, ROOT
+from wildlab.paths import DATA, PACKAGE
 
 #: A change in any of these rooms can change a number.
 ROOMS = (
@@ -49,14 +49,17 @@ def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
 def code_key() -> str:
     """The code of all trials and below them, the twins' parameters and the packages' versions, as 64
     hexadecimal digits."""
-    package = ROOT / "wildlab"
-    code = [path for room in ROOMS for path in (package / room).rglob("*.py")]
-    # Twins share parts, so a change of any of their files may be a change of each.
-    files = sorted([*code, *package.glob(TRIALS), *(DATA / "twins").rglob("*.toml")])
+    code = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")] + [*PACKAGE.glob(TRIALS)]
+    # Twins share parts, so a change of any of their files may be a change of each. Named as in a checkout, so
+    # that a wheel of the same code has the same key.
+    named = [(f"wildlab/{path.relative_to(PACKAGE).as_posix()}", path) for path in code]
+    named += [
+        (f"data/{path.relative_to(DATA).as_posix()}", path) for path in (DATA / "twins").rglob("*.toml")
+    ]
     versions = [f"{package} {_version(package)}" for package in PACKAGES]
     digest = hashlib.sha256(" ".join([*platform.python_version_tuple()[:2], *versions]).encode())
-    for path in files:
-        digest.update(path.relative_to(ROOT).as_posix().encode())
+    for name, path in sorted(named):
+        digest.update(name.encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import sha256, write_atomic
-from wildlab.paths import DATA, ROOT
+from wildlab.paths import DATA, PACKAGE
 
 #: A change in any of these rooms can change a flight.
 _ROOMS = ("geometry", "flight", "simulation")
@@ -103,7 +103,7 @@ def _fingerprint(words: Iterable[str], files: Iterable[Path]) -> str:
     import numpy as np
 
     digest = hashlib.sha256(repr([np.__version__, *words]).encode())
-    code = sorted(path for room in _ROOMS for path in (ROOT / "wildlab" / room).glob("**/*.py"))
+    code = sorted(path for room in _ROOMS for path in (PACKAGE / room).glob("**/*.py"))
     for path in [*code, *files]:
         digest.update(f"{path.name} {sha256(path) if path.is_file() else 'absent'}\n".encode())
     return digest.hexdigest()

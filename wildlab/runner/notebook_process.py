@@ -152,11 +152,12 @@ def _others(job: Job) -> list[Path]:
 
 
 def _relative(flight: Path | None, job: Job) -> str:
-    """The flight's folder as seen from the report's, where both lie in the project; else its name."""
+    """The flight's folder as seen from the report's, where both lie in the checkout; else its name."""
     if flight is None:
         return ""
     flight, reports = flight.resolve(), Path(job.reports).resolve()
-    if flight.is_relative_to(reports) or (flight.is_relative_to(ROOT) and reports.is_relative_to(ROOT)):
+    inside = ROOT is not None and flight.is_relative_to(ROOT) and reports.is_relative_to(ROOT)
+    if flight.is_relative_to(reports) or inside:
         return Path(os.path.relpath(flight, reports / job.name)).as_posix()
     return flight.name
 
@@ -227,7 +228,8 @@ def _explain(error: BaseException, folder: Path) -> Failure:
         )
     elif kind == "NoSuchKernel":
         reason = (
-            "This environment has no Jupyter kernel named python3. Make the environment again: make reports."
+            "This environment has no Jupyter kernel named python3. Register it: "
+            "python -m ipykernel install --sys-prefix."
         )
     else:
         reason = f"It ended with {kind}: {error}"

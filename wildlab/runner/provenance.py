@@ -33,8 +33,13 @@ PACKAGES = [
 ]
 
 
-def git_state(root: Path = ROOT) -> dict[str, Any]:
-    """``{"commit": 40 hex digits or None, "dirty": bool or None, "note": "" or why there is none}``."""
+def git_state(root: Path | None = ROOT) -> dict[str, Any]:
+    """``{"commit": 40 hex digits or None, "dirty": bool or None, "note": "" or why there is none}``.
+
+    ``root`` is the checkout; None where there is none, and the version alone says what the code was.
+    """
+    if root is None:
+        return {"commit": None, "dirty": None, "note": "installed from a wheel"}
     git = shutil.which("git")
     if git is None:
         return {"commit": None, "dirty": None, "note": "git is not installed"}

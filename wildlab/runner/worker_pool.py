@@ -71,7 +71,7 @@ def _same_code(code: str) -> None:
     if _CODE[0] != code:
         raise WildlabError(
             "the code, the twins' parameters or the packages here are not those that the run began with",
-            "run it again; on a cluster, give every worker the same checkout and environment",
+            "run it again; on a cluster, give every worker the same wildlab and environment",
         )
 
 

@@ -1,0 +1,79 @@
+"""Every package that wildlab asks for is imported by it or its notebooks, or there is a reason on paper."""
+
+from __future__ import annotations
+
+import ast
+import json
+import tomllib
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from tests.test_architecture import imported_names
+from wildlab import paths
+
+#: Asked for and imported by nothing: why it is asked for all the same.
+NOT_IMPORTED = {
+    "ipykernel": "the kernel that runs the notebooks; Jupyter starts it by name",
+    "jupyterlab": "what `make lab` opens",
+    "opencv-python-headless": "reading and writing images; given from the start for work on photos",
+    "pyproj": "map projections and heights; given from the start for terrain models and maps",
+    "rasterio": "raster files; given from the start for terrain models",
+    "rerun-sdk": "replay of a flight in time and space; given from the start for that",
+}
+
+
+def sources(root: Path) -> Iterable[str]:
+    """The Python of the package and of the notebooks' code cells."""
+    for path in sorted((root / "wildlab").rglob("*.py")):
+        yield path.read_text(encoding="utf-8")
+    for path in sorted((root / "notebooks").rglob("*.ipynb")):
+        if ".ipynb_checkpoints" not in path.parts:
+            for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+                if cell["cell_type"] == "code":
+                    yield "".join(cell["source"])
+
+
+def complaints(root: Path, reasons: dict[str, str]) -> list[str]:
+    """Packages without import and reason, and reasons that are no longer needed."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {canonicalize_name(Requirement(text).name) for text in project["dependencies"]}
+    providers = metadata.packages_distributions()
+    used: set[str] = set()
+    for source in sources(root):
+        for _, name in imported_names(ast.parse(source), ("wildlab",)):
+            package = name.partition(".")[0]
+            used |= {canonicalize_name(provider) for provider in providers.get(package, [package])}
+    missing = [f"{name}: asked for and imported by nothing" for name in declared - used - set(reasons)]
+    stale = [f"{name}: imported after all" for name in used & set(reasons)]
+    gone = [f"{name}: not asked for" for name in set(reasons) - declared]
+    return sorted(missing + stale + gone)
+
+
+def test_what_is_asked_for_is_used_or_has_a_reason() -> None:
+    assert complaints(paths.ROOT, NOT_IMPORTED) == []
+
+
+def test_an_unused_package_and_a_stale_reason_are_found(tmp_path: Path) -> None:
+    (tmp_path / "wildlab").mkdir()
+    (tmp_path / "notebooks").mkdir()
+    (tmp_path / "pyproject.toml").write_text(
+        "[project]\ndependencies = ['numpy>=2', 'scipy', 'Click', 'opencv-python-headless', 'pandas']\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "wildlab" / "a.py").write_text("def f():\n    import numpy.linalg\n", encoding="utf-8")
+    cells = [
+        {"cell_type": "code", "source": ["from cv2 import imread\n"]},
+        {"cell_type": "markdown", "source": ["import click\n"]},
+    ]
+    (tmp_path / "notebooks" / "a.ipynb").write_text(json.dumps({"cells": cells}), encoding="utf-8")
+    reasons = {"opencv-python-headless": "images", "rasterio": "terrain", "pandas": "tables"}
+    assert complaints(tmp_path, reasons) == [
+        "click: asked for and imported by nothing",
+        "opencv-python-headless: imported after all",
+        "rasterio: not asked for",
+        "scipy: asked for and imported by nothing",
+    ]

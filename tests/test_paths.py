@@ -1,0 +1,38 @@
+"""Where things lie, in a checkout and without one. `test_wheel.py` looks at a real installation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from wildlab import paths
+from wildlab.flight import catalog
+
+
+def test_a_checkout_is_known_by_what_lies_beside_the_package(tmp_path: Path) -> None:
+    package = tmp_path / "wildlab"
+    (tmp_path / "notebooks").mkdir()
+    assert paths.find_checkout(package) is None
+    (tmp_path / "notebooks" / "studies.toml").touch()
+    assert paths.find_checkout(package) is None
+    (tmp_path / "pyproject.toml").touch()
+    assert paths.find_checkout(package) == tmp_path
+
+
+def test_here_all_is_in_the_checkout() -> None:
+    assert Path(__file__).resolve().parents[1] == paths.ROOT
+    assert (paths.NOTEBOOKS, paths.DATA) == (paths.ROOT / "notebooks", paths.ROOT / "data")
+    assert (paths.REPORTS, paths.fetched()) == (paths.ROOT / "reports", paths.ROOT / "data" / "fetched")
+    assert paths.LOCK.is_file()
+
+
+def test_public_data_of_an_installed_wildlab_go_to_the_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paths, "ROOT", None)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / ".cache"))
+    folder = catalog.dataset_folder("openathena")
+    assert folder.is_relative_to(tmp_path) and folder.parts[-2:] == ("fetched", "openathena")
+    assert "wildlab" in folder.relative_to(tmp_path).parts
