@@ -18,7 +18,7 @@ from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.judge import errors_of, judge
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.targets import target_path
+from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import constant_velocity, in_steps
