@@ -26,7 +26,7 @@ from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.noise import STIM300
 from wildlab.navigation.timeline import Imu
-from wildlab.simulation.trajectory import angular_rates, attitude_of, loiter, move, specific_forces
+from wildlab.simulation import angular_rates, attitude_of, loiter_path, move, specific_forces
 
 DURATION, RATE, FRACTION = 1500.0, 250, 100
 ORIGIN = (1.11, 0.17, 40.0)
@@ -37,7 +37,7 @@ def flight() -> tuple[Imu, Start, list[Aiding], Aiding]:
     """Ideal sensors on a loiter: what they say does not matter to the clock."""
     earth = local_earth(ORIGIN[0], ORIGIN[2])
     times = np.arange(0, DURATION, 1 / RATE)
-    path = loiter((0.0, 0.0), 160.0, 350.0, 20.0)
+    path = loiter_path((0.0, 0.0), 160.0, 350.0, 20.0)
     attitude = attitude_of(path, gravity=earth.gravity)
     motion = move(path, attitude, times)
     imu = Imu(times, specific_forces(motion, earth.gravity), angular_rates(attitude, times))

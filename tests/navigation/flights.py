@@ -12,8 +12,7 @@ from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.timeline import Imu
-from wildlab.simulation.sensors import gauss_markov
-from wildlab.simulation.trajectory import Motion, angular_rates, coordinated_attitude, specific_forces
+from wildlab.simulation import Motion, angular_rates, coordinated_attitude, gauss_markov, specific_forces
 
 SPEED, GRAVITY = 18.0, 9.81
 #: Turns: from, to (s), rate (rad/s). Straight in between.

@@ -19,8 +19,8 @@ from wildlab.navigation.aiding import positions, velocities
 from wildlab.navigation.mekf import prepare, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.timeline import Imu
+from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.imu import misaligned_triad
-from wildlab.simulation.sensors import gauss_markov
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,18 @@ import pytest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.navigate import navigate_mekf
 from wildlab.pipeline.navigation_errors import errors_against
-from wildlab.simulation.aboard import gnss_table, imu_table, nav_table, payload_attitude, ticks
-from wildlab.simulation.courses import trajectory
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.manifest import twin_manifest
+from wildlab.simulation.onboard_sensors import (
+    gnss_table,
+    imu_table,
+    nav_table,
+    payload_attitude,
+    sample_times,
+)
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.settings import twin_manifest
 from wildlab.simulation.trajectory import angular_rates, move
+from wildlab.simulation.twin_trajectory import twin_trajectory
 
 DURATION, SEEDS = 200.0, 50
 OUTAGE = (115.0, 175.0)
@@ -34,9 +40,9 @@ def shortened(name: str) -> TwinParameters:
 
 def sensors(twin: TwinParameters, seed: int) -> tuple[Flight, np.ndarray]:
     """Inertial unit, receivers and truth alone, with the outage; and whether it turns at each time."""
-    path, attitude = trajectory(twin, stream(seed, "trajectory"))
+    path, attitude = twin_trajectory(twin, stream(seed, "trajectory"))
     payload = payload_attitude(twin, attitude, seed)
-    times = ticks(5.0, DURATION)
+    times = sample_times(5.0, DURATION)
     gnss = gnss_table(twin, path, payload, seed)
     gnss = gnss[~gnss["time_s"].between(*OUTAGE)].reset_index(drop=True)
     tables = {"imu": imu_table(twin, path, payload, seed), "gnss": gnss}
@@ -48,7 +54,7 @@ def sensors(twin: TwinParameters, seed: int) -> tuple[Flight, np.ndarray]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fast-vessel", "drifting-vessel-eight"])
 def test_errors_are_as_large_as_the_filter_says(name):
-    twin, times = shortened(name), ticks(5.0, DURATION)
+    twin, times = shortened(name), sample_times(5.0, DURATION)
     squares: dict[str, list[np.ndarray]] = {"position": [], "attitude": []}
     nis, turns = [], []
     for seed in range(SEEDS):

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.simulation.trajectory import attitude_of, loiter, random_wander
+from wildlab.simulation.attitudes import attitude_of
+from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation.loiter import loiter_path
 
 WIND = np.array([4.0, -3.0, 0.0])
 
 
 def _restless_loiter(turn="clockwise"):
-    """A loiter with wind, wander and sway, all on: (path, attitude)."""
+    """A loiter with wind, control errors and gusts, all on: (path, attitude)."""
     rng = np.random.default_rng(7)
-    path = loiter(
+    path = loiter_path(
         (30.0, -50.0),
         160.0,
         350.0,
@@ -21,11 +23,11 @@ def _restless_loiter(turn="clockwise"):
         wind=WIND[:2],
         turn=turn,
         start_angle=0.3,
-        radius_wander=random_wander(3.0, 20.0, 120.0, rng),
-        altitude_wander=random_wander(2.0, 20.0, 120.0, rng),
+        radius_error=band_limited_disturbance(3.0, 20.0, 120.0, rng),
+        altitude_error=band_limited_disturbance(2.0, 20.0, 120.0, rng),
     )
-    sway = tuple(random_wander(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
-    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), sway=sway)
+    disturbance = tuple(band_limited_disturbance(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
+    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), disturbance=disturbance)
 
 
 @pytest.fixture

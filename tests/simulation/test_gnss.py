@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.simulation.gnss import antenna_motion, fixes
+from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.trajectory import angular_rates, move
 
 ARM = np.array([0.5, -0.2, -0.1])
@@ -33,14 +33,14 @@ def test_fixes_scatter_about_the_truth_as_stated():
     off = (
         np.array(
             [
-                fixes(true, 0.5, rng, wander=(2.0, 3.0), wander_time=25.0, noise=(0.5, 1.0))
+                position_fixes(true, 0.5, PositionErrors((2.0, 3.0), 25.0, (0.5, 1.0)), rng)
                 for _ in range(runs)
             ]
         )
         - true
     )
     variance = np.array([2.0**2 + 0.5**2] * 2 + [3.0**2 + 1.0**2])
-    # 100 s hold two independent errors of the wandering kind (100 / 2 tau).
+    # 100 s hold two independent errors of the correlated kind (100 / 2 tau).
     assert (off**2).mean(axis=(0, 1)) == pytest.approx(variance, rel=5 * np.sqrt(2 / (2 * runs)))
     lag = 10  # 5 s
     together = (off[:, :-lag] * off[:, lag:]).mean(axis=(0, 1))

@@ -7,25 +7,25 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.files import read_toml
-from wildlab.simulation.imu import ideal_imu, misaligned_triad, read_imu, read_triad
-from wildlab.simulation.models import Imu
+from wildlab.simulation.imu import TriadDataSheet, ideal_imu, misaligned_triad, read_imu, read_triad
 from wildlab.simulation.parameters import PARTS
+from wildlab.simulation.sensor_parameters import Imu
 from wildlab.simulation.trajectory import angular_rates, move, specific_forces
 
 #: A triad that does not err; each test switches one error on.
-IDEAL = dict(
+IDEAL = TriadDataSheet(
     random_walk=0.0,
     bias_stability=0.0,
     bias_time=100.0,
     turn_on_bias=0.0,
-    axis=0.0,
-    package=0.0,
+    axis_misalignment=0.0,
+    package_misalignment=0.0,
     limit=np.inf,
     resolution=0.0,
 )
 
 
-def sheet(name: str) -> Imu:
+def data_sheet(name: str) -> Imu:
     return Imu.model_validate(read_toml(PARTS / f"imu-{name}.toml", "an IMU")["imu"])
 
 
@@ -71,7 +71,7 @@ def test_ideal_readings_carry_a_strapdown_round_the_loiter(restless_loiter):
 @pytest.mark.parametrize("name", ["adis16490", "stim300"])
 def test_standing_still_the_walks_are_those_of_the_data_sheet(name):
     """Allan deviation at 1 s, where white noise is all there is: N / sqrt(T) (IEEE 952)."""
-    imu, seconds, hertz = sheet(name), 1000, 250
+    imu, seconds, hertz = data_sheet(name), 1000, 250
     force = np.tile([0.0, 0.0, -9.81], (seconds * hertz, 1))
     f, w = read_imu(force, np.zeros_like(force), imu, lambda n: np.random.default_rng([4, len(n)]))
     per_root_hour = 60.0  # 1/sqrt(s) -> 1/sqrt(h)
@@ -86,11 +86,11 @@ def test_standing_still_the_walks_are_those_of_the_data_sheet(name):
 @pytest.mark.parametrize("name", ["adis16490", "stim300"])
 def test_the_bias_in_the_run_has_the_allan_deviation_of_its_process(name):
     """Of a Gauss-Markov process it is known in closed form (IEEE 952), and largest at 1.89 times tau."""
-    imu = sheet(name)
+    imu = data_sheet(name)
     sd, tau = imu.gyro_bias_stability.si, imu.gyro_bias_time.si
     count, hertz = 400_000, 1.0  # 1333 correlation times
-    quiet = {**IDEAL, "bias_stability": sd, "bias_time": tau}
-    bias = read_triad(np.zeros((count, 3)), hertz, np.random.default_rng(8), **quiet)
+    quiet = IDEAL._replace(bias_stability=sd, bias_time=tau)
+    bias = read_triad(np.zeros((count, 3)), hertz, quiet, np.random.default_rng(8))
     averaged = round(1.89 * tau)
     x = averaged / hertz / tau
     expected = sd * np.sqrt(2 / x * (1 - (3 - 4 * np.exp(-x) + np.exp(-2 * x)) / (2 * x)))
@@ -104,7 +104,7 @@ def test_the_turn_on_bias_is_drawn_once_per_flight():
     still = np.zeros((10, 3))
     runs = np.array(
         [
-            read_triad(still, 250.0, np.random.default_rng(seed), **{**IDEAL, "turn_on_bias": 0.3})
+            read_triad(still, 250.0, IDEAL._replace(turn_on_bias=0.3), np.random.default_rng(seed))
             for seed in range(2000)
         ]
     )
@@ -132,7 +132,8 @@ def test_misaligned_axes_stay_within_the_stated_angles():
 
 def test_range_and_resolution_bound_the_reading():
     true = np.array([[0.2512, -3.0, 0.0], [1e9, -1e9, 0.2549]])
-    reading = read_triad(true, 250.0, np.random.default_rng(0), **{**IDEAL, "limit": 2.0, "resolution": 0.01})
+    sheet = IDEAL._replace(limit=2.0, resolution=0.01)
+    reading = read_triad(true, 250.0, sheet, np.random.default_rng(0))
     assert reading == pytest.approx(np.array([[0.25, -2.0, 0.0], [2.0, -2.0, 0.25]]))
 
 
@@ -143,5 +144,5 @@ def test_gyros_and_accelerometers_err_apart():
         asked.append(name)
         return np.random.default_rng(len(asked))
 
-    read_imu(np.zeros((5, 3)), np.zeros((5, 3)), sheet("adis16490"), stream)
+    read_imu(np.zeros((5, 3)), np.zeros((5, 3)), data_sheet("adis16490"), stream)
     assert sorted(asked) == ["accelerometers", "gyros"]

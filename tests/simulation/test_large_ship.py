@@ -7,15 +7,15 @@ import pytest
 
 from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
-from wildlab.simulation.courses import trajectory
+from wildlab.simulation.camera_detections import exposure_times
+from wildlab.simulation.camera_view import Exposures
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.manifest import true_mount
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.seen import exposure_times
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.settings import true_mount
-from wildlab.simulation.targets import target_outline, target_path
+from wildlab.simulation.target_motion import target_outline, target_path
 from wildlab.simulation.trajectory import move
+from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
-from wildlab.simulation.view import Exposures
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_the_three_misses_show_least_of_the_ship(twin, flight):
 
 def test_blobs_are_of_the_ship_seen_through_the_true_mount(twin):
     exact = simulate(with_values(twin, camera__marking_sd=0.0), 4).detections
-    path, attitude = trajectory(twin, stream(4, "trajectory"))
+    path, attitude = twin_trajectory(twin, stream(4, "trajectory"))
     true = move(path, attitude, exposure_times(twin))
     view = Exposures(twin, true)
     image = exact["frame_id"].str[1:].astype(int).to_numpy() - 1

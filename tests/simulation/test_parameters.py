@@ -8,6 +8,7 @@ import tomllib
 import pytest
 
 from wildlab.errors import WildlabError
+from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import (
     PARTS,
     TWINS,
@@ -17,7 +18,6 @@ from wildlab.simulation.parameters import (
     part_names,
     twin_names,
 )
-from wildlab.simulation.settings import twin_manifest
 
 
 def complete(name: str) -> str:
@@ -225,10 +225,10 @@ RADIUS = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "chosen"'
             "Lower wind_speed",
         ),
         (
-            "[flight.sway_longest_period]\nvalue = 9.0",
-            "[flight.sway_longest_period]\nvalue = 1.0",
+            "[flight.attitude_longest_period]\nvalue = 9.0",
+            "[flight.attitude_longest_period]\nvalue = 1.0",
             "flight",
-            "sway_shortest_period is longer",
+            "attitude_shortest_period is longer",
             "Exchange",
         ),
     ],
@@ -298,9 +298,9 @@ source = "H 6.4.4: 349 images had both vessels within the same image"
         ("slow-vessel", "value = 2001\n", "value = 3000\n", "the subset ends behind the last of 3635"),
         (
             "drifting-vessel",
-            "[target.motion.stray_longest_period]\nvalue = 900.0",
-            "[target.motion.stray_longest_period]\nvalue = 9.0",
-            r"target\.motion: stray_shortest_period is longer .* Exchange",
+            "[target.motion.deviation_longest_period]\nvalue = 900.0",
+            "[target.motion.deviation_longest_period]\nvalue = 9.0",
+            r"target\.motion: deviation_shortest_period is longer .* Exchange",
         ),
     ],
 )

@@ -14,16 +14,16 @@ from wildlab.flight.store import load_flight, save_flight
 from wildlab.geometry.frames import matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import Mount, camera_pose
-from wildlab.simulation.animals import herd
-from wildlab.simulation.courses import trajectory
+from wildlab.simulation.animal_motion import animal_paths
 from wildlab.simulation.gimbal import gimbal_angles as true_angles
 from wildlab.simulation.imu import ideal_imu
+from wildlab.simulation.manifest import true_mount
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.routes import headings
-from wildlab.simulation.settings import true_mount
-from wildlab.simulation.surveys import rows, survey_course
+from wildlab.simulation.survey_courses import rows, survey_course
 from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
+from wildlab.simulation.waypoint_courses import Laps, leg_headings
 
 NAMES = ["uav-search", "uav-search-low", "uav-tracking", "gondola"]
 #: Published in F 7.5: altitude and distance between rows, m.
@@ -36,14 +36,14 @@ def named(request):
 
 
 def calm(twin):
-    """The twin without control errors and sway."""
+    """The twin without control errors and disturbance."""
     spreads = ("track_sd", "altitude_sd", "roll_sd", "pitch_sd", "yaw_sd")
     return with_values(twin, **{f"flight__{name}": 0.0 for name in spreads})
 
 
 @pytest.mark.parametrize("name", ["uav-search-low", "gondola"])
 def test_velocity_and_acceleration_are_the_derivatives_of_position(name):
-    path, _ = trajectory(load_twin(name), np.random.default_rng(1))
+    path, _ = twin_trajectory(load_twin(name), np.random.default_rng(1))
     t, h = np.linspace(0, 1700, 6000), 1e-3
     (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
     _, v, a = path(t)
@@ -56,7 +56,7 @@ def test_velocity_and_acceleration_are_the_derivatives_of_position(name):
 
 @pytest.mark.parametrize("name", ["uav-search", "uav-search-low", "gondola"])
 def test_angular_rate_is_the_derivative_of_attitude(name):
-    _, attitude = trajectory(load_twin(name), np.random.default_rng(1))
+    _, attitude = twin_trajectory(load_twin(name), np.random.default_rng(1))
     t, h = np.linspace(5, 1700, 6000), 1e-3
     rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
     assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
@@ -66,7 +66,7 @@ def test_angular_rate_is_the_derivative_of_attitude(name):
 def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
     """Rate and force as the inertial unit would feel them, for four minutes: two rows and their turns."""
     twin = load_twin("uav-search-low")
-    path, attitude = trajectory(twin, np.random.default_rng(1))
+    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
     rate, count = 250.0, 60_001
     force, spin = ideal_imu(path, attitude, rate, count)
     h = 1 / rate
@@ -89,7 +89,7 @@ def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
 
 def test_a_multicopter_leans_just_as_its_thrust_must():
     twin = with_values(calm(load_twin("uav-search")), flight__trim_pitch=0.0)
-    path, attitude = trajectory(twin, np.random.default_rng(1))
+    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
     motion = move(path, attitude, np.linspace(0, 2000, 5000))
     force = specific_forces(motion, twin.place.gravity.si)
     assert np.abs(force[:, :2]).max() < 1e-9  # all of it along z of the body
@@ -100,14 +100,14 @@ def test_a_multicopter_leans_just_as_its_thrust_must():
     assert 0.9 * steepest < lean.max() < steepest
     assert np.median(lean) < 0.01
     # In steady flight it has its trim, nose down.
-    path, attitude = trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
+    path, attitude = twin_trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
     angles = np.degrees(matrix_to_euler(attitude(np.linspace(0, 2000, 5000))))
     assert np.median(angles[:, 1]) == pytest.approx(-4.0, abs=0.01)
 
 
 def test_a_gondola_hangs_level_and_goes_round_clockwise_at_its_speed():
     twin = calm(load_twin("gondola"))
-    path, attitude = trajectory(twin, np.random.default_rng(1))
+    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
     t = np.arange(0, 1800, 0.5)
     p, v, _ = path(t)
     assert np.hypot(v[:, 0], v[:, 1]) == pytest.approx(1.5, abs=0.01)
@@ -152,7 +152,7 @@ def test_a_survey_visits_every_row_once_and_comes_back():
 
 def test_heading_is_that_of_the_leg_and_turns_at_corners():
     square = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0], [0.0, 0.0]])
-    heading = headings(square, 5.0, 200.0, roll_time=2.0)
+    heading = leg_headings(Laps(square, 5.0, 200.0, roll_time=2.0))
     turned = np.degrees(heading([10.0, 30.0, 50.0, 70.0, 90.0, 170.0]) - heading([10.0]))
     assert turned == pytest.approx([0, 90, 180, 270, 360, 720], abs=1e-6)
     assert np.sin(heading([10.0])) == pytest.approx(0.0, abs=1e-9)
@@ -165,7 +165,7 @@ def test_heading_is_that_of_the_leg_and_turns_at_corners():
 @pytest.mark.parametrize(("name", "pattern"), PATTERNS.items())
 def test_altitude_and_rows_are_those_printed(name, pattern):
     twin = load_twin(name)
-    path, _ = trajectory(twin, np.random.default_rng(2))
+    path, _ = twin_trajectory(twin, np.random.default_rng(2))
     p, v, _ = path(np.arange(0, twin.flight.duration.si, 1.0))
     assert -p[:, 2].mean() == pytest.approx(pattern[0], abs=0.5)
     assert np.hypot(v[:, 0], v[:, 1]).max() < 1.3 * twin.flight.airspeed.number
@@ -212,7 +212,7 @@ def test_marks_are_on_the_animals_through_pose_and_gimbal(named):
     pose = camera_pose(flight.manifest.geometry_mount(), p_nb, R_nb, pan, tilt)
     uv = flight.detections[["u_px", "v_px"]].to_numpy()
     ground = pixel_to_plane(flight.manifest.geometry_camera(), uv, *pose, -0.7)
-    walks = herd(twin, 2)
+    walks = animal_paths(twin, 2)
     at = np.concatenate(
         [walks[animal](times[[i]]) for animal, i in zip(flight.detections["target_id"], row, strict=True)]
     )

@@ -7,15 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import matrix_to_euler
-from wildlab.simulation.trajectory import (
-    angular_rates,
-    attitude_of,
-    coordinated_attitude,
-    loiter,
-    move,
-    random_wander,
-    specific_forces,
-)
+from wildlab.simulation.attitudes import attitude_of, coordinated_attitude
+from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation.loiter import loiter_path
+from wildlab.simulation.trajectory import angular_rates, move, specific_forces
 
 WIND = np.array([4.0, -3.0, 0.0])
 
@@ -23,7 +18,7 @@ WIND = np.array([4.0, -3.0, 0.0])
 @pytest.mark.parametrize(("turn", "sense"), [("clockwise", 1), ("counter-clockwise", -1)])
 def test_still_air_circle_is_a_coordinated_turn(turn, sense):
     speed, radius, gravity = 20.0, 150.0, 9.82
-    path = loiter((0.0, 0.0), radius, 300.0, speed, turn=turn)
+    path = loiter_path((0.0, 0.0), radius, 300.0, speed, turn=turn)
     t = np.linspace(0, 100, 500)
     p, v, _ = path(t)
     roll, pitch, yaw = matrix_to_euler(attitude_of(path, gravity=gravity)(t)).T
@@ -38,7 +33,7 @@ def test_still_air_circle_is_a_coordinated_turn(turn, sense):
 
 
 def test_in_wind_the_airspeed_is_steady_and_the_ground_track_a_circle():
-    path = loiter((10.0, 20.0), 160.0, 350.0, 19.5, wind=WIND[:2])
+    path = loiter_path((10.0, 20.0), 160.0, 350.0, 19.5, wind=WIND[:2])
     p, v, a = path(np.linspace(0, 1500, 4000))
     assert np.hypot(p[:, 0] - 10, p[:, 1] - 20) == pytest.approx(160.0, abs=1e-9)
     assert np.linalg.norm(v - WIND, axis=1) == pytest.approx(19.5, abs=1e-10)
@@ -109,11 +104,11 @@ def test_dead_reckoning_with_ideal_inertial_sensors_returns_the_motion(restless_
     assert np.linalg.norm(p - end.position[0]) < 0.1
 
 
-def test_wander_has_its_spread_its_band_and_its_derivatives():
+def test_a_disturbance_has_its_spread_its_band_and_its_derivatives():
     rng = np.random.default_rng(3)
     t = np.arange(0, 200_000, 0.7)
     for _ in range(5):
-        w = random_wander(2.5, 4.0, 40.0, rng)
+        w = band_limited_disturbance(2.5, 4.0, 40.0, rng)
         # Over 5000 of the longest periods a mean square of sines is theirs to a few parts in a thousand.
         assert np.sqrt(np.mean(w(t) ** 2)) == pytest.approx(2.5, rel=0.01)
         periods = 2 * np.pi / w.frequencies
@@ -126,6 +121,6 @@ def test_wander_has_its_spread_its_band_and_its_derivatives():
 
 def test_a_circle_that_cannot_be_flown_is_refused():
     with pytest.raises(ValueError, match="exceed the wind"):
-        loiter((0.0, 0.0), 100.0, 300.0, 10.0, wind=(8.0, 8.0))
+        loiter_path((0.0, 0.0), 100.0, 300.0, 10.0, wind=(8.0, 8.0))
     with pytest.raises(ValueError, match="radius"):
-        loiter((0.0, 0.0), 0.0, 300.0, 10.0)
+        loiter_path((0.0, 0.0), 0.0, 300.0, 10.0)

@@ -19,10 +19,10 @@ from wildlab.geometry.frames import (
 )
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import camera_pose
-from wildlab.simulation.aboard import payload_attitude
-from wildlab.simulation.courses import loiter_centre, trajectory
+from wildlab.simulation.onboard_sensors import payload_attitude
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.trajectory import move
+from wildlab.simulation.twin_trajectory import loiter_centre, twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Most tests need no inertial readings, which take most of the time.
@@ -161,7 +161,7 @@ def test_the_pair_of_autopilot_logs_differs_by_exactly_the_imus_misalignment(fli
 
 
 @pytest.mark.slow
-def test_autopilot_errors_have_the_stated_size_and_wander():
+def test_autopilot_errors_have_the_stated_size_and_correlation():
     """Over 12 flights: 25 min hold 50 correlation times of attitude, and 5 of position."""
     turns, shifts = [], []
     for seed in range(12):
@@ -186,7 +186,7 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
     calm = with_values(calm, flight__roll_sd=0.0, flight__pitch_sd=0.0, flight__yaw_sd=0.0)
     for changes in ({}, {"loiter__turn": "counter-clockwise"}, {"loiter__course_at_target": 120.0}):
         changed = with_values(calm, **changes)
-        path, attitude = trajectory(changed, np.random.default_rng(0))
+        path, attitude = twin_trajectory(changed, np.random.default_rng(0))
         motion = move(path, attitude, np.arange(0, 120, 0.01))
         flight = quick(with_values(changed, target__observations=1), 0)
         pose = camera_pose(flight.manifest.geometry_mount(), motion.position, motion.R_nb)
@@ -225,7 +225,7 @@ def test_the_antennas_ride_on_the_payload_as_the_levers_say(sensed):
         off = gnss[[which + name for name in names]].to_numpy() - (p + (R @ lever[..., None])[..., 0])
         spread = np.sqrt((off**2).mean(axis=0))
         stated = [np.hypot(0.01, 0.01)] * 2 + [np.hypot(0.015, 0.015)]
-        # Half of the variance wanders over 60 s: 420 s hold at least 3 independent errors of it.
+        # Half of the variance is correlated over 60 s: 420 s hold at least 3 independent errors of it.
         assert spread == pytest.approx(stated, rel=0.5 * 5 * np.sqrt(0.5 / 7))
         assert gnss["sd_horizontal_m"].iloc[0] == pytest.approx(stated[0])
     speeds = [f"v_{axis}_m_s" for axis in ("north", "east", "down")]
@@ -234,7 +234,7 @@ def test_the_antennas_ride_on_the_payload_as_the_levers_say(sensed):
 
 
 def test_the_payload_turns_against_the_airframe_slowly_by_about_a_degree(twin):
-    _, attitude = trajectory(twin, np.random.default_rng(0))
+    _, attitude = twin_trajectory(twin, np.random.default_rng(0))
     t = np.arange(1500.0)
     turns = [
         np.degrees(matrix_to_rotation_vector(np.swapaxes(attitude(t), 1, 2) @ payload(t)))

@@ -14,7 +14,7 @@ from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.targets import target_path, truth_table
+from wildlab.simulation.target_motion import target_path, truth_table
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Twin, detections, segments (None: not printed), tracking period in s, seconds per fix of the truth.

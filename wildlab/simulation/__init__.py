@@ -1,8 +1,80 @@
 """Twins: simulated flights that nothing downstream can tell from logged ones.
 
-Sensors are simulated, never results: `trajectory`, `routes`, `surveys` and `courses` move the platform,
-`targets` and `animals` what it looks for; `imu`, `gnss`, `gimbal` and `sensors` err as data sheets say,
-`aboard` and `seen` (with `partly_seen` and `animals_seen`, through a `view`) write the tables, and `twins`
-puts the flight together. Every number comes from a file in ``data/twins`` that says whether it was published
-or chosen, and why (`parameters`, `models`, `subjects`, `quantities`).
+Sensors are simulated, never results. Frames as in H 5.2.2: ``n`` is north-east-down with a fixed origin on
+the ground or the sea, ``b`` is the body (x forward, y right, z down); ``R_nb`` takes a vector from b to n.
+Units are SI and radians; only the files in ``data/twins`` have others, each number with its own. Times are
+(N,) s from the start of the flight; positions, velocities, accelerations, specific forces and angular rates
+are (N, 3), attitudes (N, 3, 3), one row per time. All randomness comes from `stream`, which is keyed by the
+seed and the sensor's name.
+
+Where a change belongs:
+
+- parameters: `parameters` (a twin's file) with `platform_parameters`, `sensor_parameters` and
+  `target_parameters`, whose values are `parameter_quantities`;
+- motion: `trajectory`, from `loiter`, `waypoint_courses`, `survey_courses`, `attitudes` and `disturbances`;
+  what a twin flies is in `twin_trajectory`, what it looks for in `target_motion` and `animal_motion`;
+- sensors: `imu`, `gnss`, `gimbal`, and the `error_models` that they share;
+- tables: `onboard_sensors`; `camera_detections` with `camera_view`, `animal_detections`,
+  `extended_target_detections` and `clipped_outlines`; `manifest`;
+- the whole flight: `twins`.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wildlab.simulation.attitudes import attitude_of, coordinated_attitude, thrust_aligned_attitude
+    from wildlab.simulation.error_models import gauss_markov, stream
+    from wildlab.simulation.loiter import loiter_path
+    from wildlab.simulation.parameters import TwinParameters, load_twin, parameters_table, twin_names
+    from wildlab.simulation.target_motion import target_path
+    from wildlab.simulation.trajectory import Motion, angular_rates, move, specific_forces
+    from wildlab.simulation.twins import simulate, simulate_twin
+
+_WHERE = {
+    "Motion": "trajectory",
+    "TwinParameters": "parameters",
+    "angular_rates": "trajectory",
+    "attitude_of": "attitudes",
+    "coordinated_attitude": "attitudes",
+    "gauss_markov": "error_models",
+    "load_twin": "parameters",
+    "loiter_path": "loiter",
+    "move": "trajectory",
+    "parameters_table": "parameters",
+    "simulate": "twins",
+    "simulate_twin": "twins",
+    "specific_forces": "trajectory",
+    "stream": "error_models",
+    "target_path": "target_motion",
+    "thrust_aligned_attitude": "attitudes",
+    "twin_names": "parameters",
+}
+__all__ = [
+    "Motion",
+    "TwinParameters",
+    "angular_rates",
+    "attitude_of",
+    "coordinated_attitude",
+    "gauss_markov",
+    "load_twin",
+    "loiter_path",
+    "move",
+    "parameters_table",
+    "simulate",
+    "simulate_twin",
+    "specific_forces",
+    "stream",
+    "target_path",
+    "thrust_aligned_attitude",
+    "twin_names",
+]
+
+
+def __getattr__(name: str) -> object:
+    """A public name from where it stands: a table of parameters does not wait for compiled code to load."""
+    if name not in _WHERE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.models import Gimbal
-from wildlab.simulation.sensors import stream
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.sensor_parameters import Gimbal
 
 _SHARPNESS = 0.98  # of a triangle's corners: the gimbal turns round within about a tenth of its swing
 

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.sensors import gauss_markov
+from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.trajectory import Motion
+
+
+class PositionErrors(NamedTuple):
+    """How far off a receiver's positions are.
+
+    Attributes
+    ----------
+    correlated_sd
+        SDs of the time-correlated error, a first-order Gauss-Markov process, per horizontal axis and in
+        height, m: multipath, and of a single-frequency receiver the ionosphere and orbits too.
+    correlation_time
+        Its correlation time, s.
+    noise_sd
+        SDs of the white error from fix to fix, likewise, m.
+    """
+
+    correlated_sd: tuple[float, float]
+    correlation_time: float
+    noise_sd: tuple[float, float]
 
 
 def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> tuple[Array, Array]:
@@ -31,34 +52,23 @@ def antenna_motion(motion: Motion, angular_rate: ArrayLike, arm: ArrayLike) -> t
     return motion.position + motion.R_nb @ r, motion.velocity + np.einsum("nij,nj->ni", motion.R_nb, around)
 
 
-def fixes(
-    position: ArrayLike,
-    step: float,
-    rng: np.random.Generator,
-    *,
-    wander: tuple[float, float],
-    wander_time: float,
-    noise: tuple[float, float],
+def position_fixes(
+    position: ArrayLike, step: float, errors: PositionErrors, rng: np.random.Generator
 ) -> Array:
-    """Positions as a receiver gives them: an error that wanders, and noise from fix to fix.
+    """Positions as a receiver gives them: with a time-correlated error, and noise from fix to fix.
 
     Parameters
     ----------
     position
         True positions of the antenna in n, (N, 3) m, ``step`` seconds apart.
-    wander
-        SD of the correlated error, per horizontal axis and in height, m; an RTK receiver's is multipath, a
-        single-frequency receiver's the ionosphere and orbits as well.
-    wander_time
-        Its correlation time, s.
-    noise
-        SD of the uncorrelated error, likewise, m.
 
     Returns
     -------
-    (N, 3) m.
+    (N, 3) m, in n.
     """
     p = np.asarray(position, float)
-    spread = np.array([wander[0], wander[0], wander[1]])
-    wandering = gauss_markov(len(p), step, spread, wander_time, rng)
-    return p + wandering + np.array([noise[0], noise[0], noise[1]]) * rng.standard_normal(p.shape)
+    correlated_sd, noise_sd = (
+        np.array([sd[0], sd[0], sd[1]]) for sd in (errors.correlated_sd, errors.noise_sd)
+    )
+    correlated = gauss_markov(len(p), step, correlated_sd, errors.correlation_time, rng)
+    return p + correlated + noise_sd * rng.standard_normal(p.shape)

@@ -1,13 +1,14 @@
 """Inertial measurement units: what ideal sensors would feel along a trajectory, and what a real unit reads.
 
 The errors are those of a data sheet (H tables A.5 and A.6): white noise whose integral walks (angle and
-velocity random walk), a bias that differs from one switching-on to the next and wanders during the run, axes
+velocity random walk), a bias that differs from one switching-on to the next and drifts during the run, axes
 that are not where they are said to be, a range and a resolution.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,15 +16,44 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth, attraction, flat_earth
-from wildlab.simulation.models import Imu
-from wildlab.simulation.sensors import gauss_markov, rounded
+from wildlab.simulation.error_models import gauss_markov, rounded
+from wildlab.simulation.sensor_parameters import Imu
 from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
 
 #: The n of a trajectory, by itself.
 INERTIAL = flat_earth(GRAVITY)
 
-_CHUNK = 16_384  # samples at a time: what the sines of a wander need then fits into the processor's cache
+_CHUNK = (
+    16_384  # samples at a time: what the sines of a disturbance need then fits into the processor's cache
+)
 _ASIDE = 4  # samples on either side of a difference of fourth order with a step of two samples
+
+
+class TriadDataSheet(NamedTuple):
+    """Errors of three gyros or accelerometers, in SI units.
+
+    Attributes
+    ----------
+    random_walk
+        Noise density, in the unit of a reading times the root of a second: the SD of the integral after 1 s.
+    bias_stability, bias_time
+        SD and correlation time (s) of the bias in the run, a first-order Gauss-Markov process.
+    turn_on_bias
+        SD of the bias that stays from switching on to switching off.
+    axis_misalignment, package_misalignment
+        As in :func:`misaligned_triad`, rad.
+    limit, resolution
+        Beyond the one the reading stands still, and it is a multiple of the other.
+    """
+
+    random_walk: float
+    bias_stability: float
+    bias_time: float
+    turn_on_bias: float
+    axis_misalignment: float
+    package_misalignment: float
+    limit: float
+    resolution: float
 
 
 def ideal_imu(
@@ -91,20 +121,7 @@ def misaligned_triad(axis: float, package: float, rng: np.random.Generator) -> A
     return np.asarray((axes / np.linalg.norm(axes, axis=1, keepdims=True)) @ turned.T)
 
 
-def read_triad(
-    true: ArrayLike,
-    rate: float,
-    rng: np.random.Generator,
-    *,
-    random_walk: float,
-    bias_stability: float,
-    bias_time: float,
-    turn_on_bias: float,
-    axis: float,
-    package: float,
-    limit: float,
-    resolution: float,
-) -> Array:
+def read_triad(true: ArrayLike, rate: float, sheet: TriadDataSheet, rng: np.random.Generator) -> Array:
     """What three gyros or accelerometers read of the true values.
 
     Parameters
@@ -113,27 +130,41 @@ def read_triad(
         (N, 3), in SI units.
     rate
         Hz.
-    random_walk
-        Noise density, in the unit of ``true`` times the root of a second: the SD of the integral after 1 s.
-    bias_stability, bias_time
-        SD and correlation time (s) of the bias that wanders during the run.
-    turn_on_bias
-        SD of the bias that stays from switching on to switching off.
-    axis, package
-        As in :func:`misaligned_triad`, rad.
-    limit, resolution
-        Beyond the one the reading stands still, and it is a multiple of the other.
 
     Returns
     -------
     (N, 3).
     """
     x = np.asarray(true, float)
-    triad = misaligned_triad(axis, package, rng)
-    reading = x @ triad.T + turn_on_bias * rng.standard_normal(3)
-    reading += gauss_markov(len(x), 1 / rate, [bias_stability] * 3, bias_time, rng)
-    reading += random_walk * np.sqrt(rate) * rng.standard_normal(x.shape)
-    return np.clip(rounded(reading, resolution), -limit, limit)
+    triad = misaligned_triad(sheet.axis_misalignment, sheet.package_misalignment, rng)
+    reading = x @ triad.T + sheet.turn_on_bias * rng.standard_normal(3)
+    reading += gauss_markov(len(x), 1 / rate, [sheet.bias_stability] * 3, sheet.bias_time, rng)
+    reading += sheet.random_walk * np.sqrt(rate) * rng.standard_normal(x.shape)
+    return np.clip(rounded(reading, sheet.resolution), -sheet.limit, sheet.limit)
+
+
+def triad_data_sheets(imu: Imu) -> tuple[TriadDataSheet, TriadDataSheet]:
+    """Of a unit's accelerometers, and of its gyros."""
+    angles = (imu.axis_misalignment.si, imu.package_misalignment.si)
+    accelerometers = TriadDataSheet(
+        imu.accelerometer_random_walk.si,
+        imu.accelerometer_bias_stability.si,
+        imu.accelerometer_bias_time.si,
+        imu.accelerometer_turn_on_bias.si,
+        *angles,
+        imu.accelerometer_range.si,
+        imu.accelerometer_resolution.si,
+    )
+    gyros = TriadDataSheet(
+        imu.gyro_random_walk.si,
+        imu.gyro_bias_stability.si,
+        imu.gyro_bias_time.si,
+        imu.gyro_turn_on_bias.si,
+        *angles,
+        imu.gyro_range.si,
+        imu.gyro_resolution.si,
+    )
+    return accelerometers, gyros
 
 
 def read_imu(
@@ -143,31 +174,8 @@ def read_imu(
 
     ``stream`` gives the random numbers of each triad by its name.
     """
-    rate, axis, package = imu.rate.si, imu.axis_misalignment.si, imu.package_misalignment.si
-    f = read_triad(
-        force,
-        rate,
-        stream("accelerometers"),
-        random_walk=imu.accelerometer_random_walk.si,
-        bias_stability=imu.accelerometer_bias_stability.si,
-        bias_time=imu.accelerometer_bias_time.si,
-        turn_on_bias=imu.accelerometer_turn_on_bias.si,
-        axis=axis,
-        package=package,
-        limit=imu.accelerometer_range.si,
-        resolution=imu.accelerometer_resolution.si,
+    accelerometers, gyros = triad_data_sheets(imu)
+    return (
+        read_triad(force, imu.rate.si, accelerometers, stream("accelerometers")),
+        read_triad(angular_rate, imu.rate.si, gyros, stream("gyros")),
     )
-    w = read_triad(
-        angular_rate,
-        rate,
-        stream("gyros"),
-        random_walk=imu.gyro_random_walk.si,
-        bias_stability=imu.gyro_bias_stability.si,
-        bias_time=imu.gyro_bias_time.si,
-        turn_on_bias=imu.gyro_turn_on_bias.si,
-        axis=axis,
-        package=package,
-        limit=imu.gyro_range.si,
-        resolution=imu.gyro_resolution.si,
-    )
-    return f, w

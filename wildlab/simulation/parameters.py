@@ -16,27 +16,21 @@ from pydantic import Field, field_validator, model_validator
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
 from wildlab.paths import DATA
-from wildlab.simulation.models import (
-    AirframeFlight,
+from wildlab.simulation.parameter_quantities import Parameter
+from wildlab.simulation.platform_parameters import AirframeFlight, Cable, Climb, Loiter, Place, Route, Survey
+from wildlab.simulation.sensor_parameters import (
     Assumed,
     Autopilot,
     Boresight,
-    Cable,
-    Climb,
     Gimbal,
     Gnss,
     Imu,
-    Loiter,
     OnboardClock,
-    Place,
-    Route,
-    Survey,
     TruePose,
     TwinCamera,
     TwinMount,
 )
-from wildlab.simulation.quantities import Parameter
-from wildlab.simulation.subjects import Animals, Enclosure, Pair, Segments, Subset, Target
+from wildlab.simulation.target_parameters import Animals, Enclosure, Pair, Segments, Subset, Target
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"
@@ -110,7 +104,7 @@ class TwinParameters(Strict):
 
     @property
     def targets(self) -> list[Target]:
-        """All targets with a description of their own, in their order; animals are in `animals.herd`."""
+        """All targets with a description of their own, in their order; animals are in `animal_motion`."""
         return [target for target in (self.target, self.second_target) if target is not None]
 
     @model_validator(mode="after")

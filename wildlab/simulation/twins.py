@@ -14,23 +14,23 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.simulation.aboard import (
+from wildlab.simulation.animal_motion import animals_truth
+from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.gimbal import gimbal_table
+from wildlab.simulation.manifest import twin_manifest
+from wildlab.simulation.onboard_sensors import (
     autopilot_tables,
     gnss_table,
     imu_table,
     nav_table,
     payload_attitude,
-    ticks,
+    sample_times,
 )
-from wildlab.simulation.animals import animals_truth
-from wildlab.simulation.courses import trajectory
-from wildlab.simulation.gimbal import gimbal_table
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.seen import exposure_times, frames_and_detections
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.settings import twin_manifest
-from wildlab.simulation.targets import truth_table
+from wildlab.simulation.target_motion import truth_table
 from wildlab.simulation.trajectory import move
+from wildlab.simulation.twin_trajectory import twin_trajectory
 
 #: Nav sources of a twin.
 AUTOPILOT = "autopilot"
@@ -78,15 +78,15 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
             field="without",
         )
     seed = int(seed)
-    path, attitude = trajectory(twin, stream(seed, "trajectory"))
+    path, attitude = twin_trajectory(twin, stream(seed, "trajectory"))
     duration = twin.flight.duration.si
     calibrated, uncalibrated = autopilot_tables(
-        twin, move(path, attitude, ticks(twin.autopilot.rate.si, duration)), seed
+        twin, move(path, attitude, sample_times(twin.autopilot.rate.si, duration)), seed
     )
     nav = {AUTOPILOT: calibrated}
     if uncalibrated is not None:
         nav[UNCALIBRATED] = uncalibrated
-    known = ticks(twin.truth.rate.si, duration)
+    known = sample_times(twin.truth.rate.si, duration)
     nav[TRUTH] = nav_table(move(path, attitude, known))
     frames, detections = frames_and_detections(twin, move(path, attitude, exposure_times(twin)), seed)
     if twin.animals is not None:

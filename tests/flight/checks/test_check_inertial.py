@@ -14,8 +14,8 @@ from wildlab.flight.checks.check import Finding, check_flight, usable_for
 from wildlab.flight.checks.inertial_data import FORCE, RATE
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import matrix_to_quaternion
-from wildlab.simulation.trajectory import Array, angular_rates, attitude_of, loiter, move, specific_forces
+from wildlab.geometry.frames import Array, matrix_to_quaternion
+from wildlab.simulation import angular_rates, attitude_of, loiter_path, move, specific_forces
 
 NED = ["north_m", "east_m", "down_m"]
 SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
@@ -86,7 +86,7 @@ def _found(flight: Flight) -> list[Finding]:
 
 
 def _circle() -> Any:
-    return loiter([0.0, 0.0], 150.0, 100.0, 20.0, wind=(6.0, 2.0))
+    return loiter_path([0.0, 0.0], 150.0, 100.0, 20.0, wind=(6.0, 2.0))
 
 
 def _straight(times: Array) -> tuple[Array, Array, Array]:

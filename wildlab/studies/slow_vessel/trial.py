@@ -17,7 +17,7 @@ from wildlab.pipeline.evaluate import errors_of, judge
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.targets import target_path
+from wildlab.simulation.target_motion import target_path
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.static_point.trial import TABLE_NAMES, differ
 from wildlab.tracking.measurement import positions

@@ -10,28 +10,30 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.simulation.models import Loiter
+from wildlab.simulation.attitudes import attitude_of, thrust_aligned_attitude
+from wildlab.simulation.disturbances import Disturbance, band_limited_disturbance
+from wildlab.simulation.loiter import Turn, loiter_path
+from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.routes import Shape, fly, headings, lap_times, outline, shape_corners
-from wildlab.simulation.settings import true_mount, twin_manifest
-from wildlab.simulation.surveys import cable_heights, survey_course
-from wildlab.simulation.trajectory import (
-    FlightPath,
-    Signal,
-    Turn,
-    Wander,
-    attitude_of,
-    leaning_attitude,
-    loiter,
-    move,
-    random_wander,
+from wildlab.simulation.platform_parameters import Loiter
+from wildlab.simulation.survey_courses import cable_heights, survey_course
+from wildlab.simulation.trajectory import FlightPath, Motion, Signal, move
+from wildlab.simulation.waypoint_courses import (
+    ControlErrors,
+    Laps,
+    Shape,
+    filleted_course,
+    lap_times,
+    laps_path,
+    leg_headings,
+    shape_corners,
 )
 
-Sway = tuple[Wander, Wander, Wander]
+AttitudeDisturbance = tuple[Disturbance, Disturbance, Disturbance]
 
 
-def trajectory(twin: TwinParameters, rng: np.random.Generator) -> tuple[FlightPath, Signal]:
-    """The twin's path and attitude as functions of time, with its own control errors and sway.
+def twin_trajectory(twin: TwinParameters, rng: np.random.Generator) -> tuple[FlightPath, Signal]:
+    """The twin's path and attitude as functions of time, with its own control errors and gusts.
 
     Raises
     ------
@@ -40,18 +42,26 @@ def trajectory(twin: TwinParameters, rng: np.random.Generator) -> tuple[FlightPa
     """
     f = twin.flight
     path_band = (f.path_shortest_period.si, f.path_longest_period.si)
-    sway_band = (f.sway_shortest_period.si, f.sway_longest_period.si)
     if twin.loiter is None:
         north, east, altitude = (
-            random_wander(sd.si, *path_band, rng) for sd in (f.track_sd, f.track_sd, f.altitude_sd)
+            band_limited_disturbance(sd.si, *path_band, rng) for sd in (f.track_sd, f.track_sd, f.altitude_sd)
         )
-        path = _laps(twin, (north, east), altitude)
-        roll, pitch, yaw = (random_wander(sd.si, *sway_band, rng) for sd in (f.roll_sd, f.pitch_sd, f.yaw_sd))
-        return path, _attitude(twin, path, (roll, pitch, yaw))
+        path = _laps_path(twin, ControlErrors(north, east, altitude))
+        return path, _attitude(twin, path, _attitude_disturbance(twin, rng))
     start = rng.uniform(0.0, 2 * math.pi)  # where on the circle the log happens to begin
-    radius, altitude = (random_wander(sd.si, *path_band, rng) for sd in (f.track_sd, f.altitude_sd))
-    roll, pitch, yaw = (random_wander(sd.si, *sway_band, rng) for sd in (f.roll_sd, f.pitch_sd, f.yaw_sd))
-    return _circle(twin, loiter_centre(twin), start, radius, altitude, (roll, pitch, yaw))
+    errors = tuple(band_limited_disturbance(sd.si, *path_band, rng) for sd in (f.track_sd, f.altitude_sd))
+    path = _circle(twin, loiter_centre(twin), start, *errors)
+    return path, _attitude(twin, path, _attitude_disturbance(twin, rng))
+
+
+def _attitude_disturbance(twin: TwinParameters, rng: np.random.Generator) -> AttitudeDisturbance:
+    """What gusts and control leave of the attitude."""
+    f = twin.flight
+    band = (f.attitude_shortest_period.si, f.attitude_longest_period.si)
+    roll, pitch, yaw = (
+        band_limited_disturbance(sd.si, *band, rng) for sd in (f.roll_sd, f.pitch_sd, f.yaw_sd)
+    )
+    return roll, pitch, yaw
 
 
 def _wind(twin: TwinParameters) -> Array:
@@ -60,19 +70,16 @@ def _wind(twin: TwinParameters) -> Array:
     return twin.flight.wind_speed.si * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
 
 
-def _attitude(twin: TwinParameters, path: FlightPath, sway: Sway | None) -> Signal:
+def _attitude(twin: TwinParameters, path: FlightPath, disturbance: AttitudeDisturbance | None) -> Signal:
     f, gravity, trim = twin.flight, twin.place.gravity.si, twin.flight.trim_pitch.si
     if f.kind is None or f.kind.text == "fixed wing":
-        return attitude_of(path, wind=_wind(twin), trim_pitch=trim, gravity=gravity, sway=sway)
-    start, turn_time = _timing(twin)
-    ahead = headings(
-        _closed_course(twin), f.airspeed.si, f.duration.si, wind=_felt(twin), start=start, roll_time=turn_time
-    )
+        return attitude_of(path, wind=_wind(twin), trim_pitch=trim, gravity=gravity, disturbance=disturbance)
+    ahead = leg_headings(_laps(twin))
     pull = gravity if f.kind.text == "multicopter" else math.inf
-    return leaning_attitude(path, ahead, trim_pitch=trim, gravity=pull, sway=sway)
+    return thrust_aligned_attitude(path, ahead, trim_pitch=trim, gravity=pull, disturbance=disturbance)
 
 
-def _laps(twin: TwinParameters, track_wander: tuple[Wander, Wander], altitude_wander: Wander) -> FlightPath:
+def _laps_path(twin: TwinParameters, errors: ControlErrors) -> FlightPath:
     """A closed course, flown round and round.
 
     Raises
@@ -80,28 +87,30 @@ def _laps(twin: TwinParameters, track_wander: tuple[Wander, Wander], altitude_wa
     WildlabError
         Where the course cannot be flown.
     """
-    f = twin.flight
-    start, roll_time = _timing(twin)
     try:
-        course = _closed_course(twin)
-        return fly(
-            course,
-            f.airspeed.si,
-            f.duration.si,
-            altitude=_altitudes(twin, course),
-            wind=_wind(twin)[:2],
-            drift=_drift(twin),
-            start=start,
-            roll_time=roll_time,
-            track_wander=track_wander,
-            altitude_wander=altitude_wander,
-        )
+        laps = _laps(twin)
+        return laps_path(laps, _altitudes(twin, laps), errors)
     except ValueError as error:
         raise WildlabError(
             f"this course cannot be flown: {error}",
             "lower route.turn_radius, flight.wind_speed or route.drift_speed, or raise route.width",
             field="route",
         ) from None
+
+
+def _laps(twin: TwinParameters) -> Laps:
+    """The twin's closed course, and how it is flown.
+
+    Raises
+    ------
+    ValueError
+        As :func:`_closed_course`.
+    """
+    f = twin.flight
+    start, roll_time = _timing(twin)
+    return Laps(
+        _closed_course(twin), f.airspeed.si, f.duration.si, _wind(twin)[:2], _drift(twin), start, roll_time
+    )
 
 
 def _timing(twin: TwinParameters) -> tuple[float, float]:
@@ -119,16 +128,11 @@ def _drift(twin: TwinParameters) -> Array:
     return twin.route.drift_speed.si * np.array([math.cos(along), math.sin(along)])
 
 
-def _felt(twin: TwinParameters) -> Array:
-    """Wind against a course that drifts, (2,) m/s."""
-    return np.asarray(_wind(twin)[:2] - _drift(twin))
-
-
-def _altitudes(twin: TwinParameters, course: Array) -> Array:
+def _altitudes(twin: TwinParameters, laps: Laps) -> Array:
     """Times and altitudes, (K, 2) s and m."""
     f = twin.flight
     if twin.cable is not None:
-        lap = float(lap_times(course, f.airspeed.si, _felt(twin))[-1])
+        lap = float(lap_times(laps.course, laps.airspeed, np.subtract(laps.wind, laps.drift))[-1])
         return cable_heights(twin.cable, lap, f.duration.si)
     if twin.climb is not None:
         begins, takes = twin.climb.start.si, twin.climb.duration.si
@@ -156,7 +160,7 @@ def _closed_course(twin: TwinParameters) -> Array:
     corners = corners @ np.array([[cos, sin], [-sin, cos]])
     if twin.target is not None and twin.target.motion is not None:
         corners += np.array([twin.target.motion.north.si, twin.target.motion.east.si])
-    return outline(corners, route.turn_radius.si)
+    return filleted_course(corners, route.turn_radius.si)
 
 
 def loiter_centre(twin: TwinParameters) -> Array:
@@ -174,7 +178,7 @@ def loiter_centre(twin: TwinParameters) -> Array:
     """
     if twin.loiter is None or twin.target is None:
         raise ValueError("this twin flies no loiter")
-    there = move(*_circle(twin, np.zeros(2), 0.0), np.zeros(1))
+    there = _undisturbed_start(twin)
     camera = twin_manifest(twin, 0).geometry_camera()
     middle = [[twin.camera.width.number / 2, twin.camera.height.number / 2]]
     poses = CameraPoses(camera, true_mount(twin), there.position, there.R_nb)
@@ -188,21 +192,26 @@ def loiter_centre(twin: TwinParameters) -> Array:
     return np.asarray(-ground[:2])
 
 
+def _undisturbed_start(twin: TwinParameters) -> Motion:
+    """Where and how a loiter about the origin of n begins without control errors and gusts."""
+    path = _circle(twin, np.zeros(2), 0.0)
+    return move(path, _attitude(twin, path, None), np.zeros(1))
+
+
 def _circle(
     twin: TwinParameters,
     centre: Array,
     turned: float,
-    radius_wander: Wander | None = None,
-    altitude_wander: Wander | None = None,
-    sway: Sway | None = None,
-) -> tuple[FlightPath, Signal]:
-    """Path and attitude of the loiter; it begins ``turned`` rad round from where it passes the target."""
+    radius_error: Disturbance | None = None,
+    altitude_error: Disturbance | None = None,
+) -> FlightPath:
+    """The loiter's path; it begins ``turned`` rad round from where it passes the target."""
     circle: Loiter | None = twin.loiter
     if circle is None:
         raise ValueError("this twin flies no loiter")
     turn: Turn = "clockwise" if circle.turn.text == "clockwise" else "counter-clockwise"
     quarter = math.pi / 2 if turn == "clockwise" else -math.pi / 2
-    path = loiter(
+    return loiter_path(
         centre,
         circle.radius.si,
         twin.flight.altitude.si,
@@ -210,7 +219,6 @@ def _circle(
         wind=_wind(twin)[:2],
         turn=turn,
         start_angle=circle.course_at_target.si - quarter + turned,
-        radius_wander=radius_wander,
-        altitude_wander=altitude_wander,
+        radius_error=radius_error,
+        altitude_error=altitude_error,
     )
-    return path, _attitude(twin, path, sway)

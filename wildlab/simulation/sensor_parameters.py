@@ -1,4 +1,4 @@
-"""The groups of parameters a twin has: place, flight, and one per sensor. Targets: `subjects`."""
+"""Parameters of a twin's sensors, of how they are mounted, and of what one would assume about them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import model_validator
 
 from wildlab.flight.files import Strict
-from wildlab.simulation.quantities import (
+from wildlab.simulation.parameter_quantities import (
     Angle,
     AngleSpread,
     Count,
@@ -21,115 +21,12 @@ from wildlab.simulation.quantities import (
     Rate,
     Speed,
     Text,
-    moment,
     quantity,
     word,
 )
 
 Latency = Annotated[Parameter, quantity("ms", 0, 1e4)]
 Arm = Annotated[Parameter, quantity("m", -1e3, 1e3)]
-
-
-class Place(Strict):
-    """Where and when the twin flies."""
-
-    latitude: Annotated[Parameter, quantity("deg", -90, 90)]
-    longitude: Annotated[Parameter, quantity("deg", -180, 180)]
-    height: Annotated[Parameter, quantity("m", -1e3, 1e4)]
-    gravity: Annotated[Parameter, quantity("m/s^2", 9, 10)]
-    epoch: Annotated[Parameter, moment()]
-
-
-class AirframeFlight(Strict):
-    """The airframe, the wind, and how well course and attitude are held; the course itself stands apart.
-
-    A fixed wing, unless ``kind`` says something else: it banks into turns. A multicopter leans towards where
-    it accelerates, a gondola hangs level; ``airspeed`` is their speed along the course.
-    """
-
-    platform: Text
-    duration: Duration
-    altitude: Length
-    airspeed: Annotated[Parameter, quantity("m/s", high=100, above=0)]
-    wind_speed: Speed
-    wind_from: Angle
-    trim_pitch: Annotated[Parameter, quantity("deg", -30, 30)]
-    track_sd: LengthSpread
-    altitude_sd: LengthSpread
-    path_shortest_period: Duration
-    path_longest_period: Duration
-    roll_sd: AngleSpread
-    pitch_sd: AngleSpread
-    yaw_sd: AngleSpread
-    sway_shortest_period: Duration
-    sway_longest_period: Duration
-    kind: Annotated[Parameter, word("fixed wing", "multicopter", "gondola")] | None = None
-
-    @model_validator(mode="after")
-    def _flies(self) -> AirframeFlight:
-        if self.wind_speed.number > 0.8 * self.airspeed.number:
-            raise ValueError(
-                "wind_speed is more than 0.8 of airspeed, too much to hold a course; "
-                "lower wind_speed or raise airspeed"
-            )
-        for band in ("path", "sway"):
-            shortest, longest = f"{band}_shortest_period", f"{band}_longest_period"
-            if getattr(self, shortest).number > getattr(self, longest).number:
-                raise ValueError(f"{shortest} is longer than {longest}; exchange the two")
-        return self
-
-
-class Loiter(Strict):
-    """A circle beside the target, flown from wherever on it the log happens to begin."""
-
-    radius: Length
-    turn: Annotated[Parameter, word("clockwise", "counter-clockwise")]
-    course_at_target: Angle
-
-
-class Route(Strict):
-    """A closed course over the target (see `simulation.routes`), moved along with it."""
-
-    shape: Annotated[Parameter, word("eight", "racetrack")]
-    length: Length
-    width: Length
-    turn_radius: Length
-    course: Angle
-    ahead: Arm
-    right: Arm
-    drift_speed: Speed
-    drift_course: Angle
-    start: Annotated[Parameter, quantity("1", -1, 1)]
-    roll_time: Annotated[Parameter, quantity("s", high=20, above=0.2)]
-
-
-class Survey(Strict):
-    """Rows back and forth over one enclosure after the other, and round again (F 5.2)."""
-
-    row_distance: Length
-    turn_time: Annotated[Parameter, quantity("s", high=60, above=0.2)]
-
-
-class Cable(Strict):
-    """What a gondola hangs from: its height over the ground, up and down once in each span of a lap."""
-
-    lowest: Length
-    highest: Length
-    spans: Count
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Cable:
-        if self.lowest.number > self.highest.number:
-            raise ValueError("lowest is above highest; exchange the two")
-        return self
-
-
-class Climb(Strict):
-    """One change of altitude during the flight."""
-
-    altitude: Length
-    start: Annotated[Parameter, quantity("s", 0, 7200)]
-    duration: Duration
 
 
 class TwinCamera(Strict):
@@ -236,7 +133,7 @@ class Assumed(Strict):
 class Boresight(Strict):
     """How the payload (IMU and antennas) turns against the airframe that carries the camera.
 
-    Smooth and slow: a standing error that wanders, which no data sheet of a sensor explains.
+    Smooth and slow: a standing error that drifts, which no data sheet of a sensor explains.
     """
 
     roll_sd: AngleSpread
@@ -280,9 +177,9 @@ class Gnss(Strict):
     rate: Annotated[Parameter, quantity("Hz", high=50, above=0)]
     horizontal_noise: LengthSpread
     vertical_noise: LengthSpread
-    horizontal_wander: LengthSpread
-    vertical_wander: LengthSpread
-    wander_time: Duration
+    horizontal_correlated_sd: LengthSpread
+    vertical_correlated_sd: LengthSpread
+    correlation_time: Duration
     velocity_noise: Speed
     resolution: LengthSpread
     latency: Latency

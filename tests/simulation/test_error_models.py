@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from wildlab.simulation.sensors import computer_stamps, gauss_markov, rounded, stream, turned_by
+from wildlab.simulation.error_models import (
+    computer_stamps,
+    gauss_markov,
+    rounded,
+    stream,
+    with_attitude_error,
+)
 
 
 def test_gauss_markov_has_its_variance_and_autocorrelation_from_the_first_sample_on():
@@ -46,7 +52,7 @@ def test_reported_attitude_and_error_give_back_the_truth():
     rng = np.random.default_rng(2)
     true = Rotation.random(20, rng=rng).as_matrix()
     error = 0.05 * rng.standard_normal((20, 3))
-    reported = turned_by(true, error)
+    reported = with_attitude_error(true, error)
     assert np.allclose(reported @ Rotation.from_rotvec(error).as_matrix(), true, atol=1e-14)
     assert not np.allclose(reported, true, atol=1e-3)
 

@@ -6,17 +6,17 @@ import numpy as np
 import pandas as pd
 
 from wildlab.errors import WildlabError
-from wildlab.simulation.outlines import NOTHING, Blob, visible_part
+from wildlab.simulation.camera_view import Exposures, Numbers, marks, numbered
+from wildlab.simulation.clipped_outlines import NOTHING, Blob, visible_part
+from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.subjects import Segments, Target
-from wildlab.simulation.targets import target_outline
-from wildlab.simulation.view import Exposures, Numbers, marks, numbered
+from wildlab.simulation.target_motion import target_outline
+from wildlab.simulation.target_parameters import Segments, Target
 
 _APART = 5.0  # s without the target in view, after which it is another segment
 
 
-def seen_in_part(
+def extended_target_frames_and_detections(
     twin: TwinParameters, target: Target, view: Exposures, frames: pd.DataFrame, seed: int
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The images of the segments, and the visible part of the target where most of it shows.

@@ -8,14 +8,14 @@ import pandas as pd
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import in_image
 from wildlab.geometry.frames import Array
-from wildlab.simulation.animals_seen import animal_detections
+from wildlab.simulation.animal_detections import animal_detections
+from wildlab.simulation.camera_view import Exposures, Numbers, marks, numbered
+from wildlab.simulation.error_models import computer_stamps, stream
+from wildlab.simulation.extended_target_detections import extended_target_frames_and_detections
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.partly_seen import seen_in_part
-from wildlab.simulation.sensors import computer_stamps, stream
-from wildlab.simulation.subjects import Target
-from wildlab.simulation.targets import target_path
+from wildlab.simulation.target_motion import target_path
+from wildlab.simulation.target_parameters import Target
 from wildlab.simulation.trajectory import Motion
-from wildlab.simulation.view import Exposures, Numbers, marks, numbered
 
 #: Column of the frames that holds the on-board computer's stamps.
 ONBOARD_STAMP = "time_onboard_s"
@@ -47,7 +47,7 @@ def frames_and_detections(twin: TwinParameters, true: Motion, seed: int) -> tupl
     if twin.animals is not None:
         return frames, animal_detections(twin, twin.animals, view, frames, seed)
     if twin.target is not None and twin.target.outline is not None:
-        return seen_in_part(twin, twin.target, view, frames, seed)
+        return extended_target_frames_and_detections(twin, twin.target, view, frames, seed)
     detections = detections_table(twin, view, frames, seed)
     return with_subset(twin, frames, detections), detections
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.mount import Mount, helgesen_misalignment
-from wildlab.simulation.models import Gnss, Imu, TwinMount
 from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.sensor_parameters import Gnss, Imu, TwinMount
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
@@ -101,10 +101,10 @@ def _imu(imu: Imu) -> dict[str, Any]:
 def _gnss(gnss: Gnss) -> dict[str, Any]:
     """The receiver with the first antenna; where the second one is stands in the table."""
     arm = (gnss.first_x.si, gnss.first_y.si, gnss.first_z.si)
-    wander = {
-        "wander_horizontal_m": gnss.horizontal_wander.si,
-        "wander_vertical_m": gnss.vertical_wander.si,
-        "wander_time_s": gnss.wander_time.si,
+    correlated = {
+        "wander_horizontal_m": gnss.horizontal_correlated_sd.si,
+        "wander_vertical_m": gnss.vertical_correlated_sd.si,
+        "wander_time_s": gnss.correlation_time.si,
     }
-    known = {name: value for name, value in wander.items() if value > 0}
+    known = {name: value for name, value in correlated.items() if value > 0}
     return {"name": gnss.name.text, "lever_arm_m": arm, "latency_s": gnss.latency.si, **known}

@@ -1,4 +1,4 @@
-"""How sensors err: noise processes that wander, clocks that drift, logs that round.
+"""How sensors err: time-correlated errors, clocks that drift, logs that round.
 
 Functions take true values and a generator, and return what a sensor would say. No function here knows what
 anyone makes of it.
@@ -27,7 +27,7 @@ def stream(seed: int, name: str) -> np.random.Generator:
 def gauss_markov(
     count: int, step: float, sd: ArrayLike, correlation_time: ArrayLike, rng: np.random.Generator
 ) -> Array:
-    """A stationary first-order Gauss-Markov process per axis: an error that stands, and slowly wanders.
+    """A stationary first-order Gauss-Markov process per axis: an error that stands, and slowly drifts.
 
     The autocorrelation is ``sd^2 exp(-lag / correlation_time)`` from the first sample on: the process starts
     in its stationary distribution.
@@ -54,7 +54,7 @@ def gauss_markov(
     )
 
 
-def turned_by(R_nb: ArrayLike, error: ArrayLike) -> Array:
+def with_attitude_error(R_nb: ArrayLike, error: ArrayLike) -> Array:
     """Attitudes as a sensor with an attitude error reports them.
 
     ``error`` (N, 3) rad is the rotation vector in b for which ``R_true = R_reported Exp(error)``, the sense

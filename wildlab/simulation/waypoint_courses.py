@@ -7,21 +7,30 @@ roll into a turn. The spline gives position, velocity and acceleration in closed
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.trajectory import FlightPath, Signal, Wander, no_wander
+from wildlab.simulation.disturbances import Disturbance, no_disturbance
+from wildlab.simulation.trajectory import FlightPath, Signal
 
 Shape = Literal["eight", "racetrack"]
 
 _DEGREE = 7  # five derivatives without a jump: position up to the rate of the angular acceleration
 #: Time from a tenth to nine tenths of a step after smoothing, in spline intervals: 2.56 SDs of sqrt(8/12).
 _RISE = 2.1
-_SPACING = 0.5  # m between the points of an outline
+_SPACING = 0.5  # m between the points of a course
+
+
+class ControlErrors(NamedTuple):
+    """How far off its course an airframe is: north, east and in altitude, m."""
+
+    north: Disturbance
+    east: Disturbance
+    altitude: Disturbance
 
 
 def shape_corners(shape: Shape, length: float, width: float) -> Array:
@@ -36,7 +45,7 @@ def shape_corners(shape: Shape, length: float, width: float) -> Array:
     return np.array([[-x, 0.0], [x, 0.0], [x, width], [-x, width]])
 
 
-def outline(corners: ArrayLike, radius: float) -> Array:
+def filleted_course(corners: ArrayLike, radius: float) -> Array:
     """A closed course through waypoints, each cut by an arc of that radius. (M, 2) m, half a metre apart.
 
     The first point is the middle of the first leg; the last one is the first again.
@@ -104,51 +113,51 @@ def lap_times(course: ArrayLike, airspeed: float, wind: ArrayLike) -> Array:
     return np.concatenate([[0.0], np.cumsum(far / speed)])
 
 
-def fly(
-    course: ArrayLike,
-    airspeed: float,
-    duration: float,
-    *,
-    altitude: ArrayLike,
-    wind: ArrayLike = (0.0, 0.0),
-    drift: ArrayLike = (0.0, 0.0),
-    start: float = 0.0,
-    roll_time: float = 2.0,
-    track_wander: tuple[Wander, Wander] | None = None,
-    altitude_wander: Wander | None = None,
-) -> FlightPath:
-    """Laps of a closed course over the ground.
+class Laps(NamedTuple):
+    """A closed course, flown round and round at a steady speed through a steady wind.
 
-    Parameters
+    Attributes
     ----------
     course
-        (M, 2) north and east, m, as :func:`outline` gives it.
+        (M, 2) north and east, m, as :func:`filleted_course` gives it.
     airspeed, duration
-        m/s and s. The path is defined from a few seconds before 0 to a few after the duration.
-    altitude
-        Times and altitudes above the origin of n, (K, 2) s and m: linear between, steady before and after.
+        m/s and s. Motion is defined from a few seconds before 0 to a few after the duration.
     wind
-        Velocity of the air over the ground, north and east, m/s.
+        Velocity of the air over the ground, north and east, (2,) m/s.
     drift
-        Velocity of the whole course over the ground, m/s: a pattern that is moved along with a target.
+        Velocity of the whole course over the ground, (2,) m/s: a pattern that is moved along with a target.
     start
         How far round the airframe is at time 0, as a fraction of a lap.
     roll_time
         Time to roll into a turn (from a tenth to nine tenths of it), s.
-    track_wander, altitude_wander
-        Control errors north, east and in altitude, m.
+    """
+
+    course: ArrayLike
+    airspeed: float
+    duration: float
+    wind: ArrayLike = (0.0, 0.0)
+    drift: ArrayLike = (0.0, 0.0)
+    start: float = 0.0
+    roll_time: float = 2.0
+
+
+def laps_path(laps: Laps, altitude: ArrayLike, errors: ControlErrors | None = None) -> FlightPath:
+    """Position, velocity and acceleration on laps of a closed course.
+
+    Parameters
+    ----------
+    altitude
+        Times and altitudes above the origin of n, (K, 2) s and m: linear between, steady before and after.
+    errors
+        How far off the course the airframe is, m.
 
     Raises
     ------
     ValueError
         Where the airframe cannot hold the course.
     """
-    points = np.asarray(course, float)
-    over = np.asarray(drift, float)
-    passed = lap_times(points, airspeed, np.asarray(wind, float) - over)
-    interval = roll_time / _RISE
-    knots = _knots(duration, interval)
-    lap = np.mod(knots + start * passed[-1], passed[-1])
+    points, over = np.asarray(laps.course, float), np.asarray(laps.drift, float)
+    knots, lap, passed = _flown(laps)
     profile = np.asarray(altitude, float)
     rough = np.stack(
         [
@@ -158,46 +167,40 @@ def fly(
         ],
         axis=-1,
     )
-    spline = _smoothed(knots, rough, interval)
+    spline = _smoothed(knots, rough, laps.roll_time / _RISE)
     parts = (spline, spline.derivative(1), spline.derivative(2))
-    off = (*(track_wander or (no_wander(), no_wander())), altitude_wander or no_wander())
+    off = errors or ControlErrors(no_disturbance(), no_disturbance(), no_disturbance())
     signs = (1.0, 1.0, -1.0)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
         t = np.asarray(times, float)
         p, v, a = (np.asarray(part(t)) for part in parts)
-        for axis, (wander, sign) in enumerate(zip(off, signs, strict=True)):
-            p[:, axis] += sign * wander(t)
-            v[:, axis] += sign * wander(t, 1)
-            a[:, axis] += sign * wander(t, 2)
+        for axis, (error, sign) in enumerate(zip(off, signs, strict=True)):
+            p[:, axis] += sign * error(t)
+            v[:, axis] += sign * error(t, 1)
+            a[:, axis] += sign * error(t, 2)
         return p, v, a
 
     return path
 
 
-def headings(
-    course: ArrayLike,
-    airspeed: float,
-    duration: float,
-    *,
-    wind: ArrayLike = (0.0, 0.0),
-    start: float = 0.0,
-    roll_time: float = 2.0,
-) -> Signal:
+def leg_headings(laps: Laps) -> Signal:
     """Direction of the leg that is flown, turned round at corners in the time it takes: (N,) s -> (N,) rad.
 
     For what can turn on the spot: unlike the direction of the velocity it is known where a course reverses.
-    Parameters as for :func:`fly`; the wind is that against the course, should it drift.
     """
-    points = np.asarray(course, float)
-    passed = lap_times(points, airspeed, wind)
-    interval = roll_time / _RISE
-    knots = _knots(duration, interval)
-    lap = np.mod(knots + start * passed[-1], passed[-1])
-    legs = np.diff(points, axis=0)
+    knots, lap, passed = _flown(laps)
+    legs = np.diff(np.asarray(laps.course, float), axis=0)
     leg = np.clip(np.searchsorted(passed, lap, side="right") - 1, 0, len(legs) - 1)
-    spline = _smoothed(knots, np.unwrap(np.arctan2(legs[leg, 1], legs[leg, 0])), interval)
+    spline = _smoothed(knots, np.unwrap(np.arctan2(legs[leg, 1], legs[leg, 0])), laps.roll_time / _RISE)
     return lambda times: np.asarray(spline(np.asarray(times, float)))
+
+
+def _flown(laps: Laps) -> tuple[Array, Array, Array]:
+    """Times of the control points, how long into its lap each is, and when a lap's points are passed; s."""
+    passed = lap_times(laps.course, laps.airspeed, np.subtract(laps.wind, laps.drift))
+    knots = _knots(laps.duration, laps.roll_time / _RISE)
+    return knots, np.mod(knots + laps.start * passed[-1], passed[-1]), passed
 
 
 def _knots(duration: float, interval: float) -> Array:

@@ -7,38 +7,40 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import matrix_to_euler
+from wildlab.simulation.attitudes import attitude_of
+from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.imu import ideal_imu
-from wildlab.simulation.routes import fly, lap_times, outline, shape_corners
-from wildlab.simulation.trajectory import angular_rates, attitude_of, move, random_wander
+from wildlab.simulation.trajectory import angular_rates, move
+from wildlab.simulation.waypoint_courses import (
+    ControlErrors,
+    Laps,
+    filleted_course,
+    lap_times,
+    laps_path,
+    shape_corners,
+)
 
 WIND = np.array([-3.2, -3.2, 0.0])  # 4.5 m/s from the north-east
 ALTITUDE = [[0.0, 200.0], [100.0, 200.0], [160.0, 300.0]]
 
 
 def restless(shape="eight"):
-    """A course with wind, drift, climb, wander and sway, all on: (path, attitude)."""
+    """A course with wind, drift, climb, control errors and gusts, all on: (path, attitude)."""
     rng = np.random.default_rng(5)
-    path = fly(
-        outline(shape_corners(shape, 500.0, 400.0), 80.0),
-        19.5,
-        400.0,
-        altitude=ALTITUDE,
-        wind=WIND[:2],
-        drift=(0.5, -0.3),
-        start=0.2,
-        track_wander=(random_wander(3.0, 20.0, 120.0, rng), random_wander(3.0, 20.0, 120.0, rng)),
-        altitude_wander=random_wander(2.0, 20.0, 120.0, rng),
-    )
-    sway = tuple(random_wander(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
-    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), sway=sway)
+    course = filleted_course(shape_corners(shape, 500.0, 400.0), 80.0)
+    laps = Laps(course, 19.5, 400.0, wind=WIND[:2], drift=(0.5, -0.3), start=0.2)
+    errors = ControlErrors(*(band_limited_disturbance(sd, 20.0, 120.0, rng) for sd in (3.0, 3.0, 2.0)))
+    path = laps_path(laps, ALTITUDE, errors)
+    disturbance = tuple(band_limited_disturbance(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
+    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), disturbance=disturbance)
 
 
 def calm(course, **more):
-    return fly(course, 19.5, 600.0, altitude=[[0.0, 300.0]], **more)
+    return laps_path(Laps(course, 19.5, 600.0, **more), [[0.0, 300.0]])
 
 
 def test_a_course_touches_its_legs_and_turns_with_its_radius():
-    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    course = filleted_course(shape_corners("eight", 500.0, 400.0), 80.0)
     assert course[0] == pytest.approx(course[-1])
     assert course[0] == pytest.approx([0.0, 0.0], abs=0.5)  # an eight starts in its middle
     step = np.diff(course, axis=0)
@@ -50,7 +52,7 @@ def test_a_course_touches_its_legs_and_turns_with_its_radius():
     assert np.quantile(np.abs(bend[curved]), [0.1, 0.9]) == pytest.approx(1 / 80, rel=0.01)
     # An eight turns as far to the left as to the right.
     assert heading[-1] - heading[0] == pytest.approx(0.0, abs=1e-9)
-    track = outline(shape_corners("racetrack", 500.0, 200.0), 80.0)
+    track = filleted_course(shape_corners("racetrack", 500.0, 200.0), 80.0)
     heading = np.unwrap(np.arctan2(*np.diff(track, axis=0).T[::-1]))
     assert heading[-1] - heading[0] == pytest.approx(2 * np.pi)  # clockwise once
     assert track[0] == pytest.approx([0.0, 0.0], abs=0.5)
@@ -58,13 +60,13 @@ def test_a_course_touches_its_legs_and_turns_with_its_radius():
 
 def test_turns_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match="do not fit"):
-        outline(shape_corners("eight", 300.0, 100.0), 80.0)
+        filleted_course(shape_corners("eight", 300.0, 100.0), 80.0)
     with pytest.raises(ValueError, match="exceed the wind"):
-        lap_times(outline(shape_corners("eight", 500.0, 400.0), 80.0), 19.5, (15.0, 15.0))
+        lap_times(filleted_course(shape_corners("eight", 500.0, 400.0), 80.0), 19.5, (15.0, 15.0))
 
 
 def test_a_lap_in_still_air_takes_its_length_over_the_airspeed():
-    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    course = filleted_course(shape_corners("eight", 500.0, 400.0), 80.0)
     length = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
     assert lap_times(course, 20.0, (0, 0))[-1] == pytest.approx(length / 20)
     path = calm(course)
@@ -74,7 +76,7 @@ def test_a_lap_in_still_air_takes_its_length_over_the_airspeed():
 
 
 def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
-    course = outline(shape_corners("eight", 1500.0, 400.0), 80.0)
+    course = filleted_course(shape_corners("eight", 1500.0, 400.0), 80.0)
     path = calm(course, wind=WIND[:2])
     attitude = attitude_of(path, wind=WIND)
     t = np.arange(0, 600, 0.1)
@@ -99,7 +101,7 @@ def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
 def test_head_and_tail_wind_give_the_ground_speeds_of_h_7_5_4():
     """15 m/s upwind and 24 m/s downwind; across the wind the nose points into it."""
     wind = np.array([4.5, 0.0, 0.0])
-    course = outline(shape_corners("racetrack", 1500.0, 400.0), 100.0)
+    course = filleted_course(shape_corners("racetrack", 1500.0, 400.0), 100.0)
     path = calm(course, wind=wind[:2])
     t = np.arange(0, 300, 0.1)
     _, v, a = path(t)
@@ -115,7 +117,7 @@ def test_head_and_tail_wind_give_the_ground_speeds_of_h_7_5_4():
 
 
 def test_a_drifting_course_is_the_same_course_in_its_own_frame():
-    course = outline(shape_corners("eight", 500.0, 400.0), 80.0)
+    course = filleted_course(shape_corners("eight", 500.0, 400.0), 80.0)
     drift = np.array([3.0, -4.0])
     t = np.arange(0, 300, 0.5)
     moving, v, _ = calm(course, drift=drift, wind=(1.0, 2.0))(t)
@@ -125,7 +127,8 @@ def test_a_drifting_course_is_the_same_course_in_its_own_frame():
 
 
 def test_altitude_follows_its_profile():
-    path = fly(outline(shape_corners("eight", 500.0, 400.0), 80.0), 19.5, 300.0, altitude=ALTITUDE)
+    course = filleted_course(shape_corners("eight", 500.0, 400.0), 80.0)
+    path = laps_path(Laps(course, 19.5, 300.0), ALTITUDE)
     p, v, _ = path(np.array([0.0, 50.0, 130.0, 200.0, 290.0]))
     assert -p[:, 2] == pytest.approx([200, 200, 250, 300, 300], abs=1e-6)
     assert v[2, 2] == pytest.approx(-100 / 60)

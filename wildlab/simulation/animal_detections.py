@@ -7,11 +7,11 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import in_image
-from wildlab.simulation.animals import herd
+from wildlab.simulation.animal_motion import animal_paths
+from wildlab.simulation.camera_view import Exposures, marks, numbered
+from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.subjects import Animals
-from wildlab.simulation.view import Exposures, marks, numbered
+from wildlab.simulation.target_parameters import Animals
 
 
 def animal_detections(
@@ -25,7 +25,7 @@ def animal_detections(
         Where no image shows any.
     """
     tables = []
-    for name, path in herd(twin, seed).items():
+    for name, path in animal_paths(twin, seed).items():
         uv = view.pixels(path(view.times))
         rng = stream(seed, f"marking of {name}")
         inside = in_image(view.poses.camera, uv, animals.border.si)

@@ -12,8 +12,8 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.gimbal import gimbal_angles
+from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.settings import true_mount, twin_manifest
 from wildlab.simulation.trajectory import Motion
 
 #: Numbers of images.

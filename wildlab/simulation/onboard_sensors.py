@@ -9,21 +9,15 @@ import pandas as pd
 
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion
 from wildlab.geometry.gravity import local_earth
-from wildlab.simulation.gnss import antenna_motion, fixes
+from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
+from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensors import gauss_markov, rounded, stream, turned_by
-from wildlab.simulation.trajectory import (
-    FlightPath,
-    Motion,
-    Signal,
-    angular_rates,
-    move,
-    random_wander,
-)
+from wildlab.simulation.trajectory import FlightPath, Motion, Signal, angular_rates, move
 
 
-def ticks(rate: float, duration: float) -> Array:
+def sample_times(rate: float, duration: float) -> Array:
     """Sample times from 0 to the end of the flight, (N,) s."""
     return np.arange(math.floor(duration * rate + 1e-9) + 1) / rate
 
@@ -60,7 +54,7 @@ def autopilot_tables(
         rounded(true.position + shift, a.position_resolution.si),
         true.velocity + slip,
         true.acceleration,
-        turned_by(true.R_nb, turn),
+        with_attitude_error(true.R_nb, turn),
     )
     if a.imu_roll is None or a.imu_pitch is None or a.imu_yaw is None:
         return nav_table(logged), None
@@ -79,7 +73,9 @@ def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signa
     if b is None:
         raise ValueError("this twin carries no payload")
     band = (b.shortest_period.si, b.longest_period.si)
-    roll, pitch, yaw = (random_wander(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd))
+    roll, pitch, yaw = (
+        band_limited_disturbance(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd)
+    )
 
     def turned(times: Array) -> Array:
         return np.asarray(attitude(times) @ euler_to_matrix(roll(times), pitch(times), yaw(times)))
@@ -91,7 +87,7 @@ def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int
     """Readings of the inertial unit over the whole flight."""
     if twin.imu is None:
         raise ValueError("this twin carries no inertial unit")
-    times = ticks(twin.imu.rate.si, twin.flight.duration.si)
+    times = sample_times(twin.imu.rate.si, twin.flight.duration.si)
     # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
     earth = local_earth(twin.place.latitude.si, twin.place.height.si)
     true = ideal_imu(path, payload, twin.imu.rate.si, len(times), earth)
@@ -107,28 +103,31 @@ def gnss_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: in
     g = twin.gnss
     if g is None:
         raise ValueError("this twin carries no receivers")
-    times = ticks(g.rate.si, twin.flight.duration.si)
+    times = sample_times(g.rate.si, twin.flight.duration.si)
     motion, rate = move(path, payload, times), angular_rates(payload, times)
     arms = {
         "": (g.first_x.si, g.first_y.si, g.first_z.si),
         "second_": (g.second_x.si, g.second_y.si, g.second_z.si),
     }
-    noise = (g.horizontal_noise.si, g.vertical_noise.si)
-    wander = (g.horizontal_wander.si, g.vertical_wander.si)
+    errors = PositionErrors(
+        (g.horizontal_correlated_sd.si, g.vertical_correlated_sd.si),
+        g.correlation_time.si,
+        (g.horizontal_noise.si, g.vertical_noise.si),
+    )
     columns = {"time_s": times + g.latency.si}
     for which, arm in arms.items():
         position, velocity = antenna_motion(motion, rate, arm)
         rng = stream(seed, f"gnss {which or 'first_'}antenna")
-        fix = fixes(position, 1 / g.rate.si, rng, wander=wander, wander_time=g.wander_time.si, noise=noise)
-        fix = rounded(fix, g.resolution.si)
+        fix = rounded(position_fixes(position, 1 / g.rate.si, errors, rng), g.resolution.si)
         columns |= {f"{which}{axis}_m": fix[:, i] for i, axis in enumerate(("north", "east", "down"))}
         if not which:
             slip = g.velocity_noise.si * stream(seed, "gnss velocity").standard_normal(velocity.shape)
             columns |= {
                 f"v_{axis}_m_s": (velocity + slip)[:, i] for i, axis in enumerate(("north", "east", "down"))
             }
-    columns["sd_horizontal_m"] = np.full(len(times), math.hypot(noise[0], wander[0]))
-    columns["sd_vertical_m"] = np.full(len(times), math.hypot(noise[1], wander[1]))
+    for i, axis in enumerate(("horizontal", "vertical")):
+        sd = math.hypot(errors.noise_sd[i], errors.correlated_sd[i])
+        columns[f"sd_{axis}_m"] = np.full(len(times), sd)
     columns["sd_velocity_m_s"] = np.full(len(times), g.velocity_noise.si)
     for which, arm in arms.items():
         columns |= {f"{which}lever_{axis}_m": np.full(len(times), arm[i]) for i, axis in enumerate("xyz")}

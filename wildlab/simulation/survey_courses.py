@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.animals import enclosure_axes
-from wildlab.simulation.models import Cable
-from wildlab.simulation.subjects import Enclosure
+from wildlab.simulation.animal_motion import enclosure_axes
+from wildlab.simulation.platform_parameters import Cable
+from wildlab.simulation.target_parameters import Enclosure
 
 
 def rows(enclosure: Enclosure, distance: float) -> Array:

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.sensors import stream
-from wildlab.simulation.subjects import Animals, Enclosure
+from wildlab.simulation.target_parameters import Animals, Enclosure
 from wildlab.simulation.trajectory import Signal
 
 
@@ -26,7 +26,7 @@ def enclosure_corners(enclosure: Enclosure) -> Array:
     return np.asarray(middle + half @ np.stack([along, across]))
 
 
-def turned_back(walk: Array, limit: float) -> Array:
+def reflected(walk: Array, limit: float) -> Array:
     """A coordinate that is reflected whenever it reaches -limit or limit, from one that is not."""
     lap = np.mod(walk + limit, 4 * limit)
     return np.asarray(np.where(lap < 2 * limit, lap, 4 * limit - lap) - limit)
@@ -47,7 +47,7 @@ def animal_path(enclosure: Enclosure, animals: Animals, duration: float, rng: np
 
     def path(times: Array) -> Array:
         t = np.asarray(times, float)
-        x, y = (turned_back(np.interp(t, at, walk[:, i]), half[i]) for i in range(2))
+        x, y = (reflected(np.interp(t, at, walk[:, i]), half[i]) for i in range(2))
         p = np.empty((len(t), 3))
         p[:, :2] = middle + np.outer(x, along) + np.outer(y, across)
         p[:, 2] = -animals.height.si
@@ -56,7 +56,7 @@ def animal_path(enclosure: Enclosure, animals: Animals, duration: float, rng: np
     return path
 
 
-def herd(twin: TwinParameters, seed: int) -> dict[str, Signal]:
+def animal_paths(twin: TwinParameters, seed: int) -> dict[str, Signal]:
     """Every animal by its name: the enclosure's, and a number from 1."""
     if twin.animals is None:
         return {}
@@ -73,7 +73,7 @@ def animals_truth(twin: TwinParameters, animals: Animals, seed: int) -> pd.DataF
     """Where each animal was at the rate of ``animals.rate``."""
     times = np.arange(int(twin.flight.duration.si * animals.rate.si + 1e-9) + 1) / animals.rate.si
     tables = []
-    for name, path in herd(twin, seed).items():
+    for name, path in animal_paths(twin, seed).items():
         position = path(times)
         columns = {"target_id": [name] * len(times), "time_s": times}
         columns |= {f"{axis}_m": position[:, i] for i, axis in enumerate(("north", "east", "down"))}

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.gnss import fixes
-from wildlab.simulation.sensors import rounded, stream
-from wildlab.simulation.subjects import Target
-from wildlab.simulation.trajectory import Signal, random_wander
+from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation.error_models import rounded, stream
+from wildlab.simulation.gnss import PositionErrors, position_fixes
+from wildlab.simulation.target_parameters import Target
+from wildlab.simulation.trajectory import Signal
 
 
 def target_path(target: Target, seed: int) -> Signal:
@@ -18,8 +19,8 @@ def target_path(target: Target, seed: int) -> Signal:
     if motion is None:
         return lambda times: np.broadcast_to([0.0, 0.0, down], (len(np.asarray(times)), 3))
     rng = stream(seed, f"motion of {target.identifier.text}")
-    band = (motion.stray_shortest_period.si, motion.stray_longest_period.si)
-    north, east = (random_wander(motion.stray_sd.si, *band, rng) for _ in range(2))
+    band = (motion.deviation_shortest_period.si, motion.deviation_longest_period.si)
+    north, east = (band_limited_disturbance(motion.deviation_sd.si, *band, rng) for _ in range(2))
     start, course = (motion.north.si, motion.east.si), motion.course.si
     velocity = motion.speed.si * np.array([np.cos(course), np.sin(course)])
 
@@ -66,14 +67,12 @@ def truth_table(target: Target, duration: float, seed: int) -> pd.DataFrame:
         times = np.arange(int(duration * gps.rate.si + 1e-9) + 1) / gps.rate.si
         course = motion.course.si
         antenna = path(times) + gps.ahead.si * np.array([np.cos(course), np.sin(course), 0.0])
-        position = fixes(
-            antenna,
-            1 / gps.rate.si,
-            stream(seed, f"gps of {name}"),
-            wander=(gps.horizontal_wander.si, gps.vertical_wander.si),
-            wander_time=gps.wander_time.si,
-            noise=(gps.horizontal_noise.si, gps.vertical_noise.si),
+        errors = PositionErrors(
+            (gps.horizontal_correlated_sd.si, gps.vertical_correlated_sd.si),
+            gps.correlation_time.si,
+            (gps.horizontal_noise.si, gps.vertical_noise.si),
         )
+        position = position_fixes(antenna, 1 / gps.rate.si, errors, stream(seed, f"gps of {name}"))
         position = rounded(position, gps.resolution.si)
     return pd.DataFrame(
         {

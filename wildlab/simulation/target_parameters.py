@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import model_validator
 
 from wildlab.flight.files import Strict
-from wildlab.simulation.quantities import (
+from wildlab.simulation.parameter_quantities import (
     Angle,
     Count,
     Duration,
@@ -29,20 +29,22 @@ Arm = Annotated[Parameter, quantity("m", -1e3, 1e3)]
 
 
 class TargetMotion(Strict):
-    """A steady course from where the target is at time 0, and what it strays from it."""
+    """A steady course from where the target is at time 0, and how it deviates from it."""
 
     north: Place
     east: Place
     speed: Speed
     course: Angle
-    stray_sd: LengthSpread
-    stray_shortest_period: Duration
-    stray_longest_period: Duration
+    deviation_sd: LengthSpread
+    deviation_shortest_period: Duration
+    deviation_longest_period: Duration
 
     @model_validator(mode="after")
     def _band(self) -> TargetMotion:
-        if self.stray_shortest_period.number > self.stray_longest_period.number:
-            raise ValueError("stray_shortest_period is longer than stray_longest_period; exchange the two")
+        if self.deviation_shortest_period.number > self.deviation_longest_period.number:
+            raise ValueError(
+                "deviation_shortest_period is longer than deviation_longest_period; exchange the two"
+            )
         return self
 
 
@@ -50,9 +52,9 @@ class TargetGps(Strict):
     """The single-frequency receiver that a target carries, whose log counts as the truth about it."""
 
     rate: Rate
-    horizontal_wander: LengthSpread
-    vertical_wander: LengthSpread
-    wander_time: Duration
+    horizontal_correlated_sd: LengthSpread
+    vertical_correlated_sd: LengthSpread
+    correlation_time: Duration
     horizontal_noise: LengthSpread
     vertical_noise: LengthSpread
     resolution: LengthSpread

@@ -1,0 +1,111 @@
+"""The attitude that flies a path: of a fixed wing, which banks, and of a multicopter or a gondola."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.simulation.disturbances import Disturbance
+from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
+
+
+def coordinated_attitude(
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    *,
+    wind: ArrayLike = (0.0, 0.0, 0.0),
+    trim_pitch: float = 0.0,
+    gravity: float = GRAVITY,
+) -> Array:
+    """The attitude in which a fixed wing flies a path: nose into the oncoming air, banked into the turn.
+
+    Coordinated flight: no sideslip and no specific force along y of the body, so that in still air a level
+    circle has ``tan(bank) = speed^2 / (gravity * radius)``. ``trim_pitch`` (rad) is the angle of attack.
+
+    Parameters
+    ----------
+    velocity, acceleration
+        Of b in n, (N, 3), m/s and m/s^2.
+    wind
+        Velocity of the air in n, (3,), m/s.
+
+    Returns
+    -------
+    ``R_nb`` (N, 3, 3).
+    """
+    through_air = np.asarray(velocity, float) - np.asarray(wind, float)
+    force = np.asarray(acceleration, float) - np.array([0.0, 0.0, gravity])
+    x = through_air / np.linalg.norm(through_air, axis=-1, keepdims=True)
+    y = np.cross(x, force)
+    y /= np.linalg.norm(y, axis=-1, keepdims=True)
+    R = np.stack([x, y, np.cross(x, y)], axis=-1)
+    return np.asarray(R @ euler_to_matrix(0.0, trim_pitch, 0.0))
+
+
+def attitude_of(
+    path: FlightPath,
+    *,
+    wind: ArrayLike = (0.0, 0.0, 0.0),
+    trim_pitch: float = 0.0,
+    gravity: float = GRAVITY,
+    disturbance: tuple[Disturbance, Disturbance, Disturbance] | None = None,
+) -> Signal:
+    """Attitude along a path as a function of time: coordinated flight, and gusts about it.
+
+    ``disturbance`` are small roll, pitch and yaw (rad) about the body's own axes, as gusts and control leave
+    them.
+    Returns a function (N,) s -> ``R_nb`` (N, 3, 3).
+    """
+
+    def attitude(times: Array) -> Array:
+        t = np.asarray(times, float)
+        _, v, a = path(t)
+        R = coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
+        return (
+            R if disturbance is None else np.asarray(R @ euler_to_matrix(*(part(t) for part in disturbance)))
+        )
+
+    return attitude
+
+
+def thrust_aligned_attitude(
+    path: FlightPath,
+    heading: Signal,
+    *,
+    trim_pitch: float = 0.0,
+    gravity: float = GRAVITY,
+    disturbance: tuple[Disturbance, Disturbance, Disturbance] | None = None,
+) -> Signal:
+    """Attitude of what leans no more than its own acceleration asks for, whichever way its nose points.
+
+    A multicopter's thrust points along its specific force, so it leans forward to go faster and sideways to
+    turn. With an infinite ``gravity`` it does not lean: a gondola that hangs level but for gusts.
+
+    Parameters
+    ----------
+    heading
+        Where the nose points, times (N,) s -> (N,) rad.
+    trim_pitch
+        Pitch in steady motion, rad: below zero for a multicopter that leans against the air.
+    disturbance
+        As for :func:`attitude_of`.
+
+    Returns a function (N,) s -> ``R_nb`` (N, 3, 3).
+    """
+
+    def attitude(times: Array) -> Array:
+        t = np.asarray(times, float)
+        _, _, a = path(t)
+        z = np.array([0.0, 0.0, 1.0]) - a / gravity
+        z /= np.linalg.norm(z, axis=-1, keepdims=True)
+        nose = heading(t)
+        ahead = np.stack([np.cos(nose), np.sin(nose), np.zeros(len(t))], axis=-1)
+        y = np.cross(z, ahead)
+        y /= np.linalg.norm(y, axis=-1, keepdims=True)
+        R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
+        return np.asarray(
+            R if disturbance is None else R @ euler_to_matrix(*(part(t) for part in disturbance))
+        )
+
+    return attitude
