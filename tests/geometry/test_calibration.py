@@ -5,6 +5,7 @@ import pytest
 
 from wildlab.geometry.calibration import (
     BORESIGHT,
+    Calibration,
     apply_calibration,
     calibrate,
     georeference_calibrated,
@@ -13,7 +14,7 @@ from wildlab.geometry.calibration import (
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount
+from wildlab.geometry.mount import Mount, mount_rotation
 from wildlab.geometry.sensitivity import TAU2
 
 PLAIN = Mount("down")
@@ -84,6 +85,15 @@ def test_a_correction_adds_to_the_mount_s_own_misalignment():
     assert np.allclose(apply_calibration(found, nearly).misalignment, TRUE.misalignment, atol=1e-6)
 
 
+def test_a_correction_turns_about_the_axes_of_the_airframe():
+    """Not about those of a base that is turned already: a roll leaves the airframe's x where it is."""
+    rolled = Calibration(("roll",), np.array([0.1]), np.eye(1), {}, 4, 4)
+    turned = Mount("forward", misalignment=(0.0, 0.0, np.pi / 2))
+    R_bm = mount_rotation(apply_calibration(rolled, turned))
+    assert np.allclose(R_bm @ mount_rotation(turned).T @ [1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    assert np.allclose(R_bm @ [1.0, 0.0, 0.0], [0.0, np.cos(0.1), np.sin(0.1)])
+
+
 def test_clock_and_position_come_back_too():
     survey = Survey(2, EVERY_WAY, clock=0.4, wrong=(1.0, -2.0, 1.5), pixel_sd=0.2)
     asked = (*BORESIGHT, "clock", "north", "east", "down")
@@ -135,7 +145,7 @@ def test_halves_keep_images_whole():
     assert len(np.unique(image[half])) == 3
 
 
-def test_nothing_to_calibrate_with_is_an_error():
+def test_rolled_to_calibrate_with_is_an_error():
     survey = Survey(1, EVERY_WAY)
     with pytest.raises(ValueError, match="fewer than two points"):
         calibrate(survey.poses_at(), survey.uv * np.nan, survey.known, survey.image)

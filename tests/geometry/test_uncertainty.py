@@ -122,6 +122,22 @@ def test_flatness_against_the_depression_of_sampled_rays(uv):
         assert ray_flatness(pose, [uv], e)[0] == pytest.approx(sampled, rel=0.01), source
 
 
+def test_samples_scatter_about_the_point_as_the_derivatives_say():
+    """Turned mount with a lever arm, bent lens, errors that are small and differ from axis to axis."""
+    rng = np.random.default_rng(6)
+    pose = CameraPoses(BENT, TURNED, np.array([5.0, -3.0, -20.0]), euler_to_matrix(0.2, -0.3, 0.7))
+    uv = np.array([500.0, 100.0])
+    A, B = rng.normal(size=(6, 6)), rng.normal(size=(3, 3))
+    sd = np.repeat([0.01, 0.001], 3)
+    e = PoseErrors(np.diag([0.2, 0.5]) ** 2, sd[:, None] * A @ A.T * sd, 1e-6 * B @ B.T, 0.02**2)
+    draws = sample_ground(pose, uv, 1.0, e, rng, 100_000)
+    stated = ground_covariance(pose, uv, 1.0, e, rng)
+    assert stated.method.tolist() == ["linear"]
+    C = stated.covariance[0]
+    assert np.abs(np.cov(draws.T) - C).max() < 0.03 * np.abs(C).max()
+    assert np.allclose(draws.mean(axis=0), georeference_pixels(pose, uv, 1.0)[:2], atol=1e-3)
+
+
 def test_a_pose_of_its_own_lens_has_the_same_derivatives_as_one_on_a_mount():
     """But for those with respect to the mount, whose axes are those of another mount."""
     rng = np.random.default_rng(8)
