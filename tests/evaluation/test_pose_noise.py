@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from wildlab.evaluation.pose_noise import estimate_pose_noise
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_errors_to_body, euler_to_matrix, matrix_to_rotation_vector
-from wildlab.geometry.georeference import pixel_to_plane
-from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.mount import Mount
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.studies.sensitivity.tables import TAU2
 
@@ -31,12 +32,12 @@ def simulate(seed, sd, n_images, points):
     wrong = euler + rng.normal(0, [sd[2], sd[2], sd[3]], (n_images, 3))
     uv = rng.uniform([0, 0], [640, 512], (len(image), 2))
     mount = Mount("forward")
-    true = pixel_to_plane(TAU2, uv, *camera_pose(mount, p[image], euler_to_matrix(*euler[image].T)), 0.0)
+    poses = CameraPoses(TAU2, mount, p[image], euler_to_matrix(*euler[image].T))
+    wrong_poses = CameraPoses(TAU2, mount, wrong_p[image], euler_to_matrix(*wrong[image].T))
+    true = georeference_pixels(poses, uv, 0.0)
     clicked = uv + rng.normal(0, sd[4], uv.shape)
-    ours = pixel_to_plane(
-        TAU2, clicked, *camera_pose(mount, wrong_p[image], euler_to_matrix(*wrong[image].T)), 0.0
-    )
-    J = ground_jacobians(TAU2, mount, uv, p[image], euler_to_matrix(*euler[image].T), 0.0)
+    ours = georeference_pixels(wrong_poses, clicked, 0.0)
+    J = ground_jacobians(poses, uv, 0.0)
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(*euler[image, :2].T)
     return (ours - true)[:, :2], derivatives, J.pixel, np.zeros((len(uv), 2, 2)), image

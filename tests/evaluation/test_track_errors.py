@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import ERROR_CONVENTION
-from wildlab.evaluation.track_errors import SLOWEST_M_S, summarise_track, track_errors, wrap
+from wildlab.evaluation.track_errors import SLOWEST_M_S, summarise_track, track_errors
 
 
 def test_errors_are_truth_minus_estimate():
@@ -50,11 +50,12 @@ def test_course_errors_do_not_jump_through_north():
     assert np.degrees(summary.rmse_course) == pytest.approx(2.0)
 
 
-@given(st.floats(-1e3, 1e3))
-def test_wrap_keeps_the_direction(angle):
-    wrapped = float(wrap(angle))
-    assert -np.pi < wrapped <= np.pi
-    assert np.exp(1j * wrapped) == pytest.approx(np.exp(1j * angle), abs=1e-9)
+@given(st.floats(-np.pi, np.pi), st.floats(-np.pi, np.pi))
+def test_a_course_error_is_the_turn_from_the_estimate_to_the_truth(true, estimated):
+    t, x = ([[0.0, 0.0, 2 * np.cos(angle), 2 * np.sin(angle)]] for angle in (true, estimated))
+    error = track_errors(t, x).course[0]
+    assert -np.pi < error <= np.pi
+    assert np.exp(1j * (estimated + error)) == pytest.approx(np.exp(1j * true), abs=1e-9)
 
 
 def test_a_target_at_rest_has_no_course():

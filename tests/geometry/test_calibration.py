@@ -5,16 +5,19 @@ import pytest
 
 from wildlab.geometry.calibration import (
     BORESIGHT,
+    Calibration,
     apply_calibration,
     calibrate,
     georeference_calibrated,
     split_images,
 )
+from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.geometry.mount import Mount, mount_rotation
 from wildlab.studies.sensitivity.tables import TAU2
 
+PLAIN = Mount("down")
 TRUE = Mount("down", misalignment=(0.03, -0.04, 0.02))
 
 
@@ -40,7 +43,8 @@ class Survey:
         p, R = self.truth(clock)
         own = rotation_vector_to_matrix(np.repeat(rng.normal(0, attitude_sd, (n_images, 3)), points, axis=0))
         self.known = np.column_stack([p[:, :2] + rng.uniform(-18, 18, (len(p), 2)), np.zeros(len(p))])
-        self.uv = ground_to_pixel(TAU2, self.known, *camera_pose(TRUE, p, R @ own))
+        seen = CameraPoses(TAU2, TRUE, p, R @ own)
+        self.uv = ground_to_pixel(TAU2, self.known, seen.p_nc, seen.R_nc)
         self.uv += rng.normal(0, pixel_sd, self.uv.shape)
 
     def truth(self, offset):
@@ -49,39 +53,51 @@ class Survey:
         p = np.column_stack([20.0 * offset * course, -self.height])
         return p, euler_to_matrix(self.bank, self.wave * np.sin(t), self.heading)
 
-    def poses_at(self, offset):
-        p, R = self.truth(offset)
-        return p + self.wrong, R
+    def poses_at(self, mount=PLAIN):
+        def at(offset):
+            p, R = self.truth(offset)
+            return CameraPoses(TAU2, mount, p + self.wrong, R)
+
+        return at
 
 
 EVERY_WAY = np.linspace(0, 2 * np.pi, 30, endpoint=False)
 
 
-def error(calibration, survey, mount):
-    ground = georeference_calibrated(calibration, TAU2, mount, survey.uv, survey.poses_at, 0.0)
+def error(calibration, survey):
+    ground = georeference_calibrated(calibration, survey.poses_at(), survey.uv, 0.0)
     return np.linalg.norm(ground[:, :2] - survey.known[:, :2], axis=1)
 
 
 def test_boresight_comes_back_exactly_without_noise():
     survey = Survey(1, EVERY_WAY)
-    found = calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image)
+    found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
     assert found.names == BORESIGHT
     assert not found.undetermined
-    assert np.allclose(apply_calibration(found, Mount("down")).misalignment, TRUE.misalignment, atol=1e-6)
-    assert error(found, survey, Mount("down")).max() < 1e-4
+    assert np.allclose(apply_calibration(found, PLAIN).misalignment, TRUE.misalignment, atol=1e-6)
+    assert error(found, survey).max() < 1e-4
 
 
 def test_a_correction_adds_to_the_mount_s_own_misalignment():
     survey = Survey(1, EVERY_WAY)
     nearly = Mount("down", misalignment=(0.02, -0.05, 0.025))
-    found = calibrate(TAU2, nearly, survey.uv, survey.poses_at, survey.known, survey.image)
+    found = calibrate(survey.poses_at(nearly), survey.uv, survey.known, survey.image)
     assert np.allclose(apply_calibration(found, nearly).misalignment, TRUE.misalignment, atol=1e-6)
+
+
+def test_a_correction_turns_about_the_axes_of_the_airframe():
+    """Not about those of a base that is turned already: a roll leaves the airframe's x where it is."""
+    rolled = Calibration(("roll",), np.array([0.1]), np.eye(1), {}, 4, 4)
+    turned = Mount("forward", misalignment=(0.0, 0.0, np.pi / 2))
+    R_bm = mount_rotation(apply_calibration(rolled, turned))
+    assert np.allclose(R_bm @ mount_rotation(turned).T @ [1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    assert np.allclose(R_bm @ [1.0, 0.0, 0.0], [0.0, np.cos(0.1), np.sin(0.1)])
 
 
 def test_clock_and_position_come_back_too():
     survey = Survey(2, EVERY_WAY, clock=0.4, wrong=(1.0, -2.0, 1.5), pixel_sd=0.2)
     asked = (*BORESIGHT, "clock", "north", "east", "down")
-    found = calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image, asked)
+    found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image, asked)
     assert not found.undetermined
     assert abs(found.value("clock") - 0.4) < 0.01
     assert np.allclose([found.value(k) for k in ("north", "east", "down")], [-1.0, 2.0, -1.5], atol=0.1)
@@ -91,7 +107,7 @@ def test_flying_one_way_cannot_tell_clock_or_position_from_the_angles():
     """Straight and level at one height: tilt, clock and the position along the course look the same."""
     survey = Survey(3, [0.0], pixel_sd=2.0, plain=True)
     asked = (*BORESIGHT, "clock", "north", "east")
-    found = calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image, asked)
+    found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image, asked)
     assert found.names == BORESIGHT
     assert "tilt" in found.undetermined["clock"]
     assert {"tilt", "clock"} & set(found.undetermined["north"])
@@ -105,7 +121,7 @@ def test_the_stated_standard_deviation_is_the_scatter_over_flights():
     estimates, stated = [], []
     for seed in range(60):
         survey = Survey(seed, EVERY_WAY, attitude_sd=0.01, pixel_sd=1.0)
-        found = calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image)
+        found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
         estimates.append(found.values)
         stated.append([found.sd(name) for name in found.names])
     ratio = np.mean(stated, axis=0) / np.std(estimates, axis=0, ddof=1)
@@ -115,10 +131,8 @@ def test_the_stated_standard_deviation_is_the_scatter_over_flights():
 def test_one_wrong_click_does_not_decide():
     survey = Survey(5, EVERY_WAY, pixel_sd=0.5)
     survey.known[7, :2] += 60.0
-    found = calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image)
-    assert np.allclose(
-        apply_calibration(found, Mount("down")).misalignment, TRUE.misalignment, atol=np.radians(0.1)
-    )
+    found = calibrate(survey.poses_at(), survey.uv, survey.known, survey.image)
+    assert np.allclose(apply_calibration(found, PLAIN).misalignment, TRUE.misalignment, atol=np.radians(0.1))
 
 
 def test_halves_keep_images_whole():
@@ -129,9 +143,9 @@ def test_halves_keep_images_whole():
     assert len(np.unique(image[half])) == 3
 
 
-def test_nothing_to_calibrate_with_is_an_error():
+def test_rolled_to_calibrate_with_is_an_error():
     survey = Survey(1, EVERY_WAY)
     with pytest.raises(ValueError, match="fewer than two points"):
-        calibrate(TAU2, Mount("down"), survey.uv * np.nan, survey.poses_at, survey.known, survey.image)
+        calibrate(survey.poses_at(), survey.uv * np.nan, survey.known, survey.image)
     with pytest.raises(ValueError, match="unknown parameters"):
-        calibrate(TAU2, Mount("down"), survey.uv, survey.poses_at, survey.known, survey.image, ("yaw",))
+        calibrate(survey.poses_at(), survey.uv, survey.known, survey.image, ("yaw",))

@@ -73,8 +73,9 @@ def test_geodetic_round_trip(lat0, lon0, dlat, dlon, height):
     origin = (lat0, lon0, 100.0)
     ned = frames.geodetic_to_ned(lat0 + dlat, lon0 + dlon, height, origin)
     back = frames.ned_to_geodetic(ned, origin)
-    error = (back - [lat0 + dlat, lon0 + dlon, height]) * [6.4e6, 6.4e6, 1]
-    error[1] = (error[1] + 6.4e6 * np.pi) % (6.4e6 * 2 * np.pi) - 6.4e6 * np.pi
+    error = back - [lat0 + dlat, lon0 + dlon, height]
+    error[1] = frames.wrap(error[1])
+    error *= [6.4e6, 6.4e6, 1]
     assert np.abs(error).max() < 1e-6
 
 
@@ -124,6 +125,13 @@ def test_exponential_and_logarithm_undo_each_other(rotation):
         atol=1e-9,
     )
     assert np.allclose(R[0] @ R[0].T, np.eye(3), atol=1e-12)
+
+
+@given(st.floats(-1e3, 1e3))
+def test_wrap_keeps_the_direction(a):
+    wrapped = float(frames.wrap(a))
+    assert -np.pi <= wrapped < np.pi
+    assert np.exp(1j * wrapped) == pytest.approx(np.exp(1j * a), abs=1e-9)
 
 
 @pytest.mark.parametrize("shape", [(3,), (1, 3), (2, 3), (2, 4, 3)])

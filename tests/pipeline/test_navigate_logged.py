@@ -15,7 +15,7 @@ import pytest
 from wildlab.flight.clocks import covariances, gnss_times, poses_at
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler, matrix_to_rotation_vector
+from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler, matrix_to_rotation_vector, wrap
 from wildlab.paths import DATA
 from wildlab.pipeline.navigate import Navigated, likelihoods_of_latency
 from wildlab.pipeline.navigation_errors import corrections, navigate_all
@@ -49,7 +49,7 @@ def euler_differences(flight: Flight, found: Navigated, begin: float, end: float
     known = np.isfinite(onboard[:, 0, 0])
     assert known.mean() > 0.99
     off = matrix_to_euler(ours[known]) - matrix_to_euler(onboard[known])
-    return np.degrees((off + np.pi) % (2 * np.pi) - np.pi)
+    return np.degrees(wrap(off))
 
 
 def euler_deviations(found: Navigated, begin: float, end: float) -> np.ndarray:
