@@ -59,11 +59,13 @@ def test_at_any_times_a_sum_of_sines_is_the_plain_sum(seed, count):
     same(some(times), expected[0], 1e-10)
 
 
-def test_a_step_that_changes_within_the_times_is_noticed():
-    some = signal(1)
+@pytest.mark.parametrize("off", [1e-9, 1e-3])
+def test_times_a_little_off_equal_steps_are_noticed(off):
+    some, rng = signal(1), np.random.default_rng(1)
     times = np.concatenate([np.arange(100) * 0.1, 9.9 + np.arange(1, 200) * 0.004, [11.0, 400.0]])
-    expected = plain.sum_of_sines(times, some.amplitudes, some.frequencies, some.phases)
-    same(some.with_derivatives(times), expected, 1e-10)
+    for uneven in (times, 0.004 * np.arange(COUNT) + off * rng.random(COUNT)):
+        expected = plain.sum_of_sines(uneven, some.amplitudes, some.frequencies, some.phases)
+        same(some.with_derivatives(uneven), expected, 1e-10)
 
 
 def test_polynomials_in_pieces_are_those_of_scipy_and_nan_outside():
