@@ -26,7 +26,13 @@ from wildlab.navigation.aiding import Aiding, positions
 from wildlab.navigation.mekf import Start
 from wildlab.navigation.noise import STIM300
 from wildlab.navigation.timeline import Imu
-from wildlab.simulation import angular_rates, attitude_of, loiter_path, move, specific_forces
+from wildlab.simulation import (
+    angular_rates,
+    attitude_along,
+    fixed_wing_trajectory,
+    loiter_path,
+    specific_forces,
+)
 
 DURATION, RATE, FRACTION = 1500.0, 250, 100
 ORIGIN = (1.11, 0.17, 40.0)
@@ -38,9 +44,9 @@ def flight() -> tuple[Imu, Start, list[Aiding], Aiding]:
     earth = local_earth(ORIGIN[0], ORIGIN[2])
     times = np.arange(0, DURATION, 1 / RATE)
     path = loiter_path((0.0, 0.0), 160.0, 350.0, 20.0)
-    attitude = attitude_of(path, gravity=earth.gravity)
-    motion = move(path, attitude, times)
-    imu = Imu(times, specific_forces(motion, earth.gravity), angular_rates(attitude, times))
+    trajectory = fixed_wing_trajectory(path, gravity=earth.gravity)
+    motion = trajectory(times)
+    imu = Imu(times, specific_forces(motion, earth.gravity), angular_rates(attitude_along(trajectory), times))
     fixes = slice(5, None, RATE // 10)
     antennas = [motion.position[fixes] + motion.R_nb[fixes] @ lever for lever in LEVERS]
     aiding = [positions(times[fixes], p, 0.02, lever) for p, lever in zip(antennas, LEVERS, strict=True)]

@@ -9,15 +9,21 @@ from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import EARTH_RATE, flat_earth, local_earth, normal_gravity
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import Imu
-from wildlab.simulation import angular_rates, attitude_of, loiter_path, move, specific_forces
+from wildlab.simulation import (
+    angular_rates,
+    attitude_along,
+    fixed_wing_trajectory,
+    loiter_path,
+    specific_forces,
+)
 
 
 def flown(times):
     """A loiter in wind, and what ideal sensors measure on it."""
     path = loiter_path((50.0, -20.0), 120.0, 200.0, 18.0, wind=(4.0, -2.0))
-    attitude = attitude_of(path, wind=(4.0, -2.0, 0.0), trim_pitch=0.05)
-    motion = move(path, attitude, times)
-    return motion, Imu(times, specific_forces(motion), angular_rates(attitude, times))
+    trajectory = fixed_wing_trajectory(path, wind=(4.0, -2.0, 0.0), trim_pitch=0.05)
+    motion = trajectory(times)
+    return motion, Imu(times, specific_forces(motion), angular_rates(attitude_along(trajectory), times))
 
 
 def reckon(motion, imu, **options):

@@ -19,11 +19,11 @@ from wildlab.simulation.onboard_sensors import (
     gnss_table,
     imu_table,
     nav_table,
-    payload_attitude,
+    payload_boresight,
     sample_times,
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
-from wildlab.simulation.trajectory import angular_rates, move
+from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
 DURATION, SEEDS = 200.0, 50
@@ -40,14 +40,18 @@ def shortened(name: str) -> TwinParameters:
 
 def sensors(twin: TwinParameters, seed: int) -> tuple[Flight, np.ndarray]:
     """Inertial unit, receivers and truth alone, with the outage; and whether it turns at each time."""
-    path, attitude = twin_trajectory(twin, stream(seed, "trajectory"))
-    payload = payload_attitude(twin, attitude, seed)
+    airframe = twin_trajectory(twin, stream(seed, "trajectory"))
+    boresight = payload_boresight(twin, seed)
+
+    def payload(times: np.ndarray) -> Motion:
+        return turned(airframe(times), boresight)
+
     times = sample_times(5.0, DURATION)
-    gnss = gnss_table(twin, path, payload, seed)
+    gnss = gnss_table(twin, payload, seed)
     gnss = gnss[~gnss["time_s"].between(*OUTAGE)].reset_index(drop=True)
-    tables = {"imu": imu_table(twin, path, payload, seed), "gnss": gnss}
-    truth = nav_table(move(path, payload, times))
-    turning = np.abs(angular_rates(payload, times)[:, 2]) > 0.05
+    tables = {"imu": imu_table(twin, payload, seed), "gnss": gnss}
+    truth = nav_table(payload(times))
+    turning = np.abs(angular_rates(attitude_along(payload), times)[:, 2]) > 0.05
     return Flight(twin_manifest(twin, seed), {"truth-payload": truth}, tables), turning
 
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
-from wildlab.simulation.trajectory import angular_rates, move
+from wildlab.simulation.trajectory import angular_rates, attitude_along
 
 ARM = np.array([0.5, -0.2, -0.1])
 
 
 def test_an_antennas_velocity_is_the_derivative_of_its_position(restless_loiter):
-    path, attitude = restless_loiter()
+    trajectory = restless_loiter()
     t, h = np.linspace(5, 500, 400), 1e-3
 
     def position(times):
-        return antenna_motion(move(path, attitude, times), angular_rates(attitude, times), ARM)[0]
+        return antenna_motion(trajectory(times), angular_rates(attitude_along(trajectory), times), ARM)[0]
 
-    motion = move(path, attitude, t)
-    p, v = antenna_motion(motion, angular_rates(attitude, t), ARM)
+    motion = trajectory(t)
+    p, v = antenna_motion(motion, angular_rates(attitude_along(trajectory), t), ARM)
     assert np.linalg.norm(p - motion.position, axis=1) == pytest.approx(np.linalg.norm(ARM), abs=1e-12)
     assert np.abs(v - motion.velocity).max() > 0.05  # the arm matters
     # Truncation: h^2/6 times the third derivative, 2 m/s^3 of the path and the arm times 3 rad/s^3.

@@ -10,7 +10,7 @@ from wildlab.flight.files import read_toml
 from wildlab.simulation.imu import TriadDataSheet, ideal_imu, misaligned_triad, read_imu, read_triad
 from wildlab.simulation.parameters import PARTS
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+from wildlab.simulation.trajectory import angular_rates, attitude_along, specific_forces
 
 #: A triad that does not err; each test switches one error on.
 IDEAL = TriadDataSheet(
@@ -37,24 +37,24 @@ def allan_deviation(rate: np.ndarray, hertz: float, averaged: int) -> float:
 
 
 def test_ideal_readings_are_those_of_the_motion_whatever_the_chunk(restless_loiter):
-    path, attitude = restless_loiter()
+    trajectory = restless_loiter()
     count = 40_000  # three chunks
-    force, rate = ideal_imu(path, attitude, 250.0, count)
+    force, rate = ideal_imu(trajectory, 250.0, count)
     t = np.arange(count) / 250
     for some in (slice(0, 50), slice(16_380, 16_390), slice(32_760, 32_780), slice(-50, None)):
-        assert np.abs(force[some] - specific_forces(move(path, attitude, t[some]))).max() < 1e-9
+        assert np.abs(force[some] - specific_forces(trajectory(t[some]))).max() < 1e-9
         # Two differences of different steps: each errs by some 1e-7 of a tenth of a radian per second.
-        assert np.abs(rate[some] - angular_rates(attitude, t[some])).max() < 1e-7
+        assert np.abs(rate[some] - angular_rates(attitude_along(trajectory), t[some])).max() < 1e-7
 
 
 def test_ideal_readings_carry_a_strapdown_round_the_loiter(restless_loiter):
     """A minute of dead reckoning from the readings alone, by the trapezoidal rule."""
-    path, attitude = restless_loiter()
+    trajectory = restless_loiter()
     rate, count = 250.0, 15_001
-    force, spin = ideal_imu(path, attitude, rate, count)
+    force, spin = ideal_imu(trajectory, rate, count)
     h = 1 / rate
     turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
-    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    start, end = (trajectory(np.array([t])) for t in (0.0, (count - 1) * h))
     R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
     down = np.array([0.0, 0.0, 9.81])
     for i in range(count - 1):

@@ -13,7 +13,6 @@ from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import true_mount
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.target_motion import target_outline, target_path
-from wildlab.simulation.trajectory import move
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
 
@@ -56,8 +55,8 @@ def test_the_three_misses_show_least_of_the_ship(twin, flight):
 
 def test_blobs_are_of_the_ship_seen_through_the_true_mount(twin):
     exact = simulate(with_values(twin, camera__marking_sd=0.0), 4).detections
-    path, attitude = twin_trajectory(twin, stream(4, "trajectory"))
-    true = move(path, attitude, exposure_times(twin))
+    trajectory = twin_trajectory(twin, stream(4, "trajectory"))
+    true = trajectory(exposure_times(twin))
     view = Exposures(twin, true)
     image = exact["frame_id"].str[1:].astype(int).to_numpy() - 1
     corners = target_outline(twin.target, 4)(true.times)

@@ -20,7 +20,7 @@ from wildlab.simulation.imu import ideal_imu
 from wildlab.simulation.manifest import true_mount
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.survey_courses import rows, survey_course
-from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+from wildlab.simulation.trajectory import angular_rates, attitude_along, specific_forces
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate, simulate_twin
 from wildlab.simulation.waypoint_courses import Laps, leg_headings
@@ -43,20 +43,20 @@ def calm(twin):
 
 @pytest.mark.parametrize("name", ["uav-search-low", "gondola"])
 def test_velocity_and_acceleration_are_the_derivatives_of_position(name):
-    path, _ = twin_trajectory(load_twin(name), np.random.default_rng(1))
+    trajectory = twin_trajectory(load_twin(name), np.random.default_rng(1))
     t, h = np.linspace(0, 1700, 6000), 1e-3
-    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
-    _, v, a = path(t)
+    before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
     # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4); rounding of 500 m
     # over 2 h is some 1e-10.
-    assert np.abs((p1 - p0) / (2 * h) - v).max() < 2e-6
-    assert np.abs((v1 - v0) / (2 * h) - a).max() < 2e-6
-    assert np.abs(a).max() < 3.0
+    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 2e-6
+    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 2e-6
+    assert np.abs(at.acceleration).max() < 3.0
 
 
 @pytest.mark.parametrize("name", ["uav-search", "uav-search-low", "gondola"])
 def test_angular_rate_is_the_derivative_of_attitude(name):
-    _, attitude = twin_trajectory(load_twin(name), np.random.default_rng(1))
+    trajectory = twin_trajectory(load_twin(name), np.random.default_rng(1))
+    attitude = attitude_along(trajectory)
     t, h = np.linspace(5, 1700, 6000), 1e-3
     rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
     assert np.abs(rate - angular_rates(attitude, t + h / 2)).max() < 5e-6
@@ -66,12 +66,12 @@ def test_angular_rate_is_the_derivative_of_attitude(name):
 def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
     """Rate and force as the inertial unit would feel them, for four minutes: two rows and their turns."""
     twin = load_twin("uav-search-low")
-    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
+    trajectory = twin_trajectory(twin, np.random.default_rng(1))
     rate, count = 250.0, 60_001
-    force, spin = ideal_imu(path, attitude, rate, count)
+    force, spin = ideal_imu(trajectory, rate, count)
     h = 1 / rate
     turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
-    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    start, end = (trajectory(np.array([t])) for t in (0.0, (count - 1) * h))
     R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
     down = np.array([0.0, 0.0, 9.81])
     before = R.apply(force[0]) + down
@@ -89,8 +89,8 @@ def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
 
 def test_a_multicopter_leans_just_as_its_thrust_must():
     twin = with_values(calm(load_twin("uav-search")), flight__trim_pitch=0.0)
-    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
-    motion = move(path, attitude, np.linspace(0, 2000, 5000))
+    trajectory = twin_trajectory(twin, np.random.default_rng(1))
+    motion = trajectory(np.linspace(0, 2000, 5000))
     force = specific_forces(motion, twin.place.gravity.si)
     assert np.abs(force[:, :2]).max() < 1e-9  # all of it along z of the body
     lean = np.degrees(np.arccos(motion.R_nb[:, 2, 2]))
@@ -100,20 +100,21 @@ def test_a_multicopter_leans_just_as_its_thrust_must():
     assert 0.9 * steepest < lean.max() < steepest
     assert np.median(lean) < 0.01
     # In steady flight it has its trim, nose down.
-    path, attitude = twin_trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
-    angles = np.degrees(matrix_to_euler(attitude(np.linspace(0, 2000, 5000))))
+    trajectory = twin_trajectory(calm(load_twin("uav-search")), np.random.default_rng(1))
+    angles = np.degrees(matrix_to_euler(attitude_along(trajectory)(np.linspace(0, 2000, 5000))))
     assert np.median(angles[:, 1]) == pytest.approx(-4.0, abs=0.01)
 
 
 def test_a_gondola_hangs_level_and_goes_round_clockwise_at_its_speed():
     twin = calm(load_twin("gondola"))
-    path, attitude = twin_trajectory(twin, np.random.default_rng(1))
+    trajectory = twin_trajectory(twin, np.random.default_rng(1))
     t = np.arange(0, 1800, 0.5)
-    p, v, _ = path(t)
+    motion = trajectory(t)
+    p, v = motion.position, motion.velocity
     assert np.hypot(v[:, 0], v[:, 1]) == pytest.approx(1.5, abs=0.01)
     assert -p[:, 2].max() == pytest.approx(3.0, abs=0.2)
     assert -p[:, 2].min() == pytest.approx(20.0, abs=0.2)
-    roll, pitch, yaw = matrix_to_euler(attitude(t)).T
+    roll, pitch, yaw = matrix_to_euler(motion.R_nb).T
     assert np.abs(roll).max() < 1e-12
     assert np.abs(pitch).max() < 1e-12
     course = np.arctan2(v[:, 1], v[:, 0])
@@ -165,8 +166,9 @@ def test_heading_is_that_of_the_leg_and_turns_at_corners():
 @pytest.mark.parametrize(("name", "pattern"), PATTERNS.items())
 def test_altitude_and_rows_are_those_printed(name, pattern):
     twin = load_twin(name)
-    path, _ = twin_trajectory(twin, np.random.default_rng(2))
-    p, v, _ = path(np.arange(0, twin.flight.duration.si, 1.0))
+    trajectory = twin_trajectory(twin, np.random.default_rng(2))
+    motion = trajectory(np.arange(0, twin.flight.duration.si, 1.0))
+    p, v = motion.position, motion.velocity
     assert -p[:, 2].mean() == pytest.approx(pattern[0], abs=0.5)
     assert np.hypot(v[:, 0], v[:, 1]).max() < 1.3 * twin.flight.airspeed.number
     if pattern[1] is not None:

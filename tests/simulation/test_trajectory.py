@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import matrix_to_euler
-from wildlab.simulation.attitudes import attitude_of, coordinated_attitude
+from wildlab.simulation.attitudes import coordinated_attitude, fixed_wing_trajectory
 from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.loiter import loiter_path
-from wildlab.simulation.trajectory import angular_rates, move, specific_forces
+from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
 
 WIND = np.array([4.0, -3.0, 0.0])
 
@@ -21,7 +21,7 @@ def test_still_air_circle_is_a_coordinated_turn(turn, sense):
     path = loiter_path((0.0, 0.0), radius, 300.0, speed, turn=turn)
     t = np.linspace(0, 100, 500)
     p, v, _ = path(t)
-    roll, pitch, yaw = matrix_to_euler(attitude_of(path, gravity=gravity)(t)).T
+    roll, pitch, yaw = matrix_to_euler(fixed_wing_trajectory(path, gravity=gravity)(t).R_nb).T
     assert np.tan(roll) == pytest.approx(sense * speed**2 / (gravity * radius), abs=1e-12)
     assert pitch == pytest.approx(0.0, abs=1e-12)
     course = np.arctan2(v[:, 1], v[:, 0])
@@ -45,32 +45,33 @@ def test_in_wind_the_airspeed_is_steady_and_the_ground_track_a_circle():
 
 
 def test_coordinated_flight_has_no_sideslip_and_no_lateral_force(restless_loiter):
-    path, _ = restless_loiter()
+    trajectory = restless_loiter()
     t = np.linspace(0, 200, 1000)
-    _, v, a = path(t)
+    restless = trajectory(t)
+    v, a = restless.velocity, restless.acceleration
     R = coordinated_attitude(v, a, wind=WIND, trim_pitch=0.05)
     through_air = np.einsum("nij,ni->nj", R, v - WIND)
     assert through_air[:, 1] == pytest.approx(0.0, abs=1e-10)
     assert np.arctan2(through_air[:, 2], through_air[:, 0]) == pytest.approx(0.05, abs=1e-10)
-    motion = move(path, attitude_of(path, wind=WIND, trim_pitch=0.05), t)
+    motion = Motion(t, restless.position, v, a, R)
     assert specific_forces(motion)[:, 1] == pytest.approx(0.0, abs=1e-10)
     assert np.linalg.det(R) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("turn", ["clockwise", "counter-clockwise"])
 def test_velocity_and_acceleration_are_the_derivatives_of_position(turn, restless_loiter):
-    path, _ = restless_loiter(turn)
+    trajectory = restless_loiter(turn)
     t, h = np.linspace(5, 1400, 2000), 1e-3
-    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
-    _, v, a = path(t)
+    before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
     # Truncation is h^2/6 times the third derivative, below 2 m/s^3 (and its own, below 2 m/s^4): 4e-7.
     # Rounding is 1e-13 m in 2e-3 s times a few, 1e-9.
-    assert np.abs((p1 - p0) / (2 * h) - v).max() < 4e-7
-    assert np.abs((v1 - v0) / (2 * h) - a).max() < 4e-7
+    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 4e-7
+    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 4e-7
 
 
 def test_angular_rate_is_the_derivative_of_attitude(restless_loiter):
-    _, attitude = restless_loiter()
+    trajectory = restless_loiter()
+    attitude = attitude_along(trajectory)
     t, h = np.linspace(5, 1400, 2000), 1e-3
     turn = np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)
     rate = Rotation.from_matrix(turn).as_rotvec() / h
@@ -82,16 +83,16 @@ def test_angular_rate_is_the_derivative_of_attitude(restless_loiter):
 
 def test_dead_reckoning_with_ideal_inertial_sensors_returns_the_motion(restless_loiter):
     """Strapdown at 200 Hz for two minutes, from the first pose alone."""
-    path, attitude = restless_loiter()
+    trajectory = restless_loiter()
     h, n = 0.005, 24_000
     t = np.arange(n + 1) * h
-    middle = move(path, attitude, t[:-1] + h / 2)
-    turns = Rotation.from_rotvec(angular_rates(attitude, middle.times) * h)
+    middle = trajectory(t[:-1] + h / 2)
+    turns = Rotation.from_rotvec(angular_rates(attitude_along(trajectory), middle.times) * h)
     force = specific_forces(middle)
-    start, end = move(path, attitude, t[:1]), move(path, attitude, t[-1:])
+    start, end = trajectory(t[:1]), trajectory(t[-1:])
     R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
     gravity = np.array([0.0, 0.0, 9.81])
-    half = Rotation.from_rotvec(angular_rates(attitude, middle.times) * h / 2)
+    half = Rotation.from_rotvec(angular_rates(attitude_along(trajectory), middle.times) * h / 2)
     for i in range(n):
         a = (R * half[i]).apply(force[i]) + gravity
         p += h * v + h**2 / 2 * a

@@ -19,9 +19,9 @@ from wildlab.geometry.frames import (
 )
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import camera_pose
-from wildlab.simulation.onboard_sensors import payload_attitude
+from wildlab.simulation.onboard_sensors import payload_boresight
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.trajectory import move
+from wildlab.simulation.trajectory import turned
 from wildlab.simulation.twin_trajectory import loiter_centre, twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
@@ -186,8 +186,8 @@ def test_undisturbed_flight_has_the_target_in_the_middle_on_the_course_asked_for
     calm = with_values(calm, flight__roll_sd=0.0, flight__pitch_sd=0.0, flight__yaw_sd=0.0)
     for changes in ({}, {"loiter__turn": "counter-clockwise"}, {"loiter__course_at_target": 120.0}):
         changed = with_values(calm, **changes)
-        path, attitude = twin_trajectory(changed, np.random.default_rng(0))
-        motion = move(path, attitude, np.arange(0, 120, 0.01))
+        trajectory = twin_trajectory(changed, np.random.default_rng(0))
+        motion = trajectory(np.arange(0, 120, 0.01))
         flight = quick(with_values(changed, target__observations=1), 0)
         pose = camera_pose(flight.manifest.geometry_mount(), motion.position, motion.R_nb)
         uv = ground_to_pixel(flight.manifest.geometry_camera(), [0.0, 0.0, -2.0], *pose)
@@ -234,11 +234,10 @@ def test_the_antennas_ride_on_the_payload_as_the_levers_say(sensed):
 
 
 def test_the_payload_turns_against_the_airframe_slowly_by_about_a_degree(twin):
-    _, attitude = twin_trajectory(twin, np.random.default_rng(0))
-    t = np.arange(1500.0)
+    airframe = twin_trajectory(twin, np.random.default_rng(0))(np.arange(1500.0))
     turns = [
-        np.degrees(matrix_to_rotation_vector(np.swapaxes(attitude(t), 1, 2) @ payload(t)))
-        for payload in (payload_attitude(twin, attitude, seed) for seed in range(20))
+        np.degrees(matrix_to_rotation_vector(np.swapaxes(airframe.R_nb, 1, 2) @ payload.R_nb))
+        for payload in (turned(airframe, payload_boresight(twin, seed)) for seed in range(20))
     ]
     turn = np.array(turns)
     # Sixteen sines, the slowest of 600 s: the mean square of a flight is theirs to some 10 %.

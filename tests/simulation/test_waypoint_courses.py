@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import matrix_to_euler
-from wildlab.simulation.attitudes import attitude_of
+from wildlab.simulation.attitudes import fixed_wing_trajectory
 from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.imu import ideal_imu
-from wildlab.simulation.trajectory import angular_rates, move
+from wildlab.simulation.trajectory import angular_rates, attitude_along
 from wildlab.simulation.waypoint_courses import (
     ControlErrors,
     Laps,
@@ -25,14 +25,14 @@ ALTITUDE = [[0.0, 200.0], [100.0, 200.0], [160.0, 300.0]]
 
 
 def restless(shape="eight"):
-    """A course with wind, drift, climb, control errors and gusts, all on: (path, attitude)."""
+    """A course with wind, drift, climb, control errors and gusts, all on: its trajectory."""
     rng = np.random.default_rng(5)
     course = filleted_course(shape_corners(shape, 500.0, 400.0), 80.0)
     laps = Laps(course, 19.5, 400.0, wind=WIND[:2], drift=(0.5, -0.3), start=0.2)
     errors = ControlErrors(*(band_limited_disturbance(sd, 20.0, 120.0, rng) for sd in (3.0, 3.0, 2.0)))
     path = laps_path(laps, ALTITUDE, errors)
-    disturbance = tuple(band_limited_disturbance(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
-    return path, attitude_of(path, wind=WIND, trim_pitch=np.radians(2.0), disturbance=disturbance)
+    gusts = tuple(band_limited_disturbance(np.radians(sd), 2.0, 9.0, rng) for sd in (1.5, 1.0, 1.0))
+    return fixed_wing_trajectory(path, wind=WIND, trim_pitch=np.radians(2.0), gusts=gusts)
 
 
 def calm(course, **more):
@@ -78,7 +78,7 @@ def test_a_lap_in_still_air_takes_its_length_over_the_airspeed():
 def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
     course = filleted_course(shape_corners("eight", 1500.0, 400.0), 80.0)
     path = calm(course, wind=WIND[:2])
-    attitude = attitude_of(path, wind=WIND)
+    trajectory = fixed_wing_trajectory(path, wind=WIND)
     t = np.arange(0, 600, 0.1)
     p, v, a = path(t)
     airspeed = np.linalg.norm(v - WIND, axis=1)
@@ -86,7 +86,7 @@ def test_legs_are_straight_at_the_airspeed_and_turns_are_coordinated():
     assert 0.4 < level.mean() < 0.9
     assert airspeed[level] == pytest.approx(19.5, abs=1e-9)
     assert 0.9 * 19.5 < airspeed.min() <= airspeed.max() < 1.02 * 19.5
-    roll = matrix_to_euler(attitude(t))[:, 0]
+    roll = matrix_to_euler(trajectory(t).R_nb)[:, 0]
     assert roll[level] == pytest.approx(0.0, abs=1e-9)
     ground_speed = np.linalg.norm(v, axis=1)
     steepest = np.arctan(ground_speed**2 / (9.81 * 80))
@@ -111,7 +111,7 @@ def test_head_and_tail_wind_give_the_ground_speeds_of_h_7_5_4():
     assert speed[level].max() == pytest.approx(24.0, abs=1e-9)
     across = level & (np.abs(v[:, 0]) < 1e-9)
     assert across.any()
-    yaw = matrix_to_euler(attitude_of(path, wind=wind)(t))[across, 2]
+    yaw = matrix_to_euler(fixed_wing_trajectory(path, wind=wind)(t).R_nb)[across, 2]
     crab = np.arctan2(v[across, 1], v[across, 0]) - yaw
     assert np.abs(np.degrees(crab)) == pytest.approx(np.degrees(np.arcsin(4.5 / 19.5)))
 
@@ -136,17 +136,17 @@ def test_altitude_follows_its_profile():
 
 @pytest.mark.parametrize("shape", ["eight", "racetrack"])
 def test_velocity_and_acceleration_are_the_derivatives_of_position(shape):
-    path, _ = restless(shape)
+    trajectory = restless(shape)
     t, h = np.linspace(0, 400, 4000), 1e-3
-    (p0, v0, _), (p1, v1, _) = path(t - h), path(t + h)
-    _, v, a = path(t)
+    before, at, after = trajectory(t - h), trajectory(t), trajectory(t + h)
     # Truncation is h^2/6 times the third (fourth) derivative, below 10 m/s^3 (m/s^4): 2e-6.
-    assert np.abs((p1 - p0) / (2 * h) - v).max() < 2e-6
-    assert np.abs((v1 - v0) / (2 * h) - a).max() < 2e-6
+    assert np.abs((after.position - before.position) / (2 * h) - at.velocity).max() < 2e-6
+    assert np.abs((after.velocity - before.velocity) / (2 * h) - at.acceleration).max() < 2e-6
 
 
 def test_angular_rate_is_the_derivative_of_attitude():
-    _, attitude = restless()
+    trajectory = restless()
+    attitude = attitude_along(trajectory)
     t, h = np.linspace(5, 395, 3000), 1e-3
     rate = Rotation.from_matrix(np.swapaxes(attitude(t), -1, -2) @ attitude(t + h)).as_rotvec() / h
     # As of the loiter; rolling into a turn adds some rad/s^3.
@@ -155,12 +155,12 @@ def test_angular_rate_is_the_derivative_of_attitude():
 
 
 def test_ideal_inertial_readings_carry_a_strapdown_round_the_course():
-    path, attitude = restless()
+    trajectory = restless()
     rate, count = 250.0, 30_001
-    force, spin = ideal_imu(path, attitude, rate, count)
+    force, spin = ideal_imu(trajectory, rate, count)
     h = 1 / rate
     turns = Rotation.from_rotvec((spin[1:] + spin[:-1]) * h / 2)
-    start, end = (move(path, attitude, np.array([t])) for t in (0.0, (count - 1) * h))
+    start, end = (trajectory(np.array([t])) for t in (0.0, (count - 1) * h))
     R, v, p = Rotation.from_matrix(start.R_nb[0]), start.velocity[0].copy(), start.position[0].copy()
     down = np.array([0.0, 0.0, 9.81])
     before = R.apply(force[0]) + down

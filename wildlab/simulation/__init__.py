@@ -25,50 +25,54 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wildlab.simulation.attitudes import attitude_of, coordinated_attitude, thrust_aligned_attitude
+    from wildlab.simulation.attitudes import (
+        coordinated_attitude,
+        fixed_wing_trajectory,
+        thrust_aligned_trajectory,
+    )
     from wildlab.simulation.error_models import gauss_markov, stream
     from wildlab.simulation.loiter import loiter_path
     from wildlab.simulation.parameters import TwinParameters, load_twin, parameters_table, twin_names
     from wildlab.simulation.target_motion import target_path
-    from wildlab.simulation.trajectory import Motion, angular_rates, move, specific_forces
+    from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
     from wildlab.simulation.twins import simulate, simulate_twin
 
 _WHERE = {
     "Motion": "trajectory",
     "TwinParameters": "parameters",
     "angular_rates": "trajectory",
-    "attitude_of": "attitudes",
+    "attitude_along": "trajectory",
+    "fixed_wing_trajectory": "attitudes",
     "coordinated_attitude": "attitudes",
     "gauss_markov": "error_models",
     "load_twin": "parameters",
     "loiter_path": "loiter",
-    "move": "trajectory",
     "parameters_table": "parameters",
     "simulate": "twins",
     "simulate_twin": "twins",
     "specific_forces": "trajectory",
     "stream": "error_models",
     "target_path": "target_motion",
-    "thrust_aligned_attitude": "attitudes",
+    "thrust_aligned_trajectory": "attitudes",
     "twin_names": "parameters",
 }
 __all__ = [
     "Motion",
     "TwinParameters",
     "angular_rates",
-    "attitude_of",
+    "attitude_along",
     "coordinated_attitude",
+    "fixed_wing_trajectory",
     "gauss_markov",
     "load_twin",
     "loiter_path",
-    "move",
     "parameters_table",
     "simulate",
     "simulate_twin",
     "specific_forces",
     "stream",
     "target_path",
-    "thrust_aligned_attitude",
+    "thrust_aligned_trajectory",
     "twin_names",
 ]
 

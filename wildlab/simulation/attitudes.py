@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array, euler_to_matrix
-from wildlab.simulation.disturbances import Disturbance
-from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
+from wildlab.simulation import kernels
+from wildlab.simulation.disturbances import AttitudeDisturbance
+from wildlab.simulation.trajectory import GRAVITY, FlightPath, Motion, Signal, Trajectory, turned
 
 
 def coordinated_attitude(
@@ -34,50 +35,45 @@ def coordinated_attitude(
     -------
     ``R_nb`` (N, 3, 3).
     """
-    through_air = np.asarray(velocity, float) - np.asarray(wind, float)
-    force = np.asarray(acceleration, float) - np.array([0.0, 0.0, gravity])
-    x = through_air / np.linalg.norm(through_air, axis=-1, keepdims=True)
-    y = np.cross(x, force)
-    y /= np.linalg.norm(y, axis=-1, keepdims=True)
-    R = np.stack([x, y, np.cross(x, y)], axis=-1)
-    return np.asarray(R @ euler_to_matrix(0.0, trim_pitch, 0.0))
+    v, a = (np.ascontiguousarray(part, float) for part in (velocity, acceleration))
+    R = np.empty((len(v), 3, 3))
+    kernels.coordinated_attitude(v, a, np.array(wind, float), trim_pitch, gravity, R)
+    return R
 
 
-def attitude_of(
+def fixed_wing_trajectory(
     path: FlightPath,
     *,
     wind: ArrayLike = (0.0, 0.0, 0.0),
     trim_pitch: float = 0.0,
     gravity: float = GRAVITY,
-    disturbance: tuple[Disturbance, Disturbance, Disturbance] | None = None,
-) -> Signal:
-    """Attitude along a path as a function of time: coordinated flight, and gusts about it.
+    gusts: AttitudeDisturbance | None = None,
+) -> Trajectory:
+    """Motion along a path in coordinated flight, and gusts about it.
 
-    ``disturbance`` are small roll, pitch and yaw (rad) about the body's own axes, as gusts and control leave
-    them.
-    Returns a function (N,) s -> ``R_nb`` (N, 3, 3).
+    ``gusts`` are small roll, pitch and yaw (rad) about the body's own axes, as control leaves them.
     """
 
-    def attitude(times: Array) -> Array:
+    def motion(times: Array) -> Motion:
         t = np.asarray(times, float)
-        _, v, a = path(t)
-        R = coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
-        return (
-            R if disturbance is None else np.asarray(R @ euler_to_matrix(*(part(t) for part in disturbance)))
+        p, v, a = path(t)
+        calm = Motion(
+            t, p, v, a, coordinated_attitude(v, a, wind=wind, trim_pitch=trim_pitch, gravity=gravity)
         )
+        return calm if gusts is None else turned(calm, gusts)
 
-    return attitude
+    return motion
 
 
-def thrust_aligned_attitude(
+def thrust_aligned_trajectory(
     path: FlightPath,
     heading: Signal,
     *,
     trim_pitch: float = 0.0,
     gravity: float = GRAVITY,
-    disturbance: tuple[Disturbance, Disturbance, Disturbance] | None = None,
-) -> Signal:
-    """Attitude of what leans no more than its own acceleration asks for, whichever way its nose points.
+    gusts: AttitudeDisturbance | None = None,
+) -> Trajectory:
+    """Motion of what leans no more than its own acceleration asks for, whichever way its nose points.
 
     A multicopter's thrust points along its specific force, so it leans forward to go faster and sideways to
     turn. With an infinite ``gravity`` it does not lean: a gondola that hangs level but for gusts.
@@ -88,15 +84,13 @@ def thrust_aligned_attitude(
         Where the nose points, times (N,) s -> (N,) rad.
     trim_pitch
         Pitch in steady motion, rad: below zero for a multicopter that leans against the air.
-    disturbance
-        As for :func:`attitude_of`.
-
-    Returns a function (N,) s -> ``R_nb`` (N, 3, 3).
+    gusts
+        As for :func:`fixed_wing_trajectory`.
     """
 
-    def attitude(times: Array) -> Array:
+    def motion(times: Array) -> Motion:
         t = np.asarray(times, float)
-        _, _, a = path(t)
+        p, v, a = path(t)
         z = np.array([0.0, 0.0, 1.0]) - a / gravity
         z /= np.linalg.norm(z, axis=-1, keepdims=True)
         nose = heading(t)
@@ -104,8 +98,7 @@ def thrust_aligned_attitude(
         y = np.cross(z, ahead)
         y /= np.linalg.norm(y, axis=-1, keepdims=True)
         R = np.stack([np.cross(y, z), y, z], axis=-1) @ euler_to_matrix(0.0, trim_pitch, 0.0)
-        return np.asarray(
-            R if disturbance is None else R @ euler_to_matrix(*(part(t) for part in disturbance))
-        )
+        calm = Motion(t, p, v, a, R)
+        return calm if gusts is None else turned(calm, gusts)
 
-    return attitude
+    return motion

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.simulation.sines import sum_of_sines
+from wildlab.simulation import kernels
 
 _SINES = 16  # enough that a signal does not visibly repeat, few enough to be cheap
 
@@ -30,12 +30,27 @@ class Disturbance:
         """The signal or one of its derivatives with respect to time. (N,) s -> (N,)."""
         strength = self.amplitudes * self.frequencies**derivative
         phases = self.phases + derivative * np.pi / 2
-        return sum_of_sines(np.asarray(times, float), strength, self.frequencies, phases)
+        return np.asarray(_summed(times, strength, self.frequencies, phases, 1)[0])
+
+    def with_derivatives(self, times: ArrayLike) -> Array:
+        """The signal and its first two derivatives with respect to time. (N,) s -> (3, N)."""
+        return _summed(times, self.amplitudes, self.frequencies, self.phases, 3)
+
+
+def _summed(times: ArrayLike, amplitudes: Array, frequencies: Array, phases: Array, rows: int) -> Array:
+    t = np.ascontiguousarray(times, float)
+    out = np.empty((rows, len(t)))
+    kernels.sum_of_sines(t, amplitudes, frequencies, phases, out)
+    return out
 
 
 def no_disturbance() -> Disturbance:
     """The signal that is zero."""
     return Disturbance(np.zeros(1), np.ones(1), np.zeros(1))
+
+
+#: Roll, pitch and yaw (rad) about a body's own axes.
+AttitudeDisturbance = tuple[Disturbance, Disturbance, Disturbance]
 
 
 def band_limited_disturbance(

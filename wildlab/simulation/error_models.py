@@ -10,10 +10,10 @@ import zlib
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation import kernels
 
 
 def stream(seed: int, name: str) -> np.random.Generator:
@@ -46,12 +46,9 @@ def gauss_markov(
     (N, K).
     """
     spread, tau = np.broadcast_arrays(np.atleast_1d(np.asarray(sd, float)), np.atleast_1d(correlation_time))
-    kept = np.exp(-step / tau.astype(float))
-    drive = rng.standard_normal((count, len(spread))) * spread
-    drive[1:] *= np.sqrt(1 - kept**2)
-    return np.stack(
-        [lfilter([1.0], [1.0, -a], column) for a, column in zip(kept, drive.T, strict=True)], axis=-1
-    )
+    draws = rng.standard_normal((count, len(spread)))
+    kernels.gauss_markov(draws, np.array(spread), np.exp(-step / tau.astype(float)))
+    return draws
 
 
 def with_attitude_error(R_nb: ArrayLike, error: ArrayLike) -> Array:

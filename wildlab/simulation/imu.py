@@ -15,17 +15,16 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import Earth, attraction, flat_earth
-from wildlab.simulation.error_models import gauss_markov, rounded
+from wildlab.geometry.gravity import Earth, flat_earth
+from wildlab.simulation import kernels
+from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import GRAVITY, FlightPath, Signal
+from wildlab.simulation.trajectory import GRAVITY, Trajectory
 
 #: The n of a trajectory, by itself.
 INERTIAL = flat_earth(GRAVITY)
 
-_CHUNK = (
-    16_384  # samples at a time: what the sines of a disturbance need then fits into the processor's cache
-)
+_CHUNK = 16_384  # samples at a time: their motion then fits into the processor's cache
 _ASIDE = 4  # samples on either side of a difference of fourth order with a step of two samples
 
 
@@ -57,18 +56,18 @@ class TriadDataSheet(NamedTuple):
 
 
 def ideal_imu(
-    path: FlightPath, attitude: Signal, rate: float, count: int, earth: Earth = INERTIAL
+    trajectory: Trajectory, rate: float, count: int, earth: Earth = INERTIAL
 ) -> tuple[Array, Array]:
     """Specific force and angular rate of a body, as ideal sensors feel them.
 
-    The angular rate is a central difference of fourth order over the samples themselves, so that the attitude
+    The angular rate is a central difference of fourth order over the samples themselves, so that the motion
     is asked for once per sample only. With a step of two samples of 10 ms at most, motion with periods of two
     seconds and more has a relative error of some 1e-7, far below any sensor's.
 
     Parameters
     ----------
-    path, attitude
-        Motion of the body in n; ``R`` takes a vector from the body to n.
+    trajectory
+        Of the body in n.
     rate
         Samples per second, Hz, at least 100.
     count
@@ -83,25 +82,16 @@ def ideal_imu(
     angular_rate
         (N, 3) rad/s, of the body, in the body.
     """
-    turning = np.array(earth.rate)
     force, spin = np.empty((count, 3)), np.empty((count, 3))
+    inside = slice(_ASIDE, -_ASIDE)
     for first in range(0, count, _CHUNK):
-        last = min(first + _CHUNK, count)
-        t = np.arange(first - _ASIDE, last + _ASIDE) / rate
-        R = attitude(t)
-        near, far = _mean_rate(R, 2, rate), _mean_rate(R, 4, rate)
-        position, velocity, acceleration = path(t[_ASIDE:-_ASIDE])
-        to_b = np.swapaxes(R[_ASIDE:-_ASIDE], -1, -2)
-        spin[first:last] = (4 * near[2:-2] - far) / 3 + to_b @ turning
-        felt = acceleration + 2 * np.cross(turning, velocity) - attraction(earth, position)
-        force[first:last] = np.einsum("nij,nj->ni", to_b, felt)
+        some = slice(first, min(first + _CHUNK, count))
+        m = trajectory(np.arange(some.start - _ASIDE, some.stop + _ASIDE) / rate)
+        R = m.R_nb
+        kernels.body_rates(R[:-8], R[2:-6], R[6:-2], R[8:], 2 / rate, spin[some])
+        moving = (m.position[inside], m.velocity[inside], m.acceleration[inside])
+        kernels.felt_on_earth(R[inside], *moving, earth.as_array(), force[some], spin[some])
     return force, spin
-
-
-def _mean_rate(R: Array, step: int, rate: float) -> Array:
-    """Mean angular rate over ``2 * step`` samples around each sample that has so many on either side."""
-    turn = np.swapaxes(R[: -2 * step], -1, -2) @ R[2 * step :]
-    return np.asarray(Rotation.from_matrix(turn).as_rotvec() * (rate / (2 * step)))
 
 
 def misaligned_triad(axis: float, package: float, rng: np.random.Generator) -> Array:
@@ -135,12 +125,14 @@ def read_triad(true: ArrayLike, rate: float, sheet: TriadDataSheet, rng: np.rand
     -------
     (N, 3).
     """
-    x = np.asarray(true, float)
+    x = np.ascontiguousarray(true, float)
     triad = misaligned_triad(sheet.axis_misalignment, sheet.package_misalignment, rng)
-    reading = x @ triad.T + sheet.turn_on_bias * rng.standard_normal(3)
-    reading += gauss_markov(len(x), 1 / rate, [sheet.bias_stability] * 3, sheet.bias_time, rng)
-    reading += sheet.random_walk * np.sqrt(rate) * rng.standard_normal(x.shape)
-    return np.clip(rounded(reading, sheet.resolution), -sheet.limit, sheet.limit)
+    turn_on = sheet.turn_on_bias * rng.standard_normal(3)
+    drift = gauss_markov(len(x), 1 / rate, [sheet.bias_stability] * 3, sheet.bias_time, rng)
+    noise = rng.standard_normal(x.shape)
+    limits = np.array([sheet.limit, sheet.resolution])
+    kernels.read_triad(x, triad, turn_on, drift, noise, float(sheet.random_walk * np.sqrt(rate)), limits)
+    return noise
 
 
 def triad_data_sheets(imu: Imu) -> tuple[TriadDataSheet, TriadDataSheet]:

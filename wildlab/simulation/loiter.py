@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation import kernels
 from wildlab.simulation.disturbances import Disturbance, no_disturbance
-from wildlab.simulation.trajectory import FlightPath, Signal
+from wildlab.simulation.plain import rate_on_circle
+from wildlab.simulation.trajectory import FlightPath
 
 Turn = Literal["clockwise", "counter-clockwise"]
 
@@ -57,75 +58,40 @@ def loiter_path(
         raise ValueError("the airspeed must exceed the wind, and the radius zero")
     off_radius, off_altitude = radius_error or no_disturbance(), altitude_error or no_disturbance()
     sense = 1.0 if turn == "clockwise" else -1.0
-
-    def rate(angle: Array) -> tuple[Array, Array]:
-        """Angular rate around the centre, and its derivative with respect to the angle."""
-        outward, along = _outward(angle), sense * _clockwise(angle)
-        tail, cross = along @ w, outward @ w
-        through_air = np.sqrt(airspeed**2 - cross**2)
-        slope = -sense * cross - cross * (_clockwise(angle) @ w) / through_air
-        return sense * (tail + through_air) / radius, sense * slope / radius
-
-    angle_at = _solve_angle(rate, sense, start_angle)
+    circle = tuple(float(part) for part in (radius, airspeed, *w, sense, start_angle))
+    times_of_angles = _times_of_angles(circle)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
-        t = np.asarray(times, float)
-        angle = angle_at(t)
-        spin, slope = rate(angle)
-        spin_rate = slope * spin
-        outward, clockwise = _outward(angle), _clockwise(angle)
-        r, r1, r2 = radius + off_radius(t), off_radius(t, 1), off_radius(t, 2)
+        t = np.ascontiguousarray(times, float)
+        angles = np.empty(len(t))
+        kernels.angles_on_circle(t, circle, *times_of_angles, angles)
         p, v, a = (np.empty((len(t), 3)) for _ in range(3))
-        p[:, :2] = c + r[:, None] * outward
-        v[:, :2] = r1[:, None] * outward + (r * spin)[:, None] * clockwise
-        a[:, :2] = (r2 - r * spin**2)[:, None] * outward
-        a[:, :2] += (2 * r1 * spin + r * spin_rate)[:, None] * clockwise
-        p[:, 2] = -altitude - off_altitude(t)
-        v[:, 2], a[:, 2] = -off_altitude(t, 1), -off_altitude(t, 2)
+        kernels.circle_motion(angles, circle, off_radius.with_derivatives(t), p, v, a)
+        p[:, :2] += c
+        off = off_altitude.with_derivatives(t)
+        p[:, 2], v[:, 2], a[:, 2] = -altitude - off[0], -off[1], -off[2]
         return p, v, a
 
     return path
 
 
-def _outward(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+def _times_of_angles(circle: tuple[float, ...]) -> tuple[float, Array, Array]:
+    """The time to turn through an angle x, as ``mean x + Re sum_k series_k (exp(i k x) - 1)``.
 
+    The rate is periodic in the angle, so its inverse has an integral that is a Fourier series: exact to
+    rounding with a few dozen terms. An integrator of differential equations would leave an error of its own
+    in every derivative.
 
-def _clockwise(angle: Array) -> Array:
-    return np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
-
-
-def _solve_angle(rate: Callable[[Array], tuple[Array, Array]], sense: float, start_angle: float) -> Signal:
-    """Solve d(angle)/dt = rate(angle), the rate being periodic in the angle, to rounding error.
-
-    The time as a function of the angle is an integral of a periodic function: a Fourier series, exact to
-    rounding with a few dozen terms. Newton's method turns it round. An integrator of differential equations
-    would leave an error of its own in every derivative.
+    Returns
+    -------
+    The mean, s per rad, and the real and imaginary parts of the series, (K,) s.
     """
+    *_, sense, start = circle
     count = 1024
     turned = 2 * np.pi * np.arange(count) / count  # how far around since the start, always increasing
-    spectrum = np.fft.rfft(1.0 / np.abs(rate(start_angle + sense * turned)[0])) / count
-    mean = spectrum[0].real  # s per rad
-    k = np.arange(1, count // 2)
-    series = 2 * spectrum[1:-1] / (1j * k)
+    spectrum = np.fft.rfft(1.0 / np.abs(rate_on_circle(start + sense * turned, circle)[0])) / count
+    mean = float(spectrum[0].real)
+    series = 2 * spectrum[1:-1] / (1j * np.arange(1, count // 2))
     strong = np.flatnonzero(np.abs(series) > 1e-17 * mean)
     series = series[: strong[-1] + 1] if len(strong) else series[:1]
-
-    def time_of(x: Array) -> Array:
-        z = np.exp(1j * x)
-        total = np.zeros_like(z)
-        for term in series[::-1]:  # Horner
-            total = (total + term) * z
-        return np.asarray(mean * x + (total - series.sum()).real)
-
-    def angle_at(times: Array) -> Array:
-        t = np.asarray(times, float)
-        x = t / mean
-        for _ in range(50):
-            step = (time_of(x) - t) * np.abs(rate(start_angle + sense * x)[0])
-            x = x - step
-            if not np.any(np.abs(step) > 1e-12 * (1 + np.abs(x))):
-                break
-        return np.asarray(start_angle + sense * x)
-
-    return angle_at
+    return mean, np.ascontiguousarray(series.real), np.ascontiguousarray(series.imag)

@@ -7,14 +7,15 @@ import math
 import numpy as np
 import pandas as pd
 
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.gravity import local_earth
-from wildlab.simulation.disturbances import band_limited_disturbance
+from wildlab.simulation import kernels
+from wildlab.simulation.disturbances import AttitudeDisturbance, band_limited_disturbance
 from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_attitude_error
 from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.trajectory import FlightPath, Motion, Signal, angular_rates, move
+from wildlab.simulation.trajectory import Motion, Trajectory, angular_rates, attitude_along
 
 
 def sample_times(rate: float, duration: float) -> Array:
@@ -23,7 +24,8 @@ def sample_times(rate: float, duration: float) -> Array:
 
 
 def nav_table(motion: Motion) -> pd.DataFrame:
-    q = matrix_to_quaternion(motion.R_nb)
+    q = np.empty((len(motion.times), 4))
+    kernels.quaternions(np.ascontiguousarray(motion.R_nb), q)
     columns = {"time_s": motion.times}
     columns |= {f"{axis}_m": motion.position[:, i] for i, axis in enumerate(("north", "east", "down"))}
     columns |= {f"q_{part}": q[:, i] for i, part in enumerate("wxyz")}
@@ -64,11 +66,8 @@ def autopilot_tables(
     return nav_table(logged), nav_table(left_in)
 
 
-def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signal:
-    """Attitude of the payload: that of the airframe, and the payload turned against it a little.
-
-    The IMU and the antennas are on the payload, the camera is on the airframe. (N,) s -> (N, 3, 3).
-    """
+def payload_boresight(twin: TwinParameters, seed: int) -> AttitudeDisturbance:
+    """How the payload, which carries the IMU and the antennas, turns against the airframe with the camera."""
     b, rng = twin.boresight, stream(seed, "boresight")
     if b is None:
         raise ValueError("this twin carries no payload")
@@ -76,21 +75,17 @@ def payload_attitude(twin: TwinParameters, attitude: Signal, seed: int) -> Signa
     roll, pitch, yaw = (
         band_limited_disturbance(sd.si, *band, rng) for sd in (b.roll_sd, b.pitch_sd, b.yaw_sd)
     )
-
-    def turned(times: Array) -> Array:
-        return np.asarray(attitude(times) @ euler_to_matrix(roll(times), pitch(times), yaw(times)))
-
-    return turned
+    return roll, pitch, yaw
 
 
-def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
+def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
     """Readings of the inertial unit over the whole flight."""
     if twin.imu is None:
         raise ValueError("this twin carries no inertial unit")
     times = sample_times(twin.imu.rate.si, twin.flight.duration.si)
     # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
     earth = local_earth(twin.place.latitude.si, twin.place.height.si)
-    true = ideal_imu(path, payload, twin.imu.rate.si, len(times), earth)
+    true = ideal_imu(payload, twin.imu.rate.si, len(times), earth)
     force, rate = read_imu(*true, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
     columns = {"time_s": times}
     columns |= {f"f_{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}
@@ -98,13 +93,13 @@ def imu_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int
     return pd.DataFrame(columns)
 
 
-def gnss_table(twin: TwinParameters, path: FlightPath, payload: Signal, seed: int) -> pd.DataFrame:
+def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
     """Fixes of the two receivers over the whole flight, and the velocity that the first one gives."""
     g = twin.gnss
     if g is None:
         raise ValueError("this twin carries no receivers")
     times = sample_times(g.rate.si, twin.flight.duration.si)
-    motion, rate = move(path, payload, times), angular_rates(payload, times)
+    motion, rate = payload(times), angular_rates(attitude_along(payload), times)
     arms = {
         "": (g.first_x.si, g.first_y.si, g.first_z.si),
         "second_": (g.second_x.si, g.second_y.si, g.second_z.si),

@@ -9,13 +9,14 @@ H 5.2.2: the Earth's rotation is left out.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation import kernels
+from wildlab.simulation.disturbances import AttitudeDisturbance
 
 #: Times (N,) in s -> position, velocity, acceleration in n, (N, 3) each, in m, m/s, m/s^2.
 FlightPath = Callable[[Array], tuple[Array, Array, Array]]
@@ -46,26 +47,35 @@ class Motion:
     R_nb: Array
 
 
-def move(path: FlightPath, attitude: Signal, times: ArrayLike) -> Motion:
-    """The motion at given times, (N,) s."""
-    t = np.asarray(times, float)
-    p, v, a = path(t)
-    return Motion(t, p, v, a, attitude(t))
+#: Times (N,) in s -> the motion at these times.
+Trajectory = Callable[[Array], Motion]
+
+
+def turned(motion: Motion, disturbance: AttitudeDisturbance) -> Motion:
+    """The motion of a body in the same place, turned about the axes of the first one by small angles."""
+    R = np.empty_like(motion.R_nb)
+    roll, pitch, yaw = (angle(motion.times) for angle in disturbance)
+    kernels.turn(np.ascontiguousarray(motion.R_nb), roll, pitch, yaw, R)
+    return replace(motion, R_nb=R)
+
+
+def attitude_along(trajectory: Trajectory) -> Signal:
+    """Of a trajectory the attitude alone: times (N,) s -> ``R_nb`` (N, 3, 3)."""
+    return lambda times: trajectory(times).R_nb
 
 
 def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Array:
     """Angular rate of b against n, in b. (N,) s -> (N, 3) rad/s.
 
-    By a central difference of fourth order of the attitude, which is known in closed form: for motion with
-    periods of two seconds and more the error is below 1e-8 of the rate's own size.
+    By a central difference of fourth order of the attitude, times (N,) s -> ``R_nb`` (N, 3, 3), which is
+    known in closed form: for motion with periods of two seconds and more the error is below 1e-8 of the
+    rate's own size.
     """
     t = np.asarray(times, float)
-
-    def mean_rate(h: float) -> Array:
-        turn = np.swapaxes(attitude(t - h), -1, -2) @ attitude(t + h)
-        return np.asarray(Rotation.from_matrix(turn).as_rotvec() / (2 * h))
-
-    return (4 * mean_rate(step) - mean_rate(2 * step)) / 3
+    rates = np.empty((len(t), 3))
+    R = [np.ascontiguousarray(attitude(t + steps * step)) for steps in (-2, -1, 1, 2)]
+    kernels.body_rates(R[0], R[1], R[2], R[3], step, rates)
+    return rates
 
 
 def specific_forces(motion: Motion, gravity: float = GRAVITY) -> Array:

@@ -10,14 +10,17 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.simulation.attitudes import attitude_of, thrust_aligned_attitude
-from wildlab.simulation.disturbances import Disturbance, band_limited_disturbance
+from wildlab.simulation.attitudes import (
+    fixed_wing_trajectory,
+    thrust_aligned_trajectory,
+)
+from wildlab.simulation.disturbances import AttitudeDisturbance, Disturbance, band_limited_disturbance
 from wildlab.simulation.loiter import Turn, loiter_path
 from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.platform_parameters import Loiter
 from wildlab.simulation.survey_courses import cable_heights, survey_course
-from wildlab.simulation.trajectory import FlightPath, Motion, Signal, move
+from wildlab.simulation.trajectory import FlightPath, Motion, Trajectory
 from wildlab.simulation.waypoint_courses import (
     ControlErrors,
     Laps,
@@ -29,11 +32,9 @@ from wildlab.simulation.waypoint_courses import (
     shape_corners,
 )
 
-AttitudeDisturbance = tuple[Disturbance, Disturbance, Disturbance]
 
-
-def twin_trajectory(twin: TwinParameters, rng: np.random.Generator) -> tuple[FlightPath, Signal]:
-    """The twin's path and attitude as functions of time, with its own control errors and gusts.
+def twin_trajectory(twin: TwinParameters, rng: np.random.Generator) -> Trajectory:
+    """The twin's motion as a function of time, with its own control errors and gusts.
 
     Raises
     ------
@@ -47,14 +48,14 @@ def twin_trajectory(twin: TwinParameters, rng: np.random.Generator) -> tuple[Fli
             band_limited_disturbance(sd.si, *path_band, rng) for sd in (f.track_sd, f.track_sd, f.altitude_sd)
         )
         path = _laps_path(twin, ControlErrors(north, east, altitude))
-        return path, _attitude(twin, path, _attitude_disturbance(twin, rng))
+        return _along(twin, path, _gusts(twin, rng))
     start = rng.uniform(0.0, 2 * math.pi)  # where on the circle the log happens to begin
     errors = tuple(band_limited_disturbance(sd.si, *path_band, rng) for sd in (f.track_sd, f.altitude_sd))
     path = _circle(twin, loiter_centre(twin), start, *errors)
-    return path, _attitude(twin, path, _attitude_disturbance(twin, rng))
+    return _along(twin, path, _gusts(twin, rng))
 
 
-def _attitude_disturbance(twin: TwinParameters, rng: np.random.Generator) -> AttitudeDisturbance:
+def _gusts(twin: TwinParameters, rng: np.random.Generator) -> AttitudeDisturbance:
     """What gusts and control leave of the attitude."""
     f = twin.flight
     band = (f.attitude_shortest_period.si, f.attitude_longest_period.si)
@@ -70,13 +71,14 @@ def _wind(twin: TwinParameters) -> Array:
     return twin.flight.wind_speed.si * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
 
 
-def _attitude(twin: TwinParameters, path: FlightPath, disturbance: AttitudeDisturbance | None) -> Signal:
+def _along(twin: TwinParameters, path: FlightPath, gusts: AttitudeDisturbance | None) -> Trajectory:
+    """The motion along a path of the kind of airframe that the twin has."""
     f, gravity, trim = twin.flight, twin.place.gravity.si, twin.flight.trim_pitch.si
     if f.kind is None or f.kind.text == "fixed wing":
-        return attitude_of(path, wind=_wind(twin), trim_pitch=trim, gravity=gravity, disturbance=disturbance)
+        return fixed_wing_trajectory(path, wind=_wind(twin), trim_pitch=trim, gravity=gravity, gusts=gusts)
     ahead = leg_headings(_laps(twin))
     pull = gravity if f.kind.text == "multicopter" else math.inf
-    return thrust_aligned_attitude(path, ahead, trim_pitch=trim, gravity=pull, disturbance=disturbance)
+    return thrust_aligned_trajectory(path, ahead, trim_pitch=trim, gravity=pull, gusts=gusts)
 
 
 def _laps_path(twin: TwinParameters, errors: ControlErrors) -> FlightPath:
@@ -195,7 +197,7 @@ def loiter_centre(twin: TwinParameters) -> Array:
 def _undisturbed_start(twin: TwinParameters) -> Motion:
     """Where and how a loiter about the origin of n begins without control errors and gusts."""
     path = _circle(twin, np.zeros(2), 0.0)
-    return move(path, _attitude(twin, path, None), np.zeros(1))
+    return _along(twin, path, None)(np.zeros(1))
 
 
 def _circle(

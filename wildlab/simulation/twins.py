@@ -14,6 +14,7 @@ import pandas as pd
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.simulation.animal_motion import animals_truth
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
 from wildlab.simulation.error_models import stream
@@ -24,12 +25,12 @@ from wildlab.simulation.onboard_sensors import (
     gnss_table,
     imu_table,
     nav_table,
-    payload_attitude,
+    payload_boresight,
     sample_times,
 )
 from wildlab.simulation.parameters import TwinParameters, load_twin
 from wildlab.simulation.target_motion import truth_table
-from wildlab.simulation.trajectory import move
+from wildlab.simulation.trajectory import Motion, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 
 #: Nav sources of a twin.
@@ -78,17 +79,17 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
             field="without",
         )
     seed = int(seed)
-    path, attitude = twin_trajectory(twin, stream(seed, "trajectory"))
+    trajectory = twin_trajectory(twin, stream(seed, "trajectory"))
     duration = twin.flight.duration.si
     calibrated, uncalibrated = autopilot_tables(
-        twin, move(path, attitude, sample_times(twin.autopilot.rate.si, duration)), seed
+        twin, trajectory(sample_times(twin.autopilot.rate.si, duration)), seed
     )
     nav = {AUTOPILOT: calibrated}
     if uncalibrated is not None:
         nav[UNCALIBRATED] = uncalibrated
-    known = sample_times(twin.truth.rate.si, duration)
-    nav[TRUTH] = nav_table(move(path, attitude, known))
-    frames, detections = frames_and_detections(twin, move(path, attitude, exposure_times(twin)), seed)
+    known = trajectory(sample_times(twin.truth.rate.si, duration))
+    nav[TRUTH] = nav_table(known)
+    frames, detections = frames_and_detections(twin, trajectory(exposure_times(twin)), seed)
     if twin.animals is not None:
         truth = animals_truth(twin, twin.animals, seed)
     else:
@@ -98,10 +99,14 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
     if twin.gimbal is not None:
         tables["gimbal"] = gimbal_table(twin.gimbal, duration, seed)
     if twin.boresight is not None:
-        payload = payload_attitude(twin, attitude, seed)
-        nav[PAYLOAD_TRUTH] = nav_table(move(path, payload, known))
+        boresight = payload_boresight(twin, seed)
+        nav[PAYLOAD_TRUTH] = nav_table(turned(known, boresight))
+
+        def payload(times: Array) -> Motion:
+            return turned(trajectory(times), boresight)
+
         if twin.imu is not None and "imu" not in without:
-            tables["imu"] = imu_table(twin, path, payload, seed)
+            tables["imu"] = imu_table(twin, payload, seed)
         if twin.gnss is not None and "gnss" not in without:
-            tables["gnss"] = gnss_table(twin, path, payload, seed)
+            tables["gnss"] = gnss_table(twin, payload, seed)
     return Flight(twin_manifest(twin, seed), nav, tables)

@@ -7,6 +7,7 @@ roll into a turn. The spline gives position, velocity and acceleration in closed
 
 from __future__ import annotations
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from wildlab.geometry.frames import Array
+from wildlab.simulation import kernels
 from wildlab.simulation.disturbances import Disturbance, no_disturbance
 from wildlab.simulation.trajectory import FlightPath, Signal
 
@@ -167,21 +169,28 @@ def laps_path(laps: Laps, altitude: ArrayLike, errors: ControlErrors | None = No
         ],
         axis=-1,
     )
-    spline = _smoothed(knots, rough, laps.roll_time / _RISE)
-    parts = (spline, spline.derivative(1), spline.derivative(2))
+    interval = laps.roll_time / _RISE
+    start, coefficients = _polynomials(_smoothed(knots, rough, interval))
     off = errors or ControlErrors(no_disturbance(), no_disturbance(), no_disturbance())
     signs = (1.0, 1.0, -1.0)
 
     def path(times: Array) -> tuple[Array, Array, Array]:
-        t = np.asarray(times, float)
-        p, v, a = (np.asarray(part(t)) for part in parts)
+        t = np.ascontiguousarray(times, float)
+        p, v, a = (np.empty((len(t), 3)) for _ in range(3))
+        kernels.piecewise_polynomial(t, start, interval, coefficients, p, v, a)
         for axis, (error, sign) in enumerate(zip(off, signs, strict=True)):
-            p[:, axis] += sign * error(t)
-            v[:, axis] += sign * error(t, 1)
-            a[:, axis] += sign * error(t, 2)
+            for part, derivative in zip((p, v, a), error.with_derivatives(t), strict=True):
+                part[:, axis] += sign * derivative
         return p, v, a
 
     return path
+
+
+def _polynomials(spline: BSpline) -> tuple[float, Array]:
+    """Where a spline begins, s, and its polynomials between knots: (M, 3, 8), in ascending powers."""
+    pieces = spline.t[_DEGREE : -_DEGREE - 1]
+    taylor = [spline.derivative(d)(pieces) / math.factorial(d) for d in range(_DEGREE + 1)]
+    return float(pieces[0]), np.ascontiguousarray(np.stack(taylor, axis=-1))
 
 
 def leg_headings(laps: Laps) -> Signal:

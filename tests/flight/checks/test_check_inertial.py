@@ -15,7 +15,13 @@ from wildlab.flight.checks.inertial_data import FORCE, RATE
 from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_quaternion
-from wildlab.simulation import angular_rates, attitude_of, loiter_path, move, specific_forces
+from wildlab.simulation import (
+    angular_rates,
+    attitude_along,
+    fixed_wing_trajectory,
+    loiter_path,
+    specific_forces,
+)
 
 NED = ["north_m", "east_m", "down_m"]
 SPEED = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
@@ -41,13 +47,14 @@ def _eight(times: Array) -> tuple[Array, Array, Array]:
 def _flight(path: Any = _eight, noisy: float = 1.0) -> Flight:
     """IMU at 50 Hz, GNSS at 2 Hz and poses at 10 Hz of one motion, with noise of small sensors."""
     rng = np.random.default_rng(4)
-    attitude = attitude_of(path, trim_pitch=0.05)
+    trajectory = fixed_wing_trajectory(path, trim_pitch=0.05)
+    attitude = attitude_along(trajectory)
 
     def noise(sd: float, n: int) -> np.ndarray:
         return noisy * sd * rng.standard_normal((n, 3))
 
     t = np.arange(0.0, DURATION, 0.02)
-    motion = move(path, attitude, t)
+    motion = trajectory(t)
     imu = pd.DataFrame({"time_s": t})
     imu[list(FORCE)] = specific_forces(motion) + noise(0.5, len(t)) + noisy * np.array([0.2, -0.1, 0.15])
     imu[list(RATE)] = angular_rates(attitude, t) + noise(0.02, len(t)) + noisy * np.array([0.01, -0.01, 0.02])
@@ -56,7 +63,7 @@ def _flight(path: Any = _eight, noisy: float = 1.0) -> Flight:
     gnss = pd.DataFrame({"time_s": t})
     gnss[NED], gnss[SPEED] = position + noise(1.0, len(t)), velocity + noise(0.1, len(t))
     t = np.arange(0.0, DURATION - 0.02, 0.1)
-    motion = move(path, attitude, t)
+    motion = trajectory(t)
     nav = pd.DataFrame({"time_s": t})
     nav[NED], nav[QUATERNION] = motion.position, matrix_to_quaternion(motion.R_nb)
     manifest = make_manifest(
@@ -142,7 +149,7 @@ def _turn(matrix: Any, *parts: tuple[str, ...]) -> Change:
 
 def _gravity_off(flight: Flight) -> None:
     imu, nav = flight.tables["imu"], flight.nav["autopilot"]
-    up = attitude_of(_eight, trim_pitch=0.05)(imu["time_s"].to_numpy())[:, 2, :]
+    up = fixed_wing_trajectory(_eight, trim_pitch=0.05)(imu["time_s"].to_numpy()).R_nb[:, 2, :]
     assert len(nav)
     imu[list(FORCE)] += 9.81 * up
 
