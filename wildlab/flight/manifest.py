@@ -34,11 +34,14 @@ class LocationsPart(Strict):
 
 
 class OriginPart(Strict):
-    """Origin of frame n: WGS84, height above the ellipsoid."""
+    """Origin of frame n: WGS84, height above the ellipsoid.
 
-    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
-    longitude_deg: Annotated[float, Field(ge=-180, le=180)]
-    height_m: Annotated[float, Field(ge=-1e4, le=1e5)]
+    Printed, it does not say where that is: notebooks are shared.
+    """
+
+    latitude_deg: Annotated[float, Field(ge=-90, le=90, repr=False)]
+    longitude_deg: Annotated[float, Field(ge=-180, le=180, repr=False)]
+    height_m: Annotated[float, Field(ge=-1e4, le=1e5, repr=False)]
 
 
 class PlatformPart(Strict):
