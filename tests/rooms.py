@@ -44,7 +44,8 @@ def lacking(name: str, thing: Any) -> list[str]:
     signature = inspect.signature(thing)
     wanted = ["Parameters"] if signature.parameters else []
     wanted += [] if signature.return_annotation in ("None", None, "NoReturn") else ["Returns"]
-    found = [f"{name}: no section {one}" for one in wanted if f"\n{one}\n{'-' * len(one)}\n" not in f"\n{text}\n"]
+    headings = {one: f"\n{one}\n{'-' * len(one)}\n" for one in wanted}
+    found = [f"{name}: no section {one}" for one, heading in headings.items() if heading not in f"\n{text}\n"]
     body = text.partition("\nParameters\n")[2]
     parameters = [one for one in signature.parameters if "Parameters" in wanted]
     listed = {

@@ -39,7 +39,7 @@ def simulate(twin: str | Path, seed: int = 1, without: Collection[str] = ()) -> 
     >>> import wildlab
     >>> flight = wildlab.simulate("large-ship", seed=1)
     >>> flight.name
-    'large-ship'
+    'large-ship-1'
     """
     return simulate_twin(twin, seed, without)
 

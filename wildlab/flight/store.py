@@ -147,11 +147,31 @@ def _counts(tables: Mapping[str, pd.DataFrame]) -> str:
 def load_flight(folder: Path | str) -> Flight:
     """Read a flight folder and check its structure (not its values: that is `check_flight`).
 
+    Parameters
+    ----------
+    folder
+        The flight folder, with ``flight.toml``.
+
+    Returns
+    -------
+    Flight
+        With its tables as they are on disk.
+
     Raises
     ------
     WildlabError
         Where the folder, the manifest, a table or a column is missing, a type is wrong, or a file lies
         outside of the folder.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = save_flight(simulate_twin("large-ship", 1), Path(folder) / "twin")
+    ...     load_flight(Path(folder) / "twin").manifest.kind
+    'twin'
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -198,11 +218,34 @@ def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
 def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) -> Flight:
     """Write a flight folder, whole or not at all. Returns the flight as it now stands there.
 
+    Parameters
+    ----------
+    flight
+        The flight.
+    folder
+        A new or an empty folder, or one that holds a flight.
+    overwrite
+        Whether a flight that is there may be replaced.
+
+    Returns
+    -------
+    Flight
+        As it stands in the folder.
+
     Raises
     ------
     WildlabError
         Where a table does not fit the schema, the folder holds something else, or it holds a flight and
         `overwrite` is false.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> with TemporaryDirectory() as folder:
+    ...     saved = save_flight(simulate_twin("large-ship", 1), folder)
+    ...     sorted(path.name for path in saved.folder.iterdir())
+    ['detections.parquet', 'flight.toml', 'frames.parquet', 'nav', 'truth.parquet']
     """
     target = Path(folder)
     _refuse(target, overwrite)
