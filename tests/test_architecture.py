@@ -38,17 +38,22 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reporting": BELOW_PIPELINE | {"pipeline"},
     "studies": BELOW_PIPELINE | {"pipeline", "reporting"},
     "runner": BELOW_PIPELINE | {"pipeline", "reporting", "studies"},
+    # What `import wildlab` offers; nothing of wildlab imports it.
+    "api": BELOW_PIPELINE | {"pipeline", "reporting"},
     "cli": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "doctor", "terminal"},
     "__main__": {"cli"},
+    "brief": set(),
     "doctor": set(),
+    "lazy": set(),
     "terminal": set(),
     "errors": set(),
     "files": set(),
     "paths": set(),
-    "__init__": set(),
+    # For type checkers only: at run time names are imported when they are asked for (`wildlab.lazy`).
+    "__init__": {"api", "flight"},
 }
 #: These know nothing about flights and may be used by all.
-FOR_ALL = {"errors", "files", "paths", "__version__"}
+FOR_ALL = {"brief", "errors", "files", "lazy", "paths", "__version__"}
 
 NOTEBOOK_PACKAGES = {
     "papermill", "nbconvert", "nbclient", "nbformat", "IPython", "ipykernel", "jupyter_client",

@@ -75,10 +75,25 @@ class _Catalog(RootModel[dict[str, DataSet]]):
 def read_catalog(path: Path | None = None) -> dict[str, DataSet]:
     """The data sets by name.
 
+    Parameters
+    ----------
+    path
+        The catalog; left out, wildlab's own.
+
+    Returns
+    -------
+    dict
+        Data sets by name.
+
     Raises
     ------
     WildlabError
         Where the catalog is missing or wrong.
+
+    Examples
+    --------
+    >>> "openathena" in read_catalog()
+    True
     """
     path = DATA / "catalog.toml" if path is None else path
     return check_model(_Catalog, read_toml(path, "the catalog of data sets"), path).root
@@ -112,6 +127,17 @@ def dataset_folder(name: str, into: Path | None = None) -> Path:
 
 def is_fetched(name: str, into: Path | None = None) -> bool:
     """Whether every file of a data set is there and has the right checksum.
+
+    Parameters
+    ----------
+    name
+        Of the data set.
+    into
+        Folder that holds data sets; left out, that of wildlab.
+
+    Returns
+    -------
+    bool
 
     Raises
     ------

@@ -31,10 +31,26 @@ _UPPER = np.triu_indices(6)
 def frame_times(flight: Flight) -> Array:
     """Flight time of each frame in seconds, the camera's clock offset applied. (N,)
 
+    Parameters
+    ----------
+    flight
+        With frames.
+
+    Returns
+    -------
+    (N,) s
+
     Raises
     ------
     WildlabError
         Where the flight has no frames.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> len(frame_times(flight)) == len(flight.frames)
+    True
     """
     stamps = flight.table("frames")["time_s"].to_numpy(float)
     return np.asarray(stamps + flight.manifest.clocks.camera_offset_s)
@@ -43,6 +59,15 @@ def frame_times(flight: Flight) -> Array:
 def gnss_times(flight: Flight) -> Array:
     """Flight time each satellite position is of, in seconds: its stamp, the offset of its clock applied, and
     the latency of the receiver taken off. (N,)
+
+    Parameters
+    ----------
+    flight
+        With the table ``gnss``.
+
+    Returns
+    -------
+    (N,) s
 
     Raises
     ------
@@ -125,6 +150,19 @@ def frame_poses(
 ) -> tuple[Array, Array, Array | None]:
     """Poses of the platform for every frame of a flight, row by row: see `poses_at`.
 
+    Parameters
+    ----------
+    flight
+        With frames and poses.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+    max_gap_s
+        As in `poses_at`.
+
+    Returns
+    -------
+    As from `poses_at`: positions (N, 3), rotations (N, 3, 3), covariances (N, 6, 6) or None.
+
     Raises
     ------
     WildlabError
@@ -135,7 +173,23 @@ def frame_poses(
 
 
 def covariances(nav: pd.DataFrame) -> Array | None:
-    """Pose covariances of a nav table, (N, 6, 6) in m and rad, or None where it has none."""
+    """Pose covariances of a nav table, (N, 6, 6) in m and rad, or None where it has none.
+
+    Parameters
+    ----------
+    nav
+        A nav table.
+
+    Returns
+    -------
+    (N, 6, 6) or None
+
+    Examples
+    --------
+    >>> P = np.tile(np.eye(6), (2, 1, 1))
+    >>> bool((covariances(covariance_columns(P)) == P).all())
+    True
+    """
     if not set(COVARIANCE_COLUMNS) <= set(nav.columns):
         return None
     P = np.empty((len(nav), 6, 6))
@@ -146,7 +200,23 @@ def covariances(nav: pd.DataFrame) -> Array | None:
 
 
 def covariance_columns(covariance: ArrayLike) -> pd.DataFrame:
-    """The 21 columns `cov_ij` of covariances (N, 6, 6): the inverse of `covariances`."""
+    """The 21 columns `cov_ij` of covariances (N, 6, 6): the inverse of `covariances`.
+
+    Parameters
+    ----------
+    covariance
+        (N, 6, 6): position (m, in n) before attitude (rad, in b).
+
+    Returns
+    -------
+    DataFrame
+        N rows.
+
+    Examples
+    --------
+    >>> list(covariance_columns(np.eye(6)[None]))[:2]
+    ['cov_00', 'cov_01']
+    """
     P = np.asarray(covariance, float)
     return pd.DataFrame(P[:, _UPPER[0], _UPPER[1]], columns=list(COVARIANCE_COLUMNS))
 
@@ -156,6 +226,17 @@ def gimbal_angles(flight: Flight, max_gap_s: float | None = None) -> tuple[Array
 
     From the columns of the frames where they have them, else from the gimbal table (linear in time), else the
     fixed angles of the manifest. They take the place of the manifest's, they are not added to them.
+
+    Parameters
+    ----------
+    flight
+        With frames.
+    max_gap_s
+        As in `poses_at`.
+
+    Returns
+    -------
+    (pan, tilt), (N,) each, rad
 
     Raises
     ------

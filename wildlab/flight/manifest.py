@@ -34,11 +34,14 @@ class LocationsPart(Strict):
 
 
 class OriginPart(Strict):
-    """Origin of frame n: WGS84, height above the ellipsoid."""
+    """Origin of frame n: WGS84, height above the ellipsoid.
 
-    latitude_deg: Annotated[float, Field(ge=-90, le=90)]
-    longitude_deg: Annotated[float, Field(ge=-180, le=180)]
-    height_m: Annotated[float, Field(ge=-1e4, le=1e5)]
+    Printed, it does not say where that is: notebooks are shared.
+    """
+
+    latitude_deg: Annotated[float, Field(ge=-90, le=90, repr=False)]
+    longitude_deg: Annotated[float, Field(ge=-180, le=180, repr=False)]
+    height_m: Annotated[float, Field(ge=-1e4, le=1e5, repr=False)]
 
 
 class PlatformPart(Strict):
@@ -309,10 +312,29 @@ class Manifest(Strict):
 def make_manifest(data: Mapping[str, Any], path: Path | None = None) -> Manifest:
     """A manifest from nested mappings; `path` is only for messages.
 
+    Parameters
+    ----------
+    data
+        As `flight.toml` has it, read.
+    path
+        Where it comes from, for messages.
+
+    Returns
+    -------
+    Manifest
+
     Raises
     ------
     WildlabError
         Naming the key that is unknown, missing or wrong.
+
+    Examples
+    --------
+    >>> place = {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0}
+    >>> parts = {"origin": place, "platform": {"name": "kite"}, "time": {"kind": "sequence"}}
+    >>> manifest = make_manifest({"name": "lake", "kind": "logged"} | parts)
+    >>> manifest.locations.sensitivity, manifest.origin
+    ('withheld', OriginPart())
     """
     return check_model(Manifest, dict(data), path)
 
@@ -329,13 +351,34 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def manifest_toml(manifest: Manifest) -> str:
-    """The manifest as TOML text, every value written out, defaults too."""
+    """The manifest as TOML text, every value written out, defaults too.
+
+    Parameters
+    ----------
+    manifest
+        The manifest.
+
+    Returns
+    -------
+    str
+    """
     data = manifest.model_dump(exclude_none=True)
     return dump_toml({key: value for key, value in data.items() if value not in ((), {})})
 
 
 def replace_in_manifest(manifest: Manifest, changes: Mapping[str, Mapping[str, Any] | Any]) -> Manifest:
     """A manifest with some values changed: ``replace_in_manifest(m, {"clocks": {"camera_offset_s": 0.2}})``.
+
+    Parameters
+    ----------
+    manifest
+        Is not changed.
+    changes
+        New values, by part and key.
+
+    Returns
+    -------
+    Manifest
 
     Raises
     ------

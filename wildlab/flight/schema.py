@@ -231,10 +231,31 @@ def conform(table: Table, data: pd.DataFrame, file: Path | str) -> pd.DataFrame:
 
     `file` is only for the message. Values are not judged here (see `check_flight`), only their shape.
 
+    Parameters
+    ----------
+    table
+        The schema: one of `TABLES`, or `NAV`.
+    data
+        What was read or computed.
+    file
+        Where it comes from, for messages.
+
+    Returns
+    -------
+    DataFrame
+        With the schema's types.
+
     Raises
     ------
     WildlabError
         Where a required column is missing, only some of a group of columns are there, or a type is wrong.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> read = pd.DataFrame({"tilt_rad": [0], "pan_rad": [0], "time_s": [1]})
+    >>> set(conform(TABLES["gimbal"], read, "gimbal").dtypes.astype(str))
+    {'float64'}
     """
     result = data.reset_index(drop=True)
     if not result.columns.is_unique or not all(isinstance(name, str) for name in result.columns):

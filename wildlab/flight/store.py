@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ import pandas as pd
 import pyarrow
 import pyarrow.parquet
 
+from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
 from wildlab.flight.files import inside, is_safe_name
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
@@ -28,9 +29,9 @@ arrow: Any = pyarrow
 parquet: Any = pyarrow.parquet
 
 
-@dataclass
-class Flight:
-    """A flight in memory.
+@dataclass(repr=False)
+class Flight(Brief):
+    """A flight in memory. Printed, it shows how much there is of it and no place.
 
     Attributes
     ----------
@@ -83,6 +84,25 @@ class Flight:
         path = self.folder / TERRAIN if self.folder is not None else None
         return path if path is not None and path.is_file() else None
 
+    def brief(self) -> Summary:
+        """How much there is of it: what it is, how long, its tables; no coordinates and no origin."""
+        m = self.manifest
+        tables = (*self.nav.values(), *self.tables.values())
+        stamps = [table["time_s"] for table in tables if "time_s" in table]
+        known = pd.concat(stamps).dropna() if stamps else pd.Series(dtype=float)
+        timed = m.time.kind == "utc" and len(known) > 0
+        named = [table["target_id"] for table in tables if "target_id" in table]
+        targets = pd.concat(named).replace("", None).nunique() if named else 0
+        rows = [
+            ("kind", m.kind if m.twin is None else f"{m.kind}, seed {m.twin.seed}"),
+            ("duration", f"{known.max() - known.min():.1f} s" if timed else "not known"),
+            ("nav sources", _counts(self.nav)),
+            ("tables", _counts(self.tables)),
+            ("targets", str(targets)),
+            ("locations", m.locations.sensitivity),
+        ]
+        return Summary(f"Flight {m.name}", rows)
+
     def table(self, name: str) -> pd.DataFrame:
         """A table that must be there.
 
@@ -119,14 +139,39 @@ class Flight:
         )
 
 
+def _counts(tables: Mapping[str, pd.DataFrame]) -> str:
+    """``"imu 1200, gnss 60"``, rows by table."""
+    return ", ".join(f"{name} {len(table)}" for name, table in tables.items()) or "none"
+
+
 def load_flight(folder: Path | str) -> Flight:
     """Read a flight folder and check its structure (not its values: that is `check_flight`).
+
+    Parameters
+    ----------
+    folder
+        The flight folder, with ``flight.toml``.
+
+    Returns
+    -------
+    Flight
+        With its tables as they are on disk.
 
     Raises
     ------
     WildlabError
         Where the folder, the manifest, a table or a column is missing, a type is wrong, or a file lies
         outside of the folder.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = save_flight(simulate_twin("large-ship", 1), Path(folder) / "twin")
+    ...     load_flight(Path(folder) / "twin").manifest.kind
+    'twin'
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -173,11 +218,34 @@ def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
 def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) -> Flight:
     """Write a flight folder, whole or not at all. Returns the flight as it now stands there.
 
+    Parameters
+    ----------
+    flight
+        The flight.
+    folder
+        A new or an empty folder, or one that holds a flight.
+    overwrite
+        Whether a flight that is there may be replaced.
+
+    Returns
+    -------
+    Flight
+        As it stands in the folder.
+
     Raises
     ------
     WildlabError
         Where a table does not fit the schema, the folder holds something else, or it holds a flight and
         `overwrite` is false.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> with TemporaryDirectory() as folder:
+    ...     saved = save_flight(simulate_twin("large-ship", 1), folder)
+    ...     sorted(path.name for path in saved.folder.iterdir())
+    ['detections.parquet', 'flight.toml', 'frames.parquet', 'nav', 'truth.parquet']
     """
     target = Path(folder)
     _refuse(target, overwrite)

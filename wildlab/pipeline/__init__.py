@@ -1,1 +1,102 @@
-"""Where flights meet algorithms: flight in, tables out. Thin; what notebooks and commands call."""
+"""Where flights meet algorithms: flight in, tables out. Thin; what notebooks and commands call.
+
+Positions are metres north, east and down from the flight's origin (frame ``n``), attitudes take a vector from
+``b`` to ``n``, times are flight time, s. Ground points are (N, 2) or (N, 3) with covariances (N, 2, 2) in
+m^2; pixels (N, 2) right and down; poses have covariances (N, 6, 6), position (m, in n) before attitude (rad,
+in b). Errors of points are point minus truth; those of tracks and poses truth minus estimate, H (3.11).
+
+Of each subject its file has more: `wildlab.pipeline.georeference.georeference` (which has its file's name, so
+that it is not repeated here), `navigation_errors` (against a reference), `sensor_tracks` and `sensor_tuning`
+(ranges and bearings of a moving platform).
+"""
+
+from typing import TYPE_CHECKING
+
+from wildlab.lazy import offer
+
+if TYPE_CHECKING:
+    from wildlab.pipeline.calibrate import Calibrated, calibrate_flight
+    from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
+    from wildlab.pipeline.evaluate import errors_of, judge, recorded_answers
+    from wildlab.pipeline.follow import FILTERS, usual_tuning
+    from wildlab.pipeline.georeference import (
+        USUAL,
+        Observations,
+        covariances_of,
+        observe,
+        pose_errors,
+        truth_of,
+    )
+    from wildlab.pipeline.navigate import PUBLISHED_LIKE, Navigated, Tuning, navigate_mekf, navigate_observer
+    from wildlab.pipeline.navigation_errors import Errors, errors_against
+    from wildlab.pipeline.track import (
+        CvTuning,
+        Judged,
+        Sighting,
+        follow_pixels,
+        follow_positions,
+        follow_schmidt,
+        judge_measurements,
+        judge_track,
+        sighting,
+    )
+else:
+    __getattr__, __dir__ = offer(
+        __name__,
+        {
+            "calibrate": ("Calibrated", "calibrate_flight"),
+            "consistency": ("Series", "mean_of_runs", "navigation_series", "worth"),
+            "evaluate": ("errors_of", "judge", "recorded_answers"),
+            "follow": ("FILTERS", "usual_tuning"),
+            "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
+            "navigate": ("Navigated", "PUBLISHED_LIKE", "Tuning", "navigate_mekf", "navigate_observer"),
+            "navigation_errors": ("Errors", "errors_against"),
+            "track": (
+                "CvTuning",
+                "Judged",
+                "Sighting",
+                "follow_pixels",
+                "follow_positions",
+                "follow_schmidt",
+                "judge_measurements",
+                "judge_track",
+                "sighting",
+            ),
+        },
+    )
+
+__all__ = [
+    "FILTERS",
+    "PUBLISHED_LIKE",
+    "USUAL",
+    "Calibrated",
+    "CvTuning",
+    "Errors",
+    "Judged",
+    "Navigated",
+    "Observations",
+    "Series",
+    "Sighting",
+    "Tuning",
+    "calibrate_flight",
+    "covariances_of",
+    "errors_against",
+    "errors_of",
+    "follow_pixels",
+    "follow_positions",
+    "follow_schmidt",
+    "judge",
+    "judge_measurements",
+    "judge_track",
+    "mean_of_runs",
+    "navigate_mekf",
+    "navigate_observer",
+    "navigation_series",
+    "observe",
+    "pose_errors",
+    "recorded_answers",
+    "sighting",
+    "truth_of",
+    "usual_tuning",
+    "worth",
+]

@@ -79,6 +79,23 @@ def calibrate_flight(
     ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
     asked for only where the flight has times.
 
+    Parameters
+    ----------
+    flight
+        With pixel detections, poses and truth.
+    rng
+        Draws the halves, and samples of flat rays.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+    estimate
+        What to estimate: see `wildlab.geometry.calibration.calibrate`.
+    splits
+        How many times the images are halved.
+
+    Returns
+    -------
+    Calibrated
+
     Raises
     ------
     WildlabError

@@ -21,6 +21,13 @@ def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     ``labelled``: the target that the detection names; points without one are left out. ``nearest``: the
     target nearest to the point, horizontally, among those whose position is known at that time.
 
+    Parameters
+    ----------
+    flight
+        With truth.
+    points
+        From `wildlab.pipeline.georeference.georeference`.
+
     Returns
     -------
     DataFrame
@@ -32,6 +39,15 @@ def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     ------
     WildlabError
         Where the flight has no truth, or none of its points can be judged.
+
+    Examples
+    --------
+    >>> from wildlab.pipeline.georeference import georeference, observe
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> points = georeference(flight, observe(flight, "truth"), np.random.default_rng(0))
+    >>> bool(judge(flight, points)["error_m"].median() < 20)
+    True
     """
     truth = flight.table("truth")
     xy = points[["north_m", "east_m"]].to_numpy(float)
@@ -67,12 +83,38 @@ def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
 
 
 def errors_of(judged: pd.DataFrame) -> Array:
-    """The errors (N, 2) north-east of a judged table."""
+    """The errors (N, 2) north-east of a judged table.
+
+    Parameters
+    ----------
+    judged
+        From `judge`.
+
+    Returns
+    -------
+    (N, 2) m, point minus truth
+
+    Examples
+    --------
+    >>> errors_of(pd.DataFrame({"error_north_m": [1.0], "error_east_m": [2.0]})).tolist()
+    [[1.0, 2.0]]
+    """
     return judged[["error_north_m", "error_east_m"]].to_numpy(float)
 
 
 def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
-    """Positions that other programs gave for the same detections, judged like ours, by program."""
+    """Positions that other programs gave for the same detections, judged like ours, by program.
+
+    Parameters
+    ----------
+    flight
+        With detections of the kind ``position``, and truth.
+
+    Returns
+    -------
+    dict
+        Judged tables by program.
+    """
     detections = flight.table("detections")
     frames = flight.table("frames")
     answers = {}

@@ -75,6 +75,8 @@ def observe(
 
     Parameters
     ----------
+    flight
+        With frames, pixel detections and poses.
     source
         Name of the ``nav`` table; may be left out where there is only one.
     stamps
@@ -82,10 +84,22 @@ def observe(
     clock_shift
         Seconds added to the stamps on top of the manifest's offset.
 
+    Returns
+    -------
+    Observations
+
     Raises
     ------
     WildlabError
         Where the flight has no frames, detections or poses, no such column, or two sources to choose from.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> seen = observe(flight, "autopilot")
+    >>> seen.uv.shape == (len(flight.detections), 2)
+    True
     """
     detections = flight.table("detections")
     frames = flight.table("frames")
@@ -172,6 +186,20 @@ def pose_errors(
 
     The pose's covariance is the log's where it has one; all else comes from ``assumed``, then the manifest's
     ``[uncertainty]``, then :data:`USUAL`, in that order. ``assumed`` overrides the log too.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    observations
+        From `observe`.
+    assumed
+        Standard deviations by the names of :data:`USUAL`.
+
+    Returns
+    -------
+    PoseErrors
+        Of the N observations.
     """
     sd = assumed_deviations(flight) | (assumed or {})
     n = len(observations.uv)
@@ -233,13 +261,41 @@ def georeference(
 
 
 def covariances_of(points: pd.DataFrame) -> Array:
-    """The covariances (N, 2, 2) of a table of ground points."""
+    """The covariances (N, 2, 2) of a table of ground points.
+
+    Parameters
+    ----------
+    points
+        From `georeference`.
+
+    Returns
+    -------
+    (N, 2, 2) m^2, north before east
+
+    Examples
+    --------
+    >>> points = pd.DataFrame({"cov_nn": [4.0], "cov_ne": [1.0], "cov_ee": [2.0]})
+    >>> covariances_of(points).tolist()
+    [[[4.0, 1.0], [1.0, 2.0]]]
+    """
     c = points[["cov_nn", "cov_ne", "cov_ne", "cov_ee"]].to_numpy(float)
     return c.reshape(-1, 2, 2)
 
 
 def truth_of(flight: Flight, table: pd.DataFrame) -> Array:
-    """True positions (N, 3) in n of the targets that detections name; NaN where none is named or known."""
+    """True positions (N, 3) in n of the targets that detections name; NaN where none is named or known.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    table
+        With ``target_id`` and ``time_s``, N rows.
+
+    Returns
+    -------
+    (N, 3) m
+    """
     where = np.full((len(table), 3), np.nan)
     if flight.truth is None:
         return where

@@ -117,6 +117,8 @@ def navigate_mekf(
 
     Parameters
     ----------
+    flight
+        With the tables ``imu`` and ``gnss``.
     times
         Flight times (M,) at which poses are wanted; if not given those of the frames, or, of a flight without
         any, those of the inertial samples.
@@ -129,10 +131,20 @@ def navigate_mekf(
         positions only. ``PUBLISHED_LIKE`` gives standard deviations like those of H 7.5.3 and is what the
         tracking of H 7.5.3 and 7.5.4 is to be repeated with.
 
+    Returns
+    -------
+    Navigated
+
     Raises
     ------
     WildlabError
         Where the flight lacks inertial samples, satellite positions, or what is known of their errors.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> navigate_mekf(simulate_twin("fast-vessel", 1), tuning=PUBLISHED_LIKE).signs  # doctest: +SKIP
+    ()
     """
     noise, axes = imu_noise(flight), axis_errors(flight)
     if tuning is not None:
@@ -189,6 +201,22 @@ def navigate_observer(
     Its second vector is the baseline of two antennas, else the magnetic field where the flight has it and the
     manifest says how it lies, else the course. It has no state for the accelerometers' bias, which leans its
     attitude by a degree for every 0.17 m/s^2: ``accelerometer_bias`` (3,) m/s^2 is what a calibration found.
+
+    Parameters
+    ----------
+    flight
+        As for `navigate_mekf`.
+    times
+        As for `navigate_mekf`.
+    velocity
+        As for `navigate_mekf`.
+    accelerometer_bias
+        (3,) m/s^2, what a calibration found.
+
+    Returns
+    -------
+    Navigated
+        Without covariances.
     """
     given = inputs_of(flight, velocity=velocity, accelerometer_bias=accelerometer_bias)
     by_course = heading_from(flight) == "course"

@@ -132,8 +132,15 @@ def errors_against(
         A nav table; without velocities, there are no errors of velocity.
     nav
         The estimate.
+    times
+        (K,) s.
     velocity_covariance
         (M, 3, 3) of its rows, which tables of poses have no place for.
+
+    Returns
+    -------
+    Errors
+        Reference minus estimate.
     """
     t = np.asarray(times, float)
     p_true, R_true, _ = poses_at(reference, t)

@@ -99,13 +99,28 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
 
     Parameters
     ----------
+    flight
+        With frames, pixel detections and poses.
+    source
+        Name of the ``nav`` table.
     target
         May be left out where the detections name one only.
+
+    Returns
+    -------
+    Sighting
 
     Raises
     ------
     WildlabError
         Where there is no such target or several to choose from, or none of its detections has a pose.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> seen = sighting(simulate_twin("large-ship", 1), "autopilot")
+    >>> seen.uv.shape == (len(seen.times), 2)
+    True
     """
     seen = observe(flight, source)
     names = sorted(set(seen.table["target_id"]))
@@ -173,13 +188,47 @@ def start(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
 
 
 def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
-    """The Kalman filter on georeferenced detections, H 6.2."""
+    """The Kalman filter on georeferenced detections, H 6.2.
+
+    Parameters
+    ----------
+    seen
+        From `sighting`.
+    tuning
+        Its ``pixel`` is not used.
+
+    Returns
+    -------
+    Track
+        (N, 4) states north, east, and velocities; innovations in metres.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> seen = sighting(simulate_twin("large-ship", 1), "autopilot")
+    >>> track = follow_positions(seen, CvTuning(0.1, 10.0, 5.0, 10.0, 2.0))
+    >>> track.x.shape == (len(seen.times), 4)
+    True
+    """
     R = np.eye(2) * tuning.measurement**2
     return _compiled(seen, seen.positions, R, tuning, None, None)
 
 
 def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:
-    """The extended Kalman filter on pixels, H 6.3; poses are taken as true."""
+    """The extended Kalman filter on pixels, H 6.3; poses are taken as true.
+
+    Parameters
+    ----------
+    seen
+        From `sighting`.
+    tuning
+        Its ``measurement`` is not used.
+
+    Returns
+    -------
+    Track
+        (N, 4) states as from `follow_positions`; innovations in pixels.
+    """
     view = View(seen.poses, seen.plane_down)
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, None)
 
@@ -195,10 +244,19 @@ def follow_schmidt(
 
     Parameters
     ----------
+    seen
+        From `sighting`.
+    tuning
+        Its ``measurement`` is not used.
     covariance
         (N, 6, 6) of the poses in place of that which the source states.
     correlation_time, change
         See `wildlab.tracking.schmidt.PoseUncertainty`.
+
+    Returns
+    -------
+    Track
+        As from `follow_pixels`.
 
     Raises
     ------
@@ -258,8 +316,16 @@ def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", 
 
     Parameters
     ----------
+    seen
+        From `sighting`.
+    track
+        What a filter made of it.
     axes
         What the innovation's two elements are called.
+
+    Returns
+    -------
+    Judged
     """
     state = track.x[:, :4]
     errors = track_errors(seen.truth, state)
@@ -285,7 +351,18 @@ def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", 
 
 
 def judge_measurements(seen: Sighting) -> dict[str, float]:
-    """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m."""
+    """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m.
+
+    Parameters
+    ----------
+    seen
+        From `sighting`.
+
+    Returns
+    -------
+    dict
+        By name.
+    """
     e = (seen.truth[:, :2] - seen.positions)[seen.seen]
     return {
         "mean_north": float(np.nanmean(e[:, 0])),

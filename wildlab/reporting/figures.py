@@ -97,7 +97,22 @@ _STYLE: dict[str, Any] = {
 
 
 def colour(subject: str) -> str:
-    """The fixed colour of a subject; grey for one that has none."""
+    """The fixed colour of a subject; grey for one that has none.
+
+    Parameters
+    ----------
+    subject
+        ``truth``, ``kf``, ``mekf``: see `COLOURS`.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> colour("truth"), colour("nobody") == GREY
+    ('#000000', True)
+    """
     return COLOURS.get(subject, GREY)
 
 
@@ -117,8 +132,22 @@ def new_figure(
     ----------
     width, height
         Inches. Above 6 inches a phone shows the figure in a box that scrolls sideways.
+    rows
+        Of axes.
+    columns
+        Of axes.
     **subplots
         Passed to `Figure.subplots` (``sharex``, ``width_ratios``, ...).
+
+    Returns
+    -------
+    (Figure, Axes or array of Axes)
+
+    Examples
+    --------
+    >>> figure, axes = new_figure(rows=2)
+    >>> axes.shape
+    (2,)
     """
     house_style()
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -127,7 +156,19 @@ def new_figure(
 
 
 def map_axes(ax: Axes, *, scale_bar: bool = True, east: str = "east (m)", north: str = "north (m)") -> None:
-    """Make ``ax`` a map in local metres: equal aspect, north arrow, scale bar. Call it after plotting."""
+    """Make ``ax`` a map in local metres: equal aspect, north arrow, scale bar. Call it after plotting.
+
+    Parameters
+    ----------
+    ax
+        With everything on it.
+    scale_bar
+        Whether to draw one.
+    east
+        Label to the right.
+    north
+        Label upwards.
+    """
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_xlabel(east)
     ax.set_ylabel(north)
@@ -181,10 +222,24 @@ def ellipse(
 
     Parameters
     ----------
+    ax
+        A map: east to the right.
     mean_en
         Centre (east, north), metres.
     covariance
         2x2, of (east, north), square metres. With NaN in either, nothing is drawn and None comes back.
+    probability
+        Between 0 and 1.
+    color
+        Of the line, and of the filling.
+    fill
+        Whether to fill it, lightly.
+    **patch
+        Passed to `matplotlib.patches.Ellipse`.
+
+    Returns
+    -------
+    Ellipse or None
     """
     centre = np.asarray(mean_en, dtype=float)
     matrix = np.asarray(covariance, dtype=float)
@@ -206,7 +261,21 @@ def ellipse(
 
 
 def log_band(ax: Axes, low: float, high: float, label: str = "95 % band", *, color: str = GREEN) -> None:
-    """Logarithmic y-axis with the band a consistent filter stays in, for NEES and NIS."""
+    """Logarithmic y-axis with the band a consistent filter stays in, for NEES and NIS.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    low
+        Of the band.
+    high
+        Of the band.
+    label
+        Beside it.
+    color
+        Of the band.
+    """
     ax.set_yscale("log")
     ax.axhspan(low, high, color=color, alpha=0.13, lw=0, zorder=0)
     for edge in (low, high):
@@ -249,7 +318,22 @@ def thinned(count: int) -> slice:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG at 144 dpi, without a date or the name of a program."""
+    """The figure as PNG at 144 dpi, without a date or the name of a program.
+
+    Parameters
+    ----------
+    figure
+        From `new_figure`.
+
+    Returns
+    -------
+    bytes
+
+    Examples
+    --------
+    >>> png_bytes(new_figure()[0])[1:4]
+    b'PNG'
+    """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
@@ -257,6 +341,15 @@ def png_bytes(figure: Figure) -> bytes:
 
 def save_figure(figure: Figure, folder: Path, name: str) -> bytes:
     """Write ``name.pdf`` and ``name.png`` into ``folder``; the same figure gives the same bytes.
+
+    Parameters
+    ----------
+    figure
+        From `new_figure`.
+    folder
+        Made where it is not there.
+    name
+        Of the files, without ending.
 
     Returns
     -------

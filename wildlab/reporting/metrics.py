@@ -67,7 +67,35 @@ def metric(
     low: Any = None,
     high: Any = None,
 ) -> dict[str, Any]:
-    """One entry of ``metrics``, checked."""
+    """One entry of ``metrics``, checked.
+
+    Parameters
+    ----------
+    name
+        Of ``a-z``, ``0-9`` and ``_``.
+    subject
+        What the number is of, without blanks: ``ekf``, ``level/roll``.
+    value
+        The number; NaN becomes null.
+    unit
+        ``"m"``, ``"deg"``; ``"1"`` for a number without.
+    n
+        How many values it is from.
+    published, source
+        The printed number, and where it is printed.
+    low, high
+        Bounds of the value.
+
+    Returns
+    -------
+    dict
+        As ``metrics.json`` has it.
+
+    Examples
+    --------
+    >>> metric("rmse", "kf", 1.25, "m")["value"]
+    1.25
+    """
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise WildlabError(
             f"the metric name {name!r} is not made of a-z, 0-9 and _",
@@ -98,7 +126,31 @@ def metric(
 
 
 def claim(id: str, text: str, verdict: str, *, fraction: Any = None, seeds: Any = None) -> dict[str, Any]:
-    """One entry of ``claims``, checked. ``fraction`` is the share of ``seeds`` flights on which it holds."""
+    """One entry of ``claims``, checked. ``fraction`` is the share of ``seeds`` flights on which it holds.
+
+    Parameters
+    ----------
+    id
+        Of the claim, as the published file has it.
+    text
+        The claim itself.
+    verdict
+        ``"holds"`` or another of the known verdicts.
+    fraction
+        Between 0 and 1.
+    seeds
+        How many flights.
+
+    Returns
+    -------
+    dict
+        As ``metrics.json`` has it.
+
+    Examples
+    --------
+    >>> claim("better", "The filter is better.", "holds")["verdict"]
+    'holds'
+    """
     if not isinstance(id, str) or not _SUBJECT.fullmatch(id):
         raise WildlabError(f"the claim id {id!r} is empty or has a blank", "use letters, digits, - and _")
     if verdict not in VERDICTS:
@@ -154,6 +206,15 @@ def write_metrics(path: Path, content: dict[str, Any]) -> None:
 
 def read_metrics(path: Path) -> dict[str, Any]:
     """Read and check a ``metrics.json``.
+
+    Parameters
+    ----------
+    path
+        Of a ``metrics.json``.
+
+    Returns
+    -------
+    dict
 
     Raises
     ------

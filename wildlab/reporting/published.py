@@ -52,6 +52,13 @@ _COLUMNS = ["name", "subject", "value", "digits", "unit", "source", "within"]
 def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     """The published numbers of one study, in the order of the files.
 
+    Parameters
+    ----------
+    study
+        Name of the case.
+    folder
+        That holds the files; left out, ``data/published``.
+
     Returns
     -------
     DataFrame
@@ -62,6 +69,11 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     ------
     WildlabError
         If a file is not TOML, an entry has an unknown or missing key, or a number is given twice.
+
+    Examples
+    --------
+    >>> len(load_published("consistency-bounds"))
+    6
     """
     rows = [
         {
@@ -84,7 +96,19 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
 
 
 def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, str]]:
-    """The claims of one study as ``{"study", "id", "text", "source"}``, in the order of the files."""
+    """The claims of one study as ``{"study", "id", "text", "source"}``, in the order of the files.
+
+    Parameters
+    ----------
+    study
+        Name of the case.
+    folder
+        As for `load_published`.
+
+    Returns
+    -------
+    list of dict
+    """
     return [entry for entry in _entries("claim", folder) if entry["study"] == study]
 
 

@@ -55,14 +55,24 @@ def open_report(
 
     Parameters
     ----------
+    study
+        Its name.
+    kind
+        ``analytic``, ``twin`` or ``logged``.
     flight
         The flight's name, or its folder, of which only the last part is shown.
+    seed
+        Of whatever is drawn at random.
     seeds
         How many simulated flights the numbers come from, where it is more than one.
     out
         Folder for ``metrics.json`` and ``figures/``; "" (a notebook opened by hand) writes nothing.
     expected_prefix
         ``sys.prefix`` of whoever runs the notebook; "" does not look.
+
+    Returns
+    -------
+    Report
 
     Raises
     ------

@@ -33,6 +33,22 @@ def check_flight(flight: Flight) -> list[Finding]:
     """Everything that is wrong, doubtful or good to know about a flight, worst first, in whole sentences.
 
     Structural faults (missing columns, wrong types) are errors of `load_flight` and never come this far.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+
+    Returns
+    -------
+    list of Finding
+        Problems, then warnings, then notes.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> {finding.level for finding in check_flight(simulate_twin("large-ship", 1))}
+    {'note'}
     """
     return [
         replace(
@@ -62,7 +78,24 @@ def find(flight: Flight) -> list[Finding]:
 
 
 def usable_for(flight: Flight) -> list[Use]:
-    """What the flight can be used for: georeferencing accuracy, tracking, navigation."""
+    """What the flight can be used for: georeferencing accuracy, tracking, navigation.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+
+    Returns
+    -------
+    list of Use
+        One for each purpose, usable or not.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> [use.usable for use in usable_for(simulate_twin("large-ship", 1))]
+    [True, True, False]
+    """
     broken = {finding.table for finding in find(flight) if finding.level == "problem"}
     good_nav = [name for name in flight.nav if f"nav/{name}" not in broken and len(flight.nav[name])]
     kinds = _kinds(flight)

@@ -55,11 +55,21 @@ def import_flight(
     overwrite
         Whether a flight that is there already may be replaced.
 
+    Returns
+    -------
+    Flight
+        As it stands in the folder.
+
     Raises
     ------
     WildlabError
         Naming the file, the column and the part of the recipe where something is missing or wrong, or what
         `check_flight` calls a problem.
+
+    Examples
+    --------
+    >>> import_flight("my-recipe.toml", "logs", "flights/mine")  # doctest: +SKIP
+    Flight mine
     """
     recipe_path = Path(recipe_path)
     recipe = read_recipe(recipe_path)

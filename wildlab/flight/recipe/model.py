@@ -262,9 +262,24 @@ class Recipe(Strict):
 def read_recipe(path: Path) -> Recipe:
     """Read a recipe.
 
+    Parameters
+    ----------
+    path
+        Of the TOML file.
+
+    Returns
+    -------
+    Recipe
+
     Raises
     ------
     WildlabError
         Where it is missing, not TOML, or a key is unknown, missing or wrong.
+
+    Examples
+    --------
+    >>> from wildlab.paths import DATA
+    >>> read_recipe(DATA / "recipes" / "openathena.toml").name
+    'openathena'
     """
     return check_model(Recipe, read_toml(path, "a recipe"), path)

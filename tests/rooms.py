@@ -1,0 +1,57 @@
+"""What the rooms offer, for the tests that look at all of it."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+#: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
+DOCUMENTED = (
+    "wildlab",
+    "wildlab.flight",
+    "wildlab.flight.checks",
+    "wildlab.flight.recipe",
+    "wildlab.pipeline",
+    "wildlab.reporting",
+)
+#: Rooms whose examples are run.
+WITH_EXAMPLES = (
+    *DOCUMENTED,
+    "wildlab.api",
+    "wildlab.geometry",
+    "wildlab.tracking",
+    "wildlab.navigation",
+    "wildlab.evaluation",
+    "wildlab.simulation",
+)
+#: Rooms that import what they offer when it is asked for.
+LAZY = DOCUMENTED
+
+
+def offered(room: str) -> Iterator[tuple[str, Any]]:
+    """Names and what they stand for, as the room's ``__all__`` has them."""
+    module = importlib.import_module(room)
+    yield from ((name, getattr(module, name)) for name in module.__all__)
+
+
+def lacking(name: str, thing: Any) -> list[str]:
+    """Which sections a function's docstring lacks: parameters and what comes back, where there are any."""
+    if not inspect.isfunction(thing):
+        return []
+    text = inspect.getdoc(thing) or ""
+    signature = inspect.signature(thing)
+    wanted = ["Parameters"] if signature.parameters else []
+    wanted += [] if signature.return_annotation in ("None", None, "NoReturn") else ["Returns"]
+    headings = {one: f"\n{one}\n{'-' * len(one)}\n" for one in wanted}
+    found = [f"{name}: no section {one}" for one, heading in headings.items() if heading not in f"\n{text}\n"]
+    body = text.partition("\nParameters\n")[2]
+    parameters = [one for one in signature.parameters if "Parameters" in wanted]
+    listed = {
+        word.strip().lstrip("*")
+        for line in body.splitlines()
+        if line and not line.startswith(" ")
+        for word in line.partition(" : ")[0].split(",")
+    }
+    return found + [f"{name}: {one} is not described" for one in parameters if body and one not in listed]

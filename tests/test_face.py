@@ -1,0 +1,233 @@
+"""What `import wildlab` offers: light, typed as it is imported, short when printed, silent on places."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import wildlab
+from tests.rooms import LAZY
+from wildlab import paths
+from wildlab.api.points import Points
+from wildlab.brief import LONGEST, MOST_ROWS, Summary, as_html, as_text
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.pipeline.consistency import Series, mean_of_runs, worth
+from wildlab.pipeline.follow import usual_tuning
+from wildlab.pipeline.navigate import PUBLISHED_LIKE
+from wildlab.simulation.twins import simulate_twin
+
+HEAVY = ("numpy", "pandas", "matplotlib", "scipy", "numba", "cv2", "pydantic", "pyarrow", "click")
+
+
+def loaded_by(code: str) -> set[str]:
+    """Which modules a fresh interpreter has after running some code."""
+    command = [sys.executable, "-c", f"{code}\nimport sys\nprint(*sys.modules)"]
+    done = subprocess.run(command, cwd=paths.ROOT, capture_output=True, text=True, check=True, timeout=300)
+    return set(done.stdout.split())
+
+
+@pytest.fixture(scope="module")
+def ship() -> Flight:
+    return simulate_twin("large-ship", 1)
+
+
+def test_import_is_light() -> None:
+    loaded = loaded_by("import wildlab\nassert 'track' in dir(wildlab)")
+    assert "wildlab.lazy" in loaded
+    assert not loaded & set(HEAVY)
+
+
+@pytest.mark.parametrize("room", LAZY)
+def test_a_room_is_light_until_something_is_asked_of_it(room: str) -> None:
+    assert not loaded_by(f"import {room}") & set(HEAVY)
+
+
+def test_a_name_loads_only_its_own_room() -> None:
+    loaded = loaded_by("import wildlab\nwildlab.load_flight")
+    assert {"pandas", "wildlab.flight.store"} <= loaded
+    assert not loaded & {"matplotlib", "numba", "wildlab.simulation", "wildlab.tracking", "wildlab.api"}
+
+
+@pytest.mark.parametrize("room", LAZY)
+def test_the_three_lists_of_a_room_agree(room: str) -> None:
+    module = importlib.import_module(room)
+    assert module.__file__ is not None
+    tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
+    typed = {
+        alias.name: f"{node.module}"
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    always = {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert set(typed) | (always & {"WildlabError"}) == set(module.__all__)
+    assert set(module.__all__) <= set(dir(module))
+    for name, home in typed.items():
+        assert getattr(module, name) is getattr(importlib.import_module(home), name)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = module.nonsense
+
+
+def test_no_name_hides_a_module() -> None:
+    for room in LAZY:
+        module = importlib.import_module(room)
+        folder = Path(str(module.__file__)).parent
+        assert not {path.stem for path in folder.iterdir()} & set(module.__all__), room
+
+
+def test_rooms_are_there_without_being_imported() -> None:
+    code = "import wildlab\nassert wildlab.tracking.__name__ == 'wildlab.tracking'"
+    assert "wildlab.tracking" in loaded_by(code)
+
+
+def test_a_flight_prints_in_a_few_lines_and_names_no_place(ship: Flight) -> None:
+    secret = {"latitude_deg": 61.23456, "longitude_deg": 11.98765, "height_m": 123.4}
+    manifest = replace_in_manifest(
+        ship.manifest, {"origin": secret, "locations": {"sensitivity": "withheld"}}
+    )
+    flight = Flight(manifest, ship.nav, ship.tables, Path("/home/somebody/flights/lake"))
+    text, html = repr(flight), flight._repr_html_()
+    assert len(text.splitlines()) <= 8 and len(text) < 600
+    assert "truth 241" in text and "withheld" in text and "twin, seed 1" in text and "240.0 s" in text
+    for shown in (text, html, repr(manifest), str(manifest)):
+        for number in ("61.2", "11.98", "123.4", "somebody"):
+            assert number not in shown
+    places = ship.table("truth")["north_m"].to_numpy()
+    assert not {f"{place:.1f}" for place in places} & set(re.findall(r"-?\d+\.\d", text)) - {"240.0"}
+
+
+def test_an_empty_flight_prints(ship: Flight) -> None:
+    assert "not known" in repr(Flight(ship.manifest))
+
+
+def test_hostile_names_are_harmless(ship: Flight) -> None:
+    evil = "<script>alert(1)</script>\x1b[2J"
+    flight = Flight(ship.manifest, {evil: ship.nav["truth"]}, {})
+    assert "<script" not in flight._repr_html_() and "\x1b" not in flight._repr_html_()
+    assert "\x1b" not in repr(flight)
+    points = Points(flight, evil, pd.DataFrame({c: [1.0] for c in ("north_m", "cov_nn", "cov_ne", "cov_ee")}))
+    assert "<script" not in points._repr_html_() and "\x1b" not in repr(points)
+
+
+def test_long_summaries_are_cut() -> None:
+    summary = Summary("t", [("a" * 10_000, "b")] * (MOST_ROWS + 3), ("what", "is"))
+    for text in (as_text(summary), as_html(summary)):
+        assert "and 3 more" in text
+        assert "a" * LONGEST not in text
+
+
+def test_points_and_their_errors(ship: Flight) -> None:
+    points = wildlab.georeference(ship, source="autopilot")
+    errors = wildlab.evaluate_points(points)
+    assert errors.summary.n == len(ship.table("detections")) == len(points.table)
+    assert errors.summary.mean == pytest.approx(errors.table["error_m"].mean())
+    again = wildlab.georeference(ship, source="autopilot")
+    pd.testing.assert_frame_equal(points.table, again.table)
+    assert f"{errors.summary.n} points" in repr(errors)
+    with pytest.raises(wildlab.WildlabError, match="not clear which nav source"):
+        wildlab.georeference(ship)
+
+
+def test_a_track_says_what_it_was_told(ship: Flight) -> None:
+    track = wildlab.track(
+        ship, source="autopilot", filter="kf", acceleration=0.02, measurement=15.0, position=40.0
+    )
+    assert track.tuning[:4] == (0.02, 40.0, 5.0, 15.0)
+    assert "acceleration 0.02 m/s^2, measurement 15 m" in repr(track)
+    usual = wildlab.track(ship, source="autopilot", filter="ekf")
+    assert usual.tuning == usual_tuning(ship, source="autopilot")
+    assert usual.tuning.pixel == ship.manifest.uncertainty.pixel_px
+    P = wildlab.georeference(ship, source="autopilot").table
+    assert usual.tuning.measurement == pytest.approx(np.sqrt((P["cov_nn"] + P["cov_ee"]).mean() / 2))
+
+
+def test_what_cannot_be_done_is_said_with_the_remedy(ship: Flight) -> None:
+    with pytest.raises(wildlab.WildlabError, match=r"no covariance.*Use those of navigate"):
+        wildlab.track(ship, source="autopilot")
+    with pytest.raises(wildlab.WildlabError, match="no filter 'ukf'"):
+        wildlab.track(ship, source="autopilot", filter="ukf")  # type: ignore[arg-type]
+    with pytest.raises(wildlab.WildlabError, match="no method 'magic'"):
+        wildlab.navigate(ship, method="magic")  # type: ignore[arg-type]
+    with pytest.raises(wildlab.WildlabError, match="one kind"):
+        wildlab.consistency()
+    with pytest.raises(wildlab.WildlabError, match="no figure of a str"):
+        wildlab.plot("track")  # type: ignore[arg-type]
+
+
+def test_consistency_of_one_run_and_of_two(ship: Flight) -> None:
+    track = wildlab.track(ship, source="autopilot", filter="kf")
+    one, two = wildlab.consistency(track), wildlab.consistency(track, track)
+    assert track.judged is not None
+    nees = one.means["NEES position"]
+    assert nees.mean == pytest.approx(track.judged.numbers["nees"])
+    assert 1 <= nees.worth < nees.n / 2  # errors of neighbouring frames are alike
+    assert (nees.low, nees.high) == chi_square_interval(2, runs=nees.worth)
+    assert two.means["NEES position"].worth == pytest.approx(2 * nees.worth)
+    assert nees.low < two.means["NEES position"].low < two.means["NEES position"].high < nees.high
+
+
+def test_correlated_values_are_worth_less() -> None:
+    rng = np.random.default_rng(1)
+    white = rng.chisquare(2, 2000)
+    slow = np.repeat(rng.chisquare(2, 40), 50)
+    assert worth(white) > 1000
+    assert worth(slow) < 80
+    assert worth([]) == 0.0
+    assert worth(np.full(9, np.nan)) == 0.0
+    mean = mean_of_runs([Series("NIS", 2, np.arange(2000.0), slow)])
+    assert mean.high - mean.low > 10 * (lambda band: band[1] - band[0])(chi_square_interval(2, runs=2000)) / 2
+
+
+def test_every_result_has_a_figure(ship: Flight) -> None:
+    points = wildlab.georeference(ship, source="autopilot")
+    track = wildlab.track(ship, source="autopilot", filter="kf")
+    for result in (ship, points, wildlab.evaluate_points(points), track, wildlab.consistency(track)):
+        figure = wildlab.plot(result)
+        assert figure._repr_png_()[1:4] == b"PNG"  # type: ignore[attr-defined]
+        assert all(len(ax.lines) + len(ax.patches) for ax in figure.axes)
+
+
+@pytest.mark.slow
+def test_the_script_in_the_readme_runs(tmp_path: Path) -> None:
+    readme = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"```python\n(.*?)```", readme, re.S)
+    assert len([line for line in script.splitlines() if line]) <= 11
+    command = [sys.executable, "-c", script]
+    environment = {"PYTHONPATH": str(paths.ROOT), "PATH": ""}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "NEES position" in done.stdout and "by the mekf" in done.stdout
+    assert (tmp_path / "track.png").read_bytes()[1:4] == b"PNG"
+    saved = wildlab.load_flight(tmp_path / "flights" / "fast-vessel")
+    assert "mekf" in saved.nav and saved.gnss is not None
+
+
+@pytest.mark.slow
+def test_navigation_is_judged_where_it_flies() -> None:
+    flight = simulate_twin("fast-vessel", 1)
+    before = set(flight.nav)
+    nav = wildlab.navigate(flight)
+    assert set(flight.nav) == before and set(nav.flight.nav) == before | {"mekf"}
+    assert nav.reference == "truth-payload" and nav.part[0] == "in the air"
+    honest = wildlab.consistency(nav)
+    assert list(honest.means) == ["NEES position", "NEES velocity", "NEES attitude"]
+    assert all(series[0].dof == 3 for series in honest.series.values())
+    assert all(0.3 < mean.mean < 9 for mean in honest.means.values())
+    assert "too cautious" in repr(wildlab.consistency(wildlab.navigate(flight, tuning=PUBLISHED_LIKE)))
+    assert wildlab.plot(nav).axes and wildlab.plot(honest).axes
+    with pytest.raises(wildlab.WildlabError, match="takes no tuning"):
+        wildlab.navigate(flight, method="observer", tuning=PUBLISHED_LIKE)
+    assert wildlab.navigate(flight, method="observer").source == "observer"

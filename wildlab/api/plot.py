@@ -1,0 +1,162 @@
+"""Figures for a notebook: one for each kind of result, in the house style of the reports."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wildlab.api.points import PointErrors, Points
+from wildlab.api.tracks import Consistency, Navigation, Tracked
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import chi_square_interval
+from wildlab.flight.store import Flight
+from wildlab.pipeline.georeference import covariances_of
+from wildlab.reporting.charts.navigation import error_bands
+from wildlab.reporting.charts.tracks import track_map
+from wildlab.reporting.figures import (
+    BLUE,
+    GREY,
+    colour,
+    ellipse,
+    log_band,
+    map_axes,
+    new_figure,
+    png_bytes,
+    thinned,
+)
+
+#: More ellipses than this cover one another.
+MOST_ELLIPSES = 200
+
+
+def plot(result: Flight | Points | PointErrors | Tracked | Navigation | Consistency) -> Figure:
+    """Draw a result: one figure, which a notebook shows and ``savefig`` writes.
+
+    Maps are in metres from the flight's origin, north up; they do not say where that is.
+
+    Parameters
+    ----------
+    result
+        A flight: paths of its poses and truth. Points, or their errors: each with its 90 % ellipse, and the
+        truth. A track: beside the truth and the single detections. Navigation: errors of the attitude within
+        two standard deviations. Consistency: NEES and NIS over time with the 95 % band of single values.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    WildlabError
+        Where there is nothing of it to draw.
+
+    Examples
+    --------
+    >>> import wildlab
+    >>> figure = wildlab.plot(wildlab.simulate("large-ship"))
+    >>> figure.axes[0].get_xlabel()
+    'east (m)'
+    """
+    if isinstance(result, Flight):
+        figure = _flight(result)
+    elif isinstance(result, Points):
+        figure = _points(result)
+    elif isinstance(result, PointErrors):
+        figure = _points(result.points)
+    elif isinstance(result, Tracked):
+        figure = _track(result)
+    elif isinstance(result, Navigation):
+        figure = _navigation(result)
+    elif isinstance(result, Consistency):
+        figure = _consistency(result)
+    else:
+        raise WildlabError(
+            f"there is no figure of a {type(result).__name__}",
+            "give a flight, points, a track, navigation or consistency",
+            field="result",
+        )
+    # A figure apart from pyplot's state is shown by a notebook only if it says how.
+    figure._repr_png_ = partial(png_bytes, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _flight(flight: Flight) -> Figure:
+    if not flight.nav and flight.truth is None:
+        raise WildlabError("the flight has neither poses nor truth", "add nav/<source>.parquet", field="nav")
+    fig, ax = new_figure(5.6, 5.2)
+    for name, nav in flight.nav.items():
+        keep = thinned(len(nav))
+        ax.plot(nav["east_m"][keep], nav["north_m"][keep], lw=1.0, color=colour(name), label=name)
+    if flight.truth is not None:
+        _truth(ax, flight)
+    ax.set_title(f"{flight.name}: paths of the aircraft")
+    ax.legend(loc="best")
+    map_axes(ax)
+    return fig
+
+
+def _points(points: Points) -> Figure:
+    fig, ax = new_figure(5.6, 5.2)
+    xy = points.table[["east_m", "north_m"]].to_numpy(float)
+    swapped = covariances_of(points.table)[:, ::-1, ::-1]  # east first, as the axes have it
+    for row in range(0, len(xy), max(1, -(-len(xy) // MOST_ELLIPSES))):
+        ellipse(ax, xy[row], swapped[row], lw=0.6, alpha=0.5)
+    ax.plot(xy[:, 0], xy[:, 1], ".", ms=3, color=BLUE, mec="none", label="single images, 90 % ellipses")
+    if points.flight.truth is not None:
+        _truth(ax, points.flight)
+    ax.set_title("Detections on the ground")
+    ax.legend(loc="best")
+    map_axes(ax)
+    return fig
+
+
+def _truth(ax: Axes, flight: Flight) -> None:
+    for i, (_, rows) in enumerate(flight.table("truth").groupby("target_id", sort=False)):
+        mark = "+" if len(rows) == 1 else ""
+        label = None if i else "truth"
+        ax.plot(rows["east_m"], rows["north_m"], marker=mark, color=colour("truth"), lw=1.1, label=label)
+
+
+def _track(one: Tracked) -> Figure:
+    called: dict[str, str] = {"schmidt": "Schmidt-Kalman", "ekf": "extended Kalman", "kf": "Kalman"}
+    truth = one.seen.truth if np.isfinite(one.seen.truth).any() else one.track.x[:, :4]
+    title = "Track and truth" if one.judged is not None else "Track"
+    return track_map(truth, {one.filter: one.track.x}, called, title, measured=one.seen.positions)
+
+
+def _navigation(one: Navigation) -> Figure:
+    if one.errors is None:
+        raise WildlabError("there is no pose to compare with", "give the flight a reference", field="nav")
+    axes = [f"{name} (deg)" for name in ("roll", "pitch", "yaw")]
+    error, sd = (np.degrees(values[:, 6:]) for values in (one.errors.error, one.errors.sd))
+    bounds = {one.source: sd} if np.isfinite(sd).any() else {}
+    part = (one.errors.times >= one.part[1]) & (one.errors.times < one.part[2])
+    bounds = {name: values[part] for name, values in bounds.items()}
+    title = f"Attitude against {one.reference}"
+    return error_bands(one.errors.times[part], {one.source: error[part]}, bounds, axes, title)
+
+
+def _consistency(one: Consistency) -> Figure:
+    fig, strips = new_figure(5.9, 1.9 * len(one.series) + 0.9, rows=len(one.series), squeeze=False)
+    for ax, (name, runs) in zip(strips[:, 0], one.series.items(), strict=True):
+        low, high = chi_square_interval(runs[0].dof)
+        highest = high
+        for run in runs:
+            ax.plot(
+                run.times - run.times[0],
+                run.values,
+                ".",
+                ms=3,
+                color=BLUE if len(runs) == 1 else GREY,
+                alpha=0.6,
+            )
+            highest = max(highest, float(np.nanmax(run.values)))
+        log_band(ax, low, high)
+        ax.set_ylim(low / 12, 2 * highest)
+        ax.set_ylabel(name)
+    strips[0, 0].set_title("Does the filter know how wrong it is?")
+    strips[-1, 0].set_xlabel("time (s)")
+    return fig
