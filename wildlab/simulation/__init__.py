@@ -14,6 +14,7 @@ Where a change belongs:
 - motion: `trajectory`, from `loiter`, `waypoint_courses`, `survey_courses`, `attitudes` and `disturbances`;
   what a twin flies is in `twin_trajectory`, what it looks for in `target_motion` and `animal_motion`;
 - sensors: `imu`, `gnss`, `gimbal`, and the `error_models` that they share;
+- speed: `kernels`, compiled, each with its twin in readable numpy in `plain`;
 - tables: `onboard_sensors`; `camera_detections` with `camera_view`, `animal_detections`,
   `extended_target_detections` and `clipped_outlines`; `manifest`;
 - the whole flight: `twins`.

@@ -37,7 +37,7 @@ def coordinated_attitude(
     """
     v, a = (np.ascontiguousarray(part, float) for part in (velocity, acceleration))
     R = np.empty((len(v), 3, 3))
-    kernels.coordinated_attitude(v, a, np.array(wind, float), trim_pitch, gravity, R)
+    kernels.coordinated_attitude(v, a, np.array(wind, float), float(trim_pitch), float(gravity), R)
     return R
 
 
