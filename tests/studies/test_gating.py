@@ -233,7 +233,8 @@ def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> N
     named = variations(flight, Choices())
     first = next(iter(named.values()))
     for name, (other, choices) in list(named.items())[1:]:
-        same_flight = all(np.array_equal(getattr(other, a), getattr(first[0], a)) for a in ("p_nb", "tilt"))
+        ours, theirs = other.poses, first[0].poses
+        same_flight = all(np.array_equal(getattr(ours, a), getattr(theirs, a)) for a in ("p_nb", "tilt"))
         same_flight &= other.poses.camera == over.poses.camera
         assert same_flight != (choices == first[1]), name
     aside = overflight(flight, right=30.0).place
