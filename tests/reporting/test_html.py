@@ -14,6 +14,7 @@ from wildlab.errors import WildlabError
 from wildlab.reporting import html
 from wildlab.reporting.failure import failure_page
 from wildlab.reporting.figures import new_figure
+from wildlab.reporting.notebook_file import read_notebook
 from wildlab.reporting.page import page
 from wildlab.reporting.report import Report, open_report
 
@@ -119,4 +120,4 @@ def test_a_page_that_breaks_a_promise_is_refused(body: str, sentence: str) -> No
 def test_a_file_that_is_no_notebook_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.ipynb").write_text("{}")
     with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
-        html.read_notebook(tmp_path / "a.ipynb")
+        read_notebook(tmp_path / "a.ipynb")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Column
+
+from wildlab.runner.job import Job
 
 _STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
 _ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
@@ -21,6 +23,17 @@ def outcome_line(outcome: Any) -> str:
     took = f"  {outcome.seconds:.0f} s" if outcome.state != "skipped" else ""
     why = f"  {escape(outcome.reason)}" if outcome.reason else ""
     return f"{_ENDS[outcome.state]}  [bold]{escape(outcome.name)}[/]{took}{why}"
+
+
+def pass_line(jobs: Sequence[Job]) -> str:
+    """What is said before a pass that takes first looks; nothing before any other."""
+    looks = sum(bool(job.first_look) for job in jobs)
+    if not looks:
+        return ""
+    whole = len(jobs) - looks
+    return f"First looks: {looks} of {len(jobs)} reports from few flights" + (
+        f", and {whole} in full." if whole else "."
+    )
 
 
 @contextmanager

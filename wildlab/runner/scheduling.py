@@ -275,6 +275,9 @@ def _finish(job: Job, failure: Failure | None, cell: int | None, started: float,
         "started": began,
         "finished": _now(),
         "seconds": seconds,
+        "fingerprint": job.fingerprint,
+        # Of what the page shows less than the study's own: {"seeds": [5, 200]}; {} where it is whole.
+        "first_look": {} if failure else job.first_look,
     }
     try:
         if failure is not None:
