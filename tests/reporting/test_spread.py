@@ -59,7 +59,12 @@ def test_ranges_are_typeset_with_a_minus() -> None:
 
 @pytest.mark.parametrize(
     ("n", "heading"),
-    [(1, None), (2, "lowest to highest of 2 flights"), (29, "lowest to highest of 29 flights"), (30, "90 % of flights")],
+    [
+        (1, None),
+        (2, "lowest to highest of 2 flights"),
+        (29, "lowest to highest of 29 flights"),
+        (30, "90 % of flights"),
+    ],
 )
 def test_tables_follow_the_number_of_flights(n: int, heading: str | None) -> None:
     spread = pd.DataFrame({("a", "mae"): FLIGHTS[:n]})

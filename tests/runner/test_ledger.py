@@ -243,7 +243,9 @@ def test_a_band_is_called_what_it_is(
     entry = metrics.metric("error", "kf/all", 7.9, "m", low=7, high=8, n=n)
     ran(tmp_path, entry, kind=kind, seeds=seeds)
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
-    called = {name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}</span>" in ledger_page([one])}
+    called = {
+        name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}</span>" in ledger_page([one])
+    }
     assert called == {words}
     spoken = strip(one.numbers[0])
     assert f"{words.replace('%', 'percent')} 7.000 to 8.000" in spoken

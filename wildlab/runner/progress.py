@@ -86,6 +86,8 @@ class Tally:
         elif event == "seed":
             self.seeds[name], count = what
             self.steps[name] = f"seed {what[0]} of {count}"
+        elif event == "note" and name in self.steps:
+            self.steps[name] = escape(what)
         elif event == "stage":
             self.steps[name] = _STAGES.get(what[0], str(what[0]))
             if what[0] == "page":
@@ -117,6 +119,8 @@ def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
             done, count = what
             if 4 * done // count > 4 * (done - 1) // count:
                 say(f"seeds {escape(name)}: {done} of {count}")
+        elif event == "note":
+            say(f"note  {escape(name)}: {escape(what)}")
         elif event == "end":
             say(outcome_line(what))
 
