@@ -91,6 +91,9 @@ def list_(out: Path | None, as_json: bool) -> None:
 @click.option(
     "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
 )
+@click.option(
+    "--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers."
+)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
 @click.option(
     "--seeds",
@@ -119,6 +122,7 @@ def list_(out: Path | None, as_json: bool) -> None:
 def run(
     studies: tuple[str, ...],
     everything: bool,
+    first_look: bool,
     seed: int | None,
     seeds: int | None,
     flight: Path | None,
@@ -129,6 +133,9 @@ def run(
 ) -> None:
     """Run studies; each leaves a report, and the ledger shows them all.
 
+    --all goes over them twice: first every report from few flights, then the full numbers in their place.
+    A study that is named runs once, in full. --seeds N is one pass over N flights.
+
     What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
     seeds cost only those that are new. The numbers are the same for any --jobs.
 
@@ -136,6 +143,7 @@ def run(
     Examples:
       wildlab run sensitivity consistency-bounds
       wildlab run --all --jobs 4
+      wildlab run --all --first-look
       wildlab run static-point --seeds 200 --jobs 4
       wildlab run static-point --scheduler tcp://127.0.0.1:8786
     """
@@ -143,9 +151,12 @@ def run(
 
     if everything and studies:
         raise click.UsageError("Name studies or say --all, not both.")
+    if first_look and seeds is not None:
+        raise click.UsageError("--first-look has its own number of flights: leave it or --seeds out.")
     outcomes = run_studies(
         studies,
         everything=everything,
+        first_look=first_look,
         seed=seed,
         seeds=seeds,
         flight=flight,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.reporting import html
 from wildlab.reporting.failure import failure_page
 from wildlab.reporting.figures import new_figure
+from wildlab.reporting.notebook_file import read_notebook
 from wildlab.reporting.page import page
 from wildlab.reporting.report import Report, open_report
 
@@ -119,4 +122,10 @@ def test_a_page_that_breaks_a_promise_is_refused(body: str, sentence: str) -> No
 def test_a_file_that_is_no_notebook_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.ipynb").write_text("{}")
     with pytest.raises(WildlabError, match=r"a\.ipynb: this is not a notebook"):
-        html.read_notebook(tmp_path / "a.ipynb")
+        read_notebook(tmp_path / "a.ipynb")
+
+
+def test_reading_a_notebook_does_not_build_a_grammar() -> None:
+    # jsonschema would import it, which takes seconds in every process of a run.
+    program = "import sys, wildlab.runner.run, papermill\nassert 'lark' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True)

@@ -26,7 +26,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path, help="with notebooks/; reports go beside them")
-    parser.add_argument("study", nargs="+")
+    parser.add_argument("study", nargs="*", help="all, where none is named")
+    parser.add_argument("--first-look", action="store_true")
     parser.add_argument("--out", default="reports")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--seeds", type=int)
@@ -36,6 +37,8 @@ def main() -> None:
     try:
         run_studies(
             given.study,
+            everything=not given.study,
+            first_look=given.first_look,
             notebooks=given.folder / "notebooks",
             reports=given.folder / given.out,
             parallel=given.jobs,

@@ -15,7 +15,7 @@ from wildlab.reporting.ledger import ledger_page, strip
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.front_page import build_ledger
-from wildlab.runner.status import study_status
+from wildlab.runner.status import as_plain, study_status
 
 PUBLISHED = """
 [[number]]
@@ -199,7 +199,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
     whole = ledger_page(statuses, [("tuesday", "tuesday")])
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
     assert "1 of 17 reproduced" not in whole and "25 % of 20 flights" in whole
-    assert "published 7.90, here 21.900, middle 90 percent 5.000 to 23.000" in whole
+    assert "published 7.90, here 21.900, lowest to highest 5.000 to 23.000" in whole
     html.examine(whole, "ledger")
     path = tmp_path / "index.html"
     path.write_text(whole, encoding="utf-8")
@@ -225,3 +225,78 @@ def test_a_spread_without_width_can_be_drawn(tmp_path: Path) -> None:
     ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m", low=7.9, high=7.9))
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
     assert 'role="img"' in strip(one.numbers[0]) and "nan" not in strip(one.numbers[0])
+
+
+@pytest.mark.parametrize(
+    ("kind", "seeds", "n", "words"),
+    [
+        ("twin", 29, 500, "lowest to highest"),
+        ("twin", 30, 5, "middle 90 %"),
+        ("twin", None, 29, "lowest to highest"),
+        ("twin", None, 500, "middle 90 %"),
+        ("logged", None, 7, "middle 90 %"),  # draws with replacement from seven points: not flights
+    ],
+)
+def test_a_band_is_called_what_it_is(
+    tmp_path: Path, kind: str, seeds: int | None, n: int, words: str
+) -> None:
+    entry = metrics.metric("error", "kf/all", 7.9, "m", low=7, high=8, n=n)
+    ran(tmp_path, entry, kind=kind, seeds=seeds)
+    one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
+    called = {
+        name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}</span>" in ledger_page([one])
+    }
+    assert called == {words}
+    spoken = strip(one.numbers[0])
+    assert f"{words.replace('%', 'percent')} 7.000 to 8.000" in spoken
+
+
+def test_one_flight_has_no_band(tmp_path: Path) -> None:
+    ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"), seeds=1)
+    one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
+    whole = ledger_page([one]).partition("<details><summary>How to read this")[0]
+    assert "<svg" not in whole and 'class="band"' not in whole and "1 flights" not in whole
+
+
+def first_look(reports: Path, **more: Any) -> None:
+    """A first look as a run leaves it, whose number would count as reproduced and whose claim as holding."""
+    claims = [metrics.claim("c1", "x", "holds", fraction=1.0, seeds=5)]
+    folder = ran(reports, metrics.metric("error", "kf/all", 7.9, "m"), seeds=5, claims=claims)
+    status = json.loads((folder / "status.json").read_text()) | {"first_look": {"seeds": [5, 200]}} | more
+    (folder / "status.json").write_text(json.dumps(status))
+
+
+def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
+    folder = published(tmp_path / "published")
+    first_look(tmp_path)
+    one = study_status(a_study(), tmp_path, folder)
+    assert (one.state, one.first_look, one.has_report) == ("first look", "5 of 200 flights", True)
+    assert [number.verdict for number in one.numbers] == ["first look", "not reproduced yet"]
+    assert one.numbers[0].here == 7.9 and one.count("reproduced") == 0
+    assert (one.claims[0].verdict, one.claims[0].fraction) == ("first look", 1.0)
+    whole = ledger_page([one])
+    for words in (
+        "<b>0 / 1</b><span>studies done, 1 at a first look</span>",
+        "<b>0 / 2</b><span>published numbers reproduced; 2 wait for full numbers</span>",
+        "<b>0 / 1</b><span>claims hold; 1 wait for full numbers</span>",
+        "5 of 200 flights.",
+        "<code>wildlab run s</code>",
+        "Open the report",
+        "100 % of 5 flights",
+        '<span class="pill part">first look</span></td>',
+    ):
+        assert words in whole
+    for words in (">reproduced</span></td>", ">holds</span>", "not run yet"):
+        assert words not in whole
+    html.examine(whole, "ledger")
+    assert as_plain(one)["first_look"] == "5 of 200 flights"
+    first_look(tmp_path, first_look={})
+    whole = ledger_page([study_status(a_study(), tmp_path, folder)])
+    assert "<b>1 / 2</b><span>published numbers reproduced</span>" in whole
+    assert "<b>1 / 1</b><span>claims hold</span>" in whole and "first look</span>" not in whole
+
+
+@pytest.mark.parametrize("said", [[1], {"seeds": 5}, {"seeds": [5]}, {"seeds": ["<b>", 1]}, "5", None])
+def test_nonsense_about_a_first_look_does_not_stop_the_ledger(tmp_path: Path, said: Any) -> None:
+    first_look(tmp_path, first_look=said)
+    assert study_status(a_study(), tmp_path).state == "done"

@@ -115,7 +115,7 @@ def test_the_same_numbers_for_any_number_of_processes(tmp_path: Path) -> None:
     assert numbers(folder, "one") == numbers(folder, "three")
     assert kept(folder, "one") == kept(folder, "three") and len(kept(folder, "one")) == 7
     about = json.loads((folder / "one" / "walks" / "provenance.json").read_text())["seeds"]
-    assert about["seeds"] == [1, 2, 3, 5, 6, 7, 8] and about["function"] == "walk"
+    assert about["seeds"] == [1, 2, 3, 5, 6, 7, 8] and about["case"] == "walk"
     assert {key.partition("/")[0] for key in kept(folder, "one")} == {about["key"]}
     assert about["parameters"] == {"steps": 3000, "seconds": 0.0}
 

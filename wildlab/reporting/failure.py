@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import nbformat
-
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape, inline
 
@@ -15,7 +13,7 @@ _SHOWN_HEADING = re.compile(r"<h[1-6][^>]*>(.*?)</h[1-6]>", re.S)
 _TAG = re.compile(r"<[^>]+>")
 
 
-def step_of(notebook: nbformat.NotebookNode, cell_index: int | None) -> str:
+def step_of(notebook: Any, cell_index: int | None) -> str:
     """The heading under which a cell stands: the last one above it, in markdown or shown by a report."""
     heading = ""
     for cell in notebook.cells[: len(notebook.cells) if cell_index is None else cell_index + 1]:

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-import nbformat
 from bs4 import BeautifulSoup, Tag
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from traitlets.config import Config
 
 from wildlab.errors import WildlabError
+from wildlab.reporting.notebook_file import nbformat
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape, maths
 
@@ -121,7 +120,12 @@ def _is_wrapper(name: str | None) -> bool:
 
 
 def report_page(
-    notebook: nbformat.NotebookNode, *, study: str, footer: str = "", ledger: str = "../index.html"
+    notebook: nbformat.NotebookNode,
+    *,
+    study: str,
+    footer: str = "",
+    ledger: str = "../index.html",
+    notice: str = "",
 ) -> str:
     """The whole page of a report, examined.
 
@@ -131,6 +135,8 @@ def report_page(
         HTML of the provenance line (`wildlab.runner.provenance.footer`).
     ledger
         Where the page of all studies lies, seen from the report; "" leaves the link out.
+    notice
+        HTML that stands above everything else.
 
     Raises
     ------
@@ -141,7 +147,7 @@ def report_page(
     heading = BeautifulSoup(body, "html.parser").h1
     title = heading.get_text(" ", strip=True) if heading else study
     way = f'<a href="{escape(ledger)}">wildlab ledger</a> › {escape(study)}' if ledger else escape(study)
-    whole = page(title=title, body=body, kicker=way, footer=footer)
+    whole = page(title=title, body=f"{notice}\n{body}" if notice else body, kicker=way, footer=footer)
     examine(whole, study)
     return whole
 
@@ -216,20 +222,3 @@ def _examine_headings(levels: list[int], file: str) -> None:
                 "use the level between",
                 file=file,
             )
-
-
-def read_notebook(path: Path) -> nbformat.NotebookNode:
-    """Read a notebook.
-
-    Raises
-    ------
-    WildlabError
-        If it is not one.
-    """
-    try:
-        notebook: nbformat.NotebookNode = nbformat.read(path, as_version=4)
-        return notebook
-    except Exception as error:  # nbformat raises its own, json's and jsonschema's errors
-        raise WildlabError(
-            f"this is not a notebook ({type(error).__name__})", "restore the file", file=path.name
-        ) from error

@@ -5,9 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import UTC, datetime
 
-from wildlab.reporting.page import page
-from wildlab.reporting.report import TAGS
-from wildlab.reporting.status import DIFFERS, MISSING, NOT_JUDGED, REPRODUCED, Claim, Number, StudyStatus
+from wildlab.reporting.page import TAGS, first_look_notice, page
+from wildlab.reporting.spread import MANY, spread_words
+from wildlab.reporting.status import (
+    DIFFERS,
+    FIRST_LOOK,
+    MISSING,
+    NOT_JUDGED,
+    REPRODUCED,
+    Claim,
+    Number,
+    StudyStatus,
+)
 from wildlab.reporting.text import NOTHING, escape, inline, number, prose
 
 #: A longer table is folded away behind a line that sums it up.
@@ -15,7 +24,11 @@ LONGEST_TABLE = 12
 EXPLANATION = """
 A number counts as **reproduced** when ours lies within the tolerance stated beside the published one (for
 exact calculations, about the last digit printed), or when the published one lies in the middle 90 % of our
-simulated flights. Where there is neither, only the difference is shown: ours minus the published one.
+simulated flights (of fewer than 30: between the lowest and the highest). Where there is neither, only the
+difference is shown: ours minus the published one.
+
+A **first look** comes from fewer flights than the study's own. Its numbers are shown and count as nothing
+until the full ones are in.
 
 The flights of the theses were never published. A **twin** is a simulated flight built from what the thesis
 prints about the real one; a **logged** flight is a real one from a public source.
@@ -26,6 +39,7 @@ _PILLS = {
     "holds": "yes",
     "does not hold": "no",
     "cannot be decided": "part",
+    FIRST_LOOK: "part",
 }
 
 
@@ -67,18 +81,30 @@ def ledger_page(
 def _tiles(studies: list[StudyStatus]) -> str:
     numbers = [one for study in studies for one in study.numbers]
     claims = [one for study in studies for one in study.claims]
-    done = sum(study.state == "done" for study in studies)
+    done = [study for study in studies if study.state == "done"]
     failed = sum(study.state == "failed" for study in studies)
-    reproduced = sum(one.verdict == REPRODUCED for one in numbers)
-    tiles = [(f"{done} / {len(studies)}", "studies done" + (f", {failed} failed" if failed else ""))]
+    looks = sum(study.state == FIRST_LOOK for study in studies)
+    reproduced = sum(study.count(REPRODUCED) for study in done)
+    holding = sum(one.verdict == "holds" for study in done for one in study.claims)
+    waiting = [study for study in studies if study.state != "done"]
+    studied = "studies done" + (f", {looks} at a first look" if looks else "")
+    studied += f", {failed} failed" if failed else ""
+    tiles = [(f"{len(done)} / {len(studies)}", studied)]
     if numbers:
-        tiles.append((f"{reproduced} / {len(numbers)}", "published numbers reproduced"))
+        words = "published numbers reproduced" + _waiting(sum(len(study.numbers) for study in waiting))
+        tiles.append((f"{reproduced} / {len(numbers)}", words))
     if claims:
-        tiles.append((f"{sum(one.verdict == 'holds' for one in claims)} / {len(claims)}", "claims hold"))
-    logged = sum(study.state == "done" and study.study.kind == "logged" for study in studies)
+        words = "claims hold" + _waiting(sum(len(study.claims) for study in waiting))
+        tiles.append((f"{holding} / {len(claims)}", words))
+    logged = sum(study.study.kind == "logged" for study in done)
     if any(study.study.kind == "logged" for study in studies):
         tiles.append((str(logged), "done on logged flights"))
     return f'<ul class="tiles">{"".join(f"<li><b>{v}</b><span>{t}</span></li>" for v, t in tiles)}</ul>'
+
+
+def _waiting(count: int) -> str:
+    """How many are not decided, because their study has no full numbers yet."""
+    return f"; {count} wait for full numbers" if count else ""
 
 
 def _section(one: StudyStatus) -> str:
@@ -93,7 +119,7 @@ def _section(one: StudyStatus) -> str:
         _claims(one.claims),
     ]
     if one.has_report:
-        words = "Open the report" if one.state == "done" else "See what went wrong"
+        words = "Open the report" if one.ran else "See what went wrong"
         parts.append(f'<p><a href="{escape(study.name)}/report.html">{words}</a></p>')
     return "\n".join([*(part for part in parts if part), "</section>"])
 
@@ -114,6 +140,8 @@ def _state(one: StudyStatus) -> str:
         return f'<p><span class="pill no">failed</span> {inline(one.reason)}</p>'
     if one.state == "broken off":
         return f'<p><span class="pill part">broken off</span> {inline(f"Run it again: {run}")}</p>'
+    if one.state == FIRST_LOOK:
+        return first_look_notice(one.first_look, f"wildlab run {one.study.name}")
     if one.state == "not run":
         fetch = (
             f"Get its data with `wildlab fetch {one.study.dataset}`, then run it: "
@@ -128,15 +156,15 @@ def _numbers(one: StudyStatus) -> str:
     if not one.numbers:
         return ""
     spread = any(n.low is not None and n.high is not None for n in one.numbers)
-    ran = one.state == "done"
+    ran, words = one.ran, _spread_words(one)
     head = ["quantity", "published"]
     if ran:
         head += ["here", "difference"]
     if spread:
-        words = f"{one.seeds} flights" if one.seeds and one.seeds > 1 else "spread"
+        over = f"{one.seeds} flights" if one.seeds and one.seeds > 1 else "spread"
         head.append(
-            f'{words} <span class="key"><i class="hollow"></i>published<i class="full"></i>here'
-            '<i class="band"></i>middle 90 %</span>'
+            f'{over} <span class="key"><i class="hollow"></i>published<i class="full"></i>here'
+            f'<i class="band"></i>{words}</span>'
         )
     if ran:
         head.append("")
@@ -156,8 +184,15 @@ def _numbers(one: StudyStatus) -> str:
     return table
 
 
+def _spread_words(one: StudyStatus) -> str:
+    """What the bands of a study's table are called."""
+    return spread_words(min((n.over for n in one.numbers if n.over is not None), default=MANY)).key
+
+
 def _summary(one: StudyStatus) -> str:
     count = len(one.numbers)
+    if one.state == FIRST_LOOK:
+        return f"{count} published number{'s' * (count > 1)} beside a first look"
     if one.state != "done":
         return f"{count} published number{'s' * (count > 1)} waiting for it"
     tolerances = {(n.within, n.unit) for n in one.numbers}
@@ -199,7 +234,7 @@ def _row(n: Number, *, ran: bool, spread: bool) -> str:
 
 
 def strip(n: Number) -> str:
-    """The spread over flights as a small picture: published hollow, ours filled, the middle 90 % a band."""
+    """The spread over flights as a small picture: published hollow, ours filled, the spread a band."""
     known = [value for value in (n.published, n.here, n.low, n.high) if value is not None]
     if n.low is None or n.high is None or n.here is None:
         return NOTHING
@@ -210,9 +245,10 @@ def strip(n: Number) -> str:
         return f"{8 + (value - least) * scale:.1f}"
 
     width = max(2.0, (n.high - n.low) * scale)
+    bounds = spread_words(n.over or MANY).key.replace("%", "percent")
     words = (
         f"published {number(n.published, n.digits)}, here {number(n.here, n.digits + 1)}, "
-        f"middle 90 percent {number(n.low, n.digits + 1)} to {number(n.high, n.digits + 1)}"
+        f"{bounds} {number(n.low, n.digits + 1)} to {number(n.high, n.digits + 1)}"
     )
     return (
         f'<svg width="160" height="18" viewBox="0 0 160 18" role="img" aria-label="{escape(words)}">'

@@ -6,8 +6,11 @@
      "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high"}],
      "claims":  [{"id", "text", "verdict", "fraction", "seeds"}]}
 
-A value that could not be computed is ``null``. ``low`` and ``high`` bound the middle 90 % over seeds (or
-flights) where there were several.
+A value that could not be computed is ``null``. ``low`` and ``high`` bound the spread over ``seeds`` flights
+(or over ``n`` runs of one): the middle 90 % of 30 or more, the lowest and the highest of fewer, ``null`` for
+one. Where there are no flights to go over they bound the middle 90 % of draws with replacement. ``seeds`` is
+how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where those are fewer
+than the study's own.
 """
 
 from __future__ import annotations

@@ -10,6 +10,9 @@ from wildlab.reporting.text import escape
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 
+#: What each kind of report is called.
+TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed": "computed, no flight"}
+
 # System fonts only: a font file would be a request, or a megabyte. The status colours hold 4.5:1 on white.
 STYLE = """:root { --ink: #18222d; --dim: #55626f; --line: #dce1e6; --soft: #f4f6f8; --blue: #0072b2;
   --link: #00598c; --good: #0b7a4b; --warn: #a85b00; --bad: #b3261e; --gap: 1.6rem;
@@ -91,6 +94,7 @@ footer p { margin: .25rem 0; max-width: none }
 .pill.yes { background: var(--good) }
 .pill.part { background: var(--warn) }
 .pill.no { background: var(--bad) }
+.look { border: 1px dashed var(--warn); border-radius: .4rem; padding: .5rem .85rem; max-width: none }
 .key { white-space: nowrap; font-weight: 400 }
 .key i { display: inline-block; vertical-align: -1px; margin: 0 .25rem 0 .6rem }
 .hollow, .full { width: 9px; height: 9px; border-radius: 50% }
@@ -126,6 +130,22 @@ footer p { margin: .25rem 0; max-width: none }
   th, td { padding: .22rem .45rem; white-space: normal }
   a { color: inherit; text-decoration: none }
 }"""
+
+
+def first_look_notice(look: str, again: str) -> str:
+    """What is said of a first look, as HTML.
+
+    Parameters
+    ----------
+    look
+        What it shows of what: "5 of 200 flights".
+    again
+        What to type for the full numbers.
+    """
+    return (
+        f'<p class="look"><span class="pill part">first look</span> {escape(look)}. The full numbers follow, '
+        f"as long as <code>make reports</code> runs; or type <code>{escape(again)}</code>.</p>"
+    )
 
 
 def page(*, title: str, body: str, kicker: str = "", footer: str = "") -> str:

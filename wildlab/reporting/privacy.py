@@ -11,11 +11,12 @@ import re
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
-
-import nbformat
+from typing import TYPE_CHECKING, Any
 
 from wildlab.paths import PACKAGE, ROOT
+
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
 
 _KERNEL_CELL = re.compile(r"(/[\w.+@-]+)*/ipykernel_\d+/\d+\.py")
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
@@ -47,8 +48,8 @@ def clean_text(text: str, folders: dict[str, str] | None = None) -> str:
 
 
 def clean_notebook(
-    notebook: nbformat.NotebookNode, parameters: dict[str, Any], folders: dict[str, str]
-) -> nbformat.NotebookNode:
+    notebook: NotebookNode, parameters: dict[str, Any], folders: dict[str, str]
+) -> NotebookNode:
     """A copy of an executed notebook that can be passed on.
 
     Parameters
@@ -60,7 +61,9 @@ def clean_notebook(
     """
     from papermill.translators import papermill_translators
 
-    copy: nbformat.NotebookNode = nbformat.from_dict(_clean(dict(notebook), folders))
+    from wildlab.reporting.notebook_file import nbformat
+
+    copy: NotebookNode = nbformat.from_dict(_clean(dict(notebook), folders))
     copy.metadata.pop("papermill", None)
     copy.cells = [cell for cell in copy.cells if _ERROR_MARK not in cell.metadata.get("tags", [])]
     for cell in copy.cells:

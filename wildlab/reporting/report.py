@@ -28,11 +28,11 @@ from matplotlib.figure import Figure
 from wildlab.errors import WildlabError
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import png_bytes, save_figure
+from wildlab.reporting.page import TAGS
 from wildlab.reporting.published import load_published
 from wildlab.reporting.text import NOTHING, escape, inline, maths, number, prose, slug
 
 LEVELS = ("good", "warn", "bad", "neutral")
-TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed": "computed, no flight"}
 
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
 _FULL_SIZE, _LEAST_SIZE = 116, 58

@@ -1,8 +1,9 @@
 """What became of a study: every published number and claim beside what came out here.
 
 A published number counts as *reproduced* when our value lies within the tolerance that `data/published`
-states for it, or when the published value lies in the middle 90 % of our simulated flights. Where there is
-neither, the difference is shown and nothing is claimed.
+states for it, or when the published value lies in the middle 90 % of our simulated flights, of fewer than 30
+between the lowest and the highest. Where there is neither, the difference is shown and nothing is claimed.
+Nothing is claimed of a first look either, whose numbers come from fewer flights than the study's own.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 REPRODUCED, DIFFERS, NOT_JUDGED, MISSING = "reproduced", "differs", "not judged", "not reproduced yet"
+#: The state of a study of which only a first look is there, and the verdict on whatever it has a number for.
+FIRST_LOOK = "first look"
 
 
 class ListedStudy(Protocol):
@@ -48,6 +51,8 @@ class Number:
     within: float | None
     verdict: str
     reason: str = ""
+    #: Over how many flights ``low`` and ``high`` are; None where they are of another kind.
+    over: int | None = None
 
     @property
     def difference(self) -> float | None:
@@ -68,7 +73,8 @@ class Claim:
 
 @dataclass(frozen=True)
 class StudyStatus:
-    """One study: ``state`` is "done", "failed", "not run" or "broken off"; ``reason`` says why it failed."""
+    """One study: ``state`` is "done", `FIRST_LOOK`, "failed", "not run" or "broken off"; ``reason`` says why
+    it failed, ``first_look`` what a first look shows of what ("5 of 200 flights")."""
 
     study: ListedStudy
     state: str
@@ -77,9 +83,15 @@ class StudyStatus:
     finished: str = ""
     flight: str = ""
     seeds: int | None = None
+    first_look: str = ""
     has_report: bool = False
     numbers: list[Number] = field(default_factory=list)
     claims: list[Claim] = field(default_factory=list)
+
+    @property
+    def ran(self) -> bool:
+        """Whether there are numbers."""
+        return self.state in ("done", FIRST_LOOK)
 
     def count(self, verdict: str) -> int:
         """How many of the numbers have that verdict."""
@@ -96,7 +108,7 @@ def verdict_on(
     within
         The tolerance stated for it, where one is.
     low, high
-        The middle 90 % over flights, where there were several.
+        The bounds over flights (`wildlab.reporting.spread.bounds_of`), where there were several.
     """
     if here is None:
         return MISSING

@@ -121,6 +121,10 @@ class Cluster:
             )
         return results
 
+    def notes(self) -> list[tuple[str, str]]:
+        """None: what a cluster's workers log stays with them."""
+        return []
+
     def shutdown(self, count: int) -> None:
         """Nothing to do: it takes no process of this machine's."""
 

@@ -98,7 +98,7 @@ def evaluate_flight(
             "see what is amiss: wildlab check",
             file=folder,
         )
-    return run_all(jobs, skipped, studies, reports, console)
+    return run_all([jobs], skipped, studies, reports, console)
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:

@@ -7,6 +7,7 @@ import json
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from wildlab.paths import DATA, PACKAGE
@@ -44,6 +45,18 @@ def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
     """What a trial's numbers depend on besides the seed, as 64 hexadecimal digits. ``code``: `code_key`."""
     text = json.dumps([case, dict(parameters), code], sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
+    """What a study's page depends on, as 64 hexadecimal digits: `code_key`, how it is shown and said, what is
+    published, the notebook, and ``given``, whatever the notebook is given."""
+    package = ROOT / "wildlab"
+    shown = [path for room in ("studies", "reporting") for path in (package / room).rglob("*.py")]
+    digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
+    for path in [*sorted([*shown, *(DATA / "published").glob("*.toml")]), notebook]:
+        digest.update(path.name.encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def code_key() -> str:

@@ -32,6 +32,10 @@ class Job:
     #: How many cells the notebook has, and what is to be computed for each seed before it starts.
     cells: int = 0
     seeds: SeedWork | None = None
+    #: What a first look takes less of, by parameter: (how many, of how many). Empty: the full numbers.
+    first_look: dict[str, tuple[int, int]] = field(default_factory=dict)
+    #: What the page depends on, see `wildlab.runner.fingerprint.page_key`.
+    fingerprint: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,3 +45,15 @@ class Failure:
     reason: str
     step: str = ""
     details: str = ""
+
+
+def look_words(first_look: Any) -> str:
+    """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
+    try:
+        parts = [
+            f"{int(few)} of {int(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
+            for name, (few, whole) in first_look.items()
+        ]
+    except (AttributeError, TypeError, ValueError):
+        return ""
+    return ", ".join(parts)

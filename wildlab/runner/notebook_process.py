@@ -21,7 +21,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.job import Failure, Job
+from wildlab.runner.job import Failure, Job, look_words
 from wildlab.runner.processes import end_below
 
 #: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
@@ -84,6 +84,8 @@ def _keep_to_ourselves(job: Job) -> None:
 def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.files import write_atomic, write_json
     from wildlab.reporting import html, metrics, privacy
+    from wildlab.reporting.notebook_file import read_notebook
+    from wildlab.reporting.page import first_look_notice
     from wildlab.runner import provenance
     from wildlab.runner.catalogue import OTHERS
 
@@ -100,6 +102,8 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         seed=job.seed,
         others=others,
     )
+    if job.first_look:
+        origin["first_look"] = job.first_look
     if job.seeds is not None:
         origin["seeds"] = job.seeds.provenance()
     write_json(folder / "provenance.json", origin)
@@ -118,7 +122,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         )
     finally:
         if executed.is_file():
-            cleaned = privacy.clean_notebook(html.read_notebook(executed), shown, {str(folder): "."})
+            cleaned = privacy.clean_notebook(read_notebook(executed), shown, {str(folder): "."})
             write_atomic(executed, json.dumps(cleaned, indent=1, ensure_ascii=False) + "\n")
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
@@ -128,7 +132,9 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     metrics.read_metrics(folder / "metrics.json")
     origin["seconds"] = round(time.monotonic() - started, 1)
     write_json(folder / "provenance.json", origin)
-    page = html.report_page(cleaned, study=job.name, footer=provenance.footer(origin))
+    look = look_words(job.first_look)
+    notice = first_look_notice(look, job.again) if look else ""
+    page = html.report_page(cleaned, study=job.name, footer=provenance.footer(origin), notice=notice)
     write_atomic(folder / "report.html", page)
 
 
@@ -166,7 +172,7 @@ def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any]
     import papermill
     from traitlets.config import Config
 
-    from wildlab.reporting.html import read_notebook
+    from wildlab.reporting.notebook_file import read_notebook
 
     config = Config()
     if len(job.runtime) <= _LONGEST_SOCKET_FOLDER and sys.platform != "win32":
@@ -203,7 +209,7 @@ def _explain(error: BaseException, folder: Path) -> Failure:
     import traceback
 
     from wildlab.reporting.failure import step_of
-    from wildlab.reporting.html import read_notebook
+    from wildlab.reporting.notebook_file import read_notebook
     from wildlab.reporting.privacy import clean_text
 
     kind = type(error).__name__

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.html import read_notebook
+from wildlab.reporting.notebook_file import read_notebook
 
 
 def plain_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.reporting.failure import failure_page, step_of
-from wildlab.reporting.html import read_notebook
+from wildlab.reporting.notebook_file import nbformat, read_notebook
 from wildlab.reporting.privacy import clean_notebook, clean_text
 from wildlab.runner.job import Failure, Job
 
@@ -56,8 +56,6 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
 
 def write_notebook(path: Path, notebook: Any) -> None:
     """Write a notebook atomically."""
-    import nbformat
-
     write_atomic(path, nbformat.writes(notebook) + "\n")
 
 

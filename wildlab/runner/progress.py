@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Column
+
+from wildlab.runner.job import Job
 
 _STAGES = {"flight": "preparing the flight", "notebook": "starting", "page": "writing the page"}
 _ENDS = {"done": "[green]done[/]", "failed": "[red]failed[/]", "skipped": "[yellow]skipped[/]"}
@@ -21,6 +23,17 @@ def outcome_line(outcome: Any) -> str:
     took = f"  {outcome.seconds:.0f} s" if outcome.state != "skipped" else ""
     why = f"  {escape(outcome.reason)}" if outcome.reason else ""
     return f"{_ENDS[outcome.state]}  [bold]{escape(outcome.name)}[/]{took}{why}"
+
+
+def pass_line(jobs: Sequence[Job]) -> str:
+    """What is said before a pass that takes first looks; nothing before any other."""
+    looks = sum(bool(job.first_look) for job in jobs)
+    if not looks:
+        return ""
+    whole = len(jobs) - looks
+    return f"First looks: {looks} of {len(jobs)} reports from few flights" + (
+        f", and {whole} in full." if whole else "."
+    )
 
 
 @contextmanager
@@ -73,6 +86,8 @@ class Tally:
         elif event == "seed":
             self.seeds[name], count = what
             self.steps[name] = f"seed {what[0]} of {count}"
+        elif event == "note" and name in self.steps:
+            self.steps[name] = escape(what)
         elif event == "stage":
             self.steps[name] = _STAGES.get(what[0], str(what[0]))
             if what[0] == "page":
@@ -104,6 +119,8 @@ def _in_lines(console: Console) -> Callable[[str, str, Any], None]:
             done, count = what
             if 4 * done // count > 4 * (done - 1) // count:
                 say(f"seeds {escape(name)}: {done} of {count}")
+        elif event == "note":
+            say(f"note  {escape(name)}: {escape(what)}")
         elif event == "end":
             say(outcome_line(what))
 

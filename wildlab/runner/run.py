@@ -20,11 +20,13 @@ from rich.console import Console
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_study, load_studies
+from wildlab.runner.fingerprint import code_key, page_key
+from wildlab.runner.first_look import plan_passes, quick_first
 from wildlab.runner.front_page import build_ledger
 from wildlab.runner.job import Job
 from wildlab.runner.notebooks import check_notebook, plain_parameters
-from wildlab.runner.progress import outcome_line, shown
-from wildlab.runner.scheduling import Outcome, run_jobs
+from wildlab.runner.progress import outcome_line, pass_line, shown
+from wildlab.runner.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.seeds import SeedWork, make_work
 
 
@@ -39,6 +41,7 @@ def make_job(
     timeout_s: float | None = None,
     name: str | None = None,
     again: str | None = None,
+    first_look: bool = False,
 ) -> Job:
     """The job that runs a study, checked as far as it can be before it starts.
 
@@ -52,6 +55,8 @@ def make_job(
         Name of the report's folder; the study's if not given.
     again
         What to type to run it again, where that is not `wildlab run STUDY`.
+    first_look
+        With no more flights and runs than a first look takes; the job says so in its ``first_look``.
 
     Raises
     ------
@@ -64,12 +69,20 @@ def make_job(
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
         again += "" if seeds is None else f" --seeds {seeds}"
+    reductions = study.reductions() if first_look and seeds is None else {}
+    parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])
     seed = study.seed if seed is None else seed
     reports = reports.resolve()
     name = name or study.name
     own = flight is None
+    work = _seed_work(study, name, seed, flight, reports, parameters)
+    if "seeds" in reductions and study.shown_case() is not None and work is None:
+        # A logged flight is the only one of its kind.
+        parameters["seeds"] = reductions.pop("seeds")[1]
+    given = {**parameters, "seed": seed, "flight": "" if flight is None else str(flight.resolve())}
+    given |= {"twin": study.twin, "dataset": study.dataset, "recipes": [study.recipe, *study.beside]}
     return Job(
         name=name,
         title=study.title,
@@ -87,7 +100,9 @@ def make_job(
         again=again,
         timeout_s=study.timeout_minutes * 60 if timeout_s is None else timeout_s,
         cells=cells + 1,  # papermill adds one with the parameters
-        seeds=_seed_work(study, name, seed, flight, reports, parameters),
+        seeds=work,
+        first_look=reductions,
+        fingerprint=page_key(notebook, given, work.code if work is not None else code_key()),
     )
 
 
@@ -109,6 +124,7 @@ def run_studies(
     names: Sequence[str] = (),
     *,
     everything: bool = False,
+    first_look: bool = False,
     seed: int | None = None,
     seeds: int | None = None,
     flight: Path | None = None,
@@ -119,15 +135,18 @@ def run_studies(
     timeout_s: float | None = None,
     console: Console | None = None,
 ) -> list[Outcome]:
-    """Run studies by name, or all, and rebuild the ledger.
+    """Run studies by name, or all, and keep the ledger up to date: it is written first, and after each study.
 
     Parameters
     ----------
     everything
-        Run all studies. One whose public data are not here is skipped, and says so; asked for by name, it
-        is an error.
+        Run all studies, the quick ones first, and twice: a first look at each, then the full numbers (see
+        `wildlab.runner.first_look`). One whose public data are not here is skipped, and says so; asked for by
+        name, it is an error.
+    first_look
+        Take the first look alone, at all studies or those named.
     seeds
-        Over how many simulated flights, in place of each study's own number.
+        Over how many simulated flights, in place of each study's own number; then there is one pass.
     flight
         A flight folder for the one study named, in place of its own; its report is then named
         ``<study>-<flight>``.
@@ -162,7 +181,9 @@ def run_studies(
         if len(chosen) != 1:
             raise WildlabError("a flight goes with one study", "name one study", field="--flight")
         report = f"{chosen[0].name}-{_flight_name(flight)}"
-    jobs, skipped = [], []
+    if everything:
+        chosen = quick_first(chosen, reports)
+    ready, skipped = [], []
     for study in chosen:
         absent = _absent_data(study) if flight is None else None
         if absent is not None and everything:
@@ -170,7 +191,10 @@ def run_studies(
             continue
         if absent is not None:
             raise absent
-        job = make_job(
+        ready.append(study)
+
+    def job(study: StudyEntry, few: bool = False) -> Job:
+        return make_job(
             study,
             seed=seed,
             seeds=seeds,
@@ -179,11 +203,18 @@ def run_studies(
             notebooks=notebooks,
             timeout_s=timeout_s,
             name=report,
+            first_look=few,
         )
-        jobs.append(job)
+
+    passes = [[job(study) for study in ready]]
+    if first_look or (everything and seeds is None):
+        looks = {look.name: look for study in ready if (look := job(study, few=True)).first_look}
+        planned = plan_passes(passes[0], looks)
+        passes = [planned.first] if first_look else [planned.first, planned.second]
+        skipped += planned.kept if first_look else []
     notes = _notes(chosen, seeds, scheduler)
     return run_all(
-        jobs, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
+        passes, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
     )
 
 
@@ -200,7 +231,7 @@ def _notes(chosen: Sequence[StudyEntry], seeds: int | None, scheduler: str | Non
 
 
 def run_all(
-    jobs: list[Job],
+    passes: Sequence[Sequence[Job]],
     skipped: list[Outcome],
     studies: dict[str, StudyEntry],
     reports: Path,
@@ -210,16 +241,32 @@ def run_all(
     parallel: int = 1,
     scheduler: str | None = None,
 ) -> list[Outcome]:
-    """Run what was made ready, show how it goes, and rebuild the ledger; outcomes as of `run_studies`."""
+    """Run what was made ready, one pass after the other, and show how it goes; outcomes as of `run_studies`.
+
+    The ledger is written before anything else, and after each study: whenever this is broken off, it says
+    what is there.
+    """
     if console is not None:
         for note in notes:
             console.print(note, highlight=False, soft_wrap=True)
         for outcome in skipped:
             console.print(outcome_line(outcome), highlight=False, soft_wrap=True)
-    with shown(console) if console is not None else nullcontext() as listen:
-        outcomes = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=listen)
     build_ledger(reports, studies)
-    return [*outcomes, *skipped]
+    outcomes: dict[str, Outcome] = {}
+    for jobs in filter(None, passes):
+        if console is not None and (line := pass_line(jobs)):
+            console.print(line, highlight=False, soft_wrap=True)
+        with shown(console) if console is not None else nullcontext() as listen:
+
+            def tell(name: str, event: str, what: Any, listen: Listener | None = listen) -> None:
+                if event == "end":
+                    build_ledger(reports, studies)
+                if listen is not None:
+                    listen(name, event, what)
+
+            for outcome in run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell):
+                outcomes[outcome.name] = outcome
+    return [*outcomes.values(), *skipped]
 
 
 def _flight_name(folder: Path) -> str:

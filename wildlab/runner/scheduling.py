@@ -38,8 +38,8 @@ class Outcome:
 
 
 #: Called with (name, event, what). First of all ("", "plan", how many seeds and cells there are to do); then
-#: for each study "start" None, "seeds" (to compute, all), "seed" (done, to compute), "stage" (text,), "cell"
-#: (index, count), "end" Outcome.
+#: for each study "start" None, "seeds" (to compute, all), "seed" (done, to compute), "note" text, "stage"
+#: (text,), "cell" (index, count), "end" Outcome.
 Listener = Callable[[str, str, Any], None]
 
 
@@ -116,6 +116,8 @@ class _Scheduler:
     tell: Listener
     running: list[_Running] = field(default_factory=list)
     outcomes: dict[str, Outcome] = field(default_factory=dict)
+    #: Cases of which a seed has been computed here.
+    known: set[str] = field(default_factory=set)
 
     def run(self) -> dict[str, Outcome]:
         try:
@@ -155,6 +157,8 @@ class _Scheduler:
             return
         for one in self.waiting:
             while one.seeds and one.job.seeds is not None and self.pool.places(self.room):
+                if self.compiling(one.job.seeds.case):
+                    break
                 one.start(self.tell)
                 self.pool.submit(one.job.seeds, one.seeds[0], one.job.timeout_s)
                 one.seeds.popleft()
@@ -162,14 +166,24 @@ class _Scheduler:
         if not any(one.seeds for one in self.waiting):
             self.pool.shutdown(self.pool.size)
 
+    def compiling(self, case: str) -> bool:
+        """Whether the first seed of a case is under way: what its process compiles on first use of this
+        machine, the others shall find compiled."""
+        under_way = {one.job.seeds.case for one in self.waiting if one.under_way and one.job.seeds}
+        return isinstance(self.pool, WorkerPool) and case in under_way - self.known
+
     def collect_seeds(self) -> None:
         by_name = {one.job.name: one for one in self.waiting}
         for result in self.pool.collect():
             one = by_name[result.study]
             one.under_way -= 1
+            if one.job.seeds is not None:
+                self.known.add(one.job.seeds.case)
             if result.failure is not None:
                 one.failures.append((result.seed, result.failure))
             self.tell(one.job.name, "seed", (one.count - len(one.seeds) - one.under_way, one.count))
+        for name, text in self.pool.notes():
+            self.tell(name, "note", text)
 
     def collect_notebooks(self) -> None:
         for one in list(self.running):
@@ -275,6 +289,9 @@ def _finish(job: Job, failure: Failure | None, cell: int | None, started: float,
         "started": began,
         "finished": _now(),
         "seconds": seconds,
+        "fingerprint": job.fingerprint,
+        # Of what the page shows less than the study's own: {"seeds": [5, 200]}; {} where it is whole.
+        "first_look": {} if failure else job.first_look,
     }
     try:
         if failure is not None:

@@ -12,8 +12,9 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.published import FOLDER, load_claims, load_published
-from wildlab.reporting.status import MISSING, Claim, Number, StudyStatus, verdict_on
+from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, verdict_on
 from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.job import look_words
 
 
 def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> StudyStatus:
@@ -26,11 +27,14 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
     state = str(status["state"])
     metrics: dict[str, Any] | None = None
     reason = str(status.get("reason", ""))
+    look = look_words(status.get("first_look"))
     if state == "done":
         try:
             metrics = read_metrics(folder / "metrics.json")
         except WildlabError:
             state, reason = "broken off", ""
+    if state == "done" and look:
+        state = FIRST_LOOK
     return StudyStatus(
         study=study,
         state=state,
@@ -39,9 +43,10 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
         finished=str(status.get("finished", "")),
         flight=metrics["flight"] if metrics else "",
         seeds=metrics["seeds"] if metrics else None,
-        has_report=state in ("done", "failed") and (folder / "report.html").is_file(),
+        first_look=look if state == FIRST_LOOK else "",
+        has_report=state in ("done", FIRST_LOOK, "failed") and (folder / "report.html").is_file(),
         numbers=_numbers(study, metrics, state, published),
-        claims=_claims(study, metrics, published),
+        claims=_claims(study, metrics, state, published),
     )
 
 
@@ -53,6 +58,7 @@ def as_plain(one: StudyStatus) -> dict[str, Any]:
         "section": one.study.section,
         "kind": one.study.kind,
         "state": one.state,
+        "first_look": one.first_look or None,
         "reason": one.reason,
         "seconds": one.seconds,
         "finished": one.finished or None,
@@ -93,11 +99,21 @@ def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publ
             "low": found.get("low"),
             "high": found.get("high"),
             "within": within,
+            "over": _over(metrics, found),
         }
         verdict = verdict_on(number["here"], number["published"], within, number["low"], number["high"])
+        if state == FIRST_LOOK and verdict != MISSING:
+            verdict = FIRST_LOOK
         reason = _reason(study, row["name"], row["subject"], state) if verdict == MISSING else ""
         numbers.append(Number(**number, verdict=verdict, reason=reason))
     return numbers
+
+
+def _over(metrics: dict[str, Any] | None, found: dict[str, Any]) -> int | None:
+    """Over how many flights, or runs of one, the bounds of a number are; None where they are none such."""
+    if metrics is None or found.get("low") is None:
+        return None
+    return metrics["seeds"] or (found["n"] if metrics["kind"] == "twin" else None)
 
 
 def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:
@@ -106,10 +122,10 @@ def _reason(study: StudyEntry, name: str, subject: str, state: str) -> str:
             fnmatchcase(text, pattern) for text in (subject, name, f"{name}/{subject}", *subject.split("/"))
         ):
             return reason
-    return "" if state != "done" else "the study does not give it yet"
+    return "" if state not in ("done", FIRST_LOOK) else "the study does not give it yet"
 
 
-def _claims(study: StudyEntry, metrics: dict[str, Any] | None, published: Path) -> list[Claim]:
+def _claims(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Claim]:
     typed = {entry["id"]: entry for entry in load_claims(study.name, published)}
     decided = {entry["id"]: entry for entry in metrics["claims"]} if metrics else {}
     claims = []
@@ -120,7 +136,7 @@ def _claims(study: StudyEntry, metrics: dict[str, Any] | None, published: Path) 
                 id=key,
                 text=theirs.get("text") or ours["text"],
                 source=theirs.get("source", ""),
-                verdict=ours.get("verdict", "not tested yet"),
+                verdict=FIRST_LOOK if ours and state == FIRST_LOOK else ours.get("verdict", "not tested yet"),
                 fraction=ours.get("fraction"),
                 seeds=ours.get("seeds"),
             )

@@ -9,6 +9,7 @@ added up in the same order.
 from __future__ import annotations
 
 import contextlib
+import logging
 import multiprocessing
 import os
 import threading
@@ -82,9 +83,24 @@ def serve(pipe: connection.Connection) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # a warning would break the runner's display
         os.dup2(nowhere, stream)
+    logger = logging.getLogger("wildlab")
+    logger.setLevel(logging.INFO)
+    logger.addHandler(_ToRunner(pipe))
     with contextlib.suppress(EOFError, OSError):
         while True:
             pipe.send(answer(*pipe.recv()))
+
+
+class _ToRunner(logging.Handler):
+    """What the code below logs (that it compiles, which takes a while) goes to the runner, to be shown."""
+
+    def __init__(self, pipe: connection.Connection) -> None:
+        super().__init__(logging.INFO)
+        self._pipe = pipe
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):
+            self._pipe.send(("note", record.getMessage()))
 
 
 def _end_with_parent() -> None:
@@ -114,6 +130,7 @@ class WorkerPool:
 
     def __init__(self) -> None:
         self._workers: list[_Worker] = []
+        self._notes: list[tuple[str, str]] = []
 
     def __enter__(self) -> WorkerPool:
         return self
@@ -150,6 +167,11 @@ class WorkerPool:
             connection.wait(self.pipes, timeout=wait_s)
         return [result for worker in list(self._workers) if (result := self._result(worker)) is not None]
 
+    def notes(self) -> list[tuple[str, str]]:
+        """(study, text) of what the processes have logged since the last time."""
+        notes, self._notes = self._notes, []
+        return notes
+
     def shutdown(self, count: int, *, idle: bool = True) -> None:
         """End up to ``count`` processes; only such as have nothing to do, unless told otherwise."""
         for worker in [one for one in self._workers if one.work is None or not idle][: max(0, count)]:
@@ -172,7 +194,11 @@ class WorkerPool:
             return None
         said = None
         try:
-            said = worker.pipe.recv() if worker.pipe.poll() else None
+            while said is None and worker.pipe.poll():
+                said = worker.pipe.recv()
+                if said[0] == "note":
+                    self._notes.append((work.study, said[1]))
+                    said = None
         except (EOFError, OSError):
             gone = True
         if said is not None:

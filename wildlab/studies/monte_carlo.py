@@ -11,28 +11,41 @@ from numpy.typing import ArrayLike
 
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report
+from wildlab.reporting.spread import bounds_of, range_words, spread_words
 from wildlab.studies.protocol import Study
 
 #: Share of the flights on which a claim must be true to hold, and below which it does not.
 HOLDS, FAILS = 0.9, 0.5
 
-#: Headings and decimals of the tables that `beside_published` and `decide_claims` give.
-PUBLISHED_COLUMNS = {
-    "subject": "pose",
-    "quantity": "quantity (m)",
-    "published": "published",
-    "here": "here, median",
-    "difference": "difference",
-    "range": "90 % of flights",
-    "inside": "published inside",
-    "drawn": "flight drawn",
-}
+#: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
 PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "difference", "drawn"), 2)
 CLAIM_COLUMNS = {"claim": "claim", "source": "where", "verdict": "verdict", "share": "flights (%)"}
 
 
+def published_columns(n: int) -> dict[str, str]:
+    """Headings of the table that `beside_published` gives for ``n`` flights."""
+    if n < 2:
+        return {
+            "subject": "pose",
+            "quantity": "quantity (m)",
+            "published": "published",
+            "here": "here, one flight",
+            "difference": "difference",
+        }
+    return {
+        "subject": "pose",
+        "quantity": "quantity (m)",
+        "published": "published",
+        "here": "here, median",
+        "difference": "difference",
+        "range": spread_words(n).heading,
+        "inside": "published inside",
+        "drawn": "flight drawn",
+    }
+
+
 def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping[str, int]) -> None:
-    """Record medians over flights with the middle 90 % as their range.
+    """Record medians over flights, and as their range what `bounds_of` gives.
 
     A quantity that only the flight drawn has, which stands first, is recorded from that one alone.
 
@@ -56,7 +69,7 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1)
             continue
-        low, high = values.quantile(0.05), values.quantile(0.95)
+        low, high = bounds_of(values)
         report.metric(name, subject, values.median(), unit, n=n.get(subject), low=low, high=high)
 
 
@@ -66,7 +79,7 @@ def beside_published(
     subjects: Mapping[str, str],
     names: Sequence[str],
 ) -> pd.DataFrame:
-    """Published numbers beside the median over flights, the middle 90 % of them, and the first flight.
+    """Published numbers beside the median over flights, the bounds of their spread, and the first flight.
 
     Parameters
     ----------
@@ -83,7 +96,7 @@ def beside_published(
     for subject, words in subjects.items():
         for name in names:
             values, printed = spread[subject, name], published[subject, name]
-            low, high = values.quantile(0.05), values.quantile(0.95)
+            low, high = bounds_of(values)
             rows.append(
                 {
                     "subject": words,
@@ -91,7 +104,7 @@ def beside_published(
                     "published": printed,
                     "here": values.median(),
                     "difference": values.median() - printed,
-                    "range": f"{low:.1f} to {high:.1f}".replace("-", "−"),
+                    "range": range_words(values),
                     "inside": "yes" if low <= printed <= high else "no",
                     "drawn": values.iloc[0],
                 }

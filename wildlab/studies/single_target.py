@@ -48,13 +48,17 @@ QUANTITIES = {
     "nees": "mean NEES",
     "nis": "mean NIS",
 }
-COLUMNS = {**monte_carlo.PUBLISHED_COLUMNS, "subject": "filter", "quantity": "quantity"}
 #: What is said wherever NEES or mean errors stand.
 CONVENTIONS = (
     f"Errors here are {ERROR_CONVENTION}; the thesis does not print which way round its mean errors are, so "
     "that their signs cannot be compared. The truth is the target's own single-frequency GPS receiver, as in "
     "the thesis: its error counts as the filter's. NEES is that of the position alone."
 )
+
+
+def published_columns(n: int) -> dict[str, str]:
+    """As `wildlab.studies.monte_carlo.published_columns`, for tracks."""
+    return monte_carlo.published_columns(n) | {"subject": "filter", "quantity": "quantity"}
 
 
 def name_of(subject: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.reporting.spread import range_words, spread_words
 from wildlab.studies.gating.monte_carlo import FORMS
 from wildlab.studies.gating.variations import standard_error
 
@@ -20,7 +21,7 @@ FED = {
     "own": "with the main object's own",
     "nothing": "with nothing",
 }
-RATES_COLUMNS = {
+_RATES_COLUMNS = {
     "fed": "track updated",
     "form": "gating by",
     "published": "published (%)",
@@ -28,9 +29,13 @@ RATES_COLUMNS = {
     "se": "standard error",
     "difference": "difference",
     "sd": "SD over runs",
-    "range": "90 % of runs",
 }
 RATES_DIGITS = {"published": 2, "here": 2, "se": 2, "difference": 2, "sd": 1}
+
+
+def rates_columns(runs: int) -> dict[str, str]:
+    """Headings of the table that `rates_table` gives for so many runs."""
+    return {**_RATES_COLUMNS, "range": spread_words(runs, "run").heading}
 
 
 def rates_table(rates: Mapping[str, Array], published: Mapping[str, float]) -> pd.DataFrame:
@@ -48,7 +53,7 @@ def rates_table(rates: Mapping[str, Array], published: Mapping[str, float]) -> p
                 "se": standard_error(runs),
                 "difference": runs.mean() - published[form],
                 "sd": runs.std(ddof=1),
-                "range": "{:.0f} to {:.0f}".format(*np.quantile(runs, (0.05, 0.95))),
+                "range": range_words(runs, 0),
             }
             for fed, words in FED.items()
             for form, runs in zip(FORMS, rates[fed], strict=True)

@@ -1,0 +1,95 @@
+"""The spread over few flights is not called what only many flights have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.reporting.report import open_report
+from wildlab.reporting.spread import bounds_of, range_clause, range_words, spread_words
+from wildlab.studies import monte_carlo, single_target
+from wildlab.studies.gating import text as gating
+from wildlab.studies.protocol import Metric, Study
+
+FLIGHTS = pd.Series(np.random.default_rng(1).permutation(np.arange(200.0)))
+
+
+@pytest.mark.parametrize("n", [2, 29])
+def test_of_few_flights_the_lowest_and_the_highest(n: int) -> None:
+    few = FLIGHTS[:n]
+    assert bounds_of(few) == (few.min(), few.max())
+    words = spread_words(n)
+    assert words.over == f"the median of {n} simulated flights, and the lowest and the highest of them"
+    assert (words.heading, words.key) == (f"lowest to highest of {n} flights", "lowest to highest")
+    assert range_clause(few) == f"; {few.min():.1f} to {few.max():.1f} on {n} flights"
+    assert not any("90 %" in text or "nine" in text for text in words)
+
+
+@pytest.mark.parametrize("n", [30, 200])
+def test_of_many_flights_the_middle_90_percent(n: int) -> None:
+    many = FLIGHTS[:n]
+    assert bounds_of(many) == tuple(np.quantile(many, (0.05, 0.95))), "to the last digit"
+    assert spread_words(n) == (
+        f"the median of {n} simulated flights, and the range that nine of ten lie in",
+        "on nine flights of ten",
+        "90 % of flights",
+        "middle 90 %",
+    )
+    assert spread_words(n, "run").heading == "90 % of runs"
+    assert range_clause(many).endswith(" on nine flights of ten")
+
+
+def test_one_flight_has_no_spread() -> None:
+    assert np.isnan(bounds_of(FLIGHTS[:1])).all()
+    assert spread_words(1) == ("one simulated flight", "", "", "")
+    assert range_words(FLIGHTS[:1]) == range_clause(FLIGHTS[:1]) == ""
+
+
+def test_flights_without_a_value_are_left_out_and_still_counted() -> None:
+    few = pd.Series([np.nan, 3.0, 1.0])
+    assert bounds_of(few) == (1.0, 3.0)
+    many = pd.concat([FLIGHTS[:20], pd.Series([np.nan] * 10)])
+    assert bounds_of(many) == (FLIGHTS[:20].quantile(0.05), FLIGHTS[:20].quantile(0.95))
+
+
+def test_ranges_are_typeset_with_a_minus() -> None:
+    assert range_words([-2.0, -1.0]) == "−2.0 to −1.0" and range_words([1.4, 3.6], 0) == "1 to 4"
+
+
+@pytest.mark.parametrize(
+    ("n", "heading"),
+    [
+        (1, None),
+        (2, "lowest to highest of 2 flights"),
+        (29, "lowest to highest of 29 flights"),
+        (30, "90 % of flights"),
+    ],
+)
+def test_tables_follow_the_number_of_flights(n: int, heading: str | None) -> None:
+    spread = pd.DataFrame({("a", "mae"): FLIGHTS[:n]})
+    table = monte_carlo.beside_published({("a", "mae"): 1e6}, spread, {"a": "A"}, ["mae"])
+    for columns in (monte_carlo.published_columns(n), single_target.published_columns(n)):
+        assert set(columns) <= set(table)
+        assert columns.get("range") == heading and ("inside" in columns) == (n > 1)
+        assert ("median" in columns["here"]) == (n > 1)
+    assert table.loc[0, "range"] == range_words(FLIGHTS[:n])
+
+
+def test_runs_of_gating_follow_their_number() -> None:
+    assert gating.rates_columns(10_000)["range"] == "90 % of runs"
+    assert gating.rates_columns(29)["range"] == "lowest to highest of 29 runs"
+
+
+@pytest.mark.parametrize(("n", "bounds"), [(1, (None, None)), (2, "range"), (29, "range"), (30, "quantiles")])
+def test_metrics_have_the_bounds_that_are_shown(n: int, bounds: object) -> None:
+    study = Study("x", ("a",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+    report = open_report(study="x", kind="twin")
+    values = FLIGHTS[:n]
+    monte_carlo.record_spread(report, study, pd.DataFrame({("a", "mae"): values}), {})
+    (entry,) = report._metrics
+    expected = {
+        "range": (values.min(), values.max()),
+        "quantiles": (values.quantile(0.05), values.quantile(0.95)),
+    }.get(str(bounds), bounds)
+    assert (entry["low"], entry["high"]) == expected and entry["value"] == values.median()

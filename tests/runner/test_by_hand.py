@@ -1,0 +1,121 @@
+"""Study notebooks opened by hand, with no flight and no parameter given: they get their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.catalog import is_fetched
+from wildlab.flight.store import save_flight
+from wildlab.paths import NOTEBOOKS
+from wildlab.runner import by_hand
+from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.simulation.twins import simulate_twin
+
+STUDIES = load_studies(NOTEBOOKS / "studies.toml")
+
+
+@pytest.fixture
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
+    """What flights were made of; each is a small one of its own."""
+    calls: list[tuple[Any, ...]] = []
+
+    def make(*given: Any) -> Path:
+        calls.append(given)
+        return tmp_path / str(len(calls))
+
+    monkeypatch.setattr(by_hand, "twin_flight", make)
+    monkeypatch.setattr(by_hand, "dataset_flight", make)
+    monkeypatch.setattr(by_hand, "load_flight", lambda folder: folder)
+    return calls
+
+
+def test_a_study_by_hand_makes_its_own_twin(made: list[tuple[Any, ...]], tmp_path: Path) -> None:
+    assert by_hand.flight_for("schmidt-fast-vessel", "", 7) == tmp_path / "1"
+    assert made == [("fast-vessel", 7, by_hand.REPORTS)]
+
+
+def test_a_study_by_hand_imports_all_flights_of_its_data_set(made: list[tuple[Any, ...]]) -> None:
+    study = STUDIES["autoferry"]
+    assert len(by_hand.flights_for("autoferry", "", [], 1)) == 1 + len(study.beside)
+    assert [recipe for _, recipe, _ in made] == [study.recipe, *study.beside]
+    assert {dataset for dataset, _, _ in made} == {"autoferry"}
+
+
+def test_a_flight_that_is_given_is_taken(made: list[tuple[Any, ...]], tmp_path: Path) -> None:
+    # The name is no study's: `wildlab evaluate` names reports after flights.
+    assert by_hand.flight_for("tuesday", str(tmp_path), 1) == tmp_path
+    assert by_hand.flights_for("tuesday", "a", ["b"], 1) == [Path("a"), Path("b")]
+    assert made == []
+
+
+@pytest.mark.parametrize(
+    ("study", "sentence"),
+    [("static-pont", "did you mean 'static-point'"), ("sensitivity", "no flight of its own")],
+)
+def test_without_a_flight_a_sentence_says_what_to_do(study: str, sentence: str) -> None:
+    with pytest.raises(WildlabError, match=f"(?i){sentence}"):
+        by_hand.flight_for(study, "", 1)
+
+
+def test_without_its_data_set_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wildlab.flight.catalog.is_fetched", lambda name: False)
+    with pytest.raises(WildlabError, match="wildlab fetch openathena"):
+        by_hand.flight_for("survey-markers", "", 1)
+
+
+@pytest.mark.slow
+def test_a_twin_by_hand_is_the_one_of_its_seed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(by_hand, "REPORTS", tmp_path)
+    save_flight(simulate_twin("static-antenna", 3), tmp_path / "expected")
+    ours, theirs = by_hand.flight_for("static-point", "", 3), by_hand.load_flight(tmp_path / "expected")
+    assert ours.imu is not None and ours.imu.equals(theirs.imu)
+
+
+def by_notebook() -> dict[str, StudyEntry]:
+    """The study that each notebook shows by hand: the one that its parameters name."""
+    found = {}
+    for path in sorted(NOTEBOOKS.glob("*.ipynb")):
+        cells = nbformat.read(path, as_version=4).cells
+        parameters = next(cell.source for cell in cells if "parameters" in cell.metadata.get("tags", []))
+        name = next(line.split('"')[1] for line in parameters.splitlines() if line.startswith("study = "))
+        found[path.name] = STUDIES[name]
+    return found
+
+
+def test_every_study_notebook_names_a_study_that_it_shows() -> None:
+    shown = by_notebook()
+    assert {name: study.notebook for name, study in shown.items()} == {name: name for name in shown}
+    assert set(shown) == {study.notebook for study in STUDIES.values()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({study.notebook for study in STUDIES.values()}))
+def test_every_study_notebook_runs_by_hand(name: str, tmp_path: Path) -> None:
+    from nbclient import NotebookClient
+    from nbclient.exceptions import CellExecutionError
+
+    study = by_notebook()[name]
+    notebook = nbformat.read(NOTEBOOKS / name, as_version=4)
+    # What it makes and computes is kept there, and not among the reports of this checkout.
+    elsewhere = f"import pathlib, wildlab.paths\nwildlab.paths.REPORTS = pathlib.Path({str(tmp_path)!r})"
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(elsewhere))
+    client = NotebookClient(
+        notebook, timeout=1200, kernel_name="python3", resources={"metadata": {"path": str(NOTEBOOKS)}}
+    )
+    if study.dataset is not None and not is_fetched(study.dataset):
+        with pytest.raises(CellExecutionError, match=f"wildlab fetch {study.dataset}"):
+            client.execute()
+        return
+    client.execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", []) if "data" in output]
+    assert any("<h1>" in str(output["data"].get("text/html", "")) for output in shown)
+    kept = {path.parts[len(tmp_path.parts)] for path in tmp_path.rglob("*") if path.is_file()}
+    assert kept == {
+        *((".flights",) if study.twin or study.recipe else ()),
+        *((".seeds",) if study.shown_case() else ()),
+    }, "by hand no report is written"

@@ -1,0 +1,366 @@
+"""First looks: which pass runs what, what each page says, and when the ledger is written."""
+
+from __future__ import annotations
+
+import json
+import logging
+import multiprocessing
+from collections.abc import Sequence
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+from rich.text import Text
+
+from tests.notebooks import OPEN, notebook, write
+from wildlab.errors import WildlabError
+from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.page import first_look_notice
+from wildlab.runner import run as running
+from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
+from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quick_first
+from wildlab.runner.job import Job, look_words
+from wildlab.runner.progress import Tally, shown
+from wildlab.runner.run import make_job, run_studies
+from wildlab.runner.scheduling import Outcome, _Scheduler, _waiting
+from wildlab.runner.seeds import SeedWork, read_seed, write_seed
+from wildlab.runner.worker_pool import SeedResult, WorkerPool, _ToRunner
+
+STUDIES = load_studies(NOTEBOOKS / "studies.toml")
+
+
+def jobs(reports: Path, *names: str) -> tuple[list[Job], dict[str, Job]]:
+    """The full jobs of studies, and those first looks that take less."""
+    whole = [make_job(STUDIES[name], reports=reports) for name in names]
+    looks = [make_job(STUDIES[name], reports=reports, first_look=True) for name in names]
+    return whole, {look.name: look for look in looks if look.first_look}
+
+
+def leave_report(job: Job, **more: Any) -> None:
+    folder = Path(job.reports) / job.name
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "report.html").write_text("report")
+    status = {"state": "done", "seconds": 3.0, "first_look": job.first_look, "fingerprint": job.fingerprint}
+    (folder / "status.json").write_text(json.dumps(status | more))
+
+
+# -- what a first look is
+# ------------------------------------------------------------------------------------
+
+
+def test_a_first_look_takes_fewer_flights_and_the_same_ones(tmp_path: Path) -> None:
+    (whole,), looks = jobs(tmp_path, "static-point")
+    look = looks["static-point"]
+    assert look.first_look == {"seeds": (FIRST_LOOK_SEEDS, 100)} and whole.first_look == {}
+    assert (look.parameters["seeds"], whole.parameters["seeds"]) == (FIRST_LOOK_SEEDS, 100)
+    assert look.seeds is not None and whole.seeds is not None
+    assert look.seed == whole.seed and len(look.seeds.seeds) == FIRST_LOOK_SEEDS - 1
+    assert set(look.seeds.seeds) <= set(whole.seeds.seeds) and look.seeds.folder == whole.seeds.folder
+    assert look.fingerprint != whole.fingerprint
+
+
+def test_runs_of_a_slow_study_are_fewer_as_it_says(tmp_path: Path) -> None:
+    (whole,), looks = jobs(tmp_path, "gating")
+    assert looks["gating"].parameters["runs"] < whole.parameters["runs"] == 10_000
+    assert set(looks["gating"].first_look) == {"runs", "varied_runs"}
+
+
+def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path: Path) -> None:
+    assert jobs(tmp_path, "sensitivity", "consistency-bounds")[1] == {}
+    look = make_job(STUDIES["static-point"], reports=tmp_path, seeds=7, first_look=True)
+    assert look.first_look == {} and look.parameters["seeds"] == 7
+
+
+def test_first_looks_in_words() -> None:
+    assert look_words({"seeds": (5, 200)}) == "5 of 200 flights"
+    assert look_words({"runs": [500, 10000], "varied_runs": [50, 500]}) == (
+        "500 of 10000 runs, 50 of 500 varied runs"
+    )
+    assert look_words({}) == ""
+    notice = first_look_notice("5 of <b>", "wildlab run a")
+    assert "5 of &lt;b&gt;" in notice and "<code>wildlab run a</code>" in notice
+
+
+@pytest.mark.parametrize(
+    ("entry", "sentence"),
+    [
+        ("[s.first_look]\nruns = 5", "takes 5 of 'runs', and the study's own is None"),
+        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 5", "takes 5 of 'runs', and the study's own is 5"),
+        ("[s.parameters]\nruns = 5\n[s.first_look]\nruns = 0", "takes 0 of 'runs'"),
+        ("[s.parameters]\nruns = 'x'\n[s.first_look]\nruns = 1", "the study's own is 'x'"),
+    ],
+)
+def test_a_first_look_that_is_none_is_refused(tmp_path: Path, entry: str, sentence: str) -> None:
+    path = tmp_path / "studies.toml"
+    path.write_text(f'[s]\ntitle = "S"\nnotebook = "s.ipynb"\n{entry}\n')
+    with pytest.raises(WildlabError, match=sentence):
+        load_studies(path)
+
+
+# -- which pass runs what
+# ------------------------------------------------------------------------------------
+
+
+def test_first_every_page_and_then_the_full_numbers(tmp_path: Path) -> None:
+    whole, looks = jobs(tmp_path, "sensitivity", "static-point", "gating")
+    first, second, kept = plan_passes(whole, looks)
+    assert first == [whole[0], looks["static-point"], looks["gating"]]
+    assert second == whole[1:] and kept == []
+
+
+def test_a_full_report_of_the_same_is_not_replaced_by_a_first_look(tmp_path: Path) -> None:
+    whole, looks = jobs(tmp_path, "static-point", "gating")
+    for job in whole:
+        leave_report(job)
+    first, second, kept = plan_passes(whole, looks)
+    assert first == [] and second == whole
+    assert [(one.name, one.state, one.reason) for one in kept] == [
+        (job.name, "skipped", THERE) for job in whole
+    ]
+
+
+def test_whatever_is_not_the_full_report_of_the_same_gives_way(tmp_path: Path) -> None:
+    (whole,), looks = jobs(tmp_path, "gating")
+    others: list[dict[str, Any]] = [
+        {"fingerprint": "another"},
+        {"state": "failed"},
+        {"first_look": {"runs": [500, 10000]}},
+    ]
+    for more in others:
+        leave_report(whole, **more)
+        assert not has_whole_report(whole)
+        assert plan_passes([whole], looks) == ([looks["gating"]], [whole], [])
+    leave_report(whole)
+    assert has_whole_report(whole)
+    (tmp_path / "gating" / "report.html").unlink()
+    assert not has_whole_report(whole)
+    (tmp_path / "gating" / "status.json").write_text("[]")
+    assert not has_whole_report(whole)
+
+
+def test_a_study_whose_flights_are_all_kept_is_run_in_full_at_once(tmp_path: Path) -> None:
+    (whole,), looks = jobs(tmp_path, "static-point")
+    assert whole.seeds is not None
+    *most, last = whole.seeds.seeds
+    for seed in most:
+        write_seed(whole.seeds, seed, {"a/b": 1.0})
+    assert plan_passes([whole], looks) == ([looks[whole.name]], [whole], [])
+    write_seed(whole.seeds, last, {"a/b": 1.0})
+    assert plan_passes([whole], looks) == ([whole], [], [])
+    both = {whole.name: replace(looks[whole.name], first_look={"seeds": (5, 100), "steps": (1, 2)})}
+    assert plan_passes([whole], both).second == [whole], "its notebook takes its time as well"
+
+
+def test_the_quick_ones_go_first(tmp_path: Path) -> None:
+    names = ["static-point", "survey-markers", "sensitivity", "gating", "consistency-bounds"]
+    chosen = [STUDIES[name] for name in names]
+    assert [study.name for study in quick_first(chosen, tmp_path)] == [
+        "sensitivity", "consistency-bounds", "survey-markers", "static-point", "gating",
+    ]  # fmt: skip
+    for name, seconds in (("gating", 2.0), ("sensitivity", 40.0)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "status.json").write_text(json.dumps({"seconds": seconds}))
+    assert [study.name for study in quick_first(chosen, tmp_path)] == [
+        "gating", "consistency-bounds", "survey-markers", "sensitivity", "static-point",
+    ]  # fmt: skip
+
+
+# -- runs whose jobs are not carried out
+# ------------------------------------------------------------------------------------
+
+
+class Studies:
+    """Studies in ``folder`` whose jobs only leave a status; notes what was run, and what the ledger said."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.notebooks, self.reports = folder / "notebooks", folder / "reports"
+        self.passes: list[list[tuple[str, dict[str, Any]]]] = []
+        self.ledgers: list[str] = []
+        #: Break off (Ctrl-C) before this many jobs are done.
+        self.stop_after = 99
+        entries = []
+        for name, few in (("slow", True), ("quick", False), ("other", True)):
+            write(self.notebooks, f"{name}.ipynb", notebook(OPEN, more="runs = 1"))
+            entries.append(f'[{name}]\ntitle = "{name}"\nnotebook = "{name}.ipynb"\n')
+            entries.append(f"{'' if name == 'quick' else 'twin = ' + chr(34) + 'large-ship' + chr(34)}\n")
+            entries.append(f"[{name}.parameters]\nruns = 9\n" + f"[{name}.first_look]\nruns = 2\n" * few)
+        (self.notebooks / "studies.toml").write_text("".join(entries))
+        monkeypatch.setattr(running, "run_jobs", self.run_jobs)
+
+    def ledger(self) -> str:
+        return (self.reports / "index.html").read_text(encoding="utf-8")
+
+    def run_jobs(self, given: Sequence[Job], *, listen: Any, **_: Any) -> list[Outcome]:
+        self.passes.append([])
+        for job in given:
+            self.ledgers.append(self.ledger())
+            if sum(map(len, self.passes)) == self.stop_after:
+                raise KeyboardInterrupt
+            self.passes[-1].append((job.name, job.first_look))
+            leave_report(job)
+            content = {"study": job.name, "flight": "", "kind": "twin", "seed": 1, "seeds": None}
+            (self.reports / job.name / "metrics.json").write_text(
+                json.dumps(content | {"metrics": [], "claims": []})
+            )
+            listen(job.name, "end", Outcome(job.name, "done", 1.0))
+        return [Outcome(job.name, "done", 1.0, "look" if job.first_look else "whole") for job in given]
+
+    def run(self, *names: str, **more: Any) -> list[Outcome]:
+        return run_studies(names, notebooks=self.notebooks, reports=self.reports, **more)
+
+
+@pytest.fixture
+def studies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Studies:
+    return Studies(tmp_path, monkeypatch)
+
+
+LOOK = {"runs": (2, 9)}
+
+
+def test_all_studies_go_twice_and_one_that_is_named_once(studies: Studies) -> None:
+    outcomes = studies.run(everything=True)
+    assert studies.passes == [[("quick", {}), ("slow", LOOK), ("other", LOOK)], [("slow", {}), ("other", {})]]
+    assert [(one.name, one.reason) for one in outcomes] == [(n, "whole") for n in ("quick", "slow", "other")]
+    studies.passes.clear()
+    studies.run("slow", "quick")
+    assert studies.passes == [[("slow", {}), ("quick", {})]]
+
+
+def test_a_first_look_alone(studies: Studies) -> None:
+    studies.run(everything=True, first_look=True)
+    assert studies.passes == [[("quick", {}), ("slow", LOOK), ("other", LOOK)]]
+    studies.passes.clear()
+    studies.run("other", first_look=True)
+    assert studies.passes == [[("other", LOOK)]]
+    studies.run("other")
+    studies.passes.clear()
+    (outcome,) = studies.run("other", first_look=True)
+    assert studies.passes == [] and (outcome.state, outcome.reason) == ("skipped", THERE)
+    assert "first look" not in studies.ledger().partition('id="other"')[2].partition("</section>")[0]
+
+
+def test_a_number_of_flights_is_one_pass(studies: Studies) -> None:
+    studies.run(everything=True, seeds=7)
+    assert studies.passes == [[("quick", {}), ("slow", {}), ("other", {})]]
+
+
+def test_the_ledger_is_there_before_anything_and_after_each_study(studies: Studies) -> None:
+    studies.run(everything=True)
+    assert [text.count("not run yet") for text in studies.ledgers] == [3, 2, 1, 0, 0]
+    # The words stand on the page itself and in the tile that counts them.
+    looks = [text.count('class="look"') for text in [*studies.ledgers, studies.ledger()]]
+    assert looks == [0, 0, 1, 2, 1, 0]
+    assert (
+        "2 of 9 runs." in studies.ledgers[2] and "1 / 3</b><span>studies done, 1 at a" in studies.ledgers[2]
+    )
+    assert "3 / 3</b><span>studies done</span>" in studies.ledger()
+
+
+@pytest.mark.parametrize(
+    ("stop_after", "done", "looks", "not_run"), [(0, 0, 0, 3), (1, 1, 0, 2), (3, 1, 2, 0), (4, 2, 1, 0)]
+)
+def test_broken_off_anywhere_the_ledger_says_what_is_there(
+    studies: Studies, stop_after: int, done: int, looks: int, not_run: int
+) -> None:
+    studies.stop_after = stop_after
+    with pytest.raises(KeyboardInterrupt):
+        studies.run(everything=True)
+    text = studies.ledger()
+    assert f"{done} / 3</b>" in text and text.count('class="look"') == looks
+    assert text.count("not run yet") == not_run
+    studies.stop_after = 99
+    studies.passes.clear()
+    studies.run(everything=True)
+    assert "3 / 3</b><span>studies done</span>" in studies.ledger()
+    if stop_after == 4:
+        assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
+        assert ("slow", {}) in studies.passes[1]
+
+
+def test_what_a_pass_is_is_said(studies: Studies) -> None:
+    text = StringIO()
+    studies.run(everything=True, console=Console(file=text, force_terminal=False, width=200))
+    assert "First looks: 2 of 3 reports from few flights, and 1 in full." in text.getvalue()
+
+
+# -- the first seed of a case, and what processes say meanwhile
+# ------------------------------------------------------------------------------------
+
+
+class Pool(WorkerPool):
+    """Notes what it is handed; room for everything."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.handed: list[tuple[str, int]] = []
+        self.over: list[SeedResult] = []
+
+    def places(self, room: int) -> int:
+        return 3 - len(self.handed) + len(self.over)
+
+    def submit(self, work: SeedWork, seed: int, timeout_s: float = float("inf")) -> None:
+        self.handed.append((work.study, seed))
+
+    def collect(self, wait_s: float = 0.0) -> list[SeedResult]:
+        return self.over
+
+
+def test_the_first_seed_of_a_case_is_computed_alone(tmp_path: Path) -> None:
+    whole, _ = jobs(tmp_path, "schmidt-fast-vessel", "schmidt-slow-vessel-eight", "static-point")
+    pool = Pool()
+    told: list[tuple[Any, ...]] = []
+    scheduler = _Scheduler([_waiting(job) for job in whole], pool, 3, lambda *what: told.append(what))
+    scheduler.hand_out_seeds()
+    assert pool.handed == [("schmidt-fast-vessel", 1), ("static-point", 1)]
+    scheduler.hand_out_seeds()
+    assert len(pool.handed) == 2, "a third process would compile the same once more"
+    pool.over = [SeedResult("schmidt-fast-vessel", 1)]
+    pool._notes = [("static-point", "compiling")]
+    scheduler.collect_seeds()
+    assert ("static-point", "note", "compiling") in told and pool.notes() == []
+    scheduler.hand_out_seeds()
+    assert pool.handed[2:] == [("schmidt-fast-vessel", 2), ("schmidt-fast-vessel", 3)]
+
+
+def test_what_a_process_logs_reaches_the_runner_and_its_numbers_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (whole,), _ = jobs(tmp_path, "static-point")
+    assert whole.seeds is not None
+    ours, theirs = multiprocessing.Pipe()
+    worker = SimpleNamespace(pipe=ours, work=whole.seeds, seed=1, ends=1e300)
+    worker.process = SimpleNamespace(is_alive=lambda: True)
+    pool = WorkerPool()
+    pool._workers = [worker]  # type: ignore[list-item]
+    logger = logging.getLogger("wildlab")
+    handler = _ToRunner(theirs)
+    monkeypatch.setattr(logger, "level", logging.INFO)
+    logger.addHandler(handler)
+    try:
+        logging.getLogger("wildlab.navigation.kernels").info("compiling %s", "it")
+    finally:
+        logger.removeHandler(handler)
+    assert pool.collect() == [] and pool.notes() == [("static-point", "compiling it")]
+    theirs.send(("note", "once more"))
+    theirs.send(("done", {"a/b": 1.0}))
+    assert pool.collect() == [SeedResult("static-point", 1)]
+    assert pool.notes() == [("static-point", "once more")]
+    assert read_seed(whole.seeds, 1) == {"a/b": 1.0}
+    ours.close()
+    theirs.close()
+
+
+def test_what_a_process_says_is_shown() -> None:
+    text = StringIO()
+    with shown(Console(file=text, force_terminal=False, width=160)) as tell:
+        tell("one", "note", "compiling [b]")
+    assert "note  one: compiling [b]" in text.getvalue()
+    tally = Tally()
+    tally.note("one", "note", "too early: it is no longer under way, or not yet")
+    tally.note("one", "start", None)
+    tally.note("one", "note", "compiling [b]")
+    assert Text.from_markup(tally.now()).plain == "one compiling [b]"

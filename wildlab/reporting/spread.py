@@ -1,0 +1,85 @@
+"""How far simulated flights spread, and what that is called.
+
+Of many flights the middle 90 % is shown. The quantiles that bound it say little about few: of fewer than 20
+they lie between the two outermost flights, and depend on how one interpolates. There the lowest and the
+highest are shown, which need no interpolation. One flight has no spread at all.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+#: From how many flights on the middle 90 % is shown.
+MANY = 30
+
+
+class SpreadWords(NamedTuple):
+    """What the spread over some flights is called; each is empty for one flight, but for ``over``.
+
+    Attributes
+    ----------
+    over
+        After "beside": "the median of 200 simulated flights, and the range that nine of ten lie in".
+    on
+        After a range: "on nine flights of ten".
+    heading
+        Of a column of ranges.
+    key
+        Of a legend.
+    """
+
+    over: str
+    on: str
+    heading: str
+    key: str
+
+
+def spread_words(n: int, one: str = "flight") -> SpreadWords:
+    """What the spread over ``n`` flights, or whatever ``one`` of them is, is called."""
+    many = f"{one}s"
+    if n < 2:
+        return SpreadWords(f"one simulated {one}", "", "", "")
+    if n < MANY:
+        low_high = "lowest to highest"
+        return SpreadWords(
+            f"the median of {n} simulated {many}, and the lowest and the highest of them",
+            f"on {n} {many}",
+            f"{low_high} of {n} {many}",
+            low_high,
+        )
+    return SpreadWords(
+        f"the median of {n} simulated {many}, and the range that nine of ten lie in",
+        f"on nine {many} of ten",
+        f"90 % of {many}",
+        "middle 90 %",
+    )
+
+
+def bounds_of(values: pd.Series) -> tuple[float, float]:
+    """Lower and upper bound of what is shown as the spread over flights, one row for each.
+
+    NaN for one flight. Rows that are NaN are left out, but it is the number of flights that decides which
+    bounds are meant.
+    """
+    if len(values) < 2:
+        return np.nan, np.nan
+    if len(values) < MANY:
+        return float(values.min()), float(values.max())
+    return float(values.quantile(0.05)), float(values.quantile(0.95))
+
+
+def range_words(values: ArrayLike, decimals: int = 1) -> str:
+    """The bounds of ``values`` (N,) as "6.1 to 13.0"; nothing for one flight."""
+    column = pd.Series(np.asarray(values, float))
+    low, high = bounds_of(column)
+    return f"{low:.{decimals}f} to {high:.{decimals}f}".replace("-", "−") if len(column) > 1 else ""
+
+
+def range_clause(values: ArrayLike, decimals: int = 1) -> str:
+    """The same to put behind a noun: "; 6.1 to 13.0 on nine flights of ten"."""
+    between, on = range_words(values, decimals), spread_words(np.size(values)).on
+    return f"; {between} {on}" if between else ""
