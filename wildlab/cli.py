@@ -91,9 +91,7 @@ def list_(out: Path | None, as_json: bool) -> None:
 @click.option(
     "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
 )
-@click.option(
-    "--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers."
-)
+@click.option("--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
 @click.option(
     "--seeds",

@@ -50,8 +50,7 @@ def trial_key(case: str, parameters: Mapping[str, Any], code: str) -> str:
 def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     """What a study's page depends on, as 64 hexadecimal digits: `code_key`, how it is shown and said, what is
     published, the notebook, and ``given``, whatever the notebook is given."""
-    package = ROOT / "wildlab"
-    shown = [path for room in ("studies", "reporting") for path in (package / room).rglob("*.py")]
+    shown = [path for room in ("studies", "reporting") for path in (PACKAGE / room).rglob("*.py")]
     digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
     for path in [*sorted([*shown, *(DATA / "published").glob("*.toml")]), notebook]:
         digest.update(path.name.encode())
