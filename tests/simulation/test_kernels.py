@@ -94,7 +94,7 @@ def test_the_polynomials_of_a_spline_are_the_spline():
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-@pytest.mark.parametrize("wind", [(0.0, 0.0), (4.0, -3.0), (9.0, 12.0)])
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (4.0, -3.0), (9.0, 12.0), (11.0, 15.0)])
 def test_angles_on_a_circle_solve_the_same_equation(sense, wind):
     circle = (160.0, 19.5, *wind, sense, 0.4)
     series = _times_of_angles(circle)
