@@ -19,7 +19,7 @@ from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
 from wildlab.tracking.measurement import CameraPoses
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, checked
+from wildlab.tracking.run import Start, check_rows, check_start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
 
 
@@ -60,7 +60,7 @@ def run_batch(
     *,
     view: View | None = None,
     pose: PoseUncertainty | None = None,
-    gate: float | None = None,
+    gate_probability: float = 1.0,
     rows: ArrayLike | None = None,
 ) -> BatchTracks:
     """Kalman filter on positions; with ``view`` the extended filter on pixels; with ``pose`` Schmidt's.
@@ -81,7 +81,7 @@ def run_batch(
         The camera; None: the measurements are positions.
     pose
         Its covariance is (N, 6, 6) or (B, N, 6, 6).
-    gate
+    gate_probability
         As in `wildlab.tracking.run.run_filter`.
     rows
         (M,) the rows after which estimates are kept; all when not given. Long flights of many runs fill the
@@ -98,7 +98,9 @@ def run_batch(
         raise WildlabError(
             f"measurements of the shape {z.shape}", "give (runs, times, 2)", field="measurements"
         )
-    given = checked(times, np.moveaxis(z, 0, 1), np.moveaxis(R, 0, 1) if R.ndim == 4 else R, gate, None)
+    R_rows = np.moveaxis(R, 0, 1) if R.ndim == 4 else R
+    given = checked(times, np.moveaxis(z, 0, 1), R_rows, gate_probability, None)
+    check_start(start)
     z = np.ascontiguousarray(np.moveaxis(given.z, 0, 1))
     B, N = z.shape[:2]
     first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
@@ -113,6 +115,7 @@ def run_batch(
 
     P_poses = phis = np.zeros((1, N, 36))
     if pose is not None:
+        check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
         each = [schmidt.transitions_of_pose(one.reshape(N, 6, 6), pose.change) for one in P_poses]
         phis = np.array(each).reshape(len(P_poses), N, 36)
@@ -126,15 +129,15 @@ def run_batch(
     slots = np.full(N, -1)
     slots[kept] = np.arange(len(kept))
     estimates = [np.empty((len(kept), *shape, B)) for shape in ((4,), (4, 4))]
-    judged = [np.empty((N, *shape, B)) for shape in ((2,), ())]
+    scores = [np.empty((N, *shape, B)) for shape in ((2,), ())]
     for a in estimates:
         a[kept < first] = np.nan
-    for a in judged:
+    for a in scores:
         a[:first] = np.nan
-    out = (*estimates, *judged, np.zeros((N, B), bool), np.zeros((N, B), bool))
+    out = (*estimates, *scores, np.zeros((N, B), bool), np.zeros((N, B), bool))
     there = np.isfinite(z).all(axis=2)
     alike = len(noise) == 1 and P0.ndim == 2 and bool((there == there[:1]).all())
-    if alike and view is None and pose is None and gate is None:
+    if alike and view is None and pose is None and np.isinf(given.threshold):
         x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
         return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
@@ -212,6 +215,11 @@ def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array,
             np.zeros((1, n_rows, 12)), np.zeros((1, n_rows, 9)), np.zeros(3), np.zeros(n_rows), np.zeros(5)
         )  # fmt: skip
     camera, poses = view.camera, view.poses
+    for name, values, axes in (("p_nc", poses.p_nc, 1), ("R_nc", poses.R_nc, 2), ("R_bc", poses.R_bc, 2)):
+        if np.ndim(values) > axes:
+            check_rows(np.shape(values)[-1 - axes], n_rows, f"view.poses.{name}")
+    if np.ndim(view.plane_down):
+        check_rows(np.shape(view.plane_down)[0], n_rows, "view.plane_down")
     if camera.distorts:
         raise WildlabError(
             "the camera distorts, and the batch filter knows none that does",

@@ -33,11 +33,13 @@ class Prediction(NamedTuple):
 class Sensor(NamedTuple):
     """A sensor on its way: ``predict(row, position)`` for a row of the run and the target's (2,) north, east.
 
-    ``angles`` (m,) says which elements are angles, whose differences are wrapped.
+    ``angles`` (m,) says which elements are angles, whose differences are wrapped. ``rows`` is how many rows
+    it has poses for, None where one does for all.
     """
 
     predict: Callable[[int, Array], Prediction]
     angles: tuple[bool, ...]
+    rows: int | None = None
 
 
 class CameraPoses(NamedTuple):
@@ -202,6 +204,10 @@ def _row(values: ArrayLike, row: int, base: int) -> Array:
     return np.asarray(a[row] if a.ndim > base else a)
 
 
+def _rows(values: ArrayLike, base: int) -> int | None:
+    return len(np.asarray(values)) if np.ndim(values) > base else None
+
+
 def _pose_of(poses: CameraPoses, row: int) -> CameraPoses:
     p_nc, R_nc, R_bc, lever = poses
     return CameraPoses(_row(p_nc, row, 1), _row(R_nc, row, 2), _row(R_bc, row, 2), lever)
@@ -213,7 +219,7 @@ def pixels(camera: Camera, poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return predict_pixel(camera, position, _pose_of(poses, row), _row(plane_down, row, 0))
 
-    return Sensor(predict, (False, False))
+    return Sensor(predict, (False, False), _rows(poses.p_nc, 1))
 
 
 def azimuths_elevations(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
@@ -222,7 +228,7 @@ def azimuths_elevations(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return predict_azimuth_elevation(position, _pose_of(poses, row), _row(plane_down, row, 0))
 
-    return Sensor(predict, (True, False))
+    return Sensor(predict, (True, False), _rows(poses.p_nc, 1))
 
 
 def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
@@ -231,7 +237,7 @@ def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
     def predict(row: int, position: Array) -> Prediction:
         return predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))
 
-    return Sensor(predict, (False, True))
+    return Sensor(predict, (False, True), _rows(platform, 1))
 
 
 def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
@@ -241,4 +247,4 @@ def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
         both = predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))
         return Prediction(both.z[1:], both.H_position[1:], both.H_pose[1:])
 
-    return Sensor(predict, (True,))
+    return Sensor(predict, (True,), _rows(platform, 1))
