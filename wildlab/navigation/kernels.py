@@ -11,17 +11,13 @@ Vectors are written into arrays made once before a loop, and loops run over size
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 
 Integers = NDArray[np.int64]
-F = TypeVar("F", bound=Callable[..., Any])
 
 #: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; Gauss-Markov errors.
 N_ERRORS, N_AXES = 15, 18
@@ -29,10 +25,6 @@ N_ERRORS, N_AXES = 15, 18
 POSITION, VELOCITY, HEADING = 0, 1, 2
 #: What became of a measurement.
 REJECTED, ACCEPTED, FORCED = 0, 1, 2
-
-
-def compiled(function: F) -> F:
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled

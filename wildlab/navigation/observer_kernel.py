@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
-from wildlab.navigation.kernels import POSITION, VELOCITY, Integers, compiled
+from wildlab.navigation.kernels import POSITION, VELOCITY, Integers
 
 #: WGS84: gravitational constant (m^3/s^2), equatorial radius (m), J2, rate (rad/s).
 MU, RADIUS, J2, RATE = 3.986004418e14, 6378137.0, 1.082629821313e-3, 7.292115e-5

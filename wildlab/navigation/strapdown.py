@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
 from wildlab.navigation import kernels
@@ -75,5 +76,6 @@ def integrate_strapdown(
     )
     states = np.full((len(samples.times), 16), np.nan)
     t, f, w = (part[:n] for part in samples)
-    kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
+    with announced("the strapdown integration"):
+        kernels.integrate(t, f, w, earth.as_array(), start, states[:n])
     return DeadReckoning(samples.times, states[:, :3], states[:, 3:6], states[:, 6:10], gaps)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
@@ -113,7 +114,7 @@ def run_batch(
         if pose is not None:
             left[first:] = np.array([schmidt.fade(dt, pose.correlation_time) for dt in steps.tolist()])[which]
 
-    P_poses = phis = np.zeros((1, N, 36))
+    P_poses = phis = None
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
@@ -141,12 +142,14 @@ def run_batch(
         x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
         return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, N)
-    singular = run_lanes(
-        F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
-        np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
-        np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
-        first, given.threshold, view is not None, pose is not None, slots, *out,
-    )  # fmt: skip
+    kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
+    with announced(f"the {kind} filter for many runs"):
+        singular = run_lanes(
+            F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
+            np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
+            np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
+            first, given.threshold, slots, *out,
+        )  # fmt: skip
     if singular >= 0:
         raise _singular(singular)
     if start.row >= 0:
@@ -208,12 +211,12 @@ def _singular(row: int) -> WildlabError:
     )
 
 
-def _camera_arrays(view: View | None, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; zeros where there is no camera."""
+def _camera_arrays(
+    view: View | None, n_rows: int
+) -> tuple[Array | None, Array | None, Array, Array, Array]:
+    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; without a camera no poses, and zeros."""
     if view is None:
-        return (
-            np.zeros((1, n_rows, 12)), np.zeros((1, n_rows, 9)), np.zeros(3), np.zeros(n_rows), np.zeros(5)
-        )  # fmt: skip
+        return None, None, np.zeros(3), np.zeros(n_rows), np.zeros(5)
     camera, poses = view.camera, view.poses
     for name, values, axes in (("p_nc", poses.p_nc, 1), ("R_nc", poses.R_nc, 2), ("R_bc", poses.R_bc, 2)):
         if np.ndim(values) > axes:
