@@ -21,11 +21,11 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.geometry.gravity import local_earth
-from wildlab.navigation import mekf, observer, plain, plain_observer
+from wildlab.navigation import mekf, observer, reference_mekf, reference_observer
 from wildlab.navigation.aiding import Aiding, positions
-from wildlab.navigation.mekf import Start
+from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import STIM300
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 from wildlab.simulation import (
     angular_rates,
     attitude_along,
@@ -39,24 +39,25 @@ ORIGIN = (1.11, 0.17, 40.0)
 LEVERS = np.array([[0.6, 0.0, -0.2], [-0.9, 0.0, -0.1]])
 
 
-def flight() -> tuple[Imu, Start, list[Aiding], Aiding]:
+def flight() -> tuple[ImuSamples, InitialState, list[Aiding], Aiding]:
     """Ideal sensors on a loiter: what they say does not matter to the clock."""
     earth = local_earth(ORIGIN[0], ORIGIN[2])
     times = np.arange(0, DURATION, 1 / RATE)
     path = loiter_path((0.0, 0.0), 160.0, 350.0, 20.0)
     trajectory = fixed_wing_trajectory(path, gravity=earth.gravity)
     motion = trajectory(times)
-    imu = Imu(times, specific_forces(motion, earth.gravity), angular_rates(attitude_along(trajectory), times))
+    rates = angular_rates(attitude_along(trajectory), times)
+    imu = ImuSamples(times, specific_forces(motion, earth.gravity), rates)
     fixes = slice(5, None, RATE // 10)
     antennas = [motion.position[fixes] + motion.R_nb[fixes] @ lever for lever in LEVERS]
     aiding = [positions(times[fixes], p, 0.02, lever) for p, lever in zip(antennas, LEVERS, strict=True)]
     second = observer.baseline_reference(times[fixes], *antennas, *LEVERS)
     q = matrix_to_quaternion(motion.R_nb[0])
     state = np.concatenate([motion.position[0], motion.velocity[0], q, np.zeros(6)])
-    return imu, Start(0.0, state, np.diag(np.repeat([1.0, 0.1, 1e-3, 1e-4, 1e-6], 3))), aiding, second
+    return imu, InitialState(0.0, state, np.diag(np.repeat([1.0, 0.1, 1e-3, 1e-4, 1e-6], 3))), aiding, second
 
 
-def pyins_filter(imu: Imu, start: Start, aiding: list[Aiding]) -> Callable[[], object]:
+def pyins_filter(imu: ImuSamples, start: InitialState, aiding: list[Aiding]) -> Callable[[], object]:
     """Its filter with feedback on the same samples and antennas, ready to run."""
     from pyins import filters, inertial_sensor, measurements, strapdown
 
@@ -93,7 +94,9 @@ def pyins_filter(imu: Imu, start: Start, aiding: list[Aiding]) -> Callable[[], o
     )
 
 
-def pyins_row(baseline: float, imu: Imu, start: Start, aiding: list[Aiding]) -> tuple[str, float, float, str]:
+def pyins_row(
+    baseline: float, imu: ImuSamples, start: InitialState, aiding: list[Aiding]
+) -> tuple[str, float, float, str]:
     if not find_spec("pyins"):
         return "EKF, pyins: not installed", float("nan"), float("nan"), ""
     theirs = FRACTION * best_of(pyins_filter(imu, start, aiding), repeats=3)
@@ -107,17 +110,15 @@ def run() -> tuple[str, list[tuple[str, float, float, str]]]:
     earth = local_earth(ORIGIN[0], ORIGIN[2])
     camera = np.arange(0.05, DURATION, 0.1)
     few = camera[camera < DURATION / FRACTION]
-    short = Imu(*(part[: len(imu.times) // FRACTION] for part in imu))
-    options = {"gate": 1e-4, "max_gap": 0.1, "gap_acceleration": 5.0, "gap_rate": 0.5}
+    short = ImuSamples(*(part[: len(imu.times) // FRACTION] for part in imu))
 
     def plain_mekf() -> object:
-        ready = mekf.prepare(short, start, STIM300, aiding, few, **options)
-        line, measured = ready.line, ready.measured
-        return plain.mekf(line, measured, earth.as_array(), *ready[5:10], ready.gate, 5.0)
+        ready = mekf.prepare(short, start, STIM300, aiding, few, 0.9999, mekf.OUTAGES)
+        return reference_mekf.mekf(ready, earth.as_array(), mekf.OUTAGES.patience)
 
     def plain_observe() -> object:
         ready = observer.prepare(short, start, ORIGIN, [*aiding, second], observer.Gains(), few, 0.1)
-        return plain_observer.observer(ready)
+        return reference_observer.observer(ready)
 
     def estimate() -> object:
         return mekf.run_mekf(imu, start, STIM300, earth, aiding, camera)

@@ -9,9 +9,9 @@ from scipy.integrate import cumulative_simpson
 
 from wildlab.geometry.frames import matrix_to_quaternion, rotation_vector_to_matrix
 from wildlab.navigation.aiding import Aiding, positions
-from wildlab.navigation.mekf import Start
+from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 from wildlab.simulation import Motion, angular_rates, coordinated_attitude, gauss_markov, specific_forces
 
 SPEED, GRAVITY = 18.0, 9.81
@@ -25,7 +25,7 @@ GNSS_SD = 0.02
 
 class Flight(NamedTuple):
     motion: Motion
-    imu: Imu
+    imu: ImuSamples
 
 
 def heading(times, derivative=0):
@@ -63,16 +63,16 @@ def fly(duration=330.0, step=0.01) -> Flight:
     velocity, acceleration = moved(times)
     position = cumulative_simpson(velocity, x=times, axis=0, initial=0)
     motion = Motion(times, position, velocity, acceleration, attitude(times))
-    return Flight(motion, Imu(times, specific_forces(motion, GRAVITY), angular_rates(attitude, times)))
+    return Flight(motion, ImuSamples(times, specific_forces(motion, GRAVITY), angular_rates(attitude, times)))
 
 
-def spoil(flight: Flight, rng: np.random.Generator, noise: ImuNoise = NOISE) -> tuple[Imu, np.ndarray]:
+def spoil(flight: Flight, rng: np.random.Generator, noise: ImuNoise = NOISE) -> tuple[ImuSamples, np.ndarray]:
     """Inertial measurements as bad as the noise says, and their biases (N, 6)."""
     n, step = len(flight.imu.times), flight.imu.times[1] - flight.imu.times[0]
     biases = gauss_markov(n, step, np.repeat(noise[2::2], 3), np.repeat(noise[3::2], 3), rng)
     white = rng.standard_normal((n, 6)) * np.repeat(noise[:2], 3) / np.sqrt(step)
     _, f, w = flight.imu
-    return Imu(flight.imu.times, f + (biases + white)[:, :3], w + (biases + white)[:, 3:]), biases
+    return ImuSamples(flight.imu.times, f + (biases + white)[:, :3], w + (biases + white)[:, 3:]), biases
 
 
 def fixes(flight: Flight, rng: np.random.Generator, every=20, sd=GNSS_SD, outage=(0.0, 0.0)) -> list[Aiding]:
@@ -87,10 +87,11 @@ def fixes(flight: Flight, rng: np.random.Generator, every=20, sd=GNSS_SD, outage
     return antennas
 
 
-def begin(flight: Flight, biases: np.ndarray, rng: np.random.Generator) -> Start:
+def begin(flight: Flight, biases: np.ndarray, rng: np.random.Generator) -> InitialState:
     """A start that is as wrong as its covariance says."""
     error = START_SD * rng.standard_normal(15)
     error[9:] = biases[0]  # the estimate of the biases is zero
     R = flight.motion.R_nb[0] @ rotation_vector_to_matrix(-error[6:9])
     p, v = flight.motion.position[0] - error[:3], flight.motion.velocity[0] - error[3:6]
-    return Start(0.0, np.concatenate([p, v, matrix_to_quaternion(R), np.zeros(6)]), np.diag(START_SD**2))
+    state = np.concatenate([p, v, matrix_to_quaternion(R), np.zeros(6)])
+    return InitialState(0.0, state, np.diag(START_SD**2))

@@ -1,4 +1,4 @@
-"""The MEKF's states beyond the fifteen of H: axes that are not where they should be, fixes that wander."""
+"""The MEKF's states beyond the fifteen of H: axes that are not where they should be, correlated fixes."""
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from tests.navigation.test_mekf import (
 )
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
-from wildlab.navigation import plain
+from wildlab.navigation import reference_mekf
 from wildlab.navigation.aiding import positions, velocities
-from wildlab.navigation.mekf import prepare, run_mekf
+from wildlab.navigation.mekf import Outages, prepare, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.imu import misaligned_triad
 
@@ -28,24 +28,21 @@ def flight():
     return fly()
 
 
-def test_compiled_and_plain_agree_on_axes_and_wander(flight):
-    """With every state beyond the fifteen, a gap, and one antenna of two whose error wanders."""
+def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
+    """With every state beyond the fifteen, a gap, and one antenna of two with a Gauss-Markov error."""
     imu, start, antennas, _ = spoilt(flight, 0, every=50)
     keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
-    imu = Imu(*(part[keep] for part in imu))
-    wandering = positions(
+    imu = ImuSamples(*(part[keep] for part in imu))
+    correlated = positions(
         antennas[1].times, antennas[1].value, GNSS_SD, LEVERS[1], 0.0, [0.1, 0.2, 0.3], 15.0
     )
-    aiding = [antennas[0], wandering, velocities(np.arange(1.0, 29), moved(np.arange(1.0, 29))[0], 0.5)]
+    aiding = [antennas[0], correlated, velocities(np.arange(1.0, 29), moved(np.arange(1.0, 29))[0], 0.5)]
     axes, earth = AxisErrors(0.01, 0.003, 0.005), local_earth(0.9, 100.0)
     wanted = np.arange(0.5, 29.5, 1.0)
     found = run_mekf(imu, start, NOISE, earth, aiding, wanted, axes=axes)
-    options = {"gate": 1e-4, "max_gap": 0.1, "gap_acceleration": 5.0, "gap_rate": 0.5}
-    ready = prepare(imu, start, NOISE, aiding, wanted, **options, axes=axes)
+    ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, Outages(), axes)
     assert ready.covariance.shape == (15 + 18 + 3, 15 + 18 + 3)
-    states, covariances, nis, verdicts = plain.mekf(
-        ready.line, ready.measured, earth.as_array(), *ready[5:10], ready.gate, 5.0
-    )
+    states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 5.0)
     known = np.isfinite(found.position).all(axis=1)
     ours = np.hstack(
         [found.position, found.velocity, found.quaternion, found.accelerometer_bias, found.gyro_bias]
@@ -71,13 +68,13 @@ def test_transition_with_axes_is_the_derivative_of_a_step(seed):
         # What there is, where that much of the reading came of the axes.
         E = errors.reshape(2, 3, 3)
         there = f - E[0] @ (f - x[10:13]), w - E[1] @ (w - x[13:16])
-        return plain.strapdown_step(x, *there, dt, earth)[0]
+        return reference_mekf.strapdown_step(x, *there, dt, earth)[0]
 
     after = step(np.zeros(18))
     found = np.stack(
         [(between(after, step(h)) - between(after, step(-h))) / 2e-4 for h in 1e-4 * np.eye(18)], -1
     )
-    Phi = plain.transition(np.concatenate([x, np.zeros(18)]), f, w, dt, earth, (1.0, 1.0), axes=True)
+    Phi = reference_mekf.transition(np.concatenate([x, np.zeros(18)]), f, w, dt, earth, (1.0, 1.0), axes=True)
     assert np.abs(found - Phi[:15, 15:]).max() < 2 * dt * dt
     assert np.abs(Phi[3:9, 15:]).max() > 0.02
 
@@ -99,7 +96,7 @@ def test_wrong_axes_are_owned_up_to():
     assert nees["not told"] > 2 * nees["told"]
 
 
-def test_a_fix_that_wanders_keeps_its_place_in_doubt(flight):
+def test_a_correlated_fix_keeps_its_place_in_doubt(flight):
     """Averaging does not help against an error that stays: the position remains that uncertain."""
     imu, start, antennas, _ = spoilt(flight, 13)
     rng = np.random.default_rng(14)
@@ -112,12 +109,12 @@ def test_a_fix_that_wanders_keeps_its_place_in_doubt(flight):
             NOISE,
             EARTH,
             [
-                positions(a.times, a.value + s, GNSS_SD, lever, wander_sd=sd, wander_time=60.0)
-                for a, s, lever, sd in zip(antennas, slow, LEVERS, (wander, wander), strict=True)
+                positions(a.times, a.value + s, GNSS_SD, lever, gauss_markov_sd=sd, gauss_markov_time=60.0)
+                for a, s, lever, sd in zip(antennas, slow, LEVERS, (size, size), strict=True)
             ],
             flight.imu.times[rows],
         )
-        for wander in (0.2, 0.0)
+        for size in (0.2, 0.0)
     )
     squares = [
         nees_of(errors_of(found, flight.motion, rows), found.covariance, slice(0, 3)).mean() / 3

@@ -6,7 +6,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector
 from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 IRON = np.array([20.0, -5.0, 11.0])
 
@@ -37,7 +37,7 @@ def test_the_field_turns_as_the_gyros_say_and_only_in_the_same_axes():
     angles = 0.6 * np.sin(0.5 * times), 0.2 * np.sin(0.9 * times), 0.3 * times
     R = euler_to_matrix(*angles)
     turn = matrix_to_rotation_vector(np.swapaxes(R[:-1], 1, 2) @ R[1:]) / 0.02
-    imu = Imu(times[:-1] + 0.01, np.zeros((len(turn), 3)) - [0, 0, 9.8], turn)
+    imu = ImuSamples(times[:-1] + 0.01, np.zeros((len(turn), 3)) - [0, 0, 9.8], turn)
     field = np.einsum("kji,j->ki", R, 50.0 * earth_field(0.1, 1.2))
     field += np.random.default_rng(0).normal(0, 0.3, field.shape)
     assert share_turned(times, field, imu) > 0.95

@@ -22,19 +22,20 @@ from tests.navigation.flights import (
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_rotation_vector, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth
-from wildlab.navigation import kernels, plain
+from wildlab.navigation import kernels, reference_mekf
 from wildlab.navigation.aiding import headings, positions, standstill, velocities
 from wildlab.navigation.mekf import (
     ACCEPTED,
     FORCED,
     REJECTED,
-    Start,
+    InitialState,
+    Outages,
     pose_covariance,
     prepare,
     run_mekf,
 )  # fmt: skip
 from wildlab.navigation.noise import ImuNoise
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 EARTH = flat_earth(GRAVITY)
 
@@ -71,11 +72,12 @@ def test_transition_is_the_derivative_of_a_step(seed):
     rng = np.random.default_rng(seed)
     x, f, w = some_state(rng), rng.uniform(-15, 15, 3), rng.uniform(-1, 1, 3)
     earth, dt = flat_earth(GRAVITY).as_array(), 0.01
-    after = plain.strapdown_step(x, f, w, dt, earth)[0]
+    after = reference_mekf.strapdown_step(x, f, w, dt, earth)[0]
     found = differences(
-        lambda e: between(after, plain.strapdown_step(shifted(x, e), f, w, dt, earth)[0]), np.full(15, 1e-4)
+        lambda e: between(after, reference_mekf.strapdown_step(shifted(x, e), f, w, dt, earth)[0]),
+        np.full(15, 1e-4),
     )
-    Phi = plain.transition(x, f, w, dt, earth, (1.0, 1.0))
+    Phi = reference_mekf.transition(x, f, w, dt, earth, (1.0, 1.0))
     # What a gyro bias does within one step is taken to first order of the angle turned in it.
     assert np.abs(found - Phi)[:, :12].max() < 1e-7
     assert np.abs(found - Phi)[:, 12:].max() < 2 * dt * dt
@@ -87,9 +89,10 @@ def test_transition_is_the_derivative_of_a_step(seed):
 def test_measurement_jacobians_are_derivatives_of_the_innovation(kind, seed):
     rng = np.random.default_rng(seed)
     x, w, value, lever = some_state(rng), rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3), rng.uniform(-2, 2, 3)
-    y, H = plain.predict_measurement(kind, x, w, value, lever)
+    y, H = reference_mekf.predict_measurement(kind, x, w, value, lever)
     found = differences(
-        lambda e: -plain.predict_measurement(kind, shifted(x, e), w, value, lever)[0], np.full(15, 1e-4)
+        lambda e: -reference_mekf.predict_measurement(kind, shifted(x, e), w, value, lever)[0],
+        np.full(15, 1e-4),
     )
     assert np.abs(found - H).max() < 1e-6
     compiled_y, compiled_H = np.zeros(3), np.zeros((3, 15))
@@ -114,7 +117,7 @@ def test_compiled_and_plain_agree(flight):
     imu, start, antennas, _ = spoilt(flight, 0, every=50)
     short = imu.times < 40
     keep = short & ~((imu.times > 20.0) & (imu.times < 21.3))
-    imu = Imu(*(part[keep] for part in imu))
+    imu = ImuSamples(*(part[keep] for part in imu))
     rng = np.random.default_rng(1)
     t = np.arange(1.0, 39, 0.7)
     field = np.array([0.2, 0.0, 0.4]) @ attitude(t) + 0.01 * rng.standard_normal((len(t), 3))
@@ -128,12 +131,10 @@ def test_compiled_and_plain_agree(flight):
     ]
     earth = local_earth(0.9, 100.0)
     wanted = np.sort(np.concatenate([[12.3456, 20.5], rng.uniform(0, 39, 40)]))
-    options = {"gate": 1e-4, "max_gap": 0.1, "gap_acceleration": 5.0, "gap_rate": 0.5}
-    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, patience=3.0, **options)
-    ready = prepare(imu, start, NOISE, aiding, wanted, **options)
-    states, covariances, nis, verdicts = plain.mekf(
-        ready.line, ready.measured, earth.as_array(), *ready[5:10], ready.gate, 3.0
-    )
+    outages = Outages(patience=3.0)
+    found = run_mekf(imu, start, NOISE, earth, aiding, wanted, outages=outages)
+    ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, outages)
+    states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 3.0)
     known = np.isfinite(found.position).all(axis=1)
     assert known.sum() > 30
     assert not known[np.searchsorted(wanted, 20.5)]
@@ -191,12 +192,12 @@ def test_a_filter_too_sure_of_itself_is_not_locked_out(flight):
     imu, start, antennas, _ = spoilt(flight, 5, outage=(100.0, 160.0))
     sure = ImuNoise(NOISE[0] / 100, NOISE[1] / 100, 1e-4, np.inf, 1e-7, np.inf)
     tight = start._replace(covariance=start.covariance * 1e-4)
-    found = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], patience=2.0)
+    found = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], outages=Outages(patience=2.0))
     verdict = found.innovations.verdict
     assert (verdict == REJECTED).sum() > 5
     assert (verdict == FORCED).sum() >= 1
     assert np.linalg.norm(found.position[0] - flight.motion.position[-2]) < 5.0
-    never = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], patience=np.inf)
+    never = run_mekf(imu, tight, sure, EARTH, antennas, [330.0 - 0.02], outages=Outages(patience=np.inf))
     assert np.linalg.norm(never.position[0] - flight.motion.position[-2]) > 50.0
 
 
@@ -217,7 +218,7 @@ def test_outliers_are_left_out_and_counted(flight):
 def test_a_gap_is_said_and_crossed_with_doubt(flight):
     imu, start, antennas, _ = spoilt(flight, 7)
     keep = ~((imu.times > 100) & (imu.times < 102))
-    gappy = Imu(*(part[keep] for part in imu))
+    gappy = ImuSamples(*(part[keep] for part in imu))
     wanted = np.array([99.0, 101.0, 102.0, 110.0, 150.0])
     found = run_mekf(gappy, start, NOISE, EARTH, antennas, wanted)
     assert len(found.gaps) == 1
@@ -243,7 +244,7 @@ def test_latency_puts_a_fix_where_it_belongs(flight):
     wanted = flight.imu.times[8000::50]
     known = run_mekf(imu, start, NOISE, EARTH, again, wanted)
     assert np.abs(known.position - flight.motion.position[8000::50]).max() < 0.1
-    ignored = run_mekf(imu, start, NOISE, EARTH, late, wanted, gate=0)
+    ignored = run_mekf(imu, start, NOISE, EARTH, late, wanted, gate_probability=1.0)
     assert np.median(np.linalg.norm(ignored.position - flight.motion.position[8000::50], axis=1)) > 3.0
 
 
@@ -268,12 +269,12 @@ def test_a_magnetometer_holds_the_heading_of_one_antenna(flight):
 def test_standing_still_holds_the_velocity():
     times = np.arange(0, 60, 0.02)
     rng = np.random.default_rng(11)
-    imu = Imu(
+    imu = ImuSamples(
         times,
         np.array([0, 0, -GRAVITY]) + 0.02 * rng.standard_normal((len(times), 3)),
         0.001 * rng.standard_normal((len(times), 3)),
     )
-    start = Start(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    start = InitialState(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
     held = run_mekf(imu, start, NOISE, EARTH, [standstill(np.arange(1, 60, 1.0), 0.01)], [59.9])
     free = run_mekf(imu, start, NOISE, EARTH, [], [59.9])
     assert np.abs(held.velocity).max() < 0.02
@@ -314,7 +315,7 @@ def test_what_is_no_measurement_is_refused(make, sentence):
 
 
 def test_a_start_on_another_clock_is_refused(flight):
-    start = Start(1.4e9, np.zeros(16), np.eye(15))
+    start = InitialState(1.4e9, np.zeros(16), np.eye(15))
     with pytest.raises(WildlabError, match="on the same clock"):
         run_mekf(flight.imu, start, NOISE, EARTH, [])
 
@@ -322,10 +323,10 @@ def test_a_start_on_another_clock_is_refused(flight):
 def test_twenty_five_minutes_take_seconds():
     """A bound with room for a busy machine: it takes 0.6 s. Compilation does not count."""
     times = np.arange(0, 1500, 0.004)
-    imu = Imu(times, np.tile([0.0, 0.0, -GRAVITY], (len(times), 1)), np.zeros((len(times), 3)))
+    imu = ImuSamples(times, np.tile([0.0, 0.0, -GRAVITY], (len(times), 1)), np.zeros((len(times), 3)))
     t = np.arange(0.1, 1500, 0.1)
     antennas = [positions(t, np.tile(lever, (len(t), 1)), GNSS_SD, lever) for lever in LEVERS]
-    start = Start(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
+    start = InitialState(0.0, np.concatenate([np.zeros(6), [1.0], np.zeros(9)]), np.diag(START_SD**2))
     run_mekf(imu, start, NOISE, EARTH, antennas, [0.5])
     before = time.process_time()
     found = run_mekf(imu, start, NOISE, EARTH, antennas, t)
@@ -343,7 +344,7 @@ def test_consistent_over_fifty_flights(flight):
     nees, nis = [], []
     for seed in range(50):
         imu, start, antennas, _ = spoilt(flight, 1000 + seed, outage=(200.0, 260.0))
-        found = run_mekf(imu, start, NOISE, EARTH, antennas, times, gate=0)
+        found = run_mekf(imu, start, NOISE, EARTH, antennas, times, gate_probability=1.0)
         errors = errors_of(found, flight.motion, rows)
         nees.append([nees_of(errors, found.covariance, slice(a, a + 3)) / 3 for a in (0, 3, 6)])
         nis.append(found.innovations.nis[found.innovations.times > 60].mean() / 3)

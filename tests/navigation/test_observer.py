@@ -12,7 +12,7 @@ from wildlab.geometry.frames import (
     quaternion_to_matrix,
 )
 from wildlab.geometry.gravity import local_earth, normal_gravity
-from wildlab.navigation import plain_observer
+from wildlab.navigation import reference_observer
 from wildlab.navigation.aiding import velocities
 from wildlab.navigation.mekf import run_mekf
 from wildlab.navigation.observer import (
@@ -24,7 +24,7 @@ from wildlab.navigation.observer import (
     prepare,
     run_observer,
 )
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 ORIGIN = (np.radians(63.6), np.radians(9.7), 40.0)
 
@@ -41,7 +41,7 @@ def on_earth(flight):
     force = motion.acceleration - g + 2 * np.cross(rate, motion.velocity)
     f = np.einsum("kji,kj->ki", motion.R_nb, force)
     w = flight.imu.angular_rate + np.einsum("kji,j->ki", motion.R_nb, rate)
-    return flight._replace(imu=Imu(flight.imu.times, f, w))
+    return flight._replace(imu=ImuSamples(flight.imu.times, f, w))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def attitude_errors(found, motion, rows):
 
 def test_gravity_in_ecef_is_normal_gravity():
     for latitude, height in ((0.0, 0.0), (0.7, 0.0), (1.1, 500.0), (np.pi / 2, 100.0)):
-        g = plain_observer.gravity_at(geodetic_to_ecef(latitude, 0.3, height))
+        g = reference_observer.gravity_at(geodetic_to_ecef(latitude, 0.3, height))
         assert np.linalg.norm(g) == pytest.approx(normal_gravity(latitude, height), abs=2e-4)
         _, R_en = earth_axes((latitude, 0.3, height))
         assert g @ R_en[:, 2] == pytest.approx(np.linalg.norm(g), rel=1e-9)
@@ -74,7 +74,7 @@ def test_gravity_in_ecef_is_normal_gravity():
 def test_compiled_and_plain_agree(flight, theta):
     imu, start, antennas, reference, _ = spoilt(flight, 0)
     keep = (imu.times < 30) & ~((imu.times > 15) & (imu.times < 16.2))
-    imu = Imu(*(part[keep] for part in imu))
+    imu = ImuSamples(*(part[keep] for part in imu))
     t = np.arange(0.3, 29, 0.9)
     aiding = [*antennas, reference, velocities(t, moved(t)[0], 0.3, LEVERS[1])]
     # A tight bound, so that the projection has something to do.
@@ -82,7 +82,7 @@ def test_compiled_and_plain_agree(flight, theta):
     wanted = np.array([0.0, 3.3, 9.87, 14.0, 15.5, 20.0, 28.9])
     found = run_observer(imu, start, ORIGIN, aiding, wanted, gains=gains)
     ready = prepare(imu, start, ORIGIN, aiding, gains, wanted, 0.1)
-    rows = plain_observer.observer(ready)
+    rows = reference_observer.observer(ready)
     p_e, R_en = earth_axes(ORIGIN)
     known = np.isfinite(found.position).all(axis=1)
     assert known.tolist() == [True, True, True, True, False, True, True]

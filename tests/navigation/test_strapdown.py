@@ -8,7 +8,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import EARTH_RATE, flat_earth, local_earth, normal_gravity
 from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 from wildlab.simulation import (
     angular_rates,
     attitude_along,
@@ -23,7 +23,9 @@ def flown(times):
     path = loiter_path((50.0, -20.0), 120.0, 200.0, 18.0, wind=(4.0, -2.0))
     trajectory = fixed_wing_trajectory(path, wind=(4.0, -2.0, 0.0), trim_pitch=0.05)
     motion = trajectory(times)
-    return motion, Imu(times, specific_forces(motion), angular_rates(attitude_along(trajectory), times))
+    return motion, ImuSamples(
+        times, specific_forces(motion), angular_rates(attitude_along(trajectory), times)
+    )
 
 
 def reckon(motion, imu, **options):
@@ -87,7 +89,7 @@ def test_at_rest_on_the_turning_earth():
     R = quaternion_to_matrix(q)
     times = np.arange(0, 600, 0.02)
     still = np.ones((len(times), 1))
-    imu = Imu(times, still * (R.T @ [0, 0, -earth.gravity]), still * (R.T @ np.array(earth.rate)))
+    imu = ImuSamples(times, still * (R.T @ [0, 0, -earth.gravity]), still * (R.T @ np.array(earth.rate)))
     found = integrate_strapdown(imu, np.zeros(3), np.zeros(3), q, earth)
     assert np.abs(found.position).max() < 2e-3
     assert angle_between(found.quaternion[-1:], R[None]).max() < 1e-9
@@ -105,7 +107,7 @@ def test_a_falling_body_is_pushed_east():
     times = np.linspace(0, 10, 5001)
     turning = np.ones((len(times), 1)) * np.array(earth.rate)
     found = integrate_strapdown(
-        Imu(times, np.zeros((len(times), 3)), turning), np.zeros(3), np.zeros(3), [1, 0, 0, 0], earth
+        ImuSamples(times, np.zeros((len(times), 3)), turning), np.zeros(3), np.zeros(3), [1, 0, 0, 0], earth
     )
     east = EARTH_RATE * earth.gravity * times[-1] ** 3 * np.cos(latitude) / 3
     assert found.position[-1, 1] == pytest.approx(east, rel=1e-3)
@@ -128,7 +130,7 @@ def test_the_plumb_line_leans_with_the_distance():
     nothing = np.zeros((101, 3))
     turning = nothing + np.array(earth.rate)
     found = integrate_strapdown(
-        Imu(times, nothing, turning), [1000.0, 0, 0], np.zeros(3), [1, 0, 0, 0], earth
+        ImuSamples(times, nothing, turning), [1000.0, 0, 0], np.zeros(3), [1, 0, 0, 0], earth
     )
     # The Coriolis force on the fall itself has no northward part to first order.
     assert found.velocity[-1, 0] == pytest.approx(-earth.gravity * 1000 / 6371e3, rel=0.02)
@@ -145,7 +147,7 @@ def test_the_plumb_line_leans_with_the_distance():
 )
 def test_what_is_no_series_of_samples_is_refused(spoil, sentence):
     times = np.arange(0, 1, 0.01)
-    imu = Imu(*spoil(times, np.ones((100, 3)), np.ones((100, 3))))
+    imu = ImuSamples(*spoil(times, np.ones((100, 3)), np.ones((100, 3))))
     with pytest.raises(WildlabError, match=f"(?i){sentence}"):
         integrate_strapdown(imu, np.zeros(3), np.zeros(3), [1, 0, 0, 0], flat_earth())
 

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from wildlab.geometry.frames import geodetic_to_ecef, matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth, local_earth, normal_gravity
 from wildlab.navigation.aiding import positions, velocities
-from wildlab.navigation.mekf import Start, run_mekf
+from wildlab.navigation.mekf import InitialState, run_mekf
 from wildlab.navigation.noise import ImuNoise
 from wildlab.navigation.observer import earth_axes
 from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 ORIGIN = (np.radians(59.0), np.radians(10.0), 120.0)
 
@@ -61,7 +61,7 @@ def test_dead_reckoning_agrees_with_newton_in_inertial_space():
     v = R_en.T @ (turned.T @ solved[3:6] - np.cross(spin, turned.T @ solved[:3]))
     R = R_en.T @ turned.T @ solved[6:].reshape(3, 3)
     times = np.arange(0, end + 1e-9, 0.002)
-    imu = Imu(times, np.stack([force(t) for t in times]), np.stack([rate(t) for t in times]))
+    imu = ImuSamples(times, np.stack([force(t) for t in times]), np.stack([rate(t) for t in times]))
     start = np.zeros(3), v_n, matrix_to_quaternion(R_nb)
     found = integrate_strapdown(imu, *start, local_earth(ORIGIN[0], ORIGIN[2]))
     distance = np.linalg.norm(p)
@@ -89,8 +89,9 @@ def test_without_rotation_the_mekf_is_filterpys_kalman_filter():
     known = np.diag(np.repeat([4.0, 1.0, 0.0, bias_sd**2, 0.0], 3))
     noise = ImuNoise(walk, 0.0, sd, tau, 0.0, np.inf)
     aiding = [positions(t, z_p, p_sd), velocities(t, z_v, v_sd)]
-    imu = Imu(times, f, np.zeros((len(times), 3)))
-    ours = run_mekf(imu, Start(0.0, state, known), noise, flat_earth(), aiding, t, gate=0)
+    imu = ImuSamples(times, f, np.zeros((len(times), 3)))
+    start = InitialState(0.0, state, known)
+    ours = run_mekf(imu, start, noise, flat_earth(), aiding, t, gate_probability=1.0)
 
     kept = np.exp(-step / tau)
     eye = np.eye(3)

@@ -12,8 +12,8 @@ from tests.tracking.poses import overflight
 from wildlab.tracking import measurement as m
 from wildlab.tracking.batch import run_batch
 from wildlab.tracking.motion import constant_velocity, singer
-from wildlab.tracking.others import run_unscented
 from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.unscented import run_unscented
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 

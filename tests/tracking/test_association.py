@@ -57,7 +57,7 @@ def test_who_is_not_in_sight_has_no_detection(kind):
     up = turned(poses, slice(None))
     nis = distances(expected(kind, truth[:, :2], up), ANGLES[kind], P, np.zeros((1, 3, 2)), NOISE[kind])
     assert np.isnan(nis).all()
-    assert nearest_within(nis, None, 2).tolist() == [-1]
+    assert nearest_within(nis, 1.0, 2).tolist() == [-1]
 
 
 @given(probability=st.floats(0.5, 0.999), m_=st.integers(1, 3), seed=st.integers(0, 99))
@@ -76,4 +76,4 @@ def test_the_gate_holds_its_share(probability, m_, seed):
 def test_outside_the_gate_there_is_no_neighbour():
     nis = np.array([[5.0, 3.0, np.nan], [np.nan, np.nan, np.nan], [30.0, 20.0, 10.0]])
     assert nearest_within(nis, 0.95, 2).tolist() == [1, -1, -1]
-    assert nearest_within(nis, None, 2).tolist() == [1, -1, 2]
+    assert nearest_within(nis, 1.0, 2).tolist() == [1, -1, 2]

@@ -47,7 +47,7 @@ def flight(runs, seed=0):
     return times, z, CameraPoses.at_lens(CAMERA, p_nc, R_nc, poses.R_bc, (0.3, -0.1, 0.2)), truth
 
 
-@pytest.mark.parametrize("gate", [None, 0.99])
+@pytest.mark.parametrize("gate", [1.0, 0.99])
 @pytest.mark.parametrize("runs", [1, 3, 64, 70])
 def test_positions(runs, gate):
     rng = np.random.default_rng(runs)
@@ -59,10 +59,11 @@ def test_positions(runs, gate):
     R = A @ np.swapaxes(A, -1, -2) + np.eye(2)
     R[0, 4] = np.nan
     start = Start(times[0], rng.normal(size=(runs, 4)), np.diag([50.0, 40, 9, 4]), row=0)
-    batch = run_batch(times, z, R, CV, start, gate=gate)
+    batch = run_batch(times, z, R, CV, start, gate_probability=gate)
     for run in range(runs):
         own = start._replace(x=start.x[run])
-        agree(batch, run, run_filter(times, z[run], R[run], m.positions(), CV, own, gate=gate), but=[6])
+        single = run_filter(times, z[run], R[run], m.positions(), CV, own, gate_probability=gate)
+        agree(batch, run, single, but=[6])
 
 
 @pytest.mark.parametrize("runs", [1, 70])
@@ -90,17 +91,17 @@ def test_positions_of_runs_that_know_the_same_of_their_errors(runs, row):
     assert run_batch(times, z, R, CV, start).P.flags.writeable == (runs > 1)
 
 
-@pytest.mark.parametrize("gate", [None, 0.99])
+@pytest.mark.parametrize("gate", [1.0, 0.99])
 def test_pixels(gate):
     runs = 67
     times, z, poses, _ = flight(runs)
     plane = np.linspace(0, 1, N)
     start = Start(-0.5, np.zeros(4), np.diag([25.0, 25, 9, 9]))
     R = np.diag([4.0, 6.0])
-    batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate=gate)
+    batch = run_batch(times, z, R, CV, start, view=View(poses, plane), gate_probability=gate)
     for run in (0, 1, 33, 63, 64, 66):
         sensor = m.pixels(poses.take(run), plane)
-        agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate=gate))
+        agree(batch, run, run_filter(times, z[run], R, sensor, CV, start, gate_probability=gate))
     assert not batch.used[33, 5]
 
 
@@ -116,12 +117,12 @@ def test_schmidt(correlation_time):
     start = Start(0.0, np.zeros(4), np.tile(np.diag([25.0, 25, 9, 9]), (runs, 1, 1)))
     R = np.tile(np.diag([4.0, 6.0]), (N, 1, 1))
     pose = PoseUncertainty(covariance, correlation_time)
-    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose, gate=0.999)
+    batch = run_batch(times, z, R, CV, start, view=View(poses, 0.0), pose=pose, gate_probability=0.999)
     for run in (0, 1, 3, 4, 5, 33, 63, 65):
         own = start._replace(P=start.P[run])
         track = run_filter(
             times, z[run], R, m.pixels(poses.take(run), 0.0), CV, own,
-            pose=pose._replace(covariance=covariance[run]), gate=0.999,
+            pose=pose._replace(covariance=covariance[run]), gate_probability=0.999,
         )  # fmt: skip
         agree(batch, run, track)
 
@@ -162,7 +163,7 @@ def test_the_cross_covariance_is_limited_alike():
 def test_only_the_rows_asked_for_are_kept():
     times, z, poses, _ = flight(66)
     start = Start(times[1], np.ones(4), np.diag([25.0, 25, 9, 9]), row=1)
-    arguments = dict(view=View(poses, 0.0), gate=0.99)
+    arguments = dict(view=View(poses, 0.0), gate_probability=0.99)
     full = run_batch(times, z, np.eye(2), CV, start, **arguments)
     rows = [0, 1, 17, N - 1]
     some = run_batch(times, z, np.eye(2), CV, start, rows=rows, **arguments)
@@ -190,4 +191,9 @@ def test_bad_input_is_named():
     with pytest.raises(WildlabError, match="R of row 6 is not a covariance"):
         run_batch(times, z, bad, CV, start)
     with pytest.raises(WildlabError, match="innovation covariance S of row 0"):
-        run_batch(times, np.zeros((3, N, 2)), R, CV, start._replace(P=-9 * np.eye(4)))
+        run_batch(times, np.zeros((3, N, 2)), R, lambda dt: (np.eye(4), -99 * np.eye(4)), start)
+    with pytest.raises(WildlabError, match="innovation covariance S of row 0"):  # by the compiled filter
+        run_batch(
+            times, np.zeros((3, N, 2)), R, lambda dt: (np.eye(4), -99 * np.eye(4)), start,
+            gate_probability=0.99,
+        )  # fmt: skip

@@ -114,7 +114,7 @@ def test_a_measurement_that_is_not_used_is_no_reference():
     far[8] += 500
     gone[8] = np.nan
     left_out = run_coloured(np.delete(times, 8), np.delete(z, 8, 0), R_W, CV, start, output_times=times)
-    gated = run_coloured(times, far, R_W, CV, start, gate=0.9999)
+    gated = run_coloured(times, far, R_W, CV, start, gate_probability=0.9999)
     assert not gated.used[8]
     assert gated.nis[8] > 100
     missing = run_coloured(times, gone, R_W, CV, start)

@@ -15,10 +15,11 @@ from wildlab.geometry.frames import wrap
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
 from wildlab.tracking import measurement as m
 from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.imm import run_imm
 from wildlab.tracking.motion import constant_velocity
 from wildlab.tracking.noise import constant_noise, noise_by_altitude
-from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.unscented import run_unscented
 
 
 def slope(function, k, step):

@@ -187,7 +187,7 @@ def test_the_gate_keeps_out_what_is_too_far():
     times, z = walk_of(30)
     z[12] += 200
     open_to_all = run_filter(times, z, R2, m.positions(), CV, START)
-    track = run_filter(times, z, R2, m.positions(), CV, START, gate=0.99)
+    track = run_filter(times, z, R2, m.positions(), CV, START, gate_probability=0.99)
     assert open_to_all.used.all()
     assert not track.used[12]
     assert track.nis[12] > 9.21  # 99 % of chi-square with two degrees
@@ -210,7 +210,7 @@ def test_of_several_detections_the_nearest_is_used():
     assert np.allclose(track.x, alone.x)
     both[4] = np.nan
     both[5, track.chosen[5]] = np.nan
-    gated = run_filter(times, both, PIXELS, sensor, CV, start, gate=0.999)
+    gated = run_filter(times, both, PIXELS, sensor, CV, start, gate_probability=0.999)
     assert gated.chosen[4] == -1
     assert gated.chosen[5] == 1 - track.chosen[5]
     assert gated.used.sum() == 28
@@ -242,9 +242,8 @@ def test_a_singular_noise_names_the_row(bad):
 
 def test_a_singular_innovation_covariance_names_the_row():
     times, z = walk_of(5)
-    wrong = START._replace(P=-20.0 * np.eye(4))
     with pytest.raises(WildlabError, match=r"innovation covariance S of row 0 is not positive definite"):
-        run_filter(times, z, R2, m.positions(), CV, wrong)
+        run_filter(times, z, R2, m.positions(), lambda dt: (np.eye(4), -9000.0 * np.eye(4)), START)
 
 
 def test_shapes_that_do_not_fit_are_named():

@@ -39,6 +39,14 @@ def chi_square_interval(dof: int, probability: float = 0.95, runs: float = 1) ->
     ------
     WildlabError
         If ``dof`` or ``runs`` is below 1, or ``probability`` not between 0 and 1.
+
+    Examples
+    --------
+    The mean NEES of four states over a hundred independent runs:
+
+    >>> low, high = chi_square_interval(4, runs=100)
+    >>> round(low, 2), round(high, 2)
+    (3.46, 4.57)
     """
     if dof < 1 or runs < 1 or not 0 < probability < 1:
         raise WildlabError(
@@ -111,6 +119,11 @@ def nees(errors: ArrayLike, covariances: ArrayLike, truth_covariance: ArrayLike 
     ------
     WildlabError
         If the shapes do not fit, or a covariance is not positive definite.
+
+    Examples
+    --------
+    >>> nees([[1.0, 2.0], [0.0, float("nan")]], [[1.0, 0.0], [0.0, 4.0]]).tolist()
+    [2.0, nan]
     """
     P = np.asarray(covariances, dtype=float)
     if truth_covariance is not None:

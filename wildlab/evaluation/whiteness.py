@@ -69,6 +69,15 @@ def innovation_whiteness(innovations: ArrayLike, lags: int) -> Whiteness:
     ------
     WildlabError
         If fewer innovations are left than ``lags + 2``.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> white = rng.standard_normal((500, 2))
+    >>> innovation_whiteness(white, lags=10).p_value > 0.05
+    True
+    >>> innovation_whiteness(white[1:] + white[:-1], lags=10).p_value < 1e-6
+    True
     """
     v = np.asarray(innovations, float)
     v = v[np.isfinite(v).all(axis=1)]

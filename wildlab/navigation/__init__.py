@@ -1,1 +1,99 @@
-"""From inertial and GNSS measurements to the airframe's pose, and how wrong it may be. Arrays in and out."""
+"""Inertial navigation aided by GNSS and magnetometer: position, velocity and attitude with their covariance.
+
+Frames: n is north, east, down about the flight's origin, b the airframe's forward, right, down. Positions are
+metres and velocities m/s in n; quaternions turn b into n, scalar first; specific force (m/s^2) and angular
+rate (rad/s) are in b, and so are biases and lever arms. Times are seconds on one clock. N samples are (N, 3),
+a state is (16,): position, velocity, quaternion, accelerometer bias, gyro bias; its errors are (15,), with
+the attitude's as a rotation vector in b (rad). H is H. H. Helgesen, Detection and Tracking of Floating
+Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
+
+- `run_mekf`: the multiplicative extended Kalman filter; `run_observer`: the nonlinear observer.
+- `integrate_strapdown`: inertial measurements alone.
+- `align_at`, `align_from_baseline`, `align_from_course`, `align_at_rest`: where they start.
+- `positions`, `velocities`, `headings`, `standstill`: aiding measurements.
+- `signs_of_trouble`: what of an estimate should not be believed.
+"""
+
+from wildlab.navigation.aiding import Aiding, headings, positions, standstill, velocities
+from wildlab.navigation.alignment import (
+    InitialSd,
+    Kinematics,
+    Reference,
+    align_at,
+    align_at_rest,
+    align_from_baseline,
+    align_from_course,
+    find_rest,
+)
+from wildlab.navigation.diagnostics import signs_of_trouble
+from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
+from wildlab.navigation.mekf import (
+    InitialState,
+    Innovations,
+    Navigation,
+    Outages,
+    log_likelihood,
+    pose_covariance,
+    run_mekf,
+)
+from wildlab.navigation.noise import (
+    ADIS16490,
+    STIM300,
+    AxisErrors,
+    ImuNoise,
+    from_data_sheet,
+    with_turn_on,
+)
+from wildlab.navigation.observer import (
+    Gains,
+    Observed,
+    baseline_reference,
+    course_reference,
+    field_reference,
+    run_observer,
+)
+from wildlab.navigation.strapdown import DeadReckoning, integrate_strapdown
+from wildlab.navigation.timeline import Gap, ImuSamples
+
+__all__ = [
+    "ADIS16490",
+    "STIM300",
+    "Aiding",
+    "AxisErrors",
+    "DeadReckoning",
+    "Gains",
+    "Gap",
+    "ImuNoise",
+    "ImuSamples",
+    "InitialSd",
+    "InitialState",
+    "Innovations",
+    "Kinematics",
+    "Navigation",
+    "Observed",
+    "Outages",
+    "Reference",
+    "align_at",
+    "align_at_rest",
+    "align_from_baseline",
+    "align_from_course",
+    "baseline_reference",
+    "course_reference",
+    "earth_field",
+    "field_reference",
+    "find_rest",
+    "from_data_sheet",
+    "hard_iron",
+    "headings",
+    "integrate_strapdown",
+    "log_likelihood",
+    "pose_covariance",
+    "positions",
+    "run_mekf",
+    "run_observer",
+    "share_turned",
+    "signs_of_trouble",
+    "standstill",
+    "velocities",
+    "with_turn_on",
+]

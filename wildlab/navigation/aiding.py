@@ -1,4 +1,4 @@
-"""What holds dead reckoning down: measurements of position, velocity and heading, with their uncertainty.
+"""Aiding measurements of the inertial navigation: position, velocity, heading, with their uncertainty.
 
 H 7.3 has the positions of two GNSS antennas, which give the heading as well. Beyond it: antennas' velocities,
 the direction of the magnetic field, and standing still.
@@ -18,7 +18,7 @@ from wildlab.navigation import kernels
 from wildlab.navigation.kernels import Integers
 from wildlab.navigation.timeline import (
     Gap,
-    Imu,
+    ImuSamples,
     Measurements,
     Timeline,
     checked_imu,
@@ -27,9 +27,16 @@ from wildlab.navigation.timeline import (
 )
 
 
-class Wander(NamedTuple):
-    """An error that a source's measurements share for a while: of first order, with a standard deviation per
-    axis of n, (3,), and a correlation time, s."""
+class GaussMarkov(NamedTuple):
+    """A first-order Gauss-Markov error that a source's measurements share.
+
+    Attributes
+    ----------
+    sd
+        (3,) stationary standard deviation per axis of n, m.
+    time
+        Correlation time, s.
+    """
 
     sd: Array
     time: float
@@ -38,7 +45,7 @@ class Wander(NamedTuple):
 class Aiding(NamedTuple):
     """Measurements of one kind from one source: (N,) times, (N, 3) values, variances and lever arms.
 
-    ``wander`` comes on top of the variances, which are of what differs from one measurement to the next.
+    ``gauss_markov`` comes on top of the variances, which are those of the white noise.
     """
 
     kind: int
@@ -46,7 +53,7 @@ class Aiding(NamedTuple):
     value: Array
     variance: Array
     lever: Array
-    wander: Wander | None = None
+    gauss_markov: GaussMarkov | None = None
 
 
 def _aiding(
@@ -80,8 +87,8 @@ def positions(
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
     latency: float = 0.0,
-    wander_sd: ArrayLike = 0.0,
-    wander_time: float = np.inf,
+    gauss_markov_sd: ArrayLike = 0.0,
+    gauss_markov_time: float = np.inf,
 ) -> Aiding:
     """Positions of a GNSS antenna, H (7.25).
 
@@ -97,14 +104,24 @@ def positions(
         Of the antenna in b, (3,) m.
     latency
         How long before its stamp a fix was valid, s.
-    wander_sd, wander_time
-        Of an error on top of ``sd`` that stays much the same from fix to fix (multipath, for instance):
-        standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates it.
+    gauss_markov_sd, gauss_markov_time
+        Of a first-order Gauss-Markov error on top of ``sd``, which neighbouring fixes share (multipath, for
+        instance): standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates
+        it.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    WildlabError
+        For shapes that do not fit, or a standard deviation that is not positive.
     """
     t = np.asarray(times, float) - latency
     found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
-    slow = np.array(np.broadcast_to(np.asarray(wander_sd, float), 3))
-    return found._replace(wander=Wander(slow, float(wander_time)) if slow.any() else None)
+    slow = np.array(np.broadcast_to(np.asarray(gauss_markov_sd, float), 3))
+    return found._replace(gauss_markov=GaussMarkov(slow, float(gauss_markov_time)) if slow.any() else None)
 
 
 def velocities(
@@ -144,7 +161,7 @@ def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: f
 
 
 def set_out(
-    imu: Imu, start: float, aiding: Sequence[Aiding], wanted: Array, max_gap: float
+    imu: ImuSamples, start: float, aiding: Sequence[Aiding], wanted: Array, max_gap: float
 ) -> tuple[Timeline, list[Gap]]:
     """The line of time from ``start`` (s) on, with the times that are wanted (M,), and the gaps along it.
 
@@ -171,7 +188,7 @@ def gather(
 ) -> tuple[Measurements, Integers, list[int]]:
     """Measurements in order of time, the index of the aiding of each, and how many of each lie outside.
 
-    The states of what wanders follow each other from index ``first`` on, in order of the aiding.
+    The states of Gauss-Markov errors follow each other from index ``first`` on, in order of the aiding.
     """
     low, high = line.times[0], line.times[-1]
     inside = [(source.times >= low) & (source.times <= high) for source in aiding]
@@ -185,8 +202,8 @@ def gather(
 
     kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
     source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
-    wanders = np.array([a.wander is not None for a in aiding] + [False])
-    states = np.where(wanders, first + 3 * (np.cumsum(wanders) - 1), -1).astype(np.int64)
+    correlated = np.array([a.gauss_markov is not None for a in aiding] + [False])
+    states = np.where(correlated, first + 3 * (np.cumsum(correlated) - 1), -1).astype(np.int64)
     measured = Measurements(
         np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),
         joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]), states[source],

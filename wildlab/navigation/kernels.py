@@ -1,36 +1,30 @@
 """The hot loops, compiled: strapdown steps and the MEKF.
 
-What they compute is written out again, short and slow, in `plain`; tests hold the two together. All compiled
-functions that call each other stay in this one file: the compiler's cache only looks at the file a function
-stands in, and would go on using the old version of what it calls in another one.
+What they compute is written out again, short and slow, in `reference_mekf`; tests hold the two together. All
+compiled functions that call each other stay in this one file: the compiler's cache only looks at the file a
+function stands in, and would go on using the old version of what it calls in another one. They take more
+arguments than a function elsewhere may: scratch is made once, and an array by itself compiles faster and is
+typed faster at each call than one in a tuple of many.
 
 Vectors are written into arrays made once before a loop, and loops run over sizes known to the compiler.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 
 Integers = NDArray[np.int64]
-F = TypeVar("F", bound=Callable[..., Any])
 
-#: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; of positions that wander.
+#: Errors of H (7.22). Behind them: of the axes, accelerometers first, row by row; Gauss-Markov errors.
 N_ERRORS, N_AXES = 15, 18
 #: Kinds of measurement.
 POSITION, VELOCITY, HEADING = 0, 1, 2
 #: What became of a measurement.
 REJECTED, ACCEPTED, FORCED = 0, 1, 2
-
-
-def compiled(function: F) -> F:
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled
@@ -244,9 +238,9 @@ def correct(
     x: Array, P: Array, H: Array, m: int, y: Array, variance: Array, axes: bool, S_inverse: Array, PH: Array,
     K: Array, M: Array, work: Array,
 ) -> None:  # fmt: skip
-    """Take in a measurement, Joseph form; the attitude error is then folded into the quaternion.
+    """Measurement update, Joseph form; the attitude error is then folded into the quaternion.
 
-    Errors of the axes have no gain, as in a Schmidt filter: they are reckoned with, not estimated.
+    Errors of the axes have no gain, as in a Schmidt filter: they are considered, not estimated.
     """
     n = P.shape[0]
     dx = np.zeros(n)
@@ -301,10 +295,10 @@ def correct(
 def mekf(
     times: Array, f: Array, w: Array, gap: Array, row_of_node: Integers, earth: Array, noise: Array, x: Array,
     P: Array, axes: bool, extra: Array, node: Integers, kind: Integers, value: Array, variance: Array,
-    lever: Array, wander: Integers, gate: Array, patience: float, states: Array, covariances: Array,
+    lever: Array, gauss_markov: Integers, gate: Array, patience: float, states: Array, covariances: Array,
     innovations: Array, spreads: Array, nis: Array, verdicts: Integers,
 ) -> None:  # fmt: skip
-    """The whole filter over a timeline; see `plain.mekf` for the same in short."""
+    """The whole filter over a timeline; see `reference_mekf.mekf` for the same in short."""
     n = P.shape[0]
     work, R, R_start, R_mid = np.empty((3, 4)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     A, B, C, E = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -351,9 +345,9 @@ def mekf(
         while event < len(node) and node[event] == k:
             sort = kind[event]
             m = predict_measurement(sort, x, w[k], value[event], lever[event], R, y, H)
-            if wander[event] >= 0:
-                y -= x[1 + wander[event] : 4 + wander[event]]
-                H[:, wander[event] : wander[event] + 3] = np.eye(3)
+            if gauss_markov[event] >= 0:
+                y -= x[1 + gauss_markov[event] : 4 + gauss_markov[event]]
+                H[:, gauss_markov[event] : gauss_markov[event] + 3] = np.eye(3)
             growth = 1.0
             while True:
                 PH[:] = 0.0

@@ -9,7 +9,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth
 from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import Imu, checked_imu
+from wildlab.navigation.timeline import ImuSamples, checked_imu
 
 #: Largest standard deviation of a centre, over the radius: a heading by it is then good to some two degrees.
 SURE = 0.03
@@ -53,7 +53,7 @@ def earth_field(declination: float, inclination: float) -> Array:
     return np.array([level * np.cos(declination), level * np.sin(declination), np.sin(inclination)])
 
 
-def share_turned(times: ArrayLike, field_b: ArrayLike, imu: Imu, step: float = 2.0) -> float:
+def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples, step: float = 2.0) -> float:
     """How much of the field's turning in b the gyros explain: near one where both are in the same axes.
 
     The Earth's field stands still in n, so in b it turns as the airframe does, the other way round. With an

@@ -6,9 +6,9 @@ b (``q = q_hat * dq``, H 7.15-7.16), accelerometer bias, gyro bias. What may be 
 the filter.
 
 Behind the fifteen come, where asked for, what H leaves out and sensors have, and what looks like motion to a
-filter of fifteen states. Positions whose error wanders have it estimated. Axes that are not where they should
-be are only reckoned with, as the pose is in the tracking of H 7.4: estimated, they come out surer than they
-are, since what little tells them from biases hangs on estimates that still move.
+filter of fifteen states. Gauss-Markov errors of positions are estimated. Misaligned axes and scale factors
+are considered, as the pose is in the tracking of H 7.4: estimated, they come out surer than they are, since
+what little tells them from biases hangs on estimates that still move.
 
 Everything is computed after the flight, so a latency needs no model: a fix belongs to the time at which it
 was valid.
@@ -22,22 +22,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
-from scipy.stats import chi2
 
+from wildlab.errors import WildlabError
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
+from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
 from wildlab.navigation.kernels import Integers
 from wildlab.navigation.noise import AxisErrors
 from wildlab.navigation.noise import ImuNoise as ImuNoise  # part of what a run takes, so also found here
-from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu
+from wildlab.navigation.timeline import Gap, ImuSamples, Measurements, Timeline, checked_imu
 
-#: Verdicts on a measurement: left out by its gate; taken in; taken in after the covariance was widened.
+#: Verdicts on a measurement: left out by its gate; used; used after the covariance was widened.
 REJECTED, ACCEPTED, FORCED = kernels.REJECTED, kernels.ACCEPTED, kernels.FORCED
 
 
-class Start(NamedTuple):
+class InitialState(NamedTuple):
     """What is known at the start.
 
     Attributes
@@ -45,7 +47,8 @@ class Start(NamedTuple):
     time
         s. Earlier measurements are not used.
     state
-        (16,): position, velocity, quaternion, accelerometer bias, gyro bias.
+        (16,): position (m) and velocity (m/s) in n, quaternion from b to n, scalar first, accelerometer bias
+        (m/s^2) and gyro bias (rad/s) in b.
     covariance
         (15, 15) of the errors.
     """
@@ -53,6 +56,30 @@ class Start(NamedTuple):
     time: float
     state: Array
     covariance: Array
+
+
+class Outages(NamedTuple):
+    """How the filter gets through times without inertial samples, or without a measurement that passes.
+
+    Attributes
+    ----------
+    patience
+        Where all measurements of a kind were left out for so long (s), the filter has lost its way rather
+        than the sensor: the covariance is then widened until the next one fits, which is marked ``FORCED``.
+    max_gap
+        Intervals between inertial samples longer than this (s) are crossed in a straight line.
+    gap_acceleration, gap_rate
+        Standard deviations of what may have been meanwhile, m/s^2 and rad/s.
+    """
+
+    patience: float = 5.0
+    max_gap: float = 0.1
+    gap_acceleration: float = 5.0
+    gap_rate: float = 0.5
+
+
+#: What `run_mekf` does where nobody says otherwise.
+OUTAGES = Outages()
 
 
 class Innovations(NamedTuple):
@@ -98,8 +125,8 @@ class Navigation(NamedTuple):
     unused: list[int]
 
 
-class Prepared(NamedTuple):
-    """What both the compiled filter and the plain one take.
+class MekfInputs(NamedTuple):
+    """What both the compiled filter and its reference take.
 
     ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
     ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
@@ -119,10 +146,12 @@ class Prepared(NamedTuple):
 
 
 def prepare(
-    imu: Imu, start: Start, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array, gate: float,
-    max_gap: float, gap_acceleration: float, gap_rate: float, axes: AxisErrors | None = None,
-) -> Prepared:  # fmt: skip
-    line, gaps = set_out(imu, start.time, aiding, output_times, max_gap)
+    imu: ImuSamples, start: InitialState, noise: ImuNoise, aiding: Sequence[Aiding], output_times: Array,
+    gate_probability: float, outages: Outages, axes: AxisErrors | None = None,
+) -> MekfInputs:  # fmt: skip
+    """Timeline, measurements in order of time, and all numbers of the filter."""
+    check_initial(start)
+    line, gaps = set_out(imu, start.time, aiding, output_times, outages.max_gap)
     beyond, extra = _extra(aiding, axes)
     state = np.concatenate([start.state, np.zeros(len(extra))])
     covariance = block_diag(start.covariance, beyond)
@@ -131,9 +160,9 @@ def prepare(
         sd if np.isinf(time) else sd * np.sqrt(2 / time)  # spectral density from the standard deviation
         for sd, time in ((noise[2], noise[3]), (noise[4], noise[5]))
     ]
-    numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], gap_acceleration, gap_rate])
-    limits = chi2.isf(gate, [3, 3, 1]) if gate > 0 else np.full(3, np.inf)
-    return Prepared(
+    numbers = np.array([*noise[:2], long_run[0], noise[3], long_run[1], noise[5], *outages[2:]])
+    limits = [gate_threshold(gate_probability, m) for m in (3, 3, 1)]  # by kind of measurement
+    return MekfInputs(
         line, measured, source, unused, gaps, numbers, state, covariance, axes is not None, extra,
         np.asarray(limits, float),
     )  # fmt: skip
@@ -145,36 +174,51 @@ def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Ar
     if axes is not None:
         covariances += [axes.covariance()] * 2
         processes.append(np.tile([0.0, np.inf], (18, 1)))
-    for wander in (a.wander for a in aiding if a.wander is not None):
-        covariances.append(np.diag(wander.sd**2))
-        density = wander.sd * np.sqrt(2 / wander.time)
-        processes.append(np.stack([density, np.full(3, wander.time)], axis=-1))
+    for process in (a.gauss_markov for a in aiding if a.gauss_markov is not None):
+        covariances.append(np.diag(process.sd**2))
+        density = process.sd * np.sqrt(2 / process.time)
+        processes.append(np.stack([density, np.full(3, process.time)], axis=-1))
     return block_diag(*covariances), np.concatenate(processes)
 
 
+def check_initial(start: InitialState) -> None:
+    """Refuse an initial state that is not finite, or whose covariance is none."""
+    state, P = np.asarray(start.state, float), np.asarray(start.covariance, float)
+    if state.shape != (16,) or P.shape != (15, 15):
+        raise WildlabError(
+            f"a state of the shape {state.shape} and a covariance of the shape {P.shape}",
+            "give (16,) and (15, 15)",
+            field="start",
+        )
+    lost = np.flatnonzero(~np.isfinite(state))
+    if len(lost):
+        raise WildlabError(
+            f"row {lost[0]} is {state[lost[0]]}", "give every state a value to start from",
+            field="start.state",
+        )  # fmt: skip
+    check_covariance(P, "start.covariance")
+
+
 def run_mekf(
-    imu: Imu,
-    start: Start,
+    imu: ImuSamples,
+    start: InitialState,
     noise: ImuNoise,
     earth: Earth,
     aiding: Sequence[Aiding],
     output_times: ArrayLike | None = None,
     *,
     axes: AxisErrors | None = None,
-    gate: float = 1e-4,
-    patience: float = 5.0,
-    max_gap: float = 0.1,
-    gap_acceleration: float = 5.0,
-    gap_rate: float = 0.5,
+    gate_probability: float = 0.9999,
+    outages: Outages = OUTAGES,
 ) -> Navigation:
     """Position, velocity, attitude and biases with their covariance, from inertial measurements and aiding.
 
     Parameters
     ----------
     imu
-        Inertial measurements; see `Imu`.
+        Inertial measurements; see `ImuSamples`.
     start
-        From `start.start_at` or of one's own.
+        From `alignment.align_at` or of one's own.
     noise, earth
         How the sensors err, and what pulls: `gravity.local_earth`, or `gravity.flat_earth` as in H.
     aiding
@@ -184,36 +228,55 @@ def run_mekf(
         sample (the covariances of 25 minutes at 250 Hz then take 0.7 GB).
     axes
         How far the inertial sensors' axes may be from where they should be; in a turn, a wrong one is a bias
-        that was not there before. Reckoned with, not estimated.
-    gate
-        Probability with which a good measurement is left out as an outlier, by its NIS. 0 leaves none out.
-    patience
-        Where all measurements of a kind were left out for so long (s), the filter has lost its way rather
-        than the sensor: the covariance is then widened until the next one fits, which is marked ``FORCED``.
-    max_gap
-        Intervals between inertial samples longer than this (s) are crossed in a straight line, with
-        ``gap_acceleration`` (m/s^2) and ``gap_rate`` (rad/s) as standard deviations of what may have been.
+        that was not there before. Considered, not estimated.
+    gate_probability
+        Probability that a good measurement is let in, by its NIS, H (3.9). In (0, 1]; 1 leaves none out.
+    outages
+        See `Outages`.
+
+    Returns
+    -------
+    Navigation
 
     Raises
     ------
     WildlabError
-        For arrays that do not fit, or a start outside the inertial samples.
+        For arrays that do not fit, a start outside the inertial samples, an initial state that is not finite
+        or without a covariance, or a ``gate_probability`` outside (0, 1].
+
+    Examples
+    --------
+    Two seconds at rest, with a fix every half a second:
+
+    >>> import numpy as np
+    >>> from wildlab.geometry.gravity import flat_earth
+    >>> from wildlab.navigation import STIM300, ImuSamples, InitialState, positions, run_mekf
+    >>> t = np.arange(0, 2.01, 0.01)
+    >>> earth = flat_earth()
+    >>> imu = ImuSamples(t, np.tile([0, 0, -earth.gravity], (len(t), 1)), np.zeros((len(t), 3)))
+    >>> level = np.concatenate([np.zeros(6), [1, 0, 0, 0], np.zeros(6)])
+    >>> start = InitialState(0.0, level, 0.01 * np.eye(15))
+    >>> fixes = positions([0.5, 1.0, 1.5, 2.0], np.zeros((4, 3)), sd=0.1)
+    >>> found = run_mekf(imu, start, STIM300, earth, [fixes], output_times=[2.0])
+    >>> bool(np.abs(found.position).max() < 1e-9), found.innovations.verdict.tolist()
+    (True, [1, 1, 1, 1])
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     known = np.isfinite(wanted)
     times, row = np.unique(wanted[known], return_inverse=True)
-    ready = prepare(imu, start, noise, aiding, times, gate, max_gap, gap_acceleration, gap_rate, axes)
+    ready = prepare(imu, start, noise, aiding, times, gate_probability, outages, axes)
     line, measured = ready.line, ready.measured
     states, covariances = np.full((len(times), 16), np.nan), np.full((len(times), 15, 15), np.nan)
     n = len(measured.node)
     innovation, S, nis = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
     verdict = np.zeros(n, np.int64)
-    kernels.mekf(
-        line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
-        ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind, measured.value,
-        measured.variance, measured.lever, measured.wander, ready.gate, float(patience), states, covariances,
-        innovation, S, nis, verdict,
-    )  # fmt: skip
+    with announced("the navigation filter"):
+        kernels.mekf(
+            line.times, line.f, line.w, line.gap, line.row_of_node, earth.as_array(), ready.noise,
+            ready.state, ready.covariance, ready.axes, ready.extra, measured.node, measured.kind,
+            measured.value, measured.variance, measured.lever, measured.gauss_markov, ready.gate,
+            float(outages.patience), states, covariances, innovation, S, nis, verdict,
+        )  # fmt: skip
     for gap in ready.gaps:
         unknown = (times > gap.start) & (times < gap.end)
         states[unknown], covariances[unknown] = np.nan, np.nan

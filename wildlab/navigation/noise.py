@@ -67,7 +67,7 @@ def with_turn_on(noise: ImuNoise, accelerometer: float, gyro: float) -> ImuNoise
     """Noise whose biases also differ from one switching-on to the next (standard deviations, SI).
 
     A constant and a process of first order together are taken as one such process, with the variance of
-    both and the spectral density that drives the second: over a flight, a constant that wanders a little.
+    both and the spectral density that drives the second: over a flight, a constant that drifts a little.
     """
     biases: list[float] = []
     for sd, time, constant in ((*noise[2:4], accelerometer), (*noise[4:6], gyro)):

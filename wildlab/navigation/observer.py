@@ -1,8 +1,9 @@
 """The nonlinear observer of H 5.5: attitude with gyro bias, and translational motion in ECEF.
 
 Where H integrates, measurements come one by one. Between them the Riccati equation (5.50) has a closed form,
-and each is taken in with the gain that (5.48)-(5.49) tend to: with ``theta`` 1 that of a Kalman filter. The
-injection of the second vector is held in b until the next one, at most half as long again as usual.
+and each updates the estimate with the gain that (5.48)-(5.49) tend to: with ``theta`` 1 that of a Kalman
+filter. The injection of the second vector is held in b until the next one, at most half as long again as
+usual.
 
 H's second vector is the baseline between two antennas. A log with one antenna has none;
 :func:`field_reference` takes the magnetic field, :func:`course_reference` the course, instead. Both are
@@ -17,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import (
     Array,
     Origin,
@@ -26,9 +28,9 @@ from wildlab.geometry.frames import (
 )
 from wildlab.navigation import kernels
 from wildlab.navigation.aiding import Aiding, gather, set_out
-from wildlab.navigation.mekf import Start
+from wildlab.navigation.mekf import InitialState, check_initial
 from wildlab.navigation.observer_kernel import observe
-from wildlab.navigation.timeline import Gap, Imu, Measurements, Timeline, checked_imu
+from wildlab.navigation.timeline import Gap, ImuSamples, Measurements, Timeline, checked_imu
 
 REFERENCE = 3
 
@@ -111,8 +113,8 @@ def course_reference(
     return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
 
 
-class Prepared(NamedTuple):
-    """What both the compiled observer and the plain one take; positions and directions in e."""
+class ObserverInputs(NamedTuple):
+    """What both the compiled observer and its reference take; positions and directions in e."""
 
     line: Timeline
     measured: Measurements
@@ -134,14 +136,15 @@ def earth_axes(origin: Origin) -> tuple[Array, Array]:
 
 
 def prepare(
-    imu: Imu,
-    start: Start,
+    imu: ImuSamples,
+    start: InitialState,
     origin: Origin,
     aiding: Sequence[Aiding],
     gains: Gains,
     wanted: Array,
     max_gap: float,
-) -> Prepared:
+) -> ObserverInputs:
+    check_initial(start)
     line, gaps = set_out(imu, start.time, aiding, wanted, max_gap)
     p_e, R_en = earth_axes(origin)
     in_e = [a._replace(value=a.value @ R_en.T + (p_e if a.kind == kernels.POSITION else 0.0)) for a in aiding]
@@ -164,12 +167,12 @@ def prepare(
     force = (9.8**2 * start.covariance[6:9, 6:9] + start.covariance[9:12, 9:12]).trace() / 3
     spread = [start.covariance[i : i + 3, i : i + 3].trace() / 3 for i in (0, 3)] + [force]
     P = np.diag(np.repeat(spread, 3) / np.repeat([1.0, gains.theta**2, gains.theta**4], 3))
-    return Prepared(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
+    return ObserverInputs(line, measured, numbers, q, state[13:].copy(), x, P, unused, gaps)
 
 
 def run_observer(
-    imu: Imu,
-    start: Start,
+    imu: ImuSamples,
+    start: InitialState,
     origin: Origin,
     aiding: Sequence[Aiding],
     output_times: ArrayLike | None = None,
@@ -195,7 +198,8 @@ def run_observer(
     Raises
     ------
     WildlabError
-        For arrays that do not fit, or a start outside the inertial samples.
+        For arrays that do not fit, an initial state that is not finite or without a covariance, or one
+        outside the inertial samples.
     """
     wanted = checked_imu(imu).times if output_times is None else np.asarray(output_times, float)
     known = np.isfinite(wanted)
@@ -203,10 +207,12 @@ def run_observer(
     ready = prepare(imu, start, origin, aiding, gains or Gains(), times, max_gap)
     line, measured = ready.line, ready.measured
     out = np.full((len(times), 16), np.nan)
-    observe(
-        line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind, measured.value,
-        measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x, ready.P, out,
-    )  # fmt: skip
+    with announced("the nonlinear observer"):
+        observe(
+            line.times, line.f, line.w, line.gap, line.row_of_node, measured.node, measured.kind,
+            measured.value, measured.variance, measured.lever, ready.gains, ready.q, ready.bias, ready.x,
+            ready.P, out,
+        )  # fmt: skip
     for gap in ready.gaps:
         out[(times > gap.start) & (times < gap.end)] = np.nan
     rows = np.full((len(wanted), 16), np.nan)

@@ -1,4 +1,4 @@
-"""The hot loop of the nonlinear observer, compiled; `plain.observer` says the same in short.
+"""The hot loop of the nonlinear observer, compiled; `reference_observer` says the same in short.
 
 Quaternions are worked out here again rather than called from `kernels`: the compiler's cache looks only at
 the file that a function stands in.
@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
-from wildlab.navigation.kernels import POSITION, VELOCITY, Integers, compiled
+from wildlab.navigation.kernels import POSITION, VELOCITY, Integers
 
 #: WGS84: gravitational constant (m^3/s^2), equatorial radius (m), J2, rate (rad/s).
 MU, RADIUS, J2, RATE = 3.986004418e14, 6378137.0, 1.082629821313e-3, 7.292115e-5
@@ -100,8 +101,8 @@ def project(b: Array, move: Array, inner: float, outer: float) -> None:
 
 
 @compiled
-def take_in(x: Array, P: Array, y: Array, variance: Array, first: int, theta: float, K: Array) -> None:
-    """The gains H (5.48)-(5.49) on one measurement of the elements from ``first`` on."""
+def update(x: Array, P: Array, y: Array, variance: Array, first: int, theta: float, K: Array) -> None:
+    """Measurement update of the elements from ``first`` on, with the gains H (5.48)-(5.49)."""
     S, s_first = np.empty((3, 3)), theta if first == 3 else 1.0
     for i in range(3):
         for j in range(3):
@@ -203,7 +204,7 @@ def observe(
                 for i in range(3):
                     y[i] = value[event, i] - x[first + i]
                     y[i] -= R[i, 0] * arm[0] + R[i, 1] * arm[1] + R[i, 2] * arm[2]
-                take_in(x, P, y, variance[event], first, theta, K)
+                update(x, P, y, variance[event], first, theta, K)
             else:
                 # A direction: value in e, lever in b, H (5.38).
                 force_directions(f[k], R, x[6:9], limit, f_b, f_e, work)

@@ -16,7 +16,7 @@ from wildlab.geometry.frames import Array
 from wildlab.navigation.kernels import Integers
 
 
-class Imu(NamedTuple):
+class ImuSamples(NamedTuple):
     """Inertial measurements.
 
     Attributes
@@ -57,7 +57,7 @@ class Timeline(NamedTuple):
 class Measurements(NamedTuple):
     """Measurements in order of time: the node each belongs to, its kind, value, variance and lever arm.
 
-    ``wander`` (E,) is where the error states of what wanders in it begin, -1 where nothing does.
+    ``gauss_markov`` (E,) is the first of its three Gauss-Markov error states, -1 where it has none.
     """
 
     node: Integers
@@ -65,10 +65,10 @@ class Measurements(NamedTuple):
     value: Array
     variance: Array
     lever: Array
-    wander: Integers
+    gauss_markov: Integers
 
 
-def checked_imu(imu: Imu) -> Imu:
+def checked_imu(imu: ImuSamples) -> ImuSamples:
     """The samples that can be used, as arrays of floats.
 
     Raises
@@ -96,7 +96,7 @@ def checked_imu(imu: Imu) -> Imu:
             "sort them and remove repeated stamps",
             field="imu",
         )
-    return Imu(np.ascontiguousarray(t), np.ascontiguousarray(f), np.ascontiguousarray(w))
+    return ImuSamples(np.ascontiguousarray(t), np.ascontiguousarray(f), np.ascontiguousarray(w))
 
 
 def find_gaps(times: ArrayLike, max_gap: float) -> list[Gap]:
@@ -105,7 +105,7 @@ def find_gaps(times: ArrayLike, max_gap: float) -> list[Gap]:
     return [Gap(float(t[i]), float(t[i + 1])) for i in np.flatnonzero(np.diff(t) > max_gap)]
 
 
-def lay_out(imu: Imu, start: float, others: ArrayLike, wanted: ArrayLike, max_gap: float) -> Timeline:
+def lay_out(imu: ImuSamples, start: float, others: ArrayLike, wanted: ArrayLike, max_gap: float) -> Timeline:
     """Nodes from ``start`` to the last inertial sample.
 
     Parameters

@@ -14,12 +14,12 @@ from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.aiding import Aiding, headings, positions, velocities
+from wildlab.navigation.alignment import align_at_rest, align_from_baseline, align_from_course, find_rest
 from wildlab.navigation.magnetometer import earth_field, hard_iron, share_turned
-from wildlab.navigation.mekf import Start
+from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.noise import AxisErrors, ImuNoise, with_turn_on
 from wildlab.navigation.observer import baseline_reference, course_reference, field_reference
-from wildlab.navigation.start import find_rest, start_at_rest, start_from_baseline, start_from_course
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,9 @@ Heading = Literal["antennas", "field", "course"]
 class Inputs(NamedTuple):
     """Samples, aiding by what it is called in a report, and the start."""
 
-    imu: Imu
+    imu: ImuSamples
     aiding: dict[str, Aiding]
-    start: Start
+    start: InitialState
 
 
 def imu_noise(flight: Flight) -> ImuNoise:
@@ -149,13 +149,13 @@ def inputs_of(
         aiding["second position"] = positions(t, second, white, arms[1], 0.0, wander, wander_time)
         # The fixes that it starts from are taken in once more: loosely here, so that they count once.
         known["baseline_sd"] = LOOSE * spread
-        start = start_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)
+        start = align_from_baseline(samples, t, p, second, *arms, gravity=gravity, **known)
     else:
         rest = find_rest(samples, t, v) if moving else None
         if rest is None:
-            start = start_from_course(samples, t, p, v, gravity=gravity, **known)
+            start = align_from_course(samples, t, p, v, gravity=gravity, **known)
         else:
-            start = start_at_rest(samples, t, p, v, rest=rest, gravity=gravity, min_speed=FLYING, **known)
+            start = align_at_rest(samples, t, p, v, rest=rest, gravity=gravity, min_speed=FLYING, **known)
     return Inputs(samples, aiding, start)
 
 
@@ -215,10 +215,10 @@ def _lever(flight: Flight, gnss: pd.DataFrame, columns: tuple[str, ...]) -> Arra
     return np.array(flight.manifest.gnss.lever_arm_m)
 
 
-def samples_of(flight: Flight) -> Imu:
+def samples_of(flight: Flight) -> ImuSamples:
     """The flight's inertial samples."""
     imu = flight.table("imu")
-    return Imu(
+    return ImuSamples(
         imu["time_s"].to_numpy(float),
         imu[["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]].to_numpy(float),
         imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float),

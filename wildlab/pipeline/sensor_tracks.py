@@ -34,8 +34,8 @@ from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import Looks, Truth, looks_of, truths_at
 from wildlab.pipeline.sensor_tuning import REACH, Tuning, errors_near
-from wildlab.tracking.afloat import bearings_from, positions_from, white_acceleration
 from wildlab.tracking.coloured import run_coloured, thin
+from wildlab.tracking.maritime import bearings_from, positions_from, white_acceleration
 from wildlab.tracking.run import Start, Track, run_filter
 from wildlab.tracking.schmidt import PoseUncertainty
 
@@ -112,7 +112,8 @@ def follow(looks: Looks, truth: Truth, tuning: Tuning, others: Sequence[Truth] =
     sensor = positions_from if looks.kind == "position" else bearings_from
     motion = partial(white_acceleration, density=ACCELERATION_DENSITY)
     white = np.eye(m) * tuning.sd**2
-    first = run_filter(looks.times, seen, white, sensor(at, np.zeros_like(at)), motion, begin, gate=GATE)
+    own_drift = np.zeros_like(at)
+    first = run_filter(looks.times, seen, white, sensor(at, own_drift), motion, begin, gate_probability=GATE)
     # From here on one detection a look: the same for all.
     own = np.where(first.used[:, None], seen[np.arange(len(seen)), np.maximum(first.chosen, 0)], np.nan)
     rest: dict[str, Callable[[], Track]] = {

@@ -16,7 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import Looks, Truth, looks_of, truths_at
-from wildlab.tracking.afloat import CLOCK, EAST, NORTH, YAW, predict_bearing, predict_position
+from wildlab.tracking.maritime import CLOCK, EAST, NORTH, YAW, predict_bearing, predict_position
 from wildlab.tracking.measurement import Prediction, difference
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Tuning(NamedTuple):
 
     @property
     def pose_covariance(self) -> Array:
-        """(6, 6) of the considered errors, as `wildlab.tracking.afloat` orders them."""
+        """(6, 6) of the considered errors, as `wildlab.tracking.maritime` orders them."""
         variance = np.zeros(6)
         variance[[NORTH, EAST]] = self.position_sd_m**2
         variance[CLOCK], variance[YAW] = self.clock_sd_s**2, self.yaw_sd_rad**2

@@ -1,7 +1,76 @@
-"""Tracking filters: measurements with covariances in, estimates with covariances out; nothing kept between.
+"""Target tracking: measurements with covariances in, estimates with covariances out; nothing kept between.
 
-- `run`: a whole flight through the Kalman, extended or Schmidt filter; `coloured` through differences of
-  measurements; `others` through the unscented filter and interacting models. `batch`: many runs at once.
-- `motion`, `measurement`, `noise`: what the filters are told of target, sensor and errors.
+Positions are metres north and east in n, whose origin the flight chooses; the down coordinate of the plane
+the target moves on is given. States are ``[pN, pE]``, ``[pN, pE, vN, vE]`` or with ``[aN, aE]`` behind, times
+seconds, angles radians, pixels (u, v) to the right and down. N rows of measurements are (N, m), or (N, K, m)
+with K detections in each; covariances have one axis more. A pose's errors are three of the position in n (m)
+and a rotation vector in b (rad). H is H. H. Helgesen, Detection and Tracking of Floating Objects using UAVs
+with Optical Sensors, doctoral thesis, NTNU 2019; F is A. Flodell and C. Christensson, Wildlife Surveillance
+Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
+
+- `run_filter`: Kalman, extended or Schmidt filter over a whole flight; `run_batch`: many runs at once.
+- `run_coloured`, `run_unscented`, `run_imm`: differenced measurements, sigma points, several motion models.
+- `motion`, `measurement`, `noise`, `maritime`: what the filters are told of target, sensor and errors.
 - `kalman`, `schmidt`, `association`: the single steps.
 """
+
+from wildlab.tracking.association import distances, nearest_within
+from wildlab.tracking.batch import BatchTracks, View, run_batch
+from wildlab.tracking.coloured import run_coloured, thin
+from wildlab.tracking.imm import ModeTrack, run_imm
+from wildlab.tracking.kalman import filter_at_rest
+from wildlab.tracking.measurement import (
+    Sensor,
+    azimuths_elevations,
+    bearings,
+    pixels,
+    positions,
+    ranges_bearings,
+)
+from wildlab.tracking.motion import (
+    Motion,
+    constant_position,
+    constant_velocity,
+    in_steps,
+    random_walk,
+    rest,
+    singer,
+)
+from wildlab.tracking.noise import constant_noise, noise_by_altitude
+from wildlab.tracking.run import Start, Track, run_filter, start_from_first
+from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.unscented import run_unscented
+
+__all__ = [
+    "BatchTracks",
+    "ModeTrack",
+    "Motion",
+    "PoseUncertainty",
+    "Sensor",
+    "Start",
+    "Track",
+    "View",
+    "azimuths_elevations",
+    "bearings",
+    "constant_noise",
+    "constant_position",
+    "constant_velocity",
+    "distances",
+    "filter_at_rest",
+    "in_steps",
+    "nearest_within",
+    "noise_by_altitude",
+    "pixels",
+    "positions",
+    "random_walk",
+    "ranges_bearings",
+    "rest",
+    "run_batch",
+    "run_coloured",
+    "run_filter",
+    "run_imm",
+    "run_unscented",
+    "singer",
+    "start_from_first",
+    "thin",
+]

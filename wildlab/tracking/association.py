@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.measurement import Prediction, difference, on_state
 
 
@@ -20,11 +20,6 @@ class Nearest(NamedTuple):
     innovation: Array  # (m,)
     S: Array  # (m, m)
     nis: float
-
-
-def gate_threshold(probability: float, m: int) -> float:
-    """Largest NIS inside the validation region of a measurement with ``m`` elements, H (3.9)."""
-    return float(chi2.ppf(probability, m))
 
 
 def innovation_squared(innovation: ArrayLike, S: ArrayLike) -> Array:
@@ -103,11 +98,30 @@ def distances(
     return nis
 
 
-def nearest_within(nis: ArrayLike, probability: float | None, m: int) -> NDArray[np.int64]:
-    """Index of the smallest NIS (..., K) along the last axis, -1 where none lies within the gate."""
+def nearest_within(nis: ArrayLike, gate_probability: float, m: int) -> NDArray[np.int64]:
+    """Nearest neighbour within the validation region, H 3.3.
+
+    Parameters
+    ----------
+    nis
+        (..., K), NaN where there is nothing to compare.
+    gate_probability
+        Probability that the target's own measurement is let in, in (0, 1]; 1 is no gate.
+    m
+        Elements of the measurement.
+
+    Returns
+    -------
+    (...) index of the smallest NIS along the last axis, -1 where none lies within the gate.
+
+    Raises
+    ------
+    WildlabError
+        For a ``gate_probability`` outside (0, 1].
+    """
     d = np.asarray(nis, float)
     d = np.where(np.isnan(d), np.inf, d)
     best = np.argmin(d, axis=-1)
     least = np.take_along_axis(d, best[..., None], axis=-1)[..., 0]
-    limit = np.finfo(float).max if probability is None else gate_threshold(probability, m)
+    limit = min(gate_threshold(gate_probability, m), float(np.finfo(float).max))
     return np.asarray(np.where(least <= limit, best, -1))

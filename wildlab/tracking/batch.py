@@ -14,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, checked
+from wildlab.tracking.run import Start, check_rows, check_start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
 
 
@@ -58,7 +59,7 @@ def run_batch(
     *,
     view: View | None = None,
     pose: PoseUncertainty | None = None,
-    gate: float | None = None,
+    gate_probability: float = 1.0,
     rows: ArrayLike | None = None,
 ) -> BatchTracks:
     """Kalman filter on positions; with ``view`` the extended filter on pixels; with ``pose`` Schmidt's.
@@ -79,7 +80,7 @@ def run_batch(
         The camera; None: the measurements are positions.
     pose
         Its covariance is (N, 6, 6) or (B, N, 6, 6).
-    gate
+    gate_probability
         As in `wildlab.tracking.run.run_filter`.
     rows
         (M,) the rows after which estimates are kept; all when not given. Long flights of many runs fill the
@@ -96,7 +97,9 @@ def run_batch(
         raise WildlabError(
             f"measurements of the shape {z.shape}", "give (runs, times, 2)", field="measurements"
         )
-    given = checked(times, np.moveaxis(z, 0, 1), np.moveaxis(R, 0, 1) if R.ndim == 4 else R, gate, None)
+    R_rows = np.moveaxis(R, 0, 1) if R.ndim == 4 else R
+    given = checked(times, np.moveaxis(z, 0, 1), R_rows, gate_probability, None)
+    check_start(start)
     z = np.ascontiguousarray(np.moveaxis(given.z, 0, 1))
     B, N = z.shape[:2]
     first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
@@ -109,8 +112,9 @@ def run_batch(
         if pose is not None:
             left[first:] = np.array([schmidt.fade(dt, pose.correlation_time) for dt in steps.tolist()])[which]
 
-    P_poses = phis = np.zeros((1, N, 36))
+    P_poses = phis = None
     if pose is not None:
+        check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
         each = [schmidt.transitions_of_pose(one.reshape(N, 6, 6), pose.change) for one in P_poses]
         phis = np.array(each).reshape(len(P_poses), N, 36)
@@ -124,24 +128,26 @@ def run_batch(
     slots = np.full(N, -1)
     slots[kept] = np.arange(len(kept))
     estimates = [np.empty((len(kept), *shape, B)) for shape in ((4,), (4, 4))]
-    judged = [np.empty((N, *shape, B)) for shape in ((2,), ())]
+    scores = [np.empty((N, *shape, B)) for shape in ((2,), ())]
     for a in estimates:
         a[kept < first] = np.nan
-    for a in judged:
+    for a in scores:
         a[:first] = np.nan
-    out = (*estimates, *judged, np.zeros((N, B), bool), np.zeros((N, B), bool))
+    out = (*estimates, *scores, np.zeros((N, B), bool), np.zeros((N, B), bool))
     there = np.isfinite(z).all(axis=2)
     alike = len(noise) == 1 and P0.ndim == 2 and bool((there == there[:1]).all())
-    if alike and view is None and pose is None and gate is None:
+    if alike and view is None and pose is None and np.isinf(given.threshold):
         x0 = np.broadcast_to(np.asarray(start.x, float), (B, 4))
         return _run_alike(given.times, z, there[0], noise[0].reshape(N, 2, 2), F, Q, x0, start, first, kept)
     poses, R_bc, lever, planes, intrinsics = _camera_arrays(view, B, N)
-    singular = run_lanes(
-        F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
-        np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
-        np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
-        first, given.threshold, view is not None, pose is not None, slots, *out,
-    )  # fmt: skip
+    kind = "Schmidt" if pose is not None else "Kalman" if view is None else "extended Kalman"
+    with announced(f"the {kind} filter for many runs"):
+        singular = run_lanes(
+            F, Q, left, phis, z, noise, poses, R_bc, P_poses, lever, planes, intrinsics,
+            np.array(np.broadcast_to(np.asarray(start.x, float), (B, 4)), order="C"),
+            np.ascontiguousarray(P0[None] if P0.ndim == 2 else P0),
+            first, given.threshold, slots, *out,
+        )  # fmt: skip
     if singular >= 0:
         raise _singular(singular)
     if start.row >= 0:
@@ -203,15 +209,17 @@ def _singular(row: int) -> WildlabError:
     )
 
 
-def _camera_arrays(view: View | None, runs: int, n_rows: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; zeros where there is no camera."""
+def _camera_arrays(
+    view: View | None, runs: int, n_rows: int
+) -> tuple[Array | None, Array | None, Array, Array, Array]:
+    """Poses, R_bc, lever arm, planes and intrinsics for the kernel; without a camera no poses, and zeros."""
     if view is None:
-        return (
-            np.zeros((1, n_rows, 12)), np.zeros((1, n_rows, 9)), np.zeros(3), np.zeros(n_rows), np.zeros(5)
-        )  # fmt: skip
+        return None, None, np.zeros(3), np.zeros(n_rows), np.zeros(5)
     poses = view.poses
     camera = poses.camera
     poses.require_rows((n_rows,) if len(poses.rows) == 1 else (runs, n_rows), "measurements")
+    if np.ndim(view.plane_down):
+        check_rows(np.shape(view.plane_down)[0], n_rows, "view.plane_down")
     if camera.distorts:
         raise WildlabError(
             "the camera distorts, and the batch filter knows none that does",

@@ -4,30 +4,25 @@ Runs are taken in blocks of at most `LANES`, one run in each lane, with the lane
 innermost loops run over lanes, and all other sizes are known to the compiler. What they compute is what
 `wildlab.tracking.run.run_filter` computes for each run; tests hold the two together.
 
-All compiled functions stay in this one file, see `wildlab.navigation.kernels`.
+An argument of None (no camera, no pose) is a type of its own: each kind of filter is compiled for itself,
+when it is first used, without the branches that it does not take. Values are copied in loops and not by
+slices, whose check of shapes takes seconds to compile. All compiled functions stay in this one file, and have
+their many arguments, for the reasons that `wildlab.navigation.kernels` gives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.geometry.compilation import compiled
 from wildlab.geometry.frames import Array
 from wildlab.tracking.schmidt import LARGEST_CORRELATION, NEGLIGIBLE
 
-Function = TypeVar("Function", bound=Callable[..., Any])
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 LANES = 64
-
-
-def compiled(function: Function) -> Function:
-    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled
@@ -88,7 +83,7 @@ def invert_and_weigh(S: Array, v: Array, inverse: Array, nis: Array, ok: Array, 
 @compiled
 def update_lanes(
     x: Array, P: Array, C: Array, P_pose: Array, v: Array, H: Array, H_pose: Array, R: Array,
-    with_pose: bool, threshold: float, ok: Array, nis: Array, singular: Flags,
+    considered: Array | None, threshold: float, ok: Array, nis: Array, singular: Flags,
     U: Array, W: Array, S: Array, inverse: Array, K: Array, G: Array,
 ) -> None:  # fmt: skip
     """H (3.7d)-(3.7h), or with the pose H (7.34)-(7.38); Joseph form.
@@ -102,7 +97,7 @@ def update_lanes(
         for a in range(2):
             for r in range(lanes):
                 U[i, a, r] = P[i, 0, r] * H[a, 0, r] + P[i, 1, r] * H[a, 1, r]
-            if with_pose:
+            if considered is not None:
                 for c in range(6):
                     for r in range(lanes):
                         U[i, a, r] += C[i, c, r] * H_pose[a, c, r]
@@ -110,7 +105,7 @@ def update_lanes(
         for b in range(2):
             for r in range(lanes):
                 S[a, b, r] = H[a, 0, r] * U[0, b, r] + H[a, 1, r] * U[1, b, r] + R[a, b, r]
-    if with_pose:
+    if considered is not None:
         for c in range(6):
             for b in range(2):
                 for r in range(lanes):
@@ -136,7 +131,7 @@ def update_lanes(
         for j in range(4):
             for r in range(lanes):
                 G[i, j, r] = P[i, j, r] - K[i, 0, r] * U[j, 0, r] - K[i, 1, r] * U[j, 1, r]
-        if with_pose:
+        if considered is not None:
             for c in range(6):
                 for r in range(lanes):
                     C[i, c, r] -= K[i, 0, r] * W[c, 0, r] + K[i, 1, r] * W[c, 1, r]
@@ -147,7 +142,7 @@ def update_lanes(
                     G[i, 0, r] * H[a, 0, r] + G[i, 1, r] * H[a, 1, r]
                     - K[i, 0, r] * R[0, a, r] - K[i, 1, r] * R[1, a, r]
                 )  # fmt: skip
-            if with_pose:
+            if considered is not None:
                 for c in range(6):
                     for r in range(lanes):
                         U[i, a, r] += C[i, c, r] * H_pose[a, c, r]
@@ -212,11 +207,15 @@ def expect_pixels(
 @compiled
 def root_of(covariance: Array) -> tuple[Array, Array]:
     """`schmidt._root`."""
-    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    inverse = np.zeros_like(sd)
-    for i in range(len(sd)):
+    n = len(covariance)
+    sd, inverse, scaled = np.empty(n), np.empty(n), np.empty((n, n))
+    for i in range(n):
+        sd[i] = np.sqrt(max(covariance[i, i], 0.0))
         inverse[i] = 1 / sd[i] if sd[i] > 0 else 0.0
-    values, vectors = np.linalg.eigh(covariance * np.outer(inverse, inverse))
+    for i in range(n):
+        for j in range(n):
+            scaled[i, j] = covariance[i, j] * (inverse[i] * inverse[j])
+    values, vectors = np.linalg.eigh(scaled)
     there = values > NEGLIGIBLE * max(values[-1], NEGLIGIBLE)
     lengths, vectors = np.sqrt(values[there]), np.ascontiguousarray(vectors[:, there])
     return sd.reshape(-1, 1) * vectors * lengths, np.ascontiguousarray((vectors / lengths).T) * inverse
@@ -307,15 +306,16 @@ def load(source: Array, row: int, first: int, target: Array) -> None:
 
 @compiled
 def run_lanes(
-    F: Array, Q: Array, left: Array, phis: Array, z: Array, R: Array, poses: Array, R_bc: Array,
-    P_poses: Array, lever: Array, planes: Array, A: Array, x0: Array, P0: Array, start: int, threshold: float,
-    with_camera: bool, with_pose: bool, slots: Integers,
+    F: Array, Q: Array, left: Array, phis: Array | None, z: Array, R: Array, poses: Array | None,
+    R_bc: Array | None, P_poses: Array | None, lever: Array, planes: Array, A: Array, x0: Array, P0: Array,
+    start: int, threshold: float, slots: Integers,
     out_x: Array, out_P: Array, out_v: Array, out_nis: Array, out_used: Flags, out_limited: Flags,
 ) -> int:  # fmt: skip
     """All runs through rows ``start`` to N; the row of a singular S, or -1.
 
     F, Q (N, 4, 4), left (N,) and phis (1 or B, N, 36) of the step to each row; z (B, N, 2); R (1 or B, N, 4);
-    poses, R_bc, P_poses (1 or B, N, 12, 9, 36); planes (N,); x0 (B, 4); P0 (1 or B, 4, 4);
+    poses, R_bc, P_poses (1 or B, N, 12, 9, 36), None without a camera, or where the pose is taken as true;
+    planes (N,); x0 (B, 4); P0 (1 or B, 4, 4);
     outputs with the runs last, x and P of each row at its place in ``slots`` (N,), nowhere where that is -1.
     """
     n_runs, n_rows = z.shape[:2]
@@ -332,17 +332,23 @@ def run_lanes(
     R_now, pose_now = noise.reshape(2, 2, lanes), P_pose.reshape(6, 6, lanes)
     for first in range(0, n_runs, lanes):
         width = min(lanes, n_runs - first)
-        C[:] = 0.0
+        for i in range(4):
+            for a in range(6):
+                for r in range(lanes):
+                    C[i, a, r] = 0.0
         for r in range(lanes):
             run = min(first + r, n_runs - 1)
-            x[:, r], P[:, :, r] = x0[run], P0[min(run, len(P0) - 1)]
+            for i in range(4):
+                x[i, r] = x0[run, i]
+                for j in range(4):
+                    P[i, j, r] = P0[min(run, len(P0) - 1), i, j]
         for row in range(start, n_rows):
             predict_lanes(x, P, F[row], Q[row], y, M)
             load(z, row, first, seen)
             load(R, row, first, noise)
-            if with_camera:
+            if poses is not None:
                 load(poses, row, first, pose)
-                load(R_bc, row, first, turn)
+                load(R_bc, row, first, turn)  # type: ignore[arg-type]  # there with `poses`
                 expect_pixels(x, seen, pose, turn, lever, planes[row], A, v, H, H_pose, ok)
             else:
                 for r in range(lanes):
@@ -351,21 +357,24 @@ def run_lanes(
                     for i in range(2):
                         v[i, r] = seen[i, r] - x[i, r] if there else 0.0
                         H[i, i, r] = 1.0
-            if with_pose:
-                load(phis, row, first, phi)
+            if P_poses is not None:
+                load(phis, row, first, phi)  # type: ignore[arg-type]  # there with `P_poses`
                 carry_cross(C, F[row], left[row], phi, N)
                 load(P_poses, row, first, P_pose)
                 mark_sound(C, P, pose_now, L, N, M, nis)
                 for r in range(width):
                     if ok[r] > 0 and nis[r] == 0:
-                        C[:, :, r], out_limited[row, first + r] = limit_one(
+                        limited, out_limited[row, first + r] = limit_one(
                             np.ascontiguousarray(C[:, :, r]), np.ascontiguousarray(P[:, :, r]),
                             np.ascontiguousarray(pose_now[:, :, r]),
                         )  # fmt: skip
+                        for i in range(4):
+                            for a in range(6):
+                                C[i, a, r] = limited[i, a]
             for r in range(width):
                 offered[r] = ok[r]
             update_lanes(
-                x, P, C, pose_now, v, H, H_pose, R_now, with_pose, threshold, ok, nis, singular,
+                x, P, C, pose_now, v, H, H_pose, R_now, P_poses, threshold, ok, nis, singular,
                 U, W, S, inverse, K, M,
             )  # fmt: skip
             for r in range(width):

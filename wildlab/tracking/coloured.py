@@ -12,7 +12,16 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict, update
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, State, Track, by_motion, checked, note, walk
+from wildlab.tracking.run import (
+    Start,
+    State,
+    Track,
+    check_start,
+    checked,
+    predict_by_motion,
+    record,
+    step_through,
+)
 
 
 class Differenced(NamedTuple):
@@ -47,7 +56,7 @@ def run_coloured(
     *,
     F_c: ArrayLike | None = None,
     longest_gap: float = 1.0,
-    gate: float | None = None,
+    gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
     """Filter on differences of successive georeferenced positions, H 7.2.2.
@@ -69,10 +78,11 @@ def run_coloured(
         (2, 2), the correlated noise's transition from one measurement to the next; identity in H.
     longest_gap
         s, H 7.2.2.
-    times, motion, start, gate, output_times
+    times, motion, start, gate_probability, output_times
         As in `wildlab.tracking.run.run_filter`; the start's row is the first measurement of a difference.
     """
-    given = checked(times, positions, R_w, gate, output_times)
+    given = checked(times, positions, R_w, gate_probability, output_times)
+    check_start(start)
     if given.z.shape[1] != 1:
         raise WildlabError(
             "several detections in a frame", "choose one before differencing", field="positions"
@@ -101,7 +111,7 @@ def run_coloured(
             )
         if best is None:
             return state
-        note(track, row, best.innovation, best.S, best.nis, 0, best.nis <= given.threshold)
+        record(track, row, best.innovation, best.S, best.nis, 0, best.nis <= given.threshold)
         if not track.used[row]:
             return state
         last = row
@@ -112,7 +122,7 @@ def run_coloured(
         x_new, P_new = predict(done.x, done.P, model.F, model.Q)
         return given.times[row], x_new + model.T @ y[0], P_new
 
-    return walk(given, start, by_motion(motion), step)
+    return step_through(given, start, predict_by_motion(motion), step)
 
 
 def thin(times: ArrayLike, interval: float, usable: ArrayLike | None = None) -> NDArray[np.bool_]:

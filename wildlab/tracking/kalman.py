@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 class Update(NamedTuple):
-    """What a measurement did: new estimate, and what it was judged by."""
+    """What a measurement did: the new estimate, the innovation with its covariance, and the gain."""
 
     x: Array  # (..., n)
     P: Array  # (..., n, n)

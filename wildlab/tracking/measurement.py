@@ -173,22 +173,6 @@ def positions() -> Sensor:
     return Sensor(predict, (False, False))
 
 
-def require_rows(sensor: Sensor, rows: int) -> None:
-    """Refuse a sensor that was made for another number of rows than there are measurements.
-
-    Raises
-    ------
-    WildlabError
-        Where the numbers differ.
-    """
-    if sensor.rows not in (None, rows):
-        raise WildlabError(
-            f"{sensor.rows} poses for {rows} rows of measurements",
-            "give one pose for each row, or one for all",
-            field="sensor",
-        )
-
-
 def _row(values: ArrayLike, row: int, base: int) -> Array:
     """Row of (N, ...), or the one value of all rows; ``base`` is the number of axes of a single value."""
     a = np.asarray(values, float)

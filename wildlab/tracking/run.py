@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Sensor, on_state, require_rows
+from wildlab.tracking.measurement import Sensor, on_state
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.schmidt import PoseUncertainty
 
@@ -74,7 +74,7 @@ class Track(NamedTuple):
     limited: NDArray[np.bool_]
 
 
-class Inputs(NamedTuple):
+class FilterInputs(NamedTuple):
     """Checked measurements: K detections in each of N rows."""
 
     times: Array  # (N,)
@@ -87,7 +87,7 @@ class Inputs(NamedTuple):
 #: State of a filter: when, estimate, covariance.
 State = tuple[float, Array, Array]
 #: State and a later time -> estimate and covariance then.
-Ahead = Callable[[State, float], tuple[Array, Array]]
+PredictTo = Callable[[State, float], tuple[Array, Array]]
 
 
 def start_from_first(
@@ -140,7 +140,7 @@ def run_filter(
     start: Start,
     *,
     pose: PoseUncertainty | None = None,
-    gate: float | None = None,
+    gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
     """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
@@ -164,20 +164,44 @@ def run_filter(
         See `Start`, `start_from_first`.
     pose
         Uncertainty of the poses: the Schmidt filter, H (7.32)-(7.38). None: poses are taken as true.
-    gate
-        Probability with which a target's own measurement lies in its validation region, H (3.9); what falls
-        outside is not used. None lets everything in.
+    gate_probability
+        Probability that the target's own measurement is let in, H (3.9); what falls outside the validation
+        region is not used. In (0, 1]; 1 is no gate.
     output_times
         (M,) s, in order; the measurements' own when not given.
+
+    Returns
+    -------
+    Track
 
     Raises
     ------
     WildlabError
-        Naming the row: times out of order, an ``R`` or an ``S`` that is not positive definite; a sensor with
-        another number of poses than there are rows.
+        Naming field and row: times out of order, an ``R`` or an ``S`` that is not positive definite, a start
+        that is not finite or whose ``P`` is no covariance, poses of another length than the measurements, a
+        ``gate_probability`` outside (0, 1].
+
+    Examples
+    --------
+    A target at rest at 10 m north, seen three times with a standard deviation of 1 m:
+
+    >>> import numpy as np
+    >>> from wildlab.tracking import Start, positions, rest, run_filter
+    >>> z = [[10.0, 0.0], [10.5, 0.5], [9.5, -0.5]]
+    >>> start = Start(time=0.0, x=np.array([0.0, 0.0]), P=100.0 * np.eye(2))
+    >>> track = run_filter([0.0, 1.0, 2.0], z, np.eye(2), positions(), rest, start)
+    >>> track.x[-1].round(2).tolist(), np.sqrt(track.P[-1, 0, 0]).round(2).item()
+    ([9.97, 0.0], 0.58)
     """
-    given = checked(times, measurements, R, gate, output_times)
-    require_rows(sensor, len(given.times))
+    given = checked(times, measurements, R, gate_probability, output_times)
+    check_start(start)
+    check_rows(sensor.rows, len(given.times), "poses of the sensor")
+    if pose is not None and np.shape(pose.covariance) != (len(given.times), 6, 6):
+        raise WildlabError(
+            f"shape {np.shape(pose.covariance)} for {len(given.times)} rows of measurements",
+            "give one (6, 6) covariance for each measurement",
+            field="pose.covariance",
+        )
     n = len(start.x)
     C = np.zeros((n, 6))
     covariances = np.zeros((len(given.times), 6, 6)) if pose is None else np.asarray(pose.covariance, float)
@@ -207,7 +231,7 @@ def run_filter(
             best = nearest_detection(given.z[row], expected.z, spread, given.R[row], sensor.angles, row)
         if best is None:
             return given.times[row], x, P
-        note(track, row, best.innovation, best.S, best.nis, best.detection, best.nis <= given.threshold)
+        record(track, row, best.innovation, best.S, best.nis, best.detection, best.nis <= given.threshold)
         if not track.used[row]:
             return given.times[row], x, P
         noise = given.R[row, best.detection]
@@ -218,25 +242,27 @@ def run_filter(
         C = update.C
         return given.times[row], update.x, update.P
 
-    return walk(given, start, by_motion(motion), step)
+    return step_through(given, start, predict_by_motion(motion), step)
 
 
-def note(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
-    """Write down what a measurement was judged by."""
+def record(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
+    """Enter a row's innovation with its covariance and NIS, and whether the measurement was used."""
     track.innovation[row], track.S[row], track.nis[row] = innovation, S, nis
     track.chosen[row], track.used[row] = chosen, used
 
 
-def by_motion(motion: Motion) -> Ahead:
+def predict_by_motion(motion: Motion) -> PredictTo:
     """Prediction with a motion model."""
     return lambda state, time: predict(state[1], state[2], *motion(time - state[0]))
 
 
-def walk(given: Inputs, start: Start, ahead: Ahead, step: Callable[[int, State, Track], State]) -> Track:
-    """Take a filter's ``step`` through the rows in order, and look ``ahead`` to the requested times between.
+def step_through(
+    given: FilterInputs, start: Start, predict_to: PredictTo, step: Callable[[int, State, Track], State]
+) -> Track:
+    """Apply a filter's ``step`` to the rows in order, and predict to the requested times in between.
 
-    ``ahead`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and may
-    leave it at an earlier time.
+    ``predict_to`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and
+    may leave it at an earlier time.
     """
     N, _, m = given.z.shape
     M, n = len(given.output_times), len(start.x)
@@ -260,7 +286,7 @@ def walk(given: Inputs, start: Start, ahead: Ahead, step: Callable[[int, State, 
 
     def write_until(time: float, out: int) -> int:
         while out < M and given.output_times[out] < time:
-            track.x[out], track.P[out] = ahead(state, float(given.output_times[out]))
+            track.x[out], track.P[out] = predict_to(state, float(given.output_times[out]))
             out += 1
         return out
 
@@ -275,10 +301,10 @@ def checked(
     times: ArrayLike,
     measurements: ArrayLike,
     R: ArrayLike,
-    gate: float | None,
+    gate_probability: float,
     output_times: ArrayLike | None,
-) -> Inputs:
-    """Inputs of a run with all their axes, or a `WildlabError` that names the row."""
+) -> FilterInputs:
+    """FilterInputs of a run with all their axes, or a `WildlabError` that names the row."""
     t, z = np.asarray(times, float), np.asarray(measurements, float)
     if z.ndim == 2:
         z = z[:, None, :]
@@ -317,8 +343,44 @@ def checked(
         )
     # A measurement of which a part is missing is none, and neither is one without a covariance.
     usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
-    threshold = np.inf if gate is None else float(chi2.ppf(gate, m))
-    return Inputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold)
+    threshold = gate_threshold(gate_probability, m)
+    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold)
+
+
+def single_detection(given: FilterInputs) -> FilterInputs:
+    """The same inputs, for a filter that takes no more than one detection a row."""
+    if given.z.shape[1] != 1:
+        raise WildlabError(
+            "several detections in a frame", "choose one first, or use run_filter", field="measurements"
+        )
+    return given
+
+
+def check_start(start: Start) -> None:
+    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance.
+
+    ``x`` may be (n,) or (B, n), ``P`` (n, n) or (B, n, n).
+    """
+    x, P = np.asarray(start.x, float), np.asarray(start.P, float)
+    if x.ndim not in (1, 2) or P.ndim not in (2, 3) or P.shape[-2:] != (x.shape[-1],) * 2:
+        raise WildlabError(f"x of the shape {x.shape}, P {P.shape}", "give (n,) and (n, n)", field="start")
+    if not np.isfinite(start.time):
+        raise WildlabError(f"a time of {start.time}", "give seconds", field="start.time")
+    lost = np.argwhere(~np.isfinite(x))
+    if len(lost):
+        row = ", ".join(str(i) for i in lost[0])
+        raise WildlabError(
+            f"row {row} is {x[tuple(lost[0])]}", "give every state a value to start from", field="start.x"
+        )
+    check_covariance(P, "start.P")
+
+
+def check_rows(rows: int | None, wanted: int, what: str) -> None:
+    """Refuse ``rows`` of something that goes with ``wanted`` measurements; None is one value for all."""
+    if rows is not None and rows != wanted:
+        raise WildlabError(
+            f"{rows} rows for {wanted} rows of measurements", "give one for each measurement", field=what
+        )
 
 
 def _check_order(times: Array, field: str) -> None:

@@ -1,4 +1,4 @@
-"""The Schmidt-Kalman filter, H 7.4: the errors of the pose are not estimated, but reckoned with.
+"""The Schmidt-Kalman filter, H 7.4: the errors of the pose are considered, not estimated.
 
 Beside the target's covariance ``P`` (n, n) the filter keeps its cross-covariance ``C`` (n, 6) with the errors
 of the pose, whose own covariance ``P^o`` (6, 6) comes anew from the navigation filter at every frame.
@@ -64,7 +64,7 @@ class PoseUncertainty(NamedTuple):
 
 
 class SchmidtUpdate(NamedTuple):
-    """What a measurement did: new estimate and cross-covariance, and what the measurement was judged by."""
+    """What a measurement did: new estimate and cross-covariance, and the innovation with its covariance."""
 
     x: Array  # (n,)
     P: Array  # (n, n)

@@ -310,7 +310,7 @@ def _associate(
         compared = _printed(seen, choices) if form == "angles" else seen
         angles = IS_ANGLE[form] if choices.azimuth == "atan2" else (False, False)
         nis[:, t] = distances(compared, angles, P, detections[form][:, t], R_FORM[form])
-        taken[:, t] = nearest_within(nis[:, t], None, 2)
+        taken[:, t] = nearest_within(nis[:, t], 1.0, 2)
         if choices.updated_with != "nothing":
             used = taken[:, t] if choices.updated_with == "assigned" else np.zeros(N, np.int64)
             if by != form:

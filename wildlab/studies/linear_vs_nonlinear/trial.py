@@ -32,10 +32,11 @@ from wildlab.pipeline.track import (
     start,
 )
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.imm import run_imm
 from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
-from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, Track
+from wildlab.tracking.unscented import run_unscented
 
 Array = NDArray[np.float64]
 #: Numbers of a flight by (subject, name).

@@ -22,10 +22,11 @@ from wildlab.pipeline.track import (
     sighting,
 )
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.imm import run_imm
 from wildlab.tracking.measurement import pixels
 from wildlab.tracking.motion import Motion, constant_velocity, in_steps
-from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, Track, start_from_first
+from wildlab.tracking.unscented import run_unscented
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""The filters of this room in plain numpy: short, slow, and what the compiled ones are tested against."""
+"""Reference implementation of the MEKF in plain numpy, which the compiled one is tested against."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
 from wildlab.navigation.kernels import ACCEPTED, FORCED, HEADING, POSITION, REJECTED, Integers
-from wildlab.navigation.timeline import Measurements, Timeline
+from wildlab.navigation.mekf import MekfInputs
 
 
 def rotation(q: Array) -> Rotation:
@@ -99,11 +99,12 @@ def correct(x: Array, P: Array, H: Array, y: Array, R: Array, axes: bool = False
     return after, G @ P @ G.T
 
 
-def mekf(
-    line: Timeline, measured: Measurements, earth: Array, noise: Array, x: Array, P: Array, axes: bool,
-    extra: Array, gate: Array, patience: float,
-) -> tuple[Array, Array, Array, Integers]:  # fmt: skip
+def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array, Array, Integers]:
     """States (K, n + 1) and covariances (K, n, n) at the rows of the timeline; NIS and verdicts (E,)."""
+    line, measured, noise, axes, extra, gate = (
+        ready.line, ready.measured, ready.noise, ready.axes, ready.extra, ready.gate,
+    )  # fmt: skip
+    x, P = ready.state, ready.covariance
     n = len(P)
     states, covariances = np.empty((line.rows, n + 1)), np.empty((line.rows, n, n))
     nis, verdicts = np.full(len(measured.node), np.nan), np.zeros(len(measured.node), np.int64)
@@ -118,9 +119,9 @@ def mekf(
                 whole = dt if np.isinf(time) else time / 2 * (1 - kept[i] ** 2)
                 drive[i] = density**2 * whole
             kept_extra, drive_extra = np.exp(-dt / extra[:, 1]), np.zeros(len(extra))
-            wanders = np.isfinite(extra[:, 1])
-            drive_extra[wanders] = (
-                extra[wanders, 0] ** 2 * extra[wanders, 1] / 2 * (1 - kept_extra[wanders] ** 2)
+            bounded = np.isfinite(extra[:, 1])
+            drive_extra[bounded] = (
+                extra[bounded, 0] ** 2 * extra[bounded, 1] / 2 * (1 - kept_extra[bounded] ** 2)
             )
             if line.gap[k] > 0:
                 Phi = np.diag([1.0] * 9 + [kept[0]] * 3 + [kept[1]] * 3 + [1.0] * len(extra))
@@ -140,8 +141,8 @@ def mekf(
             kind = measured.kind[event]
             y, H = predict_measurement(kind, x, line.w[k], measured.value[event], measured.lever[event])
             H = np.hstack([H, np.zeros((len(y), n - 15))])
-            if measured.wander[event] >= 0:
-                first = measured.wander[event]
+            if measured.gauss_markov[event] >= 0:
+                first = measured.gauss_markov[event]
                 y, H[:, first : first + 3] = y - x[first + 1 : first + 4], np.eye(3)
             R = np.diag(measured.variance[event, : len(y)])
             nis[event] = y @ np.linalg.solve(H @ P @ H.T + R, y)

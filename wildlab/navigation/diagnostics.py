@@ -114,7 +114,7 @@ def _absences(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
         longest = int(np.argmax(np.diff(marks)))
         if marks[longest + 1] - marks[longest] > OUTAGE_S:
             sentences.append(
-                f"From {marks[longest]:.0f} to {marks[longest + 1]:.0f} s no measurement was taken in: "
+                f"From {marks[longest]:.0f} to {marks[longest + 1]:.0f} s no measurement was used: "
                 "the estimate is dead reckoning there, with the uncertainty that it says."
             )
     return sentences

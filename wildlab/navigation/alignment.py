@@ -1,4 +1,4 @@
-"""Where a filter starts: position from a fix, attitude from two directions known in b and in n.
+"""Initial alignment: position from a fix, attitude from two directions known in b and in n.
 
 One direction is the specific force, which at rest points up. The other is whatever tells the heading: the
 baseline between two antennas, the magnetic field, or, in flight, the course.
@@ -6,15 +6,17 @@ baseline between two antennas, the magnetic field, or, in flight, the course.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array, matrix_to_quaternion
 from wildlab.geometry.gravity import flat_earth
-from wildlab.navigation.mekf import Start
+from wildlab.navigation.mekf import InitialState
 from wildlab.navigation.strapdown import integrate_strapdown
-from wildlab.navigation.timeline import Imu, checked_imu
+from wildlab.navigation.timeline import ImuSamples, checked_imu
 
 #: Deviations within a second, per axis, up to which an airframe stands: m/s^2 and rad/s; and the speed that
 #: a receiver at rest stays below, m/s. Two small drones show up to 0.14 and 0.03 standing in wind, and
@@ -47,26 +49,55 @@ def attitude_from_directions(
     return np.asarray(triads[1] @ triads[0].T, float)
 
 
-def start_at(
+class Kinematics(NamedTuple):
+    """How b moves in n at one time, (3,) each: m, m/s, m/s^2 (zero at rest)."""
+
+    position: ArrayLike
+    velocity: ArrayLike
+    acceleration: ArrayLike = (0.0, 0.0, 0.0)
+
+
+class Reference(NamedTuple):
+    """A direction that is not vertical, (3,) in b and in n, for the heading."""
+
+    in_b: ArrayLike
+    in_n: ArrayLike
+
+
+class InitialSd(NamedTuple):
+    """Standard deviations of an initial state.
+
+    Attributes
+    ----------
+    position_sd, velocity_sd
+        m and m/s; (3,) in n, or one number.
+    level_sd, heading_sd
+        rad, about level axes and about the vertical. ``level_sd`` is of roll and pitch together with what
+        the accelerometers' bias does to them.
+    accelerometer_bias_sd, gyro_bias_sd
+        m/s^2 and rad/s.
+    """
+
+    position_sd: ArrayLike = 5.0
+    velocity_sd: ArrayLike = 1.0
+    level_sd: float = 0.05
+    heading_sd: float = 0.2
+    accelerometer_bias_sd: float = 0.2
+    gyro_bias_sd: float = 0.01
+
+
+def align_at(
     time: float,
-    imu: Imu,
-    position: ArrayLike,
-    velocity: ArrayLike,
-    reference_b: ArrayLike,
-    reference_n: ArrayLike,
+    imu: ImuSamples,
+    moving: Kinematics,
+    reference: Reference,
+    sd: InitialSd,
     *,
     gravity: float,
-    acceleration: ArrayLike = (0.0, 0.0, 0.0),
     gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
     window: float = 1.0,
-    position_sd: ArrayLike = 5.0,
-    velocity_sd: ArrayLike = 1.0,
-    level_sd: float = 0.05,
-    heading_sd: float = 0.2,
-    accelerometer_bias_sd: float = 0.2,
-    gyro_bias_sd: float = 0.01,
-) -> Start:
-    """A start from what is known at one time.
+) -> InitialState:
+    """An initial state from what is known at one time.
 
     Parameters
     ----------
@@ -74,18 +105,17 @@ def start_at(
         s.
     imu
         Its mean specific force within ``window`` (s) around the time is taken as the direction of
-        ``acceleration`` less gravity.
-    position, velocity
-        Of b in n, (3,) m and m/s.
-    reference_b, reference_n
-        A direction that is not vertical, (3,) in b and in n, for the heading.
+        the acceleration less gravity.
+    moving, reference, sd
+        See `Kinematics`, `Reference`, `InitialSd`.
     gravity
         m/s^2.
-    acceleration
-        Of b in n, (3,) m/s^2: zero at rest.
-    position_sd, velocity_sd, level_sd, heading_sd, accelerometer_bias_sd, gyro_bias_sd
-        Standard deviations, in m, m/s, rad, rad, m/s^2, rad/s. ``level_sd`` is of roll and pitch together
-        with what the accelerometers' bias does to them, and is meant about level axes.
+    gyro_bias
+        (3,) rad/s in b.
+
+    Returns
+    -------
+    InitialState
 
     Raises
     ------
@@ -100,21 +130,22 @@ def start_at(
             "start later, or check that inertial sensors and GNSS are on the same clock",
             field="start",
         )
-    up = np.asarray(acceleration, float) - np.array([0.0, 0.0, gravity])
-    R = attitude_from_directions(samples.specific_force[near].mean(axis=0), up, reference_b, reference_n)
+    up = np.asarray(moving.acceleration, float) - np.array([0.0, 0.0, gravity])
+    R = attitude_from_directions(samples.specific_force[near].mean(axis=0), up, *reference)
     P = np.zeros((15, 15))
-    for first, sd in ((0, position_sd), (3, velocity_sd), (9, accelerometer_bias_sd), (12, gyro_bias_sd)):
+    blocks = ((0, sd.position_sd), (3, sd.velocity_sd), (9, sd.accelerometer_bias_sd), (12, sd.gyro_bias_sd))
+    for first, size in blocks:
         block = slice(first, first + 3)
-        P[block, block] = np.diag(np.broadcast_to(np.asarray(sd, float), 3) ** 2)
-    P[6:9, 6:9] = R.T @ np.diag([level_sd**2, level_sd**2, heading_sd**2]) @ R
-    parts = (position, velocity, matrix_to_quaternion(R), np.zeros(3), gyro_bias)
-    return Start(float(time), np.concatenate([np.asarray(part, float) for part in parts]), P)
+        P[block, block] = np.diag(np.broadcast_to(np.asarray(size, float), 3) ** 2)
+    P[6:9, 6:9] = R.T @ np.diag([sd.level_sd**2, sd.level_sd**2, sd.heading_sd**2]) @ R
+    parts = (moving.position, moving.velocity, matrix_to_quaternion(R), np.zeros(3), gyro_bias)
+    return InitialState(float(time), np.concatenate([np.asarray(part, float) for part in parts]), P)
 
 
-def start_from_baseline(
-    imu: Imu, times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike,
-    lever_second: ArrayLike, *, gravity: float, baseline_sd: float = 0.02, **known: float,
-) -> Start:  # fmt: skip
+def align_from_baseline(
+    imu: ImuSamples, times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike,
+    lever_second: ArrayLike, *, gravity: float, baseline_sd: float = 0.02, **sd: float,
+) -> InitialState:  # fmt: skip
     """A start from the first pair of positions of two antennas.
 
     Velocity and acceleration are those of a parabola through the first second of the first antenna's fixes.
@@ -129,8 +160,8 @@ def start_from_baseline(
         (3,) m in b.
     baseline_sd
         Of the difference of the positions, m: the standard deviation of the heading follows from it.
-    known
-        Standard deviations and the window, as in :func:`start_at`.
+    sd
+        Standard deviations that differ from those of `InitialSd`, by name.
     """
     t, p, other = np.asarray(times, float), np.asarray(p_first, float), np.asarray(p_second, float)
     arm, baseline_b = np.asarray(lever_first, float), np.asarray(lever_second, float) - lever_first
@@ -146,18 +177,18 @@ def start_from_baseline(
     i = both[0]
     _, v, a = np.polynomial.polynomial.polyfit(t[both] - t[i], p[both], 2)
     length = float(np.linalg.norm(baseline_b))
-    known = {"heading_sd": baseline_sd / length, **known}
-    start = start_at(
-        t[i], imu, p[i], v, baseline_b, other[i] - p[i], gravity=gravity, acceleration=2 * a, **known
-    )
+    start = align_at(
+        t[i], imu, Kinematics(p[i], v, 2 * a), Reference(baseline_b, other[i] - p[i]),
+        InitialSd(**{"heading_sd": baseline_sd / length, **sd}), gravity=gravity,
+    )  # fmt: skip
     from_arm = _turned(start.state[6:10], arm)
     return start._replace(state=np.concatenate([p[i] - from_arm, start.state[3:]]))
 
 
-def start_from_course(
-    imu: Imu, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, gravity: float, min_speed: float = 8.0,
-    **known: float,
-) -> Start:  # fmt: skip
+def align_from_course(
+    imu: ImuSamples, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, gravity: float,
+    min_speed: float = 8.0, **sd: float,
+) -> InitialState:  # fmt: skip
     """A start from the first fix in flight: the nose is taken to point where the airframe goes.
 
     It does not in wind: ``heading_sd`` must cover the crab angle (wind across, over airspeed). The
@@ -183,8 +214,10 @@ def start_from_course(
     i = int(np.argmax(fast))
     before, after = max(i - 1, 0), min(i + 1, len(t) - 1)
     a = (v[after] - v[before]) / (t[after] - t[before]) if after > before else np.zeros(3)
-    known = {"heading_sd": 0.4, "level_sd": 0.1, **known}
-    return start_at(t[i], imu, p[i], v[i], [1.0, 0.0, 0.0], v[i], gravity=gravity, acceleration=a, **known)
+    return align_at(
+        t[i], imu, Kinematics(p[i], v[i], a), Reference([1.0, 0.0, 0.0], v[i]),
+        InitialSd(**{"heading_sd": 0.4, "level_sd": 0.1, **sd}), gravity=gravity,
+    )  # fmt: skip
 
 
 def _turned(q: Array, vector: Array) -> Array:
@@ -193,7 +226,7 @@ def _turned(q: Array, vector: Array) -> Array:
 
 
 def find_rest(
-    imu: Imu, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
+    imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
     longest: float = 30.0,
 ) -> tuple[float, float] | None:  # fmt: skip
     """From when to when (s) it last stood still before it took off; None where it did not.
@@ -204,7 +237,7 @@ def find_rest(
     Parameters
     ----------
     times, v_n
-        As in :func:`start_from_course`.
+        As in :func:`align_from_course`.
     min_speed
         Level speed (m/s) from which it counts as having taken off.
     shortest, longest
@@ -234,10 +267,10 @@ def find_rest(
     return None
 
 
-def start_at_rest(
-    imu: Imu, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, rest: tuple[float, float], gravity: float,
-    min_speed: float = 4.0, **known: float,
-) -> Start:  # fmt: skip
+def align_at_rest(
+    imu: ImuSamples, times: ArrayLike, p_n: ArrayLike, v_n: ArrayLike, *, rest: tuple[float, float],
+    gravity: float, min_speed: float = 4.0, **sd: float,
+) -> InitialState:  # fmt: skip
     """A start on the ground, in the middle of a time of standing still, of which nobody knows the heading.
 
     Roll and pitch are levelled, the gyros' mean is their bias. The heading is the one from which the gyros
@@ -246,7 +279,7 @@ def start_at_rest(
     Parameters
     ----------
     times, p_n, v_n
-        As in :func:`start_from_course`.
+        As in :func:`align_from_course`.
     rest
         From when to when it stands still, s; at least two inertial samples and one fix.
     min_speed
@@ -268,18 +301,20 @@ def start_at_rest(
     bias = samples.angular_rate[still].mean(axis=0)
     time = float(samples.times[still][int(still.sum()) // 2])
     window = 0.999 * 2 * min(time - rest[0], rest[1] - time)
-    known = {"heading_sd": 0.2, "gyro_bias_sd": 0.002, **known}
+    spread = InitialSd(**{"gyro_bias_sd": 0.002, **sd})
 
-    def towards(heading: float) -> Start:
+    def towards(heading: float) -> InitialState:
         nose = [np.cos(heading), np.sin(heading), 0.0]
-        return start_at(
-            time, imu, p[fixes].mean(axis=0), np.zeros(3), [1.0, 0.0, 0.0], nose, gravity=gravity,
-            gyro_bias=bias, window=window, **known,
+        return align_at(
+            time, imu, Kinematics(p[fixes].mean(axis=0), np.zeros(3)), Reference([1.0, 0.0, 0.0], nose),
+            spread, gravity=gravity, gyro_bias=bias, window=window,
         )  # fmt: skip
 
     i = moving[0]
     rolling = (samples.times >= time) & (samples.times <= t[i])
-    part = Imu(samples.times[rolling], samples.specific_force[rolling], samples.angular_rate[rolling] - bias)
+    part = ImuSamples(
+        samples.times[rolling], samples.specific_force[rolling], samples.angular_rate[rolling] - bias
+    )
     q = towards(0.0).state[6:10]
     last = integrate_strapdown(part, p[i], v[i], q, flat_earth(gravity), max_gap=np.inf).quaternion[-1]
     nose = _turned(last, np.array([1.0, 0.0, 0.0]))

@@ -72,10 +72,12 @@ def predict_bearing(position: ArrayLike, platform: ArrayLike, drift: ArrayLike) 
 def positions_from(platform: ArrayLike, drift: ArrayLike) -> Sensor:
     """Positions (N, 2) measured from a platform at (N, 2), with the target's (N, 2) drift relative to it."""
     at, moves = np.asarray(platform, float), np.asarray(drift, float)
-    return Sensor(lambda row, position: predict_position(position, at[row], moves[row]), (False, False))
+    return Sensor(
+        lambda row, position: predict_position(position, at[row], moves[row]), (False, False), len(at)
+    )
 
 
 def bearings_from(platform: ArrayLike, drift: ArrayLike) -> Sensor:
     """Bearings from north (N, 1), likewise."""
     at, moves = np.asarray(platform, float), np.asarray(drift, float)
-    return Sensor(lambda row, position: predict_bearing(position, at[row], moves[row]), (True,))
+    return Sensor(lambda row, position: predict_bearing(position, at[row], moves[row]), (True,), len(at))

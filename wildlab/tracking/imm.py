@@ -1,7 +1,6 @@
-"""Filters beside the theses' own, through filterpy: unscented (UKF) and interacting multiple models (IMM).
+"""Interacting multiple models (IMM), H 3.2.3: extended filters with different motions, through filterpy.
 
-Same arguments and the same `Track` as `wildlab.tracking.run.run_filter`; one detection per row, and poses are
-taken as true.
+Same arguments as `wildlab.tracking.run.run_filter`; one detection per row, and poses are taken as true.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from filterpy.kalman import IMMEstimator, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from filterpy.kalman import IMMEstimator
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
@@ -18,9 +17,19 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Prediction, Sensor, difference, on_state, require_rows
+from wildlab.tracking.measurement import Prediction, Sensor, difference, on_state
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Inputs, Start, State, Track, by_motion, checked, note, walk
+from wildlab.tracking.run import (
+    Start,
+    State,
+    Track,
+    check_rows,
+    check_start,
+    checked,
+    record,
+    single_detection,
+    step_through,
+)
 
 #: A mode that fits this much worse than the best keeps so small a share, and can come back.
 LEAST_LIKELIHOOD = 1e-100
@@ -31,60 +40,6 @@ class ModeTrack(NamedTuple):
 
     track: Track
     probabilities: Array  # (N, K), NaN before the start
-
-
-def run_unscented(
-    times: ArrayLike,
-    measurements: ArrayLike,
-    R: ArrayLike,
-    sensor: Sensor,
-    motion: Motion,
-    start: Start,
-    *,
-    gate: float | None = None,
-    output_times: ArrayLike | None = None,
-) -> Track:
-    """Unscented Kalman filter; arguments and result as for `wildlab.tracking.run.run_filter`, (N, m) only.
-
-    Sigma points at ``sqrt(n)`` standard deviations, all of one weight and none in the middle (alpha 1, beta
-    0, kappa 0: the cubature rule). No weight is negative, so no covariance can be; a larger beta is for
-    points close to the middle, and would count the bend twice here. A row is left out when any point is
-    behind the camera.
-    """
-    given = _one_detection(checked(times, measurements, R, gate, output_times))
-    require_rows(sensor, len(given.times))
-    n, m = len(start.x), given.z.shape[2]
-    angles = np.array(sensor.angles)
-
-    def mean(points: Array, weights: Array) -> Array:
-        """Angles are averaged as differences from the first, which is the middle one."""
-        return np.asarray(points[0] + weights @ difference(points, points[0], sensor.angles))
-
-    def residual(a: Array, b: Array) -> Array:
-        return difference(a, b, sensor.angles)
-
-    ukf = UnscentedKalmanFilter(
-        n, m, 1.0, hx=None, fx=None, points=MerweScaledSigmaPoints(n, 1.0, 0.0, 0.0),
-        z_mean_fn=mean if angles.any() else None, residual_z=residual,
-    )  # fmt: skip
-
-    def step(row: int, state: State, track: Track) -> State:
-        then, ukf.x, ukf.P = state
-        F, ukf.Q = motion(given.times[row] - then)
-        ukf.predict(fx=lambda x, dt: F @ x)
-        prior = given.times[row], ukf.x.copy(), (ukf.P + ukf.P.T) / 2
-        if not np.isfinite(given.z[row, 0]).all():
-            return prior
-        seen = np.array([sensor.predict(row, point[:2]).z for point in ukf.sigmas_f])
-        if not np.isfinite(seen).all():
-            return prior
-        points = iter(seen)
-        ukf.update(given.z[row, 0], R=given.R[row, 0], hx=lambda x: next(points))
-        nis = float(ukf.y @ np.linalg.solve(ukf.S, ukf.y))
-        note(track, row, ukf.y, ukf.S, nis, 0, nis <= given.threshold)
-        return (given.times[row], ukf.x, (ukf.P + ukf.P.T) / 2) if track.used[row] else prior
-
-    return walk(given, start, by_motion(motion), step)
 
 
 class _Mode:
@@ -100,7 +55,7 @@ class _Mode:
     def predict(self, u: None = None) -> None:
         self.x, self.P = predict(self.x, self.P, self.F, self.Q)
 
-    def judge(self, row: int, z: Array, R: Array, sensor: Sensor) -> bool:
+    def evaluate(self, row: int, z: Array, R: Array, sensor: Sensor) -> bool:
         """Whether this mode's target would be seen; then innovation and ``S`` are there."""
         expected = sensor.predict(row, self.x[:2])
         self.expected, self.R = expected, R
@@ -119,7 +74,7 @@ class _Mode:
 
     def update(self, z: Array) -> None:
         if self.expected is None:
-            raise AssertionError("judge() comes first")
+            raise AssertionError("evaluate() comes first")
         H = on_state(self.expected.H_position, len(self.x))
         done = correct(self.x, self.P, self.innovation, H, self.R)
         self.x, self.P = done.x, done.P
@@ -134,7 +89,7 @@ def run_imm(
     mean_stay: Sequence[float],
     start: Start,
     *,
-    gate: float | None = None,
+    gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> ModeTrack:
     """Interacting multiple models over extended filters, H 3.2.3.
@@ -146,7 +101,7 @@ def run_imm(
     mean_stay
         (K,) s that each lasts on average; it is left for each of the others alike. The probabilities of
         switching over a step follow from it for any step.
-    times, measurements, R, sensor, start, gate, output_times
+    times, measurements, R, sensor, start, gate_probability, output_times
         As in `wildlab.tracking.run.run_filter`, (N, m) measurements. All models start alike and equally
         probable. Innovation, ``S`` and NIS are the mixture's.
 
@@ -155,8 +110,9 @@ def run_imm(
     WildlabError
         As `run_filter`; fewer than two models, or not one ``mean_stay`` above zero for each.
     """
-    given = _one_detection(checked(times, measurements, R, gate, output_times))
-    require_rows(sensor, len(given.times))
+    given = single_detection(checked(times, measurements, R, gate_probability, output_times))
+    check_start(start)
+    check_rows(sensor.rows, len(given.times), "poses of the sensor")
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(
@@ -188,12 +144,12 @@ def run_imm(
         imm.predict()
         weights = imm.cbar
         z = given.z[row, 0]
-        if np.isfinite(z).all() and all([mode.judge(row, z, given.R[row, 0], sensor) for mode in modes]):
+        if np.isfinite(z).all() and all([mode.evaluate(row, z, given.R[row, 0], sensor) for mode in modes]):
             middle = modes[0].innovation  # angles: the others' are near it, on the same side of the wrap
             gaps = [middle + difference(one.innovation, middle, sensor.angles) for one in modes]
             innovation, S = mixed(gaps, [mode.S for mode in modes], weights)
             nis = float(innovation @ np.linalg.solve(S, innovation))
-            note(track, row, innovation, S, nis, 0, nis <= given.threshold)
+            record(track, row, innovation, S, nis, 0, nis <= given.threshold)
             if track.used[row]:
                 logs = np.array([mode.log_likelihood() for mode in modes])
                 for mode, relative in zip(modes, np.exp(logs - logs.max()), strict=True):
@@ -204,17 +160,9 @@ def run_imm(
         x, P = mixed([mode.x for mode in modes], [mode.P for mode in modes], weights)
         return given.times[row], x, (P + P.T) / 2
 
-    def ahead(state: State, time: float) -> tuple[Array, Array]:
+    def predict_to(state: State, time: float) -> tuple[Array, Array]:
         """Each mode goes its own way; between rows none is left for another."""
         gone = [predict(m.x, m.P, *f(time - state[0])) for m, f in zip(modes, motions, strict=True)]
         return mixed([x for x, _ in gone], [P for _, P in gone], weights)
 
-    return ModeTrack(walk(given, start, ahead, step), probabilities)
-
-
-def _one_detection(given: Inputs) -> Inputs:
-    if given.z.shape[1] != 1:
-        raise WildlabError(
-            "several detections in a frame", "choose one first, or use run_filter", field="measurements"
-        )
-    return given
+    return ModeTrack(step_through(given, start, predict_to, step), probabilities)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from wildlab.tracking.afloat import (
+from wildlab.tracking.maritime import (
     CLOCK,
     EAST,
     NORTH,

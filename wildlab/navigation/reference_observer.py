@@ -1,5 +1,4 @@
-"""The nonlinear observer of H 5.5 in plain numpy: short, slow, and what the compiled one is tested
-against."""
+"""Reference implementation of the observer of H 5.5 in plain numpy: the compiled one is tested against it."""
 
 from __future__ import annotations
 
@@ -8,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
 from wildlab.navigation.kernels import POSITION, VELOCITY
-from wildlab.navigation.observer import Prepared
+from wildlab.navigation.observer import ObserverInputs
 from wildlab.navigation.observer_kernel import J2, MU, RADIUS, RATE
 
 EARTH = np.array([0.0, 0.0, RATE])
@@ -33,7 +32,7 @@ def projected(move: Array, b: Array, inner: float, outer: float) -> Array:
     return np.asarray(move - share * along * b / square)
 
 
-def observer(ready: Prepared) -> Array:
+def observer(ready: ObserverInputs) -> Array:
     """Rows of the timeline: quaternion (e), gyro bias, position, velocity and correction in e, (M, 16)."""
     line, measured = ready.line, ready.measured
     k1, k2, k_i, inner, outer, theta, q_f, q_xi, limit, hold = ready.gains

@@ -11,15 +11,18 @@ from wildlab.geometry.frames import (
     matrix_to_rotation_vector,
     quaternion_to_matrix,
 )  # fmt: skip
-from wildlab.navigation.start import (
+from wildlab.navigation.alignment import (
+    InitialSd,
+    Kinematics,
+    Reference,
+    align_at,
+    align_at_rest,
+    align_from_baseline,
+    align_from_course,
     attitude_from_directions,
     find_rest,
-    start_at,
-    start_at_rest,
-    start_from_baseline,
-    start_from_course,
 )  # fmt: skip
-from wildlab.navigation.timeline import Imu
+from wildlab.navigation.timeline import ImuSamples
 
 
 @pytest.fixture(scope="module")
@@ -50,8 +53,8 @@ def test_the_baseline_gives_pose_and_velocity_in_flight_and_in_a_turn(flight):
     antennas = fixes(flight, np.random.default_rng(1), sd=1e-6)
     for begin in (10.0, 110.0):
         late = motion.times >= begin
-        imu = Imu(*(part[late] for part in flight.imu))
-        start = start_from_baseline(
+        imu = ImuSamples(*(part[late] for part in flight.imu))
+        start = align_from_baseline(
             imu, antennas[0].times, antennas[0].value, antennas[1].value, *LEVERS, gravity=GRAVITY
         )
         row = int(np.argmin(np.abs(motion.times - start.time)))
@@ -69,14 +72,14 @@ def test_the_course_gives_the_heading(flight):
     motion = flight.motion
     rows = np.arange(500, len(motion.times), 100)
     late = motion.times > 100  # in a turn, where levelling without the acceleration would be 0.37 rad wrong
-    imu = Imu(*(part[late] for part in flight.imu))
-    start = start_from_course(
+    imu = ImuSamples(*(part[late] for part in flight.imu))
+    start = align_from_course(
         imu, motion.times[rows], motion.position[rows], motion.velocity[rows], gravity=GRAVITY
     )
     row = int(np.argmin(np.abs(motion.times - start.time)))
     assert turned_wrong(start, motion.R_nb[row]) < 0.06
     with pytest.raises(WildlabError, match=r"no GNSS velocity reaches 50\.0 m/s"):
-        start_from_course(
+        align_from_course(
             imu,
             motion.times[rows],
             motion.position[rows],
@@ -97,15 +100,15 @@ def test_a_start_on_the_ground_finds_its_heading_from_the_roll_out():
     f = np.einsum("kji,kj->ki", R, acceleration - [0, 0, GRAVITY])
     w = np.einsum("kji,j->ki", R, [0, 0, 1.0]) * (0.12 * ((times > 60) & (times < 70)))[:, None]
     bias = np.array([0.004, -0.003, 0.005])
-    imu = Imu(times, f, w + bias)
+    imu = ImuSamples(times, f, w + bias)
     t = np.arange(0.5, 99, 1.0)
     v = np.array([np.interp(t, times, column) for column in (heading * speed[:, None]).T]).T
-    start = start_at_rest(imu, t, np.zeros((len(t), 3)), v, rest=(5.0, 55.0), gravity=GRAVITY)
+    start = align_at_rest(imu, t, np.zeros((len(t), 3)), v, rest=(5.0, 55.0), gravity=GRAVITY)
     roll, pitch, found = matrix_to_euler(quaternion_to_matrix(start.state[6:10]))
     assert (roll, pitch, found) == pytest.approx((0.02, 0.1, 0.5), abs=2e-3)
     assert start.state[13:] == pytest.approx(bias, abs=1e-6)
     with pytest.raises(WildlabError, match="0 fixes after it move"):
-        start_at_rest(imu, t, np.zeros((len(t), 3)), 0 * v, rest=(5.0, 55.0), gravity=GRAVITY)
+        align_at_rest(imu, t, np.zeros((len(t), 3)), 0 * v, rest=(5.0, 55.0), gravity=GRAVITY)
 
 
 def standing_and_flying(rests, end=100.0):
@@ -119,7 +122,7 @@ def standing_and_flying(rests, end=100.0):
     t = np.arange(3.5, end, 1.0)
     v = np.zeros((len(t), 3))
     v[t > 80, 0] = 15.0
-    return Imu(times, f, w), t, v
+    return ImuSamples(times, f, w), t, v
 
 
 def test_the_last_rest_before_the_take_off_is_found():
@@ -140,4 +143,7 @@ def test_what_glides_evenly_is_not_at_rest():
 def test_no_sample_near_the_start_is_said(flight):
     nothing = np.zeros(3)
     with pytest.raises(WildlabError, match="on the same clock"):
-        start_at(5000.0, flight.imu, nothing, nothing, [1, 0, 0], [1, 0, 0], gravity=GRAVITY)
+        align_at(
+            5000.0, flight.imu, Kinematics(nothing, nothing), Reference([1, 0, 0], [1, 0, 0]), InitialSd(),
+            gravity=GRAVITY,
+        )  # fmt: skip

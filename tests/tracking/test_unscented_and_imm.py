@@ -9,9 +9,10 @@ from tests.tracking.poses import overflight, turned
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import wrap
 from wildlab.tracking import measurement as m
+from wildlab.tracking.imm import run_imm
 from wildlab.tracking.motion import constant_velocity
-from wildlab.tracking.others import run_imm, run_unscented
 from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.unscented import run_unscented
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
 CALM = partial(constant_velocity, sd_acceleration=0.02)
@@ -40,11 +41,11 @@ def the_same(ours, theirs, rtol=1e-9):
     assert np.array_equal(ours.chosen, theirs.chosen)
 
 
-@pytest.mark.parametrize("gate", [None, 0.99])
+@pytest.mark.parametrize("gate", [1.0, 0.99])
 def test_on_a_linear_model_all_are_the_kalman_filter(gate):
     times, z = positions_seen()
     asked = np.sort(np.concatenate([times, times + 0.01]))
-    arguments = dict(gate=gate, output_times=asked)
+    arguments = dict(gate_probability=gate, output_times=asked)
     plain = run_filter(times, z, R2, m.positions(), CV, START, **arguments)
     the_same(run_unscented(times, z, R2, m.positions(), CV, START, **arguments), plain)
     twice = run_imm(times, z, R2, m.positions(), [CV, CV], [5.0, 2.0], START, **arguments)

@@ -8,9 +8,9 @@ import pytest
 from tests.navigation.flights import GRAVITY, LEVERS, NOISE, attitude, begin, fixes, fly, spoil
 from wildlab.geometry.frames import matrix_to_quaternion, quaternion_to_matrix
 from wildlab.geometry.gravity import flat_earth
+from wildlab.navigation.diagnostics import signs_of_trouble
 from wildlab.navigation.mekf import run_mekf
-from wildlab.navigation.timeline import Imu
-from wildlab.navigation.trouble import signs_of_trouble
+from wildlab.navigation.timeline import ImuSamples
 
 EARTH = flat_earth(GRAVITY)
 
@@ -36,7 +36,7 @@ def test_a_good_flight_raises_no_doubt(flight, seed):
 
 def without(imu, begin_s, end_s):
     keep = (imu.times < begin_s) | (imu.times > end_s)
-    return Imu(*(part[keep] for part in imu))
+    return ImuSamples(*(part[keep] for part in imu))
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_sensors_built_in_the_wrong_way_round_are_said(flight, axes, sentence):
     rng = np.random.default_rng(0)
     imu, biases = spoil(flight, rng)
     start, (first, _) = begin(flight, biases, rng), fixes(flight, rng)
-    turned = Imu(imu.times, imu.specific_force * axes, imu.angular_rate * axes)
+    turned = ImuSamples(imu.times, imu.specific_force * axes, imu.angular_rate * axes)
     R = quaternion_to_matrix(start.state[6:10]) @ np.diag(axes)
     start.state[6:10] = matrix_to_quaternion(R)
     central = first._replace(value=first.value - attitude(first.times) @ LEVERS[0], lever=0 * first.lever)
@@ -78,4 +78,4 @@ def test_sensors_built_in_the_wrong_way_round_are_said(flight, axes, sentence):
 
 def test_an_outage_is_said(flight):
     (sentence,) = signs(flight, outage=(100.0, 160.0))
-    assert "From 100 to 160 s no measurement was taken in" in sentence
+    assert "From 100 to 160 s no measurement was used" in sentence

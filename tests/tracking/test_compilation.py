@@ -1,0 +1,50 @@
+"""What is compiled the first time is said, and what is there already is not."""
+
+from __future__ import annotations
+
+import logging
+
+import numba
+import pytest
+
+from wildlab.geometry.compilation import announced, compiled
+from wildlab.tracking import batch_kernels
+
+
+def test_the_first_use_is_announced_once(caplog):
+    caplog.set_level(logging.INFO, "wildlab.compilation")
+
+    @compiled
+    def twice(x):
+        return 2 * x
+
+    @compiled
+    def four_times(x):
+        return twice(twice(x))
+
+    with announced("the doubling"):
+        assert four_times(1.5) == 6.0  # two functions, one line
+    assert [record.getMessage().split(" for ")[0] for record in caplog.records] == ["compiling the doubling"]
+    with announced("the doubling"):
+        assert four_times(2.5) == 10.0
+    assert len(caplog.records) == 1
+    with announced("the doubling"):
+        four_times(1)  # another type
+    assert len(caplog.records) == 2
+
+
+@pytest.mark.slow
+def test_a_kind_of_filter_compiles_no_other():
+    """Positions need neither camera nor pose, and a camera no cross-covariances."""
+    float_2d, float_3d = numba.float64[:, ::1], numba.float64[:, :, ::1]
+    own = batch_kernels.update_lanes
+    assert own.py_func.__name__ == "update_lanes"
+    signature = (
+        float_2d, float_3d, float_3d, float_3d, float_2d, float_3d, float_3d, float_3d, numba.none,
+        numba.float64, *[numba.float64[::1]] * 2, numba.bool_[::1], *[float_3d] * 6,
+    )  # fmt: skip
+    alone, with_pose = (numba.njit(error_model="numpy")(own.py_func) for _ in range(2))
+    alone.compile(signature)
+    with_pose.compile((*signature[:8], float_3d, *signature[9:]))
+    (short,), (long,) = (list(one.inspect_llvm().values()) for one in (alone, with_pose))
+    assert len(short) < 0.8 * len(long)
