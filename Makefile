@@ -3,7 +3,7 @@
 # Every path here is relative, so that a checkout may lie in a folder with blanks in its name.
 
 .DEFAULT_GOAL := help
-.PHONY: help environment reports first-look test test-all style strip lab lock bench doctor clean
+.PHONY: help environment reports first-look test test-all style docs strip lab lock bench doctor clean
 
 # How many notebooks or test processes at once.
 JOBS ?= 2
@@ -40,6 +40,9 @@ style: environment ## ruff, mypy and the notebooks' state, as the tests check th
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/python -m pytest -q tests/test_notebooks_stripped.py
+
+docs: environment ## the reference of all functions, to be opened from disk
+	@$(BIN)/python tools/reference.py
 
 strip: environment ## take outputs and execution counts out of the notebooks
 	@$(BIN)/nbstripout --keep-id notebooks/*.ipynb

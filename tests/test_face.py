@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import chi2
 
 import wildlab
 from tests.rooms import LAZY
@@ -21,9 +22,10 @@ from wildlab.brief import LONGEST, MOST_ROWS, Summary, as_html, as_text
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.consistency import Series, mean_of_runs, worth
+from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
 from wildlab.pipeline.follow import usual_tuning
 from wildlab.pipeline.navigate import PUBLISHED_LIKE
+from wildlab.pipeline.navigation_errors import Errors
 from wildlab.simulation.twins import simulate_twin
 
 HEAVY = ("numpy", "pandas", "matplotlib", "scipy", "numba", "cv2", "pydantic", "pyarrow", "click")
@@ -196,6 +198,31 @@ def test_every_result_has_a_figure(ship: Flight) -> None:
         figure = wildlab.plot(result)
         assert figure._repr_png_()[1:4] == b"PNG"  # type: ignore[attr-defined]
         assert all(len(ax.lines) + len(ax.patches) for ax in figure.axes)
+
+
+def test_only_the_part_that_counts_is_judged() -> None:
+    times, nothing = np.arange(4.0), np.full((4, 9), np.nan)
+    squares = {"position": times, "velocity": times + 10, "attitude": np.full(4, np.nan)}
+    found = navigation_series(Errors(times, nothing, nothing, squares), 1.0, 3.0)
+    assert [(one.name, list(one.values)) for one in found] == [
+        ("NEES position", [1.0, 2.0]),
+        ("NEES velocity", [11.0, 12.0]),
+    ]
+
+
+def test_a_verdict_goes_the_right_way(ship: Flight) -> None:
+    bold = wildlab.track(ship, source="autopilot", filter="kf", acceleration=0.001, measurement=0.1)
+    timid = wildlab.track(ship, source="autopilot", filter="kf", measurement=500.0)
+    assert repr(wildlab.consistency(bold)).count("overconfident") == 2
+    assert repr(wildlab.consistency(timid)).count("too cautious") == 2
+
+
+def test_an_ellipse_lies_as_its_covariance(ship: Flight) -> None:
+    row = {"north_m": [0.0], "east_m": [0.0], "cov_nn": [100.0], "cov_ne": [0.0], "cov_ee": [1.0]}
+    (patch,) = wildlab.plot(Points(ship, "truth", pd.DataFrame(row))).axes[0].patches
+    box = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
+    assert box.height == pytest.approx(10 * box.width)
+    assert box.height == pytest.approx(2 * 10 * np.sqrt(chi2.ppf(0.9, 2)))
 
 
 @pytest.mark.slow

@@ -52,6 +52,25 @@ def test_hostile_names_stay_text(tmp_path: Path, faults: Callable[[Path], list[s
     assert faults(path) == []
 
 
+@pytest.mark.parametrize(
+    ("text", "theses"),
+    [
+        ("as in H 5.6.1", "H"),
+        ("tuned by H (7.35) and F tables 3.1", "HF"),
+        ("the matrix H and the force F, H2O, CH 4", ""),
+    ],
+)
+def test_a_report_says_what_it_cites(text: str, theses: str) -> None:
+    report = open_report(study="test", kind="twin", seed=1)
+    report.head("Title")
+    report.text(text)
+    whole = html.report_page(shown(report), study="test", footer="<p>made</p>")
+    footer = whole.partition("<footer>")[2]
+    assert ("H: H. H. Helgesen" in footer) == ("H" in theses)
+    assert ("F: A. Flodell" in footer) == ("F" in theses)
+    assert footer.startswith("<p>made</p>")
+
+
 def test_failure_page_opens_offline_and_stays_text(
     tmp_path: Path, faults: Callable[[Path], list[str]]
 ) -> None:

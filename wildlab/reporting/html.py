@@ -47,6 +47,14 @@ _WRAPPERS = {
     *("cell", "inner_cell", "output_wrapper", "output", "output_area", "output_subarea", "text_cell_render"),
     *("prompt", "input"),
 }
+#: The theses, as reports cite them: "H 5.6.1", "H (7.35)", "F table 3.1" (in full: ``docs/references.md``).
+THESES = {
+    "H": "H. H. Helgesen, Detection and Tracking of Floating Objects using UAVs with Optical Sensors, "
+    "doctoral thesis, Norwegian University of Science and Technology, 2019",
+    "F": "A. Flodell and C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, "
+    "master's thesis, Linköping University, 2016",
+}
+_CITED = re.compile(r"\b([HF])\s(?:\(?\d|(?:section|chapter|example|equation|table|figure)s?\s\(?\d)")
 _FETCHING = ("src", "srcset", "poster", "background", "data", "xlink:href", "action", "formaction", "ping")
 _CSS_REQUEST = re.compile(r"@import|url\s*\(\s*['\"]?(?!data:)", re.I)
 
@@ -144,12 +152,33 @@ def report_page(
         If the page would break one of the promises in `examine`.
     """
     body = notebook_body(notebook)
-    heading = BeautifulSoup(body, "html.parser").h1
+    soup = BeautifulSoup(body, "html.parser")
+    heading = soup.h1
     title = heading.get_text(" ", strip=True) if heading else study
     way = f'<a href="{escape(ledger)}">wildlab ledger</a> › {escape(study)}' if ledger else escape(study)
-    whole = page(title=title, body=f"{notice}\n{body}" if notice else body, kicker=way, footer=footer)
+    whole = page(
+        title=title,
+        body=f"{notice}\n{body}" if notice else body,
+        kicker=way,
+        footer=footer + cited_theses(soup.get_text(" ")),
+    )
     examine(whole, study)
     return whole
+
+
+def cited_theses(text: str) -> str:
+    """A line of HTML that says what H and F are, those of them that a text cites; "" where it cites neither.
+
+    Examples
+    --------
+    >>> cited_theses("after H (5.15) to (5.17)")[:22]
+    '<p>H: H. H. Helgesen, '
+    >>> cited_theses("the matrix H is not a thesis")
+    ''
+    """
+    found = set(_CITED.findall(text))
+    named = [f"{letter}: {escape(about)}" for letter, about in THESES.items() if letter in found]
+    return f"<p>{'. '.join(named)}.</p>" if named else ""
 
 
 def examine(whole: str, name: str) -> None:
