@@ -170,9 +170,9 @@ def test_what_cannot_be_done_is_said_with_the_remedy(ship: Flight) -> None:
 def test_consistency_of_one_run_and_of_two(ship: Flight) -> None:
     track = wildlab.track(ship, source="autopilot", filter="kf")
     one, two = wildlab.consistency(track), wildlab.consistency(track, track)
-    assert track.judged is not None
+    assert track.scored is not None
     nees = one.means["NEES position"]
-    assert nees.mean == pytest.approx(track.judged.numbers["nees"])
+    assert nees.mean == pytest.approx(track.scored.numbers["nees"])
     assert 1 <= nees.worth < nees.n / 2  # errors of neighbouring frames are alike
     assert (nees.low, nees.high) == chi_square_interval(2, runs=nees.worth)
     assert two.means["NEES position"].worth == pytest.approx(2 * nees.worth)

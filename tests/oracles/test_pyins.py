@@ -36,7 +36,7 @@ SHARE, ANGLE, SPEED = 0.05, 0.05, 0.02
 Array = np.ndarray
 
 
-class Judged(NamedTuple):
+class Scored(NamedTuple):
     """RMS in the air of roll, pitch, yaw (deg) and of the velocities (m/s) off those on board, the estimate
     itself, and what it took, s."""
 
@@ -50,16 +50,16 @@ class Thor(NamedTuple):
     flight: Flight
     given: Inputs
     noise: ImuNoise
-    pyins: Judged
+    pyins: Scored
 
 
-def judge(flight: Flight, nav: pd.DataFrame, seconds: float) -> Judged:
+def compare(flight: Flight, nav: pd.DataFrame, seconds: float) -> Scored:
     attitude = euler_differences(flight, Navigated(nav, pd.DataFrame(), pd.DataFrame()), *THOR_AIRBORNE)
     flown = nav[nav["time_s"].between(*THOR_AIRBORNE)]
     both = flown.merge(flight.nav["onboard"], on="time_s", suffixes=("", "_onboard"))  # rows of one log
     assert len(both) > 0.99 * len(flown)
     off = [both[name] - both[f"{name}_onboard"] for name in VELOCITY]
-    return Judged(rms(attitude), rms(np.stack(off, axis=-1)), nav, seconds)
+    return Scored(rms(attitude), rms(np.stack(off, axis=-1)), nav, seconds)
 
 
 def nav_table(times: Array, velocity: Array, quaternion: Array) -> pd.DataFrame:
@@ -70,7 +70,7 @@ def nav_table(times: Array, velocity: Array, quaternion: Array) -> pd.DataFrame:
     )
 
 
-def by_pyins(pyins: Any, flight: Flight, given: Inputs, noise: ImuNoise) -> Judged:
+def by_pyins(pyins: Any, flight: Flight, given: Inputs, noise: ImuNoise) -> Scored:
     origin, start = flight.manifest.origin_tuple(), given.start
     p_0, v_0, q_0, accelerometer_bias, gyro_bias = np.split(start.state, [3, 6, 10, 13])
     R_0 = quaternion_to_matrix(q_0)
@@ -117,10 +117,10 @@ def by_pyins(pyins: Any, flight: Flight, given: Inputs, noise: ImuNoise) -> Judg
     seconds = time.perf_counter() - begin
     angles = found[["roll", "pitch", "heading"]].to_numpy(float)
     q = Rotation.from_euler("xyz", angles, degrees=True).as_quat()[:, [3, 0, 1, 2]]
-    return judge(flight, nav_table(found.index.to_numpy(float), found[speed].to_numpy(float), q), seconds)
+    return compare(flight, nav_table(found.index.to_numpy(float), found[speed].to_numpy(float), q), seconds)
 
 
-def by_wildlab(thor: Thor, noise: ImuNoise, axes: AxisErrors | None, gate_probability: float) -> Judged:
+def by_wildlab(thor: Thor, noise: ImuNoise, axes: AxisErrors | None, gate_probability: float) -> Scored:
     latitude, _, height = thor.flight.manifest.origin_tuple()
     given = thor.given, local_earth(latitude, height)
     times = thor.pyins.nav["time_s"].to_numpy(float)
@@ -134,7 +134,7 @@ def by_wildlab(thor: Thor, noise: ImuNoise, axes: AxisErrors | None, gate_probab
     begin = time.perf_counter()
     found = run()
     seconds = time.perf_counter() - begin
-    return judge(thor.flight, nav_table(found.times, found.velocity, found.quaternion), seconds)
+    return compare(thor.flight, nav_table(found.times, found.velocity, found.quaternion), seconds)
 
 
 def walking(noise: ImuNoise) -> ImuNoise:
@@ -160,8 +160,8 @@ def thor(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathFact
     return Thor(flight, given, noise, by_pyins(pyins, flight, given, noise))
 
 
-def show(name: str, judged: Judged) -> None:
-    print(f"{name}: {judged.attitude.round(3)} deg, {judged.velocity.round(3)} m/s, {judged.seconds:.2f} s")
+def show(name: str, scored: Scored) -> None:
+    print(f"{name}: {scored.attitude.round(3)} deg, {scored.velocity.round(3)} m/s, {scored.seconds:.2f} s")
 
 
 @pytest.mark.slow

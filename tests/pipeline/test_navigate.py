@@ -13,7 +13,7 @@ from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLU
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.navigation.magnetometer import earth_field
-from wildlab.pipeline.evaluate import judge
+from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.navigate import likelihoods_of_latency, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_inputs import imu_noise
@@ -61,9 +61,9 @@ def test_poses_at_the_frames_are_one_more_source_of_the_flight(flight, tmp_path)
     assert set(nav["time_s"]) <= set(flight.frames["time_s"])
     save_flight(Flight(flight.manifest, {**flight.nav, "observer": nav}, flight.tables), tmp_path / "flight")
     again = load_flight(tmp_path / "flight")
-    judged = judge(again, georeference(again, observe(again, "observer"), np.random.default_rng(0)))
-    assert judged["error_m"].notna().all()
-    assert judged["error_m"].mean() < 20.0
+    scored = score_points(again, georeference(again, observe(again, "observer"), np.random.default_rng(0)))
+    assert scored["error_m"].notna().all()
+    assert scored["error_m"].mean() < 20.0
 
 
 def test_the_filter_states_its_covariance_and_its_innovations(flight):

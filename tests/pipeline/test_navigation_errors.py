@@ -105,7 +105,7 @@ def early() -> Flight:
 def test_a_twin_is_judged_by_the_truth_of_its_payload(early):
     studied = study_navigation(early)
     assert studied.reference == "truth-payload"
-    assert set(studied.judged) == {
+    assert set(studied.scored) == {
         "mekf",
         "observer",
         "mekf-published-like",

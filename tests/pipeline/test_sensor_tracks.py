@@ -9,7 +9,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.scans import looks_of, sensors_of, truths_at
+from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.pipeline.sensor_tracks import (
     FILTERS,
     GATE,
@@ -107,30 +107,30 @@ def by_filter(followed: list[Followed], target: str = "one") -> pd.DataFrame:
     return rows[rows["target"] == target].set_index("filter")
 
 
-# --- looks --------------------------------------------------------------------------------------------------
+# --- scans --------------------------------------------------------------------------------------------------
 
 
 def test_looks_keep_those_that_saw_nothing():
     flight = make(sd=0.0)
-    looks = looks_of(flight, "lidar")
+    scans = scans_of(flight, "lidar")
     assert sensors_of(flight) == ["lidar"]
-    assert looks.detections.shape == (len(flight.table("frames")), 2, 2)
-    empty = np.isnan(looks.detections).all(axis=(1, 2))
+    assert scans.detections.shape == (len(flight.table("frames")), 2, 2)
+    empty = np.isnan(scans.detections).all(axis=(1, 2))
     np.testing.assert_array_equal(np.flatnonzero(empty), np.arange(3, len(empty), 7))
-    assert looks.interval_s == pytest.approx(0.5)
-    np.testing.assert_allclose(looks.platform, platform(looks.times), atol=0.02)
-    slope = (platform(looks.times + 1e-3) - platform(looks.times - 1e-3)) / 2e-3
-    np.testing.assert_allclose(looks.platform_velocity[2:], slope[2:], atol=0.01)
+    assert scans.interval_s == pytest.approx(0.5)
+    np.testing.assert_allclose(scans.platform, platform(scans.times), atol=0.02)
+    slope = (platform(scans.times + 1e-3) - platform(scans.times - 1e-3)) / 2e-3
+    np.testing.assert_allclose(scans.platform_velocity[2:], slope[2:], atol=0.01)
 
 
 def test_what_a_late_sensor_saw_stands_where_the_platform_was_then():
-    looks = looks_of(make(sd=0.0, late_s=1.5), "lidar", -1.5)
-    truth = truths_at(make(), looks.times)[0]
-    error, which = errors_near(looks, truth)
+    scans = scans_of(make(sd=0.0, late_s=1.5), "lidar", -1.5)
+    truth = truths_at(make(), scans.times)[0]
+    error, which = errors_near(scans, truth)
     seen = which >= 0
     assert seen.sum() > 150
     assert np.abs(error[seen]).max() < 0.02
-    uncorrected = looks_of(make(sd=0.0, late_s=1.5), "lidar")
+    uncorrected = scans_of(make(sd=0.0, late_s=1.5), "lidar")
     late = errors_near(uncorrected, truths_at(make(), uncorrected.times)[0])[0]
     assert np.nanmean(np.hypot(*late.T)) > 2
 
@@ -145,10 +145,10 @@ def test_truth_that_ends_early_is_not_known_behind_its_end():
 def test_what_cannot_be_followed_is_said():
     flight = make()
     with pytest.raises(WildlabError, match=r"no sensor 'radar'.*Use one of lidar"):
-        looks_of(flight, "radar")
+        scans_of(flight, "radar")
     flight.tables["detections"]["kind"] = "pixel"
     with pytest.raises(WildlabError, match=r"the sensor 'lidar' detects pixel.*position or bearing"):
-        looks_of(flight, "lidar")
+        scans_of(flight, "lidar")
     del flight.tables["frames"]["sensor"]
     with pytest.raises(WildlabError, match="the frames do not say which sensor looked"):
         sensors_of(flight)
@@ -277,11 +277,11 @@ def test_a_track_does_not_start_on_another_target():
     two = truth[truth["target_id"] == "two"]
     beside = two.assign(target_id="one", north_m=two["north_m"] + 3.0)
     flight.tables["truth"] = pd.concat([beside, two], ignore_index=True)
-    looks = looks_of(flight, "lidar")
-    one, other = truths_at(flight, looks.times)
-    assert start_near(looks, one, quiet()) is not None
-    assert start_near(looks, one, quiet(), [other]) is None
-    start = start_near(looks, other, quiet(), [one])
+    scans = scans_of(flight, "lidar")
+    one, other = truths_at(flight, scans.times)
+    assert start_near(scans, one, quiet()) is not None
+    assert start_near(scans, one, quiet(), [other]) is None
+    start = start_near(scans, other, quiet(), [one])
     assert start is not None
     np.testing.assert_allclose(start.x[:2], other.position[0], atol=0.5)
     np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * REACH["position"] ** 2)

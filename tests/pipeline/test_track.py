@@ -9,11 +9,11 @@ from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.track import (
     CvTuning,
     Sighting,
+    evaluate_measurements,
+    evaluate_track,
     follow_pixels,
     follow_positions,
     follow_schmidt,
-    judge_measurements,
-    judge_track,
     sighting,
     start,
 )
@@ -47,7 +47,7 @@ def test_the_sighting_holds_every_frame_between_first_and_last_detection(
 
 def test_a_detection_seen_from_the_true_pose_lies_on_the_target(flight: Flight) -> None:
     # Only the detector's pixels and the error of the receiver on the target are left.
-    assert judge_measurements(sighting(flight, "truth"))["mae_georeferenced"] < 4.0
+    assert evaluate_measurements(sighting(flight, "truth"))["mae_georeferenced"] < 4.0
 
 
 def test_the_compiled_filters_are_the_readable_ones(seen: Sighting) -> None:
@@ -91,12 +91,12 @@ def test_without_pose_uncertainty_schmidt_is_the_extended_filter(seen: Sighting)
 
 def test_the_numbers_are_those_of_the_track(seen: Sighting) -> None:
     track = follow_positions(seen, TUNING)
-    judged = judge_track(seen, track)
+    scored = evaluate_track(seen, track)
     e = seen.truth[:, :2] - track.x[:, :2]
-    assert judged.numbers["mae"] == pytest.approx(np.nanmean(np.hypot(*e.T)))
-    assert judged.numbers["mean_north"] == pytest.approx(np.nanmean(e[:, 0]))
+    assert scored.numbers["mae"] == pytest.approx(np.nanmean(np.hypot(*e.T)))
+    assert scored.numbers["mean_north"] == pytest.approx(np.nanmean(e[:, 0]))
     one = np.array([row @ np.linalg.solve(P[:2, :2], row) for row, P in zip(e, track.P, strict=True)])
-    np.testing.assert_allclose(judged.nees, one, rtol=1e-9)
+    np.testing.assert_allclose(scored.nees, one, rtol=1e-9)
 
 
 def test_a_target_that_nothing_names_is_refused(flight: Flight) -> None:

@@ -17,7 +17,7 @@ def report():
     return open_report(study="made-up", kind="twin")
 
 
-def judged_table(n=20, seed=0):
+def scored_table(n=20, seed=0):
     rng = np.random.default_rng(seed)
     e = rng.normal(size=(n, 2))
     return pd.DataFrame(
@@ -56,7 +56,7 @@ def test_factors_are_sorted_by_their_share_and_carry_their_numbers():
 
 
 def test_metrics_have_the_promised_names(report):
-    georeferencing.record_errors(report, "logged-pose", judged_table(), {"horizontal_error_mean": (0.5, 2.0)})
+    georeferencing.record_errors(report, "logged-pose", scored_table(), {"horizontal_error_mean": (0.5, 2.0)})
     names = [m["name"] for m in report._metrics]
     assert names == [
         "horizontal_error_mean", "horizontal_error_median", "horizontal_error_p90", "horizontal_error_max",

@@ -1,4 +1,4 @@
-"""The ferry's five scenarios: tuned on the first, judged on all, against what is known from elsewhere."""
+"""The ferry's five scenarios: tuned on the first, scored on all, against what is known from elsewhere."""
 
 from __future__ import annotations
 

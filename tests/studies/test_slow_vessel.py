@@ -13,9 +13,9 @@ from wildlab.studies.slow_vessel.trial import (
     SD_MEASUREMENT,
     SUBJECTS,
     check_claims,
+    evaluate_sources,
     first_case,
     follow,
-    judge_sources,
     navigate_vessel,
     subset_of,
     summarise_vessel,
@@ -23,8 +23,8 @@ from wildlab.studies.slow_vessel.trial import (
 )
 
 
-def judged_points(times, errors, truth):
-    """A judged table, in no order."""
+def scored_points(times, errors, truth):
+    """A scored table, in no order."""
     xy = truth + errors
     table = pd.DataFrame(
         {"time_s": times, "north_m": xy[:, 0], "east_m": xy[:, 1], "error_north_m": errors[:, 0],
@@ -40,7 +40,7 @@ def test_the_filter_is_a_straight_line_through_the_first_points_where_nothing_ac
     times = np.cumsum(rng.uniform(0.1, 20.0, 30))
     truth = np.array([50.0, -20.0]) + np.outer(times, [0.3, -0.1])
     errors = rng.normal(0, 5, (30, 2))
-    got = follow(judged_points(times, errors, truth))
+    got = follow(scored_points(times, errors, truth))
     t, z = times - times[0], truth + errors
     for axis in range(2):
         A = np.column_stack([np.ones(30), t])
@@ -56,9 +56,9 @@ def test_the_filter_is_a_straight_line_through_the_first_points_where_nothing_ac
 def test_long_steps_state_more_and_are_the_same_without_pauses():
     rng = np.random.default_rng(5)
     even, errors = np.arange(40) / 7.5, rng.normal(0, 4, (40, 2))
-    points = judged_points(even, errors, np.zeros((40, 2)))
+    points = scored_points(even, errors, np.zeros((40, 2)))
     assert np.allclose(follow(points).error, follow(points, np.inf).error)
-    paused = judged_points(np.where(even > 3, even + 60, even), errors, np.zeros((40, 2)))
+    paused = scored_points(np.where(even > 3, even + 60, even), errors, np.zeros((40, 2)))
     long, short = follow(paused, np.inf).stated, follow(paused).stated
     assert np.all(long >= short) and np.all(long[even > 3] > short[even > 3])
 
@@ -96,10 +96,10 @@ def test_where_a_logged_vessel_truly_was_nobody_knows(make_flight):
 def test_a_simulated_flight_gives_every_number():
     flight = simulate_twin("slow-vessel", 2)
     navigate_vessel(flight)
-    judged = judge_sources(flight, np.random.default_rng(2))
-    found = summarise_vessel(flight, judged) | {("first-case", "mae"): first_case(2, "static-antenna")}
+    scored = evaluate_sources(flight, np.random.default_rng(2))
+    found = summarise_vessel(flight, scored) | {("first-case", "mae"): first_case(2, "static-antenna")}
     assert set(found) == set(METRICS)
-    table = judged["observer"]
+    table = scored["observer"]
     assert (len(table), len(subset_of(table))) == (3635, 1250)
     assert np.allclose(table["down_m"], 0.0, atol=1e-9), "points lie on the sea, not at the receiver"
     assert found["observer", "mae"] == pytest.approx(table["error_m"].mean())

@@ -15,8 +15,8 @@ from wildlab.studies.static_point.trial import (
     OBSERVER,
     UNCALIBRATED,
     check_claims,
+    evaluate_columns,
     filter_errors,
-    judge_columns,
     navigate_observers,
     summarise_at_rest,
     turned,
@@ -30,12 +30,12 @@ def test_filtering_errors_is_filtering_positions():
     A = rng.normal(size=(n, 2, 2))
     C = A @ np.swapaxes(A, 1, 2) + 0.1 * np.eye(2)
     errors = rng.normal(size=(n, 2))
-    judged = pd.DataFrame(
+    scored = pd.DataFrame(
         {"time_s": np.arange(n) * 1.0, "error_north_m": errors[:, 0], "error_east_m": errors[:, 1],
          "cov_nn": C[:, 0, 0], "cov_ne": C[:, 0, 1], "cov_ee": C[:, 1, 1]}
     ).sample(frac=1.0, random_state=1)  # fmt: skip
     direct = filter_at_rest(errors + truth, C)
-    ours = filter_errors(judged)
+    ours = filter_errors(scored)
     assert np.allclose(ours.x, direct.x - truth)
     assert np.allclose(ours.P, direct.P)
     assert np.allclose(ours.innovation[1:], direct.innovation[1:])
@@ -44,12 +44,12 @@ def test_filtering_errors_is_filtering_positions():
 def test_columns_are_those_the_flight_has_and_none_is_an_error(make_flight):
     flight = make_flight(pixel_px=1.0)
     with pytest.raises(WildlabError, match="no poses named 'observer'"):
-        judge_columns(flight, np.random.default_rng(0))
+        evaluate_columns(flight, np.random.default_rng(0))
     flight.nav["observer"] = flight.nav["logged"]
-    judged = judge_columns(flight, np.random.default_rng(0))
-    assert list(judged) == ["observer"]
-    found = summarise_at_rest(judged)
-    assert found["observer", "mae"] == pytest.approx(judged["observer"]["error_m"].mean())
+    scored = evaluate_columns(flight, np.random.default_rng(0))
+    assert list(scored) == ["observer"]
+    found = summarise_at_rest(scored)
+    assert found["observer", "mae"] == pytest.approx(scored["observer"]["error_m"].mean())
     assert found["filter", "at_end"] < found["observer", "mae"]
 
 
@@ -84,9 +84,9 @@ def test_a_simulated_flight_has_every_column_and_the_misalignment_costs_most():
     between = (np.swapaxes(a, 1, 2) @ b for a, b in ((ours, left_in), (theirs, theirs_left_in)))
     of_observer, of_autopilot = between
     assert np.allclose(of_observer[known], of_autopilot[known], atol=1e-6)
-    judged = judge_columns(flight, np.random.default_rng(2))
-    assert list(judged) == list(COLUMNS)
-    found = summarise_at_rest(judged)
+    scored = evaluate_columns(flight, np.random.default_rng(2))
+    assert list(scored) == list(COLUMNS)
+    found = summarise_at_rest(scored)
     assert set(found) == set(METRICS)
     assert found["without-misalignment-calibration", "mae"] == max(found[column, "mae"] for column in COLUMNS)
 

@@ -12,9 +12,9 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.geometry.frames import ned_to_geodetic
 from wildlab.paths import DATA
 from wildlab.pipeline.calibrate import calibrate_flight
-from wildlab.pipeline.evaluate import errors_of, judge, recorded_answers
+from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
 from wildlab.pipeline.georeference import georeference, heights_left_in, observe
-from wildlab.pipeline.pose_noise import judge_with_estimated_noise
+from wildlab.pipeline.pose_noise import evaluate_with_estimated_noise
 
 
 @pytest.fixture(scope="module")
@@ -31,17 +31,17 @@ def flights(tmp_path_factory, shared_data):
 
 def errors(flight, observations=None):
     observations = observations or observe(flight)
-    return judge(flight, georeference(flight, observations, np.random.default_rng(0)))
+    return score_points(flight, georeference(flight, observations, np.random.default_rng(0)))
 
 
 def test_labelled_clicks_of_one_flight(flights):
     flight = flights["openathena-f1"]
-    judged = errors(flight)
-    ours, theirs = summarise(errors_of(judged)), summarise(errors_of(recorded_answers(flight)["openathena"]))
+    scored = errors(flight)
+    ours, theirs = summarise(errors_of(scored)), summarise(errors_of(recorded_answers(flight)["openathena"]))
     assert ours.n == theirs.n == 103
     assert ours.mean <= 3.0
     assert theirs.mean == pytest.approx(8.0, abs=0.1)
-    assert judged["frame_id"].nunique() == 29
+    assert scored["frame_id"].nunique() == 29
 
 
 def test_without_the_vertical_correction_it_would_be_useless(flights):
@@ -79,8 +79,8 @@ def test_one_flight_as_plain_tables_is_the_same_flight_as_published(flights):
 
 def test_estimated_noise_makes_the_ellipses_honest(flights):
     flight = flights["openathena-f1"]
-    judged = errors(flight)
-    after = judge_with_estimated_noise(flight, observe(flight), judged, np.random.default_rng(3))
+    scored = errors(flight)
+    after = evaluate_with_estimated_noise(flight, observe(flight), scored, np.random.default_rng(3))
     assert 0.82 <= after["inside_90"].mean() <= 0.97
 
 

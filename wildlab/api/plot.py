@@ -123,7 +123,7 @@ def _truth(ax: Axes, flight: Flight) -> None:
 def _track(one: Tracked) -> Figure:
     called: dict[str, str] = {"schmidt": "Schmidt-Kalman", "ekf": "extended Kalman", "kf": "Kalman"}
     truth = one.seen.truth if np.isfinite(one.seen.truth).any() else one.track.x[:, :4]
-    title = "Track and truth" if one.judged is not None else "Track"
+    title = "Track and truth" if one.scored is not None else "Track"
     return track_map(truth, {one.filter: one.track.x}, called, title, measured=one.seen.positions)
 
 

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from wildlab.brief import Brief, Summary
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
-from wildlab.pipeline.evaluate import errors_of, judge
+from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import covariances_of, observe
 from wildlab.pipeline.georeference import georeference as to_ground
 
@@ -88,9 +88,9 @@ class PointErrors(Brief):
     Attributes
     ----------
     points
-        What was judged.
+        What was scored.
     table
-        Those of them that can be judged: see `wildlab.pipeline.evaluate.judge`.
+        Those of them that can be judged: see `wildlab.pipeline.evaluate.score_points`.
     summary
         Of the horizontal errors, m.
     inside_90
@@ -141,5 +141,5 @@ def evaluate_points(points: Points) -> PointErrors:
     >>> errors.summary.n == len(points.table)
     True
     """
-    judged = judge(points.flight, points.table)
-    return PointErrors(points, judged, summarise(errors_of(judged)), float(judged["inside_90"].mean()))
+    scored = score_points(points.flight, points.table)
+    return PointErrors(points, scored, summarise(errors_of(scored)), float(scored["inside_90"].mean()))

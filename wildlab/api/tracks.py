@@ -24,7 +24,7 @@ from wildlab.pipeline.navigation_errors import (
     flown_part,
     summarise,
 )
-from wildlab.pipeline.track import CvTuning, Judged, Sighting, judge_track, sighting
+from wildlab.pipeline.track import CvTuning, Scored, Sighting, evaluate_track, sighting
 from wildlab.tracking.run import Track
 
 Method = Literal["mekf", "observer"]
@@ -147,7 +147,7 @@ class Tracked(Brief):
         What the camera saw of the target.
     track
         Estimates with covariances, innovations.
-    judged
+    scored
         Beside the truth; None where the target has none.
     """
 
@@ -157,7 +157,7 @@ class Tracked(Brief):
     tuning: CvTuning
     seen: Sighting
     track: Track
-    judged: Judged | None
+    scored: Scored | None
 
     def brief(self) -> Summary:
         """What was followed with what, and how far off it was."""
@@ -169,8 +169,8 @@ class Tracked(Brief):
             ("at the start", f"{t.position_0:.3g} m, {t.velocity_0:.3g} m/s"),
             ("detections", f"{int(self.seen.seen.sum())} in {np.ptp(self.seen.times):.0f} s"),
         ]
-        if self.judged is not None:
-            n = self.judged.numbers
+        if self.scored is not None:
+            n = self.scored.numbers
             rows.append(("distance from the truth", f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS"))
             rows.append(("mean NEES and NIS", f"{n['nees']:.2f} and {n['nis']:.2f} (see consistency)"))
         return Summary(f"Track on {self.flight.name}", rows)
@@ -256,8 +256,8 @@ def track(
     found = FILTERS[filter](seen, tuning)
     known = np.isfinite(seen.truth[:, :2]).all(axis=1) & np.isfinite(found.x[:, :2]).all(axis=1)
     axes = ("north", "east") if filter == "kf" else ("u", "v")
-    judged = judge_track(seen, found, axes) if known.any() else None
-    return Tracked(flight, name, filter, tuning, seen, found, judged)
+    scored = evaluate_track(seen, found, axes) if known.any() else None
+    return Tracked(flight, name, filter, tuning, seen, found, scored)
 
 
 @dataclass(frozen=True, repr=False)
@@ -337,8 +337,8 @@ def consistency(*results: Tracked | Navigation) -> Consistency:
 
 def _series(one: Tracked | Navigation) -> list[Series]:
     if isinstance(one, Navigation):
-        judged = one.errors is not None and one.reference == REFERENCES[0]
-        return navigation_series(one.errors, *one.part[1:]) if one.errors is not None and judged else []
+        scored = one.errors is not None and one.reference == REFERENCES[0]
+        return navigation_series(one.errors, *one.part[1:]) if one.errors is not None and scored else []
     nis = Series("NIS", 2, one.seen.times, one.track.nis)
-    nees = [] if one.judged is None else [Series("NEES position", 2, one.seen.times, one.judged.nees)]
+    nees = [] if one.scored is None else [Series("NEES position", 2, one.seen.times, one.scored.nees)]
     return [each for each in (*nees, nis) if np.isfinite(each.values).any()]

@@ -17,7 +17,7 @@ from wildlab.lazy import offer
 if TYPE_CHECKING:
     from wildlab.pipeline.calibrate import Calibrated, calibrate_flight
     from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
-    from wildlab.pipeline.evaluate import errors_of, judge, recorded_answers
+    from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
     from wildlab.pipeline.follow import FILTERS, usual_tuning
     from wildlab.pipeline.georeference import (
         USUAL,
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from wildlab.pipeline.navigation_errors import Errors, errors_against
     from wildlab.pipeline.track import (
         CvTuning,
-        Judged,
+        Scored,
         Sighting,
+        evaluate_measurements,
+        evaluate_track,
         follow_pixels,
         follow_positions,
         follow_schmidt,
-        judge_measurements,
-        judge_track,
         sighting,
     )
 else:
@@ -46,20 +46,20 @@ else:
         {
             "calibrate": ("Calibrated", "calibrate_flight"),
             "consistency": ("Series", "mean_of_runs", "navigation_series", "worth"),
-            "evaluate": ("errors_of", "judge", "recorded_answers"),
+            "evaluate": ("errors_of", "score_points", "recorded_answers"),
             "follow": ("FILTERS", "usual_tuning"),
             "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
             "navigate": ("Navigated", "PUBLISHED_LIKE", "Tuning", "navigate_mekf", "navigate_observer"),
             "navigation_errors": ("Errors", "errors_against"),
             "track": (
                 "CvTuning",
-                "Judged",
+                "Scored",
                 "Sighting",
                 "follow_pixels",
                 "follow_positions",
                 "follow_schmidt",
-                "judge_measurements",
-                "judge_track",
+                "evaluate_measurements",
+                "evaluate_track",
                 "sighting",
             ),
         },
@@ -72,9 +72,9 @@ __all__ = [
     "Calibrated",
     "CvTuning",
     "Errors",
-    "Judged",
     "Navigated",
     "Observations",
+    "Scored",
     "Series",
     "Sighting",
     "Tuning",
@@ -82,12 +82,11 @@ __all__ = [
     "covariances_of",
     "errors_against",
     "errors_of",
+    "evaluate_measurements",
+    "evaluate_track",
     "follow_pixels",
     "follow_positions",
     "follow_schmidt",
-    "judge",
-    "judge_measurements",
-    "judge_track",
     "mean_of_runs",
     "navigate_mekf",
     "navigate_observer",
@@ -95,6 +94,7 @@ __all__ = [
     "observe",
     "pose_errors",
     "recorded_answers",
+    "score_points",
     "sighting",
     "truth_of",
     "usual_tuning",

@@ -1,4 +1,4 @@
-"""A flight's boresight from its own known points, judged on images it has not seen."""
+"""A flight's boresight from its own known points, scored on images it has not seen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate, split_images
-from wildlab.pipeline.evaluate import draws_of, judge, known_points
+from wildlab.pipeline.evaluate import draws_of, known_points, score_points
 from wildlab.pipeline.georeference import (
     Observations,
     calibrated,
@@ -33,28 +33,28 @@ class Calibrated(NamedTuple):
     ----------
     calibration
         From all images: what to write into the manifest.
-    judged
+    scored
         Every point placed by a calibration from the other half of the images (the first split).
     mean_errors
         Mean error of each split, metres.
     """
 
     calibration: Calibration
-    judged: pd.DataFrame
+    scored: pd.DataFrame
     mean_errors: Array
 
 
 def fit_flight(
     flight: Flight,
     observations: Observations,
-    judged: pd.DataFrame,
+    scored: pd.DataFrame,
     source: str | None = None,
     estimate: tuple[str, ...] = BORESIGHT,
 ) -> Calibration:
-    """Calibrate on the points of a judged table, weighted with their ground covariances."""
-    observations, known = known_points(flight, observations, judged)
+    """Calibrate on the points of a scored table, weighted with their ground covariances."""
+    observations, known = known_points(flight, observations, scored)
     ids = observations.table["detection_id"]
-    weights = covariances_of(judged.set_index("detection_id").loc[ids].reset_index())
+    weights = covariances_of(scored.set_index("detection_id").loc[ids].reset_index())
     return calibrate(
         partial(shifted_poses, flight, source, observations),
         observations.uv,
@@ -104,7 +104,7 @@ def calibrate_flight(
     if flight.manifest.time.kind == "sequence":
         estimate = tuple(name for name in estimate if name != "clock")
     observations = observe(flight, source)
-    plain = judge(flight, georeference(flight, observations, rng))
+    plain = score_points(flight, georeference(flight, observations, rng))
     plain = plain[np.isfinite(plain["error_m"]) & np.isfinite(plain["cov_nn"])]
     if plain["frame_id"].nunique() < 4:
         raise WildlabError(
@@ -118,7 +118,7 @@ def calibrate_flight(
     for _ in range(splits):
         half = split_images(draws, rng)
         parts = [
-            _judge_unseen(
+            _evaluate_unseen(
                 flight,
                 observations,
                 fit_flight(flight, observations, plain[seen], source, estimate),
@@ -136,7 +136,7 @@ def calibrate_flight(
     )
 
 
-def _judge_unseen(
+def _evaluate_unseen(
     flight: Flight,
     observations: Observations,
     calibration: Calibration,
@@ -147,4 +147,4 @@ def _judge_unseen(
     """Errors of the unseen points with a calibration applied."""
     rows = observations.table["detection_id"].isin(unseen["detection_id"]).to_numpy()
     placed = calibrated(flight, source, observations.take(rows), calibration)
-    return judge(flight, georeference(flight, placed, rng, pose_errors(flight, placed)))
+    return score_points(flight, georeference(flight, placed, rng, pose_errors(flight, placed)))

@@ -83,7 +83,7 @@ def navigation_series(errors: Errors, begin: float = -np.inf, end: float = np.in
     Parameters
     ----------
     errors
-        Against a reference that is the truth: else it is the difference of two estimates that is judged.
+        Against a reference that is the truth: else it is the difference of two estimates that is scored.
     begin, end
         s.
 

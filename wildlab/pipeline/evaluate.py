@@ -15,7 +15,7 @@ from wildlab.pipeline.georeference import Observations, covariances_of, truth_of
 Array = NDArray[np.float64]
 
 
-def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
+def score_points(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     """Errors of ground points against the truth, by the flight's scoring rule.
 
     ``labelled``: the target that the detection names; points without one are left out. ``nearest``: the
@@ -46,7 +46,7 @@ def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
     >>> from wildlab.simulation.twins import simulate_twin
     >>> flight = simulate_twin("large-ship", 1)
     >>> points = georeference(flight, observe(flight, "truth"), np.random.default_rng(0))
-    >>> bool(judge(flight, points)["error_m"].median() < 20)
+    >>> bool(score_points(flight, points)["error_m"].median() < 20)
     True
     """
     truth = flight.table("truth")
@@ -68,27 +68,27 @@ def judge(flight: Flight, points: pd.DataFrame) -> pd.DataFrame:
             field="detections.target_id",
         )
     error = (xy - where[:, :2])[known]
-    judged = points.iloc[np.flatnonzero(known)]
-    covariance = covariances_of(judged)
+    scored = points.iloc[np.flatnonzero(known)]
+    covariance = covariances_of(scored)
     inside = inside_ellipse(error, covariance).astype(float)
     inside[~np.isfinite(covariance).all(axis=(1, 2))] = np.nan
-    judged = judged.assign(
+    scored = scored.assign(
         truth_id=names[known],
         error_north_m=error[:, 0],
         error_east_m=error[:, 1],
         error_m=np.hypot(*error.T),
         inside_90=inside,
     )
-    return judged.reset_index(drop=True)
+    return scored.reset_index(drop=True)
 
 
-def errors_of(judged: pd.DataFrame) -> Array:
-    """The errors (N, 2) north-east of a judged table.
+def errors_of(scored: pd.DataFrame) -> Array:
+    """The errors (N, 2) north-east of a scored table.
 
     Parameters
     ----------
-    judged
-        From `judge`.
+    scored
+        From `score_points`.
 
     Returns
     -------
@@ -99,11 +99,11 @@ def errors_of(judged: pd.DataFrame) -> Array:
     >>> errors_of(pd.DataFrame({"error_north_m": [1.0], "error_east_m": [2.0]})).tolist()
     [[1.0, 2.0]]
     """
-    return judged[["error_north_m", "error_east_m"]].to_numpy(float)
+    return scored[["error_north_m", "error_east_m"]].to_numpy(float)
 
 
 def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
-    """Positions that other programs gave for the same detections, judged like ours, by program.
+    """Positions that other programs gave for the same detections, scored like ours, by program.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
     Returns
     -------
     dict
-        Judged tables by program.
+        Scored tables by program.
     """
     detections = flight.table("detections")
     frames = flight.table("frames")
@@ -133,7 +133,7 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
                 "cov_ee": np.nan,
             }
         )
-        answers[str(program)] = judge(flight, points)
+        answers[str(program)] = score_points(flight, points)
     return answers
 
 
@@ -159,13 +159,13 @@ def draws_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.str_]:
 
 
 def known_points(
-    flight: Flight, observations: Observations, judged: pd.DataFrame
+    flight: Flight, observations: Observations, scored: pd.DataFrame
 ) -> tuple[Observations, Array]:
-    """The observations that were judged, and the points (N, 3) they should have met.
+    """The observations that were scored, and the points (N, 3) they should have met.
 
     North and east are those of the truth, down is the ground that the ray was cut with.
     """
-    chosen = observations.take(observations.table["detection_id"].isin(judged["detection_id"]).to_numpy())
-    names = judged.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
+    chosen = observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())
+    names = scored.set_index("detection_id").loc[chosen.table["detection_id"], "truth_id"].to_numpy()
     where = truth_of(flight, chosen.table.assign(target_id=names))
     return chosen, np.column_stack([where[:, :2], chosen.plane_down])

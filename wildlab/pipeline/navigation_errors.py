@@ -68,13 +68,13 @@ class Errors(NamedTuple):
 
 
 class Studied(NamedTuple):
-    """A flight, navigated and judged at certain times (K,) against one of its nav sources."""
+    """A flight, navigated and scored at certain times (K,) against one of its nav sources."""
 
     flight: Flight
     reference: str
     times: Array
     found: dict[str, Navigated]
-    judged: dict[str, Errors]
+    scored: dict[str, Errors]
 
 
 def reference_of(flight: Flight) -> str:
@@ -259,24 +259,24 @@ def navigate_all(flight: Flight, times: ArrayLike) -> dict[str, Navigated]:
     return found
 
 
-def judge_all(
+def evaluate_all(
     flight: Flight, found: Mapping[str, Navigated], times: ArrayLike, reference: str
 ) -> dict[str, Errors]:
     """Errors of each estimate against the reference, and on a twin those of its autopilot.
 
-    The autopilot is judged by the airframe it sits on, not by the payload with the IMU and the antennas.
+    The autopilot is scored by the airframe it sits on, not by the payload with the IMU and the antennas.
     """
     table = flight.nav[reference]
-    judged = {
+    scored = {
         name: errors_against(table, one.nav, times, one.velocity_covariance) for name, one in found.items()
     }
     if "truth" in flight.nav and "autopilot" in flight.nav:
-        judged["autopilot"] = errors_against(flight.nav["truth"], flight.nav["autopilot"], times)
-    return judged
+        scored["autopilot"] = errors_against(flight.nav["truth"], flight.nav["autopilot"], times)
+    return scored
 
 
 def study_navigation(flight: Flight) -> Studied:
-    """A flight navigated in every way that is compared, and judged by the best reference it has.
+    """A flight navigated in every way that is compared, and scored by the best reference it has.
 
     Raises
     ------
@@ -286,7 +286,7 @@ def study_navigation(flight: Flight) -> Studied:
     reference = reference_of(flight)
     times = comparison_times(flight, reference)
     found = navigate_all(flight, times)
-    return Studied(flight, reference, times, found, judge_all(flight, found, times, reference))
+    return Studied(flight, reference, times, found, evaluate_all(flight, found, times, reference))
 
 
 def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tuple[str, str], float]:
@@ -301,13 +301,13 @@ def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tupl
     hidden += [] if set(VELOCITY) <= set(table) else [f"rms_{place}" for place in PLACES]
     numbers = {
         (subject, name): value
-        for subject, errors in studied.judged.items()
+        for subject, errors in studied.scored.items()
         for name, value in summarise(errors, begin, end).items()
         if np.isfinite(value) and not name.startswith(tuple(hidden))
     }
     for row in summarise_innovations(studied.found["mekf"], begin, end).to_dict(orient="records"):
         numbers["mekf", f"nis_{row['source']}".replace(" ", "_")] = row["nis"]
-    if "autopilot" in studied.judged:
+    if "autopilot" in studied.scored:
         for subject in [name for name in TUNINGS if name in studied.found]:
             shares = shares_within(against_autopilot(studied, subject), begin)
             numbers |= {(subject, name): value for name, value in shares.items()}

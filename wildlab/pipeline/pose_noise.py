@@ -10,14 +10,14 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import split_images
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.pipeline.evaluate import draws_of, errors_of, judge, known_points
+from wildlab.pipeline.evaluate import draws_of, errors_of, known_points, score_points
 from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
 
 
-def estimate_noise(flight: Flight, observations: Observations, judged: pd.DataFrame) -> PoseNoise:
+def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFrame) -> PoseNoise:
     """Standard deviations of the poses behind the errors of known points: see ``evaluation.pose_noise``."""
-    o, _ = known_points(flight, observations, judged)
-    errors = errors_of(judged.set_index("detection_id").loc[o.table["detection_id"]])
+    o, _ = known_points(flight, observations, scored)
+    errors = errors_of(scored.set_index("detection_id").loc[o.table["detection_id"]])
     J = ground_jacobians(o.poses, o.uv, o.plane_down)
     roll, pitch, _ = matrix_to_euler(o.poses.R_nb).T
     derivatives = J.pose.copy()
@@ -48,18 +48,18 @@ def as_deviations(noise: PoseNoise) -> dict[str, float]:
     }
 
 
-def judge_with_estimated_noise(
-    flight: Flight, observations: Observations, judged: pd.DataFrame, rng: np.random.Generator
+def evaluate_with_estimated_noise(
+    flight: Flight, observations: Observations, scored: pd.DataFrame, rng: np.random.Generator
 ) -> pd.DataFrame:
-    """Points judged again with ellipses from pose noise estimated on the other half of the images."""
-    half = split_images(draws_of(flight, judged), rng)
+    """Points scored again with ellipses from pose noise estimated on the other half of the images."""
+    half = split_images(draws_of(flight, scored), rng)
     parts = []
     for seen in (half, ~half):
-        deviations = as_deviations(estimate_noise(flight, observations, judged[seen]))
+        deviations = as_deviations(estimate_noise(flight, observations, scored[seen]))
         chosen = observations.take(
-            observations.table["detection_id"].isin(judged["detection_id"][~seen]).to_numpy()
+            observations.table["detection_id"].isin(scored["detection_id"][~seen]).to_numpy()
         )
         parts.append(
-            judge(flight, georeference(flight, chosen, rng, pose_errors(flight, chosen, deviations)))
+            score_points(flight, georeference(flight, chosen, rng, pose_errors(flight, chosen, deviations)))
         )
     return pd.concat(parts, ignore_index=True)

@@ -1,4 +1,4 @@
-"""What one sensor of a moving platform saw, look by look, as arrays for filters; and the truth beside it."""
+"""What one sensor of a moving platform saw, scan by scan, as arrays for filters; and the truth beside it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ KINDS = {"position": ("north_m", "east_m"), "bearing": ("azimuth_rad",)}
 OVER_S = 1.0
 
 
-class Looks(NamedTuple):
-    """N looks of a sensor with up to K detections each, in order of time.
+class Scans(NamedTuple):
+    """N scans of a sensor with up to K detections each, in order of time.
 
     ``times`` (N,) s; ``detections`` (N, K, 2) north, east in n, or (N, K, 1) bearings from north, NaN where
     there are fewer; ``platform`` and ``platform_velocity`` (N, 2), NaN outside of the log of the platform.
@@ -36,12 +36,12 @@ class Looks(NamedTuple):
 
     @property
     def interval_s(self) -> float:
-        """The usual time between two looks."""
+        """The usual time between two scans."""
         return float(np.median(np.diff(self.times)))
 
 
 class Truth(NamedTuple):
-    """Where one target was at N looks: ``position`` and ``velocity`` (N, 2), NaN where not known.
+    """Where one target was at N scans: ``position`` and ``velocity`` (N, 2), NaN where not known.
 
     ``sd_m`` of each axis of the position; zero where the truth does not say.
     """
@@ -58,7 +58,7 @@ class Truth(NamedTuple):
 
 
 def sensors_of(flight: Flight) -> list[str]:
-    """The sensors that looked, in the order of their first look.
+    """The sensors that looked, in the order of their first scan.
 
     Raises
     ------
@@ -76,8 +76,8 @@ def sensors_of(flight: Flight) -> list[str]:
     return [str(name) for name in frames["sensor"].drop_duplicates()]
 
 
-def looks_of(flight: Flight, sensor: str, offset_s: float = 0.0) -> Looks:
-    """The looks of a sensor, its detections those of the source of that name.
+def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0) -> Scans:
+    """The scans of a sensor, its detections those of the source of that name.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def looks_of(flight: Flight, sensor: str, offset_s: float = 0.0) -> Looks:
     ahead, behind = (
         poses_at(nav, _inside(nav, stamps + offset_s + step))[0][:, :2] for step in (OVER_S / 2, -OVER_S / 2)
     )
-    return Looks(sensor, kinds[0], stamps + offset_s, detections, platform, (ahead - behind) / OVER_S)
+    return Scans(sensor, kinds[0], stamps + offset_s, detections, platform, (ahead - behind) / OVER_S)
 
 
 def truths_at(flight: Flight, times: ArrayLike) -> list[Truth]:

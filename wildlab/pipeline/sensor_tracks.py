@@ -4,9 +4,9 @@ Every filter of a target gets the same detections: those that the filter with wh
 nearest first. What differs is what they believe of the errors:
 
 ``kf`` (positions), ``ekf`` (bearings)
-    Errors are new at every look, H (3.5), (3.7).
+    Errors are new at every scan, H (3.5), (3.7).
 ``coloured``
-    Errors of successive looks are alike, and the filter works on differences, H 7.2.2. Positions only.
+    Errors of successive scans are alike, and the filter works on differences, H 7.2.2. Positions only.
 ``schmidt``
     Position, heading and clock are wrong by something that lasts, considered and not estimated, H 7.4.
 ``thinned``
@@ -32,7 +32,7 @@ from wildlab.evaluation.consistency import average, chi_square_interval, positio
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
-from wildlab.pipeline.scans import Looks, Truth, looks_of, truths_at
+from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
 from wildlab.pipeline.sensor_tuning import REACH, Tuning, errors_near
 from wildlab.tracking.coloured import run_coloured, thin
 from wildlab.tracking.maritime import bearings_from, positions_from, white_acceleration
@@ -56,15 +56,15 @@ START_SPEED_M_S = 3.0
 #: Probability with which a target's own detection lies in the gate.
 GATE = 0.99
 PATIENCE_S = 10.0
-#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next look of a slow
-#: sensor is no gap, so it is one and a half looks at least.
+#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next scan of a slow
+#: sensor is no gap, so it is one and a half scans at least.
 LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
 
 
 class Followed(NamedTuple):
     """One target followed by one filter.
 
-    Row by row of the looks: ``estimate`` (N, 4) north, east, velocities, NaN without a track; ``error``
+    Row by row of the scans: ``estimate`` (N, 4) north, east, velocities, NaN without a track; ``error``
     (N, 4) truth minus estimate and ``nees`` (N,) of the position, NaN without truth too; ``innovation``
     (N, m) and ``nis`` (N,) of the detections used, NaN elsewhere. ``known`` (N,): where there is truth.
     """
@@ -93,37 +93,37 @@ def follow_flight(flight: Flight, tunings: Mapping[str, Tuning]) -> list[Followe
     """
     found = []
     for sensor, tuning in tunings.items():
-        looks = looks_of(flight, sensor, tuning.offset_s)
-        truths = truths_at(flight, looks.times)
+        scans = scans_of(flight, sensor, tuning.offset_s)
+        truths = truths_at(flight, scans.times)
         for truth in truths:
             others = [one for one in truths if one.target != truth.target]
-            found += follow(looks, truth, tuning, others)
+            found += follow(scans, truth, tuning, others)
     return found
 
 
-def follow(looks: Looks, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> list[Followed]:
+def follow(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> list[Followed]:
     """One target by one sensor, with every filter of its kind; ``others`` are targets not to start on."""
-    begin = start_near(looks, truth, tuning, others)
+    begin = start_near(scans, truth, tuning, others)
     if begin is None:
-        return [_nothing(looks, truth, name) for name in FILTERS[looks.kind]]
-    usable = np.asarray(np.isfinite(looks.platform).all(axis=1))
-    seen = np.where(usable[:, None, None], looks.detections, np.nan)
-    at, m = np.nan_to_num(looks.platform), seen.shape[-1]
-    sensor = positions_from if looks.kind == "position" else bearings_from
+        return [_nothing(scans, truth, name) for name in FILTERS[scans.kind]]
+    usable = np.asarray(np.isfinite(scans.platform).all(axis=1))
+    seen = np.where(usable[:, None, None], scans.detections, np.nan)
+    at, m = np.nan_to_num(scans.platform), seen.shape[-1]
+    sensor = positions_from if scans.kind == "position" else bearings_from
     motion = partial(white_acceleration, density=ACCELERATION_DENSITY)
     white = np.eye(m) * tuning.sd**2
     own_drift = np.zeros_like(at)
-    first = run_filter(looks.times, seen, white, sensor(at, own_drift), motion, begin, gate_probability=GATE)
-    # From here on one detection a look: the same for all.
+    first = run_filter(scans.times, seen, white, sensor(at, own_drift), motion, begin, gate_probability=GATE)
+    # From here on one detection a scan: the same for all.
     own = np.where(first.used[:, None], seen[np.arange(len(seen)), np.maximum(first.chosen, 0)], np.nan)
     rest: dict[str, Callable[[], Track]] = {
-        "coloured": lambda: _coloured(looks.times, own, tuning, motion, begin),
+        "coloured": lambda: _coloured(scans.times, own, tuning, motion, begin),
         "schmidt": lambda: run_filter(
-            looks.times,
+            scans.times,
             own,
             np.eye(m) * tuning.white_sd**2,
             # An error of the clock moves the target by what the filter with white noise says it moves.
-            sensor(at, np.nan_to_num(first.x[:, 2:] - looks.platform_velocity)),
+            sensor(at, np.nan_to_num(first.x[:, 2:] - scans.platform_velocity)),
             motion,
             begin,
             pose=PoseUncertainty(
@@ -131,49 +131,49 @@ def follow(looks: Looks, truth: Truth, tuning: Tuning, others: Sequence[Truth] =
             ),
         ),
         "thinned": lambda: run_filter(
-            looks.times,
-            np.where(thin(looks.times, tuning.thinning_s, first.used)[:, None], own, np.nan),
+            scans.times,
+            np.where(thin(scans.times, tuning.thinning_s, first.used)[:, None], own, np.nan),
             white,
             sensor(at, np.zeros_like(at)),
             motion,
             begin,
         ),
     }
-    last = _last_row(looks.times, first.used, begin.time)
-    begun = looks.times > begin.time
-    names = FILTERS[looks.kind]
+    last = _last_row(scans.times, first.used, begin.time)
+    begun = scans.times > begin.time
+    names = FILTERS[scans.kind]
     tracks = {names[0]: first} | {name: rest[name]() for name in names[1:]}
-    return [_judged(looks, truth, name, track, begun, last) for name, track in tracks.items()]
+    return [_score(scans, truth, name, track, begun, last) for name, track in tracks.items()]
 
 
-def start_near(looks: Looks, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> Start | None:
+def start_near(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> Start | None:
     """Where a track starts: at the first detection within reach of the target's true place, at rest.
 
     One that lies nearer to one of the ``others`` is not taken. The detection itself is not used up: the start
     is as uncertain as the search was wide, and the detection is the first that the filter is given.
     """
-    error, nearest = errors_near(looks, truth)
+    error, nearest = errors_near(scans, truth)
     taken = nearest >= 0
     for other in others:
-        beside, its = errors_near(looks, other)
+        beside, its = errors_near(scans, other)
         rival = (its == nearest) & (np.linalg.norm(beside, axis=1) < np.linalg.norm(error, axis=1))
         taken &= ~rival
-    rows = np.flatnonzero(taken & np.isfinite(looks.platform).all(axis=1))
+    rows = np.flatnonzero(taken & np.isfinite(scans.platform).all(axis=1))
     if not len(rows):
         return None
     row = int(rows[0])
-    z = looks.detections[row, nearest[row]]
+    z = scans.detections[row, nearest[row]]
     x, P = np.zeros(4), np.diag([0.0, 0.0, START_SPEED_M_S**2, START_SPEED_M_S**2])
-    if looks.kind == "position":
+    if scans.kind == "position":
         x[:2] = z
         P[:2, :2] = np.eye(2) * REACH["position"] ** 2
     else:
         ahead = np.array([np.cos(z[0]), np.sin(z[0])])
         right = np.array([-ahead[1], ahead[0]])
-        x[:2] = looks.platform[row] + tuning.range_m * ahead
+        x[:2] = scans.platform[row] + tuning.range_m * ahead
         P[:2, :2] = tuning.range_sd_m**2 * np.outer(ahead, ahead)
         P[:2, :2] += (tuning.range_m * REACH["bearing"]) ** 2 * np.outer(right, right)
-    return Start(float(looks.times[row]), x, P)
+    return Start(float(scans.times[row]), x, P)
 
 
 def _coloured(
@@ -197,8 +197,8 @@ def _last_row(times: Array, used: NDArray[np.bool_], start: float) -> int:
     return int(np.searchsorted(times, end + PATIENCE_S, side="right"))
 
 
-def _judged(
-    looks: Looks, truth: Truth, name: str, track: Track, begun: NDArray[np.bool_], last: int
+def _score(
+    scans: Scans, truth: Truth, name: str, track: Track, begun: NDArray[np.bool_], last: int
 ) -> Followed:
     x, innovation, nis = track.x.copy(), track.innovation.copy(), track.nis.copy()
     x[last:] = np.nan
@@ -210,16 +210,16 @@ def _judged(
     error = np.where(np.isfinite(x), where - x, np.nan)
     nees = position_nees(error[:, :2], track.P[:, :2, :2], truth.covariance)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    return Followed(looks.sensor, truth.target, name, looks.times, x, error, nees, innovation, nis, known)
+    return Followed(scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known)
 
 
-def _nothing(looks: Looks, truth: Truth, name: str) -> Followed:
-    n, m = len(looks.times), looks.detections.shape[-1]
+def _nothing(scans: Scans, truth: Truth, name: str) -> Followed:
+    n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
     nan = np.full(n, np.nan)
     return Followed(
-        looks.sensor, truth.target, name, looks.times, empty, empty, nan, np.full((n, m), np.nan), nan, known
+        scans.sensor, truth.target, name, scans.times, empty, empty, nan, np.full((n, m), np.nan), nan, known
     )
 
 
@@ -240,11 +240,11 @@ COLUMNS = {
 def table(followed: list[Followed]) -> pd.DataFrame:
     """One row for each track, its columns those of `COLUMNS` and:
 
-    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, looks with a track and
+    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, scans with a track and
     truth; ``nees_low`` and ``nees_high``, the 95 % interval of the mean NEES of a consistent filter, for as
     many values as the correlated ones are worth; ``nis_low`` and ``nis_high`` likewise. ``anees`` is of the
     position, 2 is right; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
-    a measurement. ``share_followed``: of the looks with truth, those that have a track.
+    a measurement. ``share_followed``: of the scans with truth, those that have a track.
     """
     return pd.DataFrame([_row(one) for one in followed])
 

@@ -15,7 +15,7 @@ from scipy.optimize import curve_fit, nnls
 from wildlab.errors import WildlabError
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
-from wildlab.pipeline.scans import Looks, Truth, looks_of, truths_at
+from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
 from wildlab.tracking.maritime import CLOCK, EAST, NORTH, YAW, predict_bearing, predict_position
 from wildlab.tracking.measurement import Prediction, difference
 
@@ -48,11 +48,11 @@ class Tuning(NamedTuple):
     share, correlation_time_s
         The autocorrelation of the errors: ``share * exp(-lag / correlation_time_s)`` beyond lag zero.
     position_sd_m, clock_sd_s, yaw_sd_rad
-        What the part of the variance that stays from look to look is put down to.
+        What the part of the variance that stays from scan to scan is put down to.
     range_m, range_sd_m
         How far away what the sensor saw was: all that is known of the distance at a first bearing.
     interval_s
-        Usual time between looks.
+        Usual time between scans.
     n
         Errors it is from.
     """
@@ -83,12 +83,12 @@ class Tuning(NamedTuple):
 
     @property
     def next_correlation(self) -> float:
-        """Correlation of the errors of two successive looks."""
+        """Correlation of the errors of two successive scans."""
         return float(self.share * np.exp(-self.interval_s / self.correlation_time_s))
 
     @property
     def fading(self) -> float:
-        """What is left of the correlated part from one look to the next: ``F_c`` of H (7.5)."""
+        """What is left of the correlated part from one scan to the next: ``F_c`` of H (7.5)."""
         return float(np.exp(-self.interval_s / self.correlation_time_s))
 
     @property
@@ -99,7 +99,7 @@ class Tuning(NamedTuple):
 
     @property
     def white_sd(self) -> float:
-        """Standard deviation of what is new at every look, beside errors that are considered."""
+        """Standard deviation of what is new at every scan, beside errors that are considered."""
         return float(self.sd * np.sqrt(1 - self.next_correlation))
 
     @property
@@ -114,7 +114,7 @@ class _Errors(NamedTuple):
     times: Array
     error: Array
     truth: Truth
-    looks: Looks
+    scans: Scans
 
 
 def tune(flight: Flight, sensor: str) -> Tuning:
@@ -125,11 +125,11 @@ def tune(flight: Flight, sensor: str) -> Tuning:
     WildlabError
         Where fewer than `FEWEST` detections lie near a target.
     """
-    costs = np.array([_cost(_errors_of(flight, looks_of(flight, sensor, float(o)))) for o in OFFSETS_S])
+    costs = np.array([_cost(_errors_of(flight, scans_of(flight, sensor, float(o)))) for o in OFFSETS_S])
     best = int(np.argmin(costs))
     offset = float(OFFSETS_S[best])
-    looks = looks_of(flight, sensor, offset)
-    errors = _errors_of(flight, looks)
+    scans = scans_of(flight, sensor, offset)
+    errors = _errors_of(flight, scans)
     known = np.concatenate([one.error[np.isfinite(one.error[:, 0])] for one in errors])
     n = len(known)
     if n < FEWEST:
@@ -143,14 +143,14 @@ def tune(flight: Flight, sensor: str) -> Tuning:
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
     worth = sum(_worth(one.error) for one in errors)
     near = OFFSETS_S[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
-    share, correlation_time = _autocorrelation(errors, looks.interval_s)
-    considered = _considered(errors, sd, share * np.exp(-looks.interval_s / correlation_time))
+    share, correlation_time = _autocorrelation(errors, scans.interval_s)
+    considered = _considered(errors, sd, share * np.exp(-scans.interval_s / correlation_time))
     distance = np.concatenate(
-        [np.hypot(*(one.truth.position - looks.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
+        [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
     )
     return Tuning(
         sensor,
-        looks.kind,
+        scans.kind,
         offset,
         float(near.min()),
         float(near.max()),
@@ -160,47 +160,47 @@ def tune(flight: Flight, sensor: str) -> Tuning:
         *considered,
         float(distance.mean()),
         float(distance.std()),
-        looks.interval_s,
+        scans.interval_s,
         n,
     )
 
 
-def predict_look(looks: Looks, position: Array, velocity: Array) -> Prediction:
-    """What every look should have seen of a target at (N, 2) moving with (N, 2)."""
-    predict = predict_position if looks.kind == "position" else predict_bearing
-    return predict(position, looks.platform, velocity - looks.platform_velocity)
+def predict_scan(scans: Scans, position: Array, velocity: Array) -> Prediction:
+    """What every scan should have seen of a target at (N, 2) moving with (N, 2)."""
+    predict = predict_position if scans.kind == "position" else predict_bearing
+    return predict(position, scans.platform, velocity - scans.platform_velocity)
 
 
-def errors_near(looks: Looks, truth: Truth) -> tuple[Array, NDArray[np.intp]]:
-    """Error (N, m) of the detection nearest to a target at every look, within `REACH`, and which it is.
+def errors_near(scans: Scans, truth: Truth) -> tuple[Array, NDArray[np.intp]]:
+    """Error (N, m) of the detection nearest to a target at every scan, within `REACH`, and which it is.
 
     Measured minus expected; NaN and -1 where there is none.
     """
-    expected = predict_look(looks, truth.position, truth.velocity).z
-    error = difference(looks.detections, expected[:, None], (looks.kind == "bearing",) * expected.shape[-1])
+    expected = predict_scan(scans, truth.position, truth.velocity).z
+    error = difference(scans.detections, expected[:, None], (scans.kind == "bearing",) * expected.shape[-1])
     size = np.linalg.norm(error, axis=-1)
     size = np.where(np.isfinite(size), size, np.inf)
     best = np.argmin(size, axis=1)
     rows = np.arange(len(best))
-    near = size[rows, best] < REACH[looks.kind]
+    near = size[rows, best] < REACH[scans.kind]
     return np.where(near[:, None], error[rows, best], np.nan), np.where(near, best, -1)
 
 
-def _errors_of(flight: Flight, looks: Looks) -> list[_Errors]:
+def _errors_of(flight: Flight, scans: Scans) -> list[_Errors]:
     return [
-        _Errors(looks.times, errors_near(looks, truth)[0], truth, looks)
-        for truth in truths_at(flight, looks.times)
+        _Errors(scans.times, errors_near(scans, truth)[0], truth, scans)
+        for truth in truths_at(flight, scans.times)
     ]
 
 
 def _cost(errors: list[_Errors]) -> float:
-    """Sum of squared errors, as if every look had a truth beside it.
+    """Sum of squared errors, as if every scan had a truth beside it.
 
-    A look at a target that has no detection within reach costs as much as one at its edge, and one that an
-    offset takes out of the truth's time as much as the mean of the others: no offset gains by losing looks.
+    A scan at a target that has no detection within reach costs as much as one at its edge, and one that an
+    offset takes out of the truth's time as much as the mean of the others: no offset gains by losing scans.
     """
     squares = [
-        np.where(np.isfinite(one.error[:, 0]), np.sum(one.error**2, axis=1), REACH[one.looks.kind] ** 2)[
+        np.where(np.isfinite(one.error[:, 0]), np.sum(one.error**2, axis=1), REACH[one.scans.kind] ** 2)[
             np.isfinite(one.truth.position[:, 0])
         ]
         for one in errors
@@ -258,13 +258,13 @@ def _considered(errors: list[_Errors], sd: float, share: float) -> tuple[float, 
     """Position (m), clock (s) and yaw (rad) standard deviations that the correlated variance is put down to.
 
     Non-negative least squares of the errors' products, less the part that is white, on what a unit of each
-    would bring about at every look.
+    would bring about at every scan.
     """
     columns: list[Array] = []
     wanted: list[Array] = []
     for one in errors:
         known = np.isfinite(one.error[:, 0])
-        H = predict_look(one.looks, one.truth.position, one.truth.velocity).H_pose[known]
+        H = predict_scan(one.scans, one.truth.position, one.truth.velocity).H_pose[known]
         known_H = np.isfinite(H).all(axis=(1, 2))
         H, e = H[known_H], one.error[known][known_H]
         groups = [[NORTH, EAST], [CLOCK], [YAW]]

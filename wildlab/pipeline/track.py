@@ -294,7 +294,7 @@ def _compiled(
     )
 
 
-class Judged(NamedTuple):
+class Scored(NamedTuple):
     """A track beside the truth: NEES of the position at every frame, NIS at every detection, and numbers.
 
     ``numbers`` by name: ``mean_north``, ``mean_east``, ``mae``, ``rmse`` (m; truth minus estimate),
@@ -308,7 +308,7 @@ class Judged(NamedTuple):
     numbers: dict[str, float]
 
 
-def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", "east")) -> Judged:
+def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", "east")) -> Scored:
     """Compare a track with the truth at every frame since its start, as the thesis does.
 
     The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
@@ -325,7 +325,7 @@ def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", 
 
     Returns
     -------
-    Judged
+    Scored
     """
     state = track.x[:, :4]
     errors = track_errors(seen.truth, state)
@@ -347,10 +347,10 @@ def judge_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north", 
     innovation = track.innovation[np.isfinite(track.innovation).all(axis=1)]
     for i, axis in enumerate(axes):
         numbers[f"lag1_autocorrelation_{axis}"] = float(autocorrelation(innovation[:, i], 1)[1])
-    return Judged(values, track.nis, numbers)
+    return Scored(values, track.nis, numbers)
 
 
-def judge_measurements(seen: Sighting) -> dict[str, float]:
+def evaluate_measurements(seen: Sighting) -> dict[str, float]:
     """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m.
 
     Parameters

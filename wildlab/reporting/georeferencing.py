@@ -79,14 +79,14 @@ _LIMITS = {
 def record_errors(
     report: Report,
     subject: str,
-    judged: pd.DataFrame,
+    scored: pd.DataFrame,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> ErrorSummary:
-    """Record the metrics of one judged table under ``subject``, and return its summary.
+    """Record the metrics of one scored table under ``subject``, and return its summary.
 
     ``intervals`` gives low and high by metric name.
     """
-    s = summarise(errors_of(judged))
+    s = summarise(errors_of(scored))
     values = {
         "horizontal_error_mean": s.mean,
         "horizontal_error_median": s.median,
@@ -100,8 +100,8 @@ def record_errors(
     for name, value in values.items():
         low, high = (intervals or {}).get(name, (None, None))
         report.metric(name, subject, value, "m", n=s.n, low=low, high=high)
-    if judged["inside_90"].notna().any():
-        report.metric("ellipse_coverage_90", subject, judged["inside_90"].mean(), "1", n=s.n)
+    if scored["inside_90"].notna().any():
+        report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=s.n)
     return s
 
 
@@ -190,7 +190,7 @@ def errors_table(rows: Mapping[str, ErrorSummary], first: str = "pose") -> pd.Da
 
 
 def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
-    """Published figures with those of the same answers judged here (``again``) and of ours (``here``)."""
+    """Published figures with those of the same answers scored here (``again``) and of ours (``here``)."""
     fields = {
         "horizontal_error_mean": ("mean error", "mean"),
         "horizontal_error_median": ("median error", "median"),
@@ -205,7 +205,7 @@ def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorS
 
 
 def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """One row of errors for each judged part of a flight, with images and ellipse coverage."""
+    """One row of errors for each scored part of a flight, with images and ellipse coverage."""
     return pd.DataFrame(
         [
             {
@@ -219,9 +219,9 @@ def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     )
 
 
-def ellipse_words(judged: pd.DataFrame) -> str:
-    """How the ellipses of a judged table were found, in words."""
-    counts = judged["ellipse"].value_counts()
+def ellipse_words(scored: pd.DataFrame) -> str:
+    """How the ellipses of a scored table were found, in words."""
+    counts = scored["ellipse"].value_counts()
     return ", ".join(f"{count} were {_ELLIPSES[str(kind)]}" for kind, count in counts.items())
 
 

@@ -95,7 +95,7 @@ def periods(seen: Sighting) -> int:
 
 def on_rows(seen: Sighting, followed: Followed) -> Array:
     """(N,) NIS at the frames of a sighting, also of a filter that went over its detections alone."""
-    nis = followed.judged.nis
+    nis = followed.scored.nis
     if len(nis) == len(seen.times):
         return nis
     result = np.full(len(seen.times), np.nan)
@@ -161,7 +161,7 @@ def show_errors(
     """Errors in position over time, and speed and course; ``figures`` as in `show_paths`."""
     times, names = seen.times - seen.times[0], names_of(followed)
     errors = {who: np.hypot(*(seen.truth - one.track.x[:, :4])[:, :2].T) for who, one in followed.items()}
-    means = [one.judged.numbers["mae"] for one in followed.values()]
+    means = [one.scored.numbers["mae"] for one in followed.values()]
     at_end = [float(e[np.isfinite(e)][-1]) for e in errors.values()]
     report.figure(
         error_over_time(
@@ -179,7 +179,7 @@ def show_errors(
             "frames with a detection; grey: no detections.",
         ),
     )
-    speeds = [one.judged.numbers["rmse_speed"] for one in followed.values()]
+    speeds = [one.scored.numbers["rmse_speed"] for one in followed.values()]
     name = figures.get("speed", "")
     report.figure(
         speed_and_course(
@@ -205,11 +205,11 @@ def show_consistency(
 ) -> None:
     """NEES and NIS over time with the 95 % band; ``figures`` as in `show_paths`."""
     times, bounds = seen.times - seen.times[0], chi_square_interval(2)
-    nees = {who: one.judged.nees for who, one in followed.items()}
+    nees = {who: one.scored.nees for who, one in followed.items()}
     nis = {who: on_rows(seen, one) for who, one in followed.items()}
     band = f"Green: 95 % band of one run, {bounds[0]:.3f} to {bounds[1]:.2f}; grey: no detections."
     for letter, what, values in (("a", "NEES", nees), ("b", "NIS", nis)):
-        means = [one.judged.numbers[what.lower()] for one in followed.values()]
+        means = [one.scored.numbers[what.lower()] for one in followed.values()]
         report.figure(
             squares_over_time(
                 times,

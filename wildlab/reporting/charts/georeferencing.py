@@ -76,13 +76,13 @@ def error_shares(series: Mapping[str, tuple[ArrayLike, str]], title: str) -> Fig
     return fig
 
 
-def errors_by_image(judged: pd.DataFrame, title: str, color: str = BLUE) -> Figure:
+def errors_by_image(scored: pd.DataFrame, title: str, color: str = BLUE) -> Figure:
     """Distance of every point from the truth by image in order of time, with each image's mean."""
-    order = judged.groupby("frame_id", sort=False)["time_s"].first().sort_values(kind="stable").index
-    place = judged["frame_id"].map({name: i for i, name in enumerate(order)})
-    mean = judged.groupby(place)["error_m"].mean()
+    order = scored.groupby("frame_id", sort=False)["time_s"].first().sort_values(kind="stable").index
+    place = scored["frame_id"].map({name: i for i, name in enumerate(order)})
+    mean = scored.groupby(place)["error_m"].mean()
     fig, ax = new_figure(5.9, 3.0)
-    ax.plot(place, judged["error_m"], ".", color=color, alpha=0.55, ms=6, mec="none")
+    ax.plot(place, scored["error_m"], ".", color=color, alpha=0.55, ms=6, mec="none")
     ax.plot(mean.index, mean, color=VERMILLION, lw=1.3)
     end_label(ax, mean.index[-1], float(mean.iloc[-1]), "mean per\nimage", VERMILLION)
     ax.set_ylim(0, None)

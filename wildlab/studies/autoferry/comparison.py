@@ -54,7 +54,7 @@ def beside_white(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
 
 
 def pooled(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
-    """Tracks of several targets as one case: RMSE and mean NEES over all looks that were compared.
+    """Tracks of several targets as one case: RMSE and mean NEES over all scans that were compared.
 
     Returns
     -------

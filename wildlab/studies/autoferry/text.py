@@ -293,7 +293,7 @@ Tuning, on {first} alone: the detection nearest to a boat within {REACH["positio
 {np.degrees(REACH["bearing"]):g}° is taken for its own. The clock offset is the one with the least sum of
 squared errors. $\sigma$ is their root mean square, standing part included; their autocorrelation is fitted by
 $c\, e^{{-t/\tau}}$. Differencing takes $F_c = e^{{-T/\tau}}$ and the variance that $e_2 - F_c e_1$ then has
-(H (7.5)-(7.12)); after more than a second, or one and a half looks, the position itself is used. The Schmidt
+(H (7.5)-(7.12)); after more than a second, or one and a half scans, the position itself is used. The Schmidt
 filter considers position, clock and heading, each with the variance that non-negative least squares gives it,
 fading with $\tau$; the rest is white. Thinning keeps detections so far apart that their errors are correlated
 by less than $1/e$.

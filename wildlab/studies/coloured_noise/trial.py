@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.pipeline.track import CvTuning, Sighting, follow_positions, judge_track
+from wildlab.pipeline.track import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.studies.linear_vs_nonlinear.trial import (
     OBSERVER,
     Followed,
@@ -124,7 +124,7 @@ def follow(seen: Sighting, tuning: Tuning) -> dict[str, Followed]:
         "singer": follow_singer(seen, tuning),
         "coloured": follow_coloured(seen, tuning),
     }
-    return {subject: Followed(one, judge_track(seen, one)) for subject, one in tracks.items()}
+    return {subject: Followed(one, evaluate_track(seen, one)) for subject, one in tracks.items()}
 
 
 def trial(seed: int, *, twin: str) -> Numbers:

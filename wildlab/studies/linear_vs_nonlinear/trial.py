@@ -22,12 +22,12 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.pipeline.track import (
     CvTuning,
-    Judged,
+    Scored,
     Sighting,
+    evaluate_measurements,
+    evaluate_track,
     follow_pixels,
     follow_positions,
-    judge_measurements,
-    judge_track,
     sighting,
     start,
 )
@@ -73,7 +73,7 @@ EVERYWHERE = ("kf", "ekf", "ukf")
 #: 10.46 m similar, which are 7.6 % apart.
 SIMILAR = 0.10
 
-#: Units of the numbers that `judge_track` gives, without those of the innovations' autocorrelation.
+#: Units of the numbers that `evaluate_track` gives, without those of the innovations' autocorrelation.
 UNITS = {
     "mean_north": "m",
     "mean_east": "m",
@@ -90,10 +90,10 @@ TABLE_NAMES = ("mean_north", "mean_east", "mae", "nees", "nis")
 
 
 class Followed(NamedTuple):
-    """One filter's track of a sighting, and how it was judged."""
+    """One filter's track of a sighting, and how it was scored."""
 
     track: Track
-    judged: Judged
+    scored: Scored
 
 
 def case_of(twin: str) -> Case:
@@ -196,18 +196,20 @@ def follow(
     The unscented filter and the multiple models run over the detections alone, with `as_in_frames`.
     """
     tracks = {subject: FILTERS[subject](seen, tuning) for subject in subjects}
-    return {subject: Followed(one, judge_track(seen, one, AXES[subject])) for subject, one in tracks.items()}
+    return {
+        subject: Followed(one, evaluate_track(seen, one, AXES[subject])) for subject, one in tracks.items()
+    }
 
 
 def numbers_of(seen: Sighting, followed: dict[str, Followed]) -> Numbers:
-    """What is compared over flights: the numbers of `judge_track` by filter.
+    """What is compared over flights: the numbers of `evaluate_track` by filter.
 
-    The subject ``measurements`` has those of `judge_measurements`, and ``detections``, how many there are.
+    The subject ``measurements`` has those of `evaluate_measurements`, and ``detections``, how many there are.
     """
     result = {
-        (who, name): value for who, one in followed.items() for name, value in one.judged.numbers.items()
+        (who, name): value for who, one in followed.items() for name, value in one.scored.numbers.items()
     }
-    measured = {**judge_measurements(seen), "detections": float(seen.seen.sum())}
+    measured = {**evaluate_measurements(seen), "detections": float(seen.seen.sum())}
     return result | {("measurements", name): value for name, value in measured.items()}
 
 

@@ -54,7 +54,7 @@ _SPEEDS = [f"{place} (m/s)" for place in PLACES]
 
 
 def has_truth(studied: Studied) -> bool:
-    """Whether it was judged by the truth, rather than by another estimate."""
+    """Whether it was scored by the truth, rather than by another estimate."""
     return studied.reference == "truth-payload"
 
 
@@ -91,10 +91,10 @@ def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]
     """RMS errors and stated deviations of filter, observer and autopilot, a row for each and each part."""
     return pd.DataFrame(
         [
-            {"who": WORDS[who], "part": part, **summarise(studied.judged[who], begin, end)}
+            {"who": WORDS[who], "part": part, **summarise(studied.scored[who], begin, end)}
             for part, begin, end in parts
             for who in ("mekf", "observer", "autopilot")
-            if who in studied.judged
+            if who in studied.scored
         ]
     )
 
@@ -137,7 +137,7 @@ def show_flight(report: Report, studied: Studied, window: tuple[float, float], f
 def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
     """Attitude and velocity against the reference, with the bounds that the filter states of itself."""
     late = (studied.times >= window[0]) & (studied.times < window[1])
-    of = {who: studied.judged[who] for who in ("mekf", "observer")}
+    of = {who: studied.scored[who] for who in ("mekf", "observer")}
     whom = "the truth" if has_truth(studied) else "the one found on board"
     turns = {who: np.degrees(e.error[late, 6:]) for who, e in of.items()}
     report.figure(
@@ -195,7 +195,7 @@ def show_against_autopilot(report: Report, studied: Studied, tuned: str, begin: 
 
 def show_states(report: Report, studied: Studied, printed: Sequence[float] | None) -> None:
     """Deviations and biases that the filter states; ``printed`` are six published means, m and degrees."""
-    sd = studied.judged["mekf"].sd
+    sd = studied.scored["mekf"].sd
     both = np.hstack([sd[:, :3], np.degrees(sd[:, 6:])])
     report.figure(
         deviation_chart(studied.times, both, printed, ("m", "°"), "What the filter states of itself"),
@@ -273,7 +273,7 @@ def show_nees(report: Report, studied: Studied, begin: float) -> None:
     late = studied.times >= begin
     report.figure(
         squares_chart(
-            {name: (studied.times[late], v[late]) for name, v in studied.judged["mekf"].nees.items()},
+            {name: (studied.times[late], v[late]) for name, v in studied.scored["mekf"].nees.items()},
             3,
             "NEES",
             "Are the errors as large as the filter says?",

@@ -14,11 +14,11 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.track import (
     CvTuning,
-    Judged,
+    Scored,
     Sighting,
+    evaluate_track,
     follow_pixels,
     follow_schmidt,
-    judge_track,
     sighting,
 )
 from wildlab.simulation.twins import simulate_twin
@@ -70,11 +70,11 @@ NAMES = {
 
 
 class Compared(NamedTuple):
-    """A sighting and each subject's track on it, judged; ``nees_predicted`` is among the numbers."""
+    """A sighting and each subject's track on it, scored; ``nees_predicted`` is among the numbers."""
 
     seen: Sighting
     tracks: dict[str, Track]
-    judged: dict[str, Judged]
+    scored: dict[str, Scored]
 
 
 def navigated_sighting(flight: Flight) -> Sighting:
@@ -114,12 +114,12 @@ def compare(seen: Sighting) -> Compared:
         "schmidt-position-only": follow_schmidt(seen, TUNING, only(P, False)),
         "ekf-60-pixels": follow_pixels(seen, MORE_NOISE),
     }
-    return Compared(seen, tracks, {name: judge(seen, track) for name, track in tracks.items()})
+    return Compared(seen, tracks, {name: evaluate(seen, track) for name, track in tracks.items()})
 
 
-def judge(seen: Sighting, track: Track) -> Judged:
-    """`judge_track`, and ``nees_predicted``: the mean NEES at frames that show nothing of the target."""
-    found = judge_track(seen, track, ("u", "v"))
+def evaluate(seen: Sighting, track: Track) -> Scored:
+    """`evaluate_track`, and ``nees_predicted``: the mean NEES at frames that show nothing of the target."""
+    found = evaluate_track(seen, track, ("u", "v"))
     predicted = found.nees[~seen.seen]
     known = predicted[np.isfinite(predicted)]
     found.numbers["nees_predicted"] = float(known.mean()) if len(known) else float("nan")
@@ -128,7 +128,7 @@ def judge(seen: Sighting, track: Track) -> Judged:
 
 def summarise(compared: Compared) -> dict[tuple[str, str], float]:
     """The numbers of `NAMES` by (subject, name); SI and radians."""
-    return {(who, name): compared.judged[who].numbers[name] for who in compared.judged for name in NAMES}
+    return {(who, name): compared.scored[who].numbers[name] for who in compared.scored for name in NAMES}
 
 
 def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:

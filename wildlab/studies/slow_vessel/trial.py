@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.store import Flight
-from wildlab.pipeline.evaluate import errors_of, judge
+from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.parameters import load_twin
@@ -82,8 +82,8 @@ class Followed(NamedTuple):
     stated: Array
 
 
-def judge_sources(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
-    """The flight's detections on the sea and judged against the vessel's receiver, by column.
+def evaluate_sources(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
+    """The flight's detections on the sea and scored against the vessel's receiver, by column.
 
     The plane is the detections' own, the sea: what the vessel's receiver says of its height is not used.
 
@@ -95,23 +95,25 @@ def judge_sources(flight: Flight, rng: np.random.Generator) -> dict[str, pd.Data
     detections = flight.table("detections")
     sea = detections.loc[detections["kind"] == "pixel", "plane_down_m"].to_numpy(float)
     return {
-        column: judge(flight, georeference(flight, replace(observe(flight, source), plane_down=sea), rng))
+        column: score_points(
+            flight, georeference(flight, replace(observe(flight, source), plane_down=sea), rng)
+        )
         for column, source in COLUMNS.items()
     }
 
 
-def subset_of(judged: pd.DataFrame) -> pd.DataFrame:
+def subset_of(scored: pd.DataFrame) -> pd.DataFrame:
     """The points of the subset."""
-    return judged[judged["group"] == SUBSET]
+    return scored[scored["group"] == SUBSET]
 
 
-def follow(judged: pd.DataFrame, longest_step: float = STEP_S) -> Followed:
-    """The Kalman filter with constant velocity on judged points, started on the first one with zero speed.
+def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> Followed:
+    """The Kalman filter with constant velocity on scored points, started on the first one with zero speed.
 
     H 6.2, with the tuning above. ``longest_step`` (s) is how long an acceleration is held; infinity: from one
     detection to the next.
     """
-    table = judged.sort_values("time_s", kind="stable")
+    table = scored.sort_values("time_s", kind="stable")
     times, xy = table["time_s"].to_numpy(float), table[["north_m", "east_m"]].to_numpy(float)
     measured = errors_of(table)
     motion = partial(constant_velocity, sd_acceleration=SD_ACCELERATION)
@@ -127,8 +129,8 @@ def follow(judged: pd.DataFrame, longest_step: float = STEP_S) -> Followed:
     return Followed(times, measured, track.x[:, :2] - (xy - measured), stated)
 
 
-def true_positions(flight: Flight, judged: pd.DataFrame) -> Array:
-    """Where the simulated vessel was at judged points, (N, 2) north and east: what no receiver knows.
+def true_positions(flight: Flight, scored: pd.DataFrame) -> Array:
+    """Where the simulated vessel was at scored points, (N, 2) north and east: what no receiver knows.
 
     Raises
     ------
@@ -141,10 +143,10 @@ def true_positions(flight: Flight, judged: pd.DataFrame) -> Array:
             "only of a simulated vessel is it known where it was", "use a twin", file=flight.folder
         )
     vessel = load_twin(made.name).targets[0]
-    return np.asarray(target_path(vessel, made.seed)(judged["time_s"].to_numpy(float))[:, :2])
+    return np.asarray(target_path(vessel, made.seed)(scored["time_s"].to_numpy(float))[:, :2])
 
 
-def summarise_vessel(flight: Flight, judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
+def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
     """Everything that is compared over many flights, by (subject, name).
 
     The names of the tables (metres) for `SUBJECTS`. For ``observer`` also ``largest`` (m), and the shares
@@ -154,12 +156,12 @@ def summarise_vessel(flight: Flight, judged: dict[str, pd.DataFrame]) -> dict[tu
     vessel was, and of ``observer-exact``: the observer's points against the same.
     """
     result: dict[tuple[str, str], float] = {}
-    for column, table in judged.items():
+    for column, table in scored.items():
         for subject, part in ((column, table), (f"{column}-{SUBSET}", subset_of(table))):
             s = summarise(errors_of(part))
             values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
             result |= {(subject, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
-    table = judged["observer"]
+    table = scored["observer"]
     distance = table["error_m"].to_numpy(float)
     result |= {
         ("observer", "largest"): float(np.nanmax(distance)),
@@ -195,7 +197,9 @@ def first_case(seed: int, twin: str) -> float:
     flight = simulate_twin(twin, seed)
     navigate_vessel(flight)
     rng = np.random.default_rng(seed)
-    return summarise(errors_of(judge(flight, georeference(flight, observe(flight, "observer"), rng)))).mean
+    return summarise(
+        errors_of(score_points(flight, georeference(flight, observe(flight, "observer"), rng)))
+    ).mean
 
 
 def trial(seed: int, *, twin: str, first: str) -> dict[tuple[str, str], float]:
@@ -210,8 +214,8 @@ def trial(seed: int, *, twin: str, first: str) -> dict[tuple[str, str], float]:
     """
     flight = simulate_twin(twin, seed)
     navigate_vessel(flight)
-    judged = judge_sources(flight, np.random.default_rng(seed))
-    return summarise_vessel(flight, judged) | {("first-case", "mae"): first_case(seed, first)}
+    scored = evaluate_sources(flight, np.random.default_rng(seed))
+    return summarise_vessel(flight, scored) | {("first-case", "mae"): first_case(seed, first)}
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:

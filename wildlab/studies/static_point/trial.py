@@ -12,7 +12,7 @@ from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
-from wildlab.pipeline.evaluate import errors_of, judge
+from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.simulation.parameters import load_twin
@@ -88,8 +88,8 @@ def turned(nav: pd.DataFrame, turn: ArrayLike) -> pd.DataFrame:
     return nav.assign(**dict(zip(names, matrix_to_quaternion(attitude).T, strict=True)))
 
 
-def judge_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
-    """The flight's detections judged once for each column that the flight has the data for.
+def evaluate_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:
+    """The flight's detections scored once for each column that the flight has the data for.
 
     Raises
     ------
@@ -105,23 +105,23 @@ def judge_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.Data
             field="nav",
         )
     return {
-        column: judge(flight, georeference(flight, observe(flight, source, stamps), rng))
+        column: score_points(flight, georeference(flight, observe(flight, source, stamps), rng))
         for column, (source, stamps) in COLUMNS.items()
         if source in flight.nav and stamps in frames
     }
 
 
-def filter_errors(judged: pd.DataFrame) -> Filtered:
-    """The filter for an object at rest on the errors of judged points, in order of time.
+def filter_errors(scored: pd.DataFrame) -> Filtered:
+    """The filter for an object at rest on the errors of scored points, in order of time.
 
     A target at rest makes the error of the estimate the estimate of the error: the filter is linear and its
     gains do not depend on where the target is. ``R`` is each point's own ground covariance.
     """
-    ordered = judged.sort_values("time_s", kind="stable")
+    ordered = scored.sort_values("time_s", kind="stable")
     return filter_at_rest(errors_of(ordered), covariances_of(ordered))
 
 
-def summarise_at_rest(judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
+def summarise_at_rest(scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
     """Everything that is compared over many flights, by (subject, name).
 
     The names of the tables for each column: ``mean_north``, ``mean_east``, ``sd_north``, ``sd_east``,
@@ -131,11 +131,11 @@ def summarise_at_rest(judged: dict[str, pd.DataFrame]) -> dict[tuple[str, str], 
     of the innovations), ``coverage`` (share of the single points' 90 % ellipses that hold the truth).
     """
     result: dict[tuple[str, str], float] = {}
-    for column, table in judged.items():
+    for column, table in scored.items():
         s = summarise(errors_of(table))
         values = (s.bias_north, s.bias_east, s.sd_north, s.sd_east, s.mean)
         result |= {(column, name): value for name, value in zip(TABLE_NAMES, values, strict=True)}
-    table = judged["observer"].sort_values("time_s", kind="stable")
+    table = scored["observer"].sort_values("time_s", kind="stable")
     followed = filter_errors(table)
     distance = np.hypot(*followed.x.T)
     pauses = np.flatnonzero(np.diff(table["time_s"]) > BATCH_GAP_S)
@@ -159,15 +159,15 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     """
     flight = simulate_twin(twin, seed)
     navigate_observers(flight)
-    judged = judge_columns(flight, np.random.default_rng(seed))
-    for column, table in judged.items():
+    scored = evaluate_columns(flight, np.random.default_rng(seed))
+    for column, table in scored.items():
         if not np.isfinite(errors_of(table)).any():
             raise WildlabError(
                 f"on the flight of seed {seed} no point was found on the ground ({column})",
                 "look at this flight: wildlab simulate",
                 file=twin,
             )
-    return summarise_at_rest(judged)
+    return summarise_at_rest(scored)
 
 
 def differ(one: pd.Series, other: pd.Series) -> pd.Series:
