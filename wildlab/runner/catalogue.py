@@ -43,9 +43,9 @@ STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
 #: What a study with further flights gets besides: a list of their folders, in the order of `beside`.
 OTHERS = "others"
 
-#: Over how many flights a first look is taken, the one drawn included: the fewest whose median is not the mean of
-#: the two outermost. Two more would make the range hold the next flight two times in three in place of one in
-#: two, and cost every study about as much again as its notebook does. Nothing is claimed of either.
+#: Over how many flights a first look is taken, the one drawn included: the fewest whose median has one below
+#: and one above it. Between the outermost of three the next flight lies one time in two, of five two in three;
+#: that is not worth two more flights of every study before there is a page, and nothing is claimed of either.
 FIRST_LOOK_SEEDS = 3
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
