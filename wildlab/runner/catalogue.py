@@ -44,8 +44,8 @@ STANDARD_PARAMETERS = ("study", "flight", "seed", "out", "expected_prefix")
 OTHERS = "others"
 
 #: Over how many flights a first look is taken, the one drawn included: the fewest whose median has one below
-#: and one above it. Between the outermost of three the next flight lies one time in two, of five two in three;
-#: that is not worth two more flights of every study before there is a page, and nothing is claimed of either.
+#: and one above it. The next flight lies between the outermost of three one time in two, of five two in
+#: three: not worth two more flights of every study before there is a page, as nothing is claimed of either.
 FIRST_LOOK_SEEDS = 3
 
 _NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
