@@ -182,6 +182,8 @@ class Studies:
         self.ledgers: list[str] = []
         #: Break off (Ctrl-C) before this many jobs are done.
         self.stop_after = 99
+        #: Break off between a page that has come into place and the word that it has, of that many.
+        self.stop_before_telling = 99
         entries = []
         for name, few in (("slow", True), ("quick", False), ("other", True)):
             write(self.notebooks, f"{name}.ipynb", notebook(OPEN, more="runs = 1"))
@@ -206,6 +208,8 @@ class Studies:
             (self.reports / job.name / "metrics.json").write_text(
                 json.dumps(content | {"metrics": [], "claims": []})
             )
+            if sum(map(len, self.passes)) == self.stop_before_telling:
+                raise KeyboardInterrupt
             listen(job.name, "end", Outcome(job.name, "done", 1.0))
         return [Outcome(job.name, "done", 1.0, "look" if job.first_look else "whole") for job in given]
 
@@ -279,6 +283,13 @@ def test_broken_off_anywhere_the_ledger_says_what_is_there(
     if stop_after == 4:
         assert ("slow", LOOK) not in studies.passes[0], "its full numbers are there"
         assert ("slow", {}) in studies.passes[1]
+
+
+def test_broken_off_right_behind_a_page_the_ledger_still_says_it(studies: Studies) -> None:
+    studies.stop_before_telling = 4
+    with pytest.raises(KeyboardInterrupt):
+        studies.run(everything=True)
+    assert "2 / 3</b>" in studies.ledger() and studies.ledger().count('class="look"') == 1
 
 
 def test_what_a_pass_is_is_said(studies: Studies) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from tests.notebooks import OPEN, notebook, write
 from tests.runner.test_seeds_many import TABLE, flown, numbers, run, start, wait_for
+from wildlab.runner.catalogue import FIRST_LOOK_SEEDS
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +49,10 @@ def ledger(folder: Path) -> str:
     return (folder / "reports" / "index.html").read_text(encoding="utf-8")
 
 
-LOOK = {"seeds": [5, SEEDS]}
+LOOK = {"seeds": [FIRST_LOOK_SEEDS, SEEDS]}
+SAID = f"{FIRST_LOOK_SEEDS} of {SEEDS} flights."
+#: Seeds that the first looks at both studies fly.
+FIRST = 2 * (FIRST_LOOK_SEEDS - 1)
 #: Each seed of both studies but the drawn one, once.
 ONCE = sorted(2 * [seed for seed in range(1, SEEDS + 1) if seed != 4])
 
@@ -58,12 +62,12 @@ def test_first_looks_then_full_numbers_and_no_seed_twice(tmp_path: Path) -> None
     assert "First looks: 2 of 3" in run(folder, "--first-look", "--jobs", "2")
     for study in ("walks", "more-walks"):
         assert status(folder, study)["first_look"] == LOOK
-        assert "5 of 9 flights." in page(folder, study) and f"wildlab run {study}" in page(folder, study)
+        assert SAID in page(folder, study) and f"wildlab run {study}" in page(folder, study)
         assert json.loads((folder / "reports" / study / "metrics.json").read_text())["seeds"] is None
-        assert len(numbers(folder, "reports", study)) == 2 * 5
+        assert len(numbers(folder, "reports", study)) == 2 * FIRST_LOOK_SEEDS
     assert status(folder, "once")["first_look"] == {} and "first look" not in page(folder, "once")
     assert "1 / 3</b><span>studies done, 2 at a first look" in ledger(folder)
-    assert len(flown(folder)) == 2 * 4
+    assert len(flown(folder)) == FIRST
     run(folder, "--jobs", "2")
     assert sorted(seed for seed, _ in flown(folder)) == ONCE
     assert "first look" not in page(folder, "walks") + page(folder, "more-walks")
@@ -92,14 +96,14 @@ def test_broken_off_in_the_second_pass_every_page_is_there(tmp_path: Path, full:
     assert not (folder / "reports" / "index.html").exists()
     wait_for(lambda: (folder / "reports" / "index.html").exists())
     wait_for(lambda: looks() == 2, 120)
-    wait_for(lambda: done() == full and len(flown(folder)) > 8 + full, 120)
+    wait_for(lambda: done() == full and len(flown(folder)) > FIRST + full, 120)
     os.killpg(program.pid, signal.SIGINT)
     assert program.wait(20) != 0
     assert (looks(), done()) == (2 - full, full)
     text = ledger(folder)
     assert f"{1 + full} / 3</b>" in text and text.count('class="look"') == 2 - full
     for study in both:
-        said = "5 of 9 flights." in page(folder, study)
+        said = SAID in page(folder, study)
         assert said == (status(folder, study)["first_look"] == LOOK)
     begun = len(flown(folder))
     run(folder, "--jobs", "2")

@@ -264,8 +264,13 @@ def run_all(
                 if listen is not None:
                     listen(name, event, what)
 
-            for outcome in run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell):
-                outcomes[outcome.name] = outcome
+            try:
+                ended = run_jobs(jobs, parallel=parallel, scheduler=scheduler, listen=tell)
+            except BaseException:
+                # A page may have come into place, and the ledger not have been written since.
+                build_ledger(reports, studies)
+                raise
+            outcomes |= {outcome.name: outcome for outcome in ended}
     return [*outcomes.values(), *skipped]
 
 
