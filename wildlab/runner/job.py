@@ -32,6 +32,8 @@ class Job:
     #: How many cells the notebook has, and what is to be computed for each seed before it starts.
     cells: int = 0
     seeds: SeedWork | None = None
+    #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
+    tutorial: bool = False
 
 
 @dataclass(frozen=True)
