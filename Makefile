@@ -3,7 +3,7 @@
 # Every path here is relative, so that a checkout may lie in a folder with blanks in its name.
 
 .DEFAULT_GOAL := help
-.PHONY: help environment reports first-look test test-all style docs strip lab lock bench doctor clean
+.PHONY: help environment reports first-look tutorials test test-all style docs strip lab lock bench doctor clean
 
 # How many notebooks or test processes at once.
 JOBS ?= 2
@@ -29,6 +29,9 @@ reports: environment ## run every study that needs no download, and say where th
 
 first-look: environment ## the same from few flights each, which `reports` begins with
 	@$(BIN)/wildlab run --all --first-look --jobs $(JOBS) $(ARGS)
+
+tutorials: environment ## run the tutorials of notebooks/tutorials, and say where their pages are
+	@$(BIN)/python -m wildlab.runner.tutorials --jobs $(JOBS) $(ARGS)
 
 test: environment ## run the tests (where CI=true: the slow ones too)
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)

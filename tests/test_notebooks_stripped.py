@@ -37,8 +37,8 @@ def text_of(cell: dict[str, Any]) -> str:
     return source if isinstance(source, str) else "".join(source)
 
 
-def problems(notebook: dict[str, Any]) -> list[str]:
-    """What keeps this notebook from being committed, one sentence each."""
+def problems(notebook: dict[str, Any], tutorial: bool = False) -> list[str]:
+    """What keeps this notebook from being committed, one sentence each. A tutorial takes no parameters."""
     found = []
     cells = notebook.get("cells", [])
     code = [cell for cell in cells if cell.get("cell_type") == "code"]
@@ -50,8 +50,9 @@ def problems(notebook: dict[str, Any]) -> list[str]:
         if ABSOLUTE.search(text_of(cell)):
             found.append(f"cell {number} names an absolute path")
     parameters = [cell for cell in code if "parameters" in cell.get("metadata", {}).get("tags", [])]
-    if len(parameters) != 1:
-        found.append(f"{len(parameters)} cells are tagged 'parameters' and there must be one")
+    wanted = 0 if tutorial else 1
+    if len(parameters) != wanted:
+        found.append(f"{len(parameters)} cells are tagged 'parameters' and there must be {wanted or 'none'}")
     lines = sum(len([line for line in text_of(cell).splitlines() if line.strip()]) for cell in code)
     if lines > MOST_CODE_LINES:
         found.append(f"{lines} lines of code: move some into wildlab ({MOST_CODE_LINES} at most)")
@@ -74,7 +75,7 @@ def test_tracked_notebooks() -> None:
     found = {
         str(path.relative_to(paths.ROOT)): faults
         for path in notebooks
-        if (faults := problems(json.loads(path.read_text(encoding="utf-8"))))
+        if (faults := problems(json.loads(path.read_text(encoding="utf-8")), path.parent.name == "tutorials"))
     }
     assert not found
 
@@ -113,7 +114,13 @@ def test_what_must_not_be_committed_is_found(more: list[dict[str, Any]], problem
     assert problem in found[0]
 
 
+def test_a_tutorial_takes_no_parameters() -> None:
+    assert problems({"cells": [cell("1 + 1")], "metadata": {}}, tutorial=True) == []
+    (found,) = problems({"cells": [PARAMETERS], "metadata": {}}, tutorial=True)
+    assert found == "1 cells are tagged 'parameters' and there must be none"
+
+
 def test_notebook_as_a_whole() -> None:
-    assert problems({"cells": []}) == ["0 cells are tagged 'parameters' and there must be one"]
+    assert problems({"cells": []}) == ["0 cells are tagged 'parameters' and there must be 1"]
     wrong = {"cells": [PARAMETERS], "metadata": {"kernelspec": {"name": "conda-base"}, "widgets": {}}}
     assert len(problems(wrong)) == 2

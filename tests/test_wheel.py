@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from wildlab.pipeline.flown import code_key
 
 from wildlab import paths
+from wildlab.runner.fingerprint import code_key
 
 pytestmark = pytest.mark.slow
 

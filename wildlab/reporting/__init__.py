@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         new_figure,
         png_bytes,
         save_figure,
+        with_alt,
     )
     from wildlab.reporting.metrics import claim, metric, read_metrics
     from wildlab.reporting.published import load_claims, load_published
@@ -34,6 +35,7 @@ else:
                 "new_figure",
                 "png_bytes",
                 "save_figure",
+                "with_alt",
             ),
             "metrics": ("claim", "metric", "read_metrics"),
             "published": ("load_claims", "load_published"),
@@ -57,4 +59,5 @@ __all__ = [
     "png_bytes",
     "read_metrics",
     "save_figure",
+    "with_alt",
 ]

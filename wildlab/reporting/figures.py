@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,11 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
+from wildlab.errors import WildlabError
+
 DPI = 144
+#: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
+FULL_SIZE, LEAST_SIZE = 116, 58
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
 MOST_POINTS = 3000
 #: Okabe and Ito's colours, which colour-blind readers can tell apart; their yellow is too faint for lines
@@ -337,6 +342,44 @@ def png_bytes(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
+
+
+def with_alt(figure: Figure, alt: str) -> Figure:
+    """The same figure, which a notebook then shows with words for those who do not see it.
+
+    Parameters
+    ----------
+    figure
+        From `new_figure` or `wildlab.plot`.
+    alt
+        What it shows, in a sentence or two.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    WildlabError
+        Where the words are missing.
+
+    Examples
+    --------
+    >>> figure = with_alt(new_figure()[0], "An empty frame.")
+    >>> figure._repr_png_()[1]["alt"]
+    'An empty frame.'
+    """
+    if not alt.strip():
+        raise WildlabError("a figure has no alt text", "say in words what it shows", field="alt")
+    width, height = (round(inches * FULL_SIZE) for inches in figure.get_size_inches())
+    about = {"alt": alt, "width": width, "height": height}
+    figure._repr_png_ = partial(_shown, figure, about)  # type: ignore[attr-defined]
+    return figure
+
+
+def _shown(figure: Figure, about: dict[str, Any]) -> tuple[bytes, dict[str, Any]]:
+    """What IPython takes for a picture: its bytes, and what there is to say about it."""
+    return png_bytes(figure), about
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> bytes:

@@ -79,15 +79,21 @@ def _markdown(source: str) -> str:
     return str(MarkdownWithMath(renderer=_Renderer(escape=True, exclude_anchor_links=True)).render(source))
 
 
-def notebook_body(notebook: nbformat.NotebookNode) -> str:
-    """What an executed notebook shows, as HTML without nbconvert's wrappers; no code, prints, warnings."""
+def notebook_body(notebook: nbformat.NotebookNode, *, code: bool = False) -> str:
+    """What an executed notebook shows, as HTML without nbconvert's wrappers, and never its warnings.
+
+    Parameters
+    ----------
+    code
+        Whether to show code, prints and the bare values of last lines as well: a tutorial's, not a report's.
+    """
     exporter = HTMLExporter(
         config=Config(
             {
                 "TagRemovePreprocessor": {"enabled": True, "remove_cell_tags": list(REMOVED_TAGS)},
                 "HTMLExporter": {
                     "template_name": "basic",
-                    "exclude_input": True,
+                    "exclude_input": not code,
                     "exclude_input_prompt": True,
                     "exclude_output_prompt": True,
                     "exclude_output_stdin": True,
@@ -107,13 +113,20 @@ def notebook_body(notebook: nbformat.NotebookNode) -> str:
     shown = nbformat.from_dict(notebook)
     for cell in shown.cells:
         if cell.cell_type == "code":
-            # Prints, warnings and the bare value of a last line are for whoever writes the notebook.
-            cell.outputs = [output for output in cell.outputs if set(output.get("data", {})) - {"text/plain"}]
+            cell.outputs = [output for output in cell.outputs if _is_shown(output, code)]
     body, _ = exporter.from_notebook_node(shown)
     soup = BeautifulSoup(body, "html.parser")
     for block in soup.find_all("div", class_=_is_wrapper):
         block.unwrap()
-    return re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+    # Blank lines between the parts say nothing; those within code do.
+    return str(soup).strip() if code else re.sub(r"\n\s*\n+", "\n", str(soup)).strip()
+
+
+def _is_shown(output: nbformat.NotebookNode, code: bool) -> bool:
+    if code:
+        return bool(output.get("name") != "stderr")
+    # Prints, warnings and the bare value of a last line are for whoever writes the notebook.
+    return bool(set(output.get("data", {})) - {"text/plain"})
 
 
 def _no_context(function: Any) -> Any:

@@ -148,7 +148,7 @@ def first_look_notice(look: str, again: str) -> str:
     )
 
 
-def page(*, title: str, body: str, kicker: str = "", footer: str = "") -> str:
+def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: str = "") -> str:
     """A whole HTML document.
 
     Parameters
@@ -157,14 +157,17 @@ def page(*, title: str, body: str, kicker: str = "", footer: str = "") -> str:
         Text of ``<title>``; escaped here.
     body, kicker, footer
         HTML, made of `wildlab.reporting.text` pieces. ``kicker`` is the line above the ``<h1>`` in ``body``.
+    style
+        CSS that this page has besides `STYLE`.
     """
     above = f'<p class="kicker">{kicker}</p>\n' if kicker else ""
     below = f"<footer>{footer}</footer>\n" if footer else ""
+    rules = f"{STYLE}\n{style}" if style else STYLE
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="referrer" content="no-referrer">\n'
-        f"<title>{escape(title)}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n"
+        f"<title>{escape(title)}</title>\n<style>\n{rules}\n</style>\n</head>\n<body>\n"
         f"{above}<main>\n{body}\n</main>\n{below}</body>\n</html>\n"
     )

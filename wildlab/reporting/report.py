@@ -27,15 +27,13 @@ from matplotlib.figure import Figure
 
 from wildlab.errors import WildlabError
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.figures import png_bytes, save_figure
+from wildlab.reporting.figures import FULL_SIZE, LEAST_SIZE, png_bytes, save_figure
 from wildlab.reporting.page import TAGS
 from wildlab.reporting.published import load_published
 from wildlab.reporting.text import NOTHING, escape, inline, maths, number, prose, slug
 
 LEVELS = ("good", "warn", "bad", "neutral")
 
-#: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
-_FULL_SIZE, _LEAST_SIZE = 116, 58
 #: Rows of a table that is still kept on one page of paper.
 LONGEST_UNBROKEN = 15
 _FILE_NAME = re.compile(r"[a-z0-9][a-z0-9-]*")
@@ -304,10 +302,10 @@ class Report:
         _close(fig)
         data = base64.b64encode(png).decode("ascii")
         # The size in pixels lets a browser keep the place before it has decoded the picture.
-        width, height = round(width_in * _FULL_SIZE), round(height_in * _FULL_SIZE)
+        width, height = round(width_in * FULL_SIZE), round(height_in * FULL_SIZE)
         image = (
             f'<img alt="{escape(alt)}" width="{width}" height="{height}" '
-            f'style="max-width:{width}px;min-width:{round(width_in * _LEAST_SIZE)}px" '
+            f'style="max-width:{width}px;min-width:{round(width_in * LEAST_SIZE)}px" '
             f'src="data:image/png;base64,{data}">'
         )
         image = f'<div class="scroll" role="region" tabindex="0" aria-label="Figure {ordinal}">{image}</div>'

@@ -36,6 +36,8 @@ class Job:
     first_look: dict[str, tuple[int, int]] = field(default_factory=dict)
     #: What the page depends on, see `wildlab.runner.fingerprint.page_key`.
     fingerprint: str = ""
+    #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
+    tutorial: bool = False
 
 
 @dataclass(frozen=True)

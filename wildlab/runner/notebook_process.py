@@ -38,7 +38,7 @@ def run_notebook(pipe: connection.Connection, job: Job) -> None:
     threading.Thread(target=_end_with_parent, args=(job,), daemon=True).start()
     _keep_to_ourselves(job)
     try:
-        _work(pipe, job)
+        (_tutorial if job.tutorial else _work)(pipe, job)
     except BaseException as error:  # whatever it is, the runner must hear of it
         pipe.send(("failed", _explain(error, Path(job.work))))
     else:
@@ -138,6 +138,25 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     write_atomic(folder / "report.html", page)
 
 
+def _tutorial(pipe: connection.Connection, job: Job) -> None:
+    """A notebook that takes no parameters and leaves no numbers: only its page."""
+    from wildlab.files import write_atomic
+    from wildlab.reporting import html, privacy
+    from wildlab.reporting.tutorial import tutorial_page
+    from wildlab.runner import provenance
+
+    pipe.send(("stage", "notebook"))
+    executed = Path(job.work) / "notebook.ipynb"
+    _papermill(pipe, job, {}, executed)
+    pipe.send(("stage", "page"))
+    cleaned = privacy.clean_notebook(html.read_notebook(executed), {}, {job.work: "."})
+    origin = provenance.collect(
+        study=job.name, notebook=Path(job.notebook), flight=None, parameters={}, seed=None
+    )
+    page = tutorial_page(cleaned, name=Path(job.notebook).stem, footer=provenance.footer(origin, beside=()))
+    write_atomic(Path(job.work) / "report.html", page)
+
+
 def _flight(job: Job) -> Path | None:
     from wildlab.runner.flights import dataset_flight, twin_flight
 
@@ -185,7 +204,7 @@ def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any]
     notebook = read_notebook(Path(job.notebook))
     # Whatever kernel the notebook was last saved with: this one is meant.
     notebook.metadata["kernelspec"] = {"name": "python3", "language": "python", "display_name": "Python 3"}
-    count = len(notebook.cells) + 1
+    count = len(notebook.cells) + bool(parameters)  # papermill adds a cell with them
 
     def on_cell(cell: Any, cell_index: int) -> None:
         _STARTED.append(cell_index)

@@ -72,7 +72,7 @@ def collect(
     notebook: Path,
     flight: Path | None,
     parameters: dict[str, Any],
-    seed: int,
+    seed: int | None,
     others: Sequence[Path] = (),
 ) -> dict[str, Any]:
     """Everything ``provenance.json`` says.
@@ -84,6 +84,8 @@ def collect(
         get in: never the origin.
     parameters
         The study's own parameters, without folders.
+    seed
+        None where the notebook is given none.
     others
         Folders of further flights, of which the same gets in.
     """
@@ -144,10 +146,11 @@ def footer(
     lock = provenance["lock"]["sha256"]
     parts.append(f"lock <code>{lock[:8]}</code>" if lock else "no lock file")
     parts.append(f"notebook <code>{provenance['notebook']['sha256'][:8]}</code>")
-    parts.append(f"seed {escape(provenance['seed'])}")
+    if provenance["seed"] is not None:
+        parts.append(f"seed {escape(provenance['seed'])}")
     parts.append(f"made {escape(provenance['made'].replace('T', ' ').replace('+00:00', ' UTC'))}")
+    line = f"<p>{' · '.join(parts)}.</p>"
     links = " and ".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in beside)
-    return (
-        f"<p>{' · '.join(parts)}.</p>"
-        f"<p>Code, parameters and all hashes (SHA-256) are in {links} beside this page.</p>"
-    )
+    if not links:
+        return line
+    return f"{line}<p>Code, parameters and all hashes (SHA-256) are in {links} beside this page.</p>"

@@ -1,0 +1,104 @@
+"""A tutorial's page: an executed notebook with its code, what the code printed, and its pictures.
+
+The frame, the security policy and the examination are those of a report (`wildlab.reporting.html`).
+"""
+
+from __future__ import annotations
+
+import nbformat
+from bs4 import BeautifulSoup, Tag
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.figures import FULL_SIZE, LEAST_SIZE
+from wildlab.reporting.html import examine, notebook_body
+from wildlab.reporting.page import page
+from wildlab.reporting.text import escape
+
+# Code at a line in blue, what it printed on grey. The colours hold 4.5:1 on white.
+STYLE = """
+.highlight pre { background: none; border-left: 3px solid var(--blue); padding: .1rem 0 .1rem .9rem;
+  margin: 1.1rem 0 .6rem }
+.highlight .k, .highlight .kn, .highlight .kc, .highlight .ow { color: var(--link); font-weight: 600 }
+.highlight .s1, .highlight .s2, .highlight .sa, .highlight .s { color: var(--good) }
+.highlight .c1 { color: var(--dim); font-style: italic }
+.highlight .mi, .highlight .mf { color: var(--warn) }
+table { width: auto }
+tbody th { text-align: left }
+caption { text-align: left; font-weight: 600; padding: .3rem 0 }
+caption ~ tbody td, caption ~ tbody th { text-align: left; white-space: normal; max-width: 34rem }
+figure img { width: auto }
+@media print { pre { white-space: pre-wrap; break-inside: avoid } }"""
+
+
+def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "") -> str:
+    """The whole page of a tutorial, examined.
+
+    Parameters
+    ----------
+    notebook
+        Executed, its figures shown by `wildlab.reporting.with_alt`.
+    name
+        Of its file, without ending.
+    footer
+        HTML of the line that says what it was made by.
+
+    Returns
+    -------
+    str
+        One file that needs nothing beside it.
+
+    Raises
+    ------
+    WildlabError
+        Where the notebook was stopped by an error, or the page would break one of the promises of
+        `wildlab.reporting.html.examine`.
+    """
+    for number, cell in enumerate(notebook.cells, start=1):
+        if any(output.output_type == "error" for output in cell.get("outputs", [])):
+            raise WildlabError(f"cell {number} ended in an error", "mend it", file=f"{name}.ipynb")
+    soup = BeautifulSoup(notebook_body(_joined(notebook), code=True), "html.parser")
+    for style in soup.find_all("style"):
+        style.decompose()  # pandas has its own for each table
+    for i, image in enumerate(soup.find_all("img"), start=1):
+        _frame(soup, image, i)
+    for i, table in enumerate(soup.find_all("table"), start=1):
+        table.attrs.pop("border", None)
+        table.wrap(_box(soup, f"Table {i}"))
+    for i, block in enumerate(soup.find_all("pre"), start=1):
+        # What scrolls sideways must be reached without a mouse.
+        block.attrs |= {"tabindex": "0", "role": "region", "aria-label": f"Code or output {i}"}
+    title = soup.h1.get_text(" ", strip=True) if soup.h1 else name
+    way = f'<a href="../index.html">wildlab ledger</a> › tutorials › {escape(name)}'
+    whole = page(title=title, body=str(soup), kicker=way, footer=footer, style=STYLE)
+    examine(whole, name)
+    return whole
+
+
+def _joined(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """A copy in which what a cell printed in one go is one output: a kernel sends it in pieces."""
+    copy: nbformat.NotebookNode = nbformat.from_dict(notebook)
+    for cell in copy.cells:
+        joined: list[nbformat.NotebookNode] = []
+        for output in cell.get("outputs", []):
+            if joined and output.get("name", "") == joined[-1].get("name") and "text" in output:
+                joined[-1].text += output.text
+            else:
+                joined.append(nbformat.from_dict(output))
+        if cell.cell_type == "code":
+            cell.outputs = joined
+    return copy
+
+
+def _frame(soup: BeautifulSoup, image: Tag, ordinal: int) -> None:
+    """As `wildlab.reporting.report.Report` frames a figure: no larger than meant, and on a phone no smaller
+    than can be read."""
+    width = str(image.get("width") or "")
+    if width.isdigit():
+        least = int(width) * LEAST_SIZE // FULL_SIZE
+        image["style"] = f"max-width:min({width}px,100%);min-width:{least}px"
+    image.wrap(_box(soup, f"Figure {ordinal}")).wrap(soup.new_tag("figure"))
+
+
+def _box(soup: BeautifulSoup, label: str) -> Tag:
+    attributes = {"class": "scroll", "role": "region", "tabindex": "0", "aria-label": label}
+    return soup.new_tag("div", attrs=attributes)
