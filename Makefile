@@ -24,8 +24,9 @@ help: ## this list
 environment: ## create or update .venv from environment.lock (the targets below do so themselves)
 	@sh tools/environment.sh
 
-reports: environment ## run every study that needs no download, and say where the reports are
+reports: environment ## run every study that needs no download, and the tutorials, and say where the pages are
 	@$(BIN)/wildlab run --all --jobs $(JOBS) $(ARGS)
+	@$(BIN)/python -m wildlab.runner.tutorials --jobs $(JOBS)
 
 first-look: environment ## the same from few flights each, which `reports` begins with
 	@$(BIN)/wildlab run --all --first-look --jobs $(JOBS) $(ARGS)

@@ -17,6 +17,9 @@ from pathlib import Path
 
 import pdoc
 
+from wildlab.runner.catalogue import load_studies
+from wildlab.runner.front_page import build_ledger
+
 ROOT = Path(__file__).resolve().parents[1]
 INTO = ROOT / "reports" / "reference"
 #: What is called from a notebook or a script. Of the studies only what a study has to offer: the cases
@@ -75,4 +78,6 @@ def build(into: Path) -> None:
 if __name__ == "__main__":
     place = Path(sys.argv[1]) if len(sys.argv) > 1 else INTO
     build(place)
+    if place == INTO:
+        build_ledger(INTO.parent, load_studies())  # its front page links what is there
     print(place / "index.html")

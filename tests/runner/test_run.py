@@ -18,7 +18,8 @@ from rich.console import Console
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.run import Outcome, _socket_folder, run_studies
+from wildlab.runner.processes import socket_folder
+from wildlab.runner.run import Outcome, run_studies
 
 pytestmark = pytest.mark.slow
 
@@ -224,7 +225,7 @@ def test_a_run_that_is_broken_off_keeps_the_former_report(tmp_path: Path, number
     assert {path.name: path.read_text() for path in (reports / "slow").iterdir()} == former
 
     def left() -> list[Path]:
-        return [*reports.glob(".*.part"), *_socket_folder().glob(f"wl{runner.pid}-*")]
+        return [*reports.glob(".*.part"), *socket_folder().glob(f"wl{runner.pid}-*")]
 
     # A notebook whose runner was killed tidies up after itself, which on a busy machine takes a while.
     deadline = time.monotonic() + 30

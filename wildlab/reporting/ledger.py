@@ -44,7 +44,11 @@ _PILLS = {
 
 
 def ledger_page(
-    studies: Iterable[StudyStatus], flights: Iterable[tuple[str, str]] = (), *, code: str = ""
+    studies: Iterable[StudyStatus],
+    flights: Iterable[tuple[str, str]] = (),
+    *,
+    learn: Iterable[tuple[str, str]] = (),
+    code: str = "",
 ) -> str:
     """The whole page.
 
@@ -52,6 +56,8 @@ def ledger_page(
     ----------
     flights
         Reports besides the studies, as (folder, flight).
+    learn
+        Tutorials and reference, as (title, address).
     code
         Which code it was put together by, as HTML.
     """
@@ -71,6 +77,9 @@ def ledger_page(
             for folder, flight in flights
         ]
         body.append(f"<h2>Flights evaluated here</h2><ul>{''.join(items)}</ul>")
+    links = [f'<li><a href="{escape(page)}">{escape(title)}</a></li>' for title, page in learn]
+    if links:
+        body.append(f"<h2>Learn</h2><ul>{''.join(links)}</ul>")
     body.append(_explanation())
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     made += f", {code}" if code else ""

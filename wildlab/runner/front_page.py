@@ -1,4 +1,4 @@
-"""Writing ``reports/index.html``, the ledger, from what runs have left behind."""
+"""Writing ``reports/index.html``, the ledger, from what runs have left behind; and what it links besides."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
+from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.metrics import read_metrics
+from wildlab.reporting.notebook_file import read_notebook
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.provenance import git_state
@@ -23,7 +25,8 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     code = f"commit <code>{git['commit'][:10]}</code>" if git["commit"] else escape(git["note"])
     path = reports / "index.html"
     reports.mkdir(parents=True, exist_ok=True)
-    write_atomic(path, ledger_page(statuses, _other_reports(reports, studies), code=code))
+    learn = [*tutorial_links(reports), *_reference_link(reports)]
+    write_atomic(path, ledger_page(statuses, _other_reports(reports, studies), learn=learn, code=code))
     return path
 
 
@@ -40,3 +43,28 @@ def _other_reports(reports: Path, studies: Mapping[str, StudyEntry]) -> list[tup
             continue
         found.append((folder.name, str(content["flight"]) or folder.name))
     return found
+
+
+def tutorial_notebooks(notebooks: Path = NOTEBOOKS) -> list[Path]:
+    """The tutorials, in the order in which they are to be read."""
+    return sorted((notebooks / "tutorials").glob("*.ipynb"))
+
+
+def title_of(notebook: Path) -> str:
+    """The main heading of a tutorial; the name of its file where it has none."""
+    for cell in read_notebook(notebook).cells:
+        first = cell.source.partition("\n")[0]
+        if cell.cell_type == "markdown" and first.startswith("# "):
+            return str(first[2:].strip())
+    return notebook.stem
+
+
+def tutorial_links(reports: Path = REPORTS, notebooks: Path = NOTEBOOKS) -> list[tuple[str, str]]:
+    """Title and address, as seen from ``reports``, of each tutorial whose page is there."""
+    pages = [(path, f"tutorials/{path.stem}.html") for path in tutorial_notebooks(notebooks)]
+    return [(title_of(path), page) for path, page in pages if (reports / page).is_file()]
+
+
+def _reference_link(reports: Path) -> list[tuple[str, str]]:
+    page = "reference/index.html"
+    return [("Reference of all functions", page)] if (reports / page).is_file() else []

@@ -141,7 +141,8 @@ def _work(pipe: connection.Connection, job: Job) -> None:
 def _tutorial(pipe: connection.Connection, job: Job) -> None:
     """A notebook that takes no parameters and leaves no numbers: only its page."""
     from wildlab.files import write_atomic
-    from wildlab.reporting import html, privacy
+    from wildlab.reporting import privacy
+    from wildlab.reporting.notebook_file import read_notebook
     from wildlab.reporting.tutorial import tutorial_page
     from wildlab.runner import provenance
 
@@ -149,7 +150,7 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
     executed = Path(job.work) / "notebook.ipynb"
     _papermill(pipe, job, {}, executed)
     pipe.send(("stage", "page"))
-    cleaned = privacy.clean_notebook(html.read_notebook(executed), {}, {job.work: "."})
+    cleaned = privacy.clean_notebook(read_notebook(executed), {}, {job.work: "."})
     origin = provenance.collect(
         study=job.name, notebook=Path(job.notebook), flight=None, parameters={}, seed=None
     )

@@ -1,11 +1,13 @@
-"""Ending processes for certain, and starting them on one thread each."""
+"""Ending processes for certain, starting them on one thread each, and where their sockets lie."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import signal
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 #: What makes numpy, scipy, numba, OpenCV and Arrow compute on one thread; read when they are imported.
 ONE_THREAD = dict.fromkeys(
@@ -55,3 +57,9 @@ def end_below(pid: int) -> None:
         for process in psutil.Process(pid).children(recursive=True):
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
+
+
+def socket_folder() -> Path:
+    """Where sockets may lie: their paths must be short, and macOS's temporary folder is not."""
+    short = Path("/tmp")  # noqa: S108 - a folder of our own is made in it, readable by us alone
+    return short if os.access(short, os.W_OK | os.X_OK) else Path(tempfile.gettempdir())

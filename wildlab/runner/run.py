@@ -9,7 +9,6 @@ as it was.
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -25,6 +24,7 @@ from wildlab.runner.first_look import plan_passes, quick_first
 from wildlab.runner.front_page import build_ledger
 from wildlab.runner.job import Job
 from wildlab.runner.notebooks import check_notebook, plain_parameters
+from wildlab.runner.processes import socket_folder
 from wildlab.runner.progress import outcome_line, pass_line, shown
 from wildlab.runner.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.seeds import SeedWork, make_work
@@ -88,7 +88,7 @@ def make_job(
         title=study.title,
         notebook=str(notebook.resolve()),
         work=str(reports / f".{name}.{os.getpid()}.part"),
-        runtime=str(_socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
+        runtime=str(socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
         reports=str(reports),
         seed=seed,
         flight="" if flight is None else str(flight.resolve()),
@@ -298,9 +298,3 @@ def _absent_data(study: StudyEntry) -> WildlabError | None:
     except WildlabError as error:
         return error
     return None
-
-
-def _socket_folder() -> Path:
-    """Where sockets may lie: their paths must be short, and macOS's temporary folder is not."""
-    short = Path("/tmp")  # noqa: S108 - a folder of our own is made in it, readable by us alone
-    return short if os.access(short, os.W_OK | os.X_OK) else Path(tempfile.gettempdir())

@@ -22,36 +22,18 @@ from rich.console import Console
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.paths import NOTEBOOKS, PACKAGE, REPORTS
-from wildlab.reporting.html import read_notebook
+from wildlab.reporting.notebook_file import read_notebook
+from wildlab.runner.catalogue import load_studies
 from wildlab.runner.fingerprint import code_key
+from wildlab.runner.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
 from wildlab.runner.job import Job
+from wildlab.runner.processes import socket_folder
 from wildlab.runner.progress import shown
-from wildlab.runner.run import _socket_folder
 from wildlab.runner.scheduling import Outcome, run_jobs
 
 #: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.fingerprint`).
 _SHOWING = ("api/*.py", "reporting/**/*.py", "brief.py", "runner/tutorials.py", "runner/notebook_process.py")
 _PACKAGES = ("matplotlib", "nbconvert", "latex2mathml")
-
-
-def tutorial_notebooks(notebooks: Path = NOTEBOOKS) -> list[Path]:
-    """The tutorials, in the order in which they are to be read."""
-    return sorted((notebooks / "tutorials").glob("*.ipynb"))
-
-
-def title_of(notebook: Path) -> str:
-    """The main heading of a tutorial; the name of its file where it has none."""
-    for cell in read_notebook(notebook).cells:
-        first = cell.source.partition("\n")[0]
-        if cell.cell_type == "markdown" and first.startswith("# "):
-            return str(first[2:].strip())
-    return notebook.stem
-
-
-def tutorial_links(reports: Path = REPORTS, notebooks: Path = NOTEBOOKS) -> list[tuple[str, str]]:
-    """Title and address, as seen from ``reports``, of each tutorial whose page is there."""
-    pages = [(path, f"tutorials/{path.stem}.html") for path in tutorial_notebooks(notebooks)]
-    return [(title_of(path), page) for path, page in pages if (reports / page).is_file()]
 
 
 def run_tutorials(
@@ -112,7 +94,7 @@ def _job(path: Path, reports: Path, timeout_s: float) -> Job:
         title=title_of(path),
         notebook=str(path.resolve()),
         work=str(reports / f".{name}.{os.getpid()}.part"),
-        runtime=str(_socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
+        runtime=str(socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),
         reports=str(reports),
         again="python -m wildlab.runner.tutorials",
         timeout_s=timeout_s,
@@ -164,6 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except WildlabError as error:
         console.print(str(error), markup=False, highlight=False)
         return 2
+    build_ledger(given.out, load_studies())
     failed = [outcome for outcome in outcomes if outcome.state != "done"]
     for outcome in failed:
         print(f"failed: {outcome.folder}/report.html")
