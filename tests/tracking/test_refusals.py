@@ -75,6 +75,7 @@ def spoilt(value, at=(1, 1)):
         (START._replace(P=spoilt(np.inf)), r"^start\.P: row 1 is not finite"),
         (START._replace(P=spoilt(0.5, (0, 3))), r"^start\.P: not symmetric: row 0, column 3 has 0\.5"),
         (START._replace(P=spoilt(-4.0, (2, 2))), r"^start\.P: row 2 has the variance -4\."),
+        (START._replace(P=spoilt(-1e-12, (3, 3))), r"^start\.P: row 3 has the variance -1e-12\."),
         (
             START._replace(P=spoilt(10.0, (0, 1)) + spoilt(10.0, (1, 0)) - 9 * np.eye(4)),
             r"^start\.P: the variance is negative in a direction between the states",
