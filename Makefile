@@ -49,7 +49,7 @@ docs: environment ## the reference of all functions, to be opened from disk
 	@$(BIN)/python tools/reference.py
 
 strip: environment ## take outputs and execution counts out of the notebooks
-	@$(BIN)/nbstripout --keep-id notebooks/*.ipynb
+	@$(BIN)/nbstripout --keep-id notebooks/*.ipynb notebooks/tutorials/*.ipynb
 
 lab: environment ## open JupyterLab on the notebooks; git then strips outputs on commit
 	@! git rev-parse --git-dir >/dev/null 2>&1 || git config filter.nbstripout.clean '$(BIN)/nbstripout --keep-id'
