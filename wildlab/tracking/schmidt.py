@@ -128,9 +128,18 @@ def transition_of_pose(before: Array, after: Array, change: Change) -> Array:
     """``Phi`` (6, 6), see the module, from the pose's covariance before to that after."""
     root, inverse = _root(before)
     values, axes = np.linalg.eigh(inverse @ after @ inverse.T)
-    values = np.maximum(values, 0)
+    values = _without_noise(values)
     kept = np.sqrt(values) if change == "bias" else np.minimum(values, 1)
     return np.asarray(root @ (axes * kept) @ axes.T @ inverse)
+
+
+def _without_noise(values: Array) -> Array:
+    """Eigenvalues (..., n), ascending, of which those that are rounding beside the largest are zero.
+
+    A pose that has lost its variance in some direction leaves 1e-16 there, and the root of that is 1e-8: on
+    each processor another one.
+    """
+    return np.where(values > NEGLIGIBLE * values[..., -1:], np.maximum(values, 0), 0.0)
 
 
 def transitions_of_pose(covariances: Array, change: Change) -> Array:
@@ -153,7 +162,7 @@ def transitions_of_pose(covariances: Array, change: Change) -> Array:
     root = sd[:, :, None] * vectors * lengths[:, None, :]
     inverse = np.swapaxes(vectors * per_length[:, None, :], 1, 2) * per_sd[:, None, :]
     kept, axes = np.linalg.eigh(inverse @ after @ np.swapaxes(inverse, 1, 2))
-    kept = np.maximum(kept, 0)
+    kept = _without_noise(kept)
     kept = np.sqrt(kept) if change == "bias" else np.minimum(kept, 1)
     phi[rows[differ]] = root @ (axes * kept[:, None, :]) @ np.swapaxes(axes, 1, 2) @ inverse
     return phi
