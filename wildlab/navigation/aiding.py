@@ -117,6 +117,8 @@ def positions(
     ------
     WildlabError
         For shapes that do not fit, or a standard deviation that is not positive.
+    ValueError
+        For a ``gauss_markov_sd`` that is neither (3,) nor one number.
     """
     t = np.asarray(times, float) - latency
     found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
@@ -131,13 +133,53 @@ def velocities(
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
     latency: float = 0.0,
 ) -> Aiding:
-    """Velocities of a GNSS antenna in n, m/s; beyond H. Parameters as in :func:`positions`."""
+    """Velocities of a GNSS antenna; beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s, as stamped.
+    v_n
+        (N, 3) m/s in n; rows with NaN are left out.
+    sd
+        Standard deviations, m/s: (N, 3), (3,) or one number.
+    lever_arm
+        Of the antenna in b, (3,) m.
+    latency
+        How long before its stamp a velocity was valid, s.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    WildlabError
+        For shapes that do not fit, or a standard deviation that is not positive.
+    """
     t = np.asarray(times, float) - latency
     return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
 
 
 def standstill(times: ArrayLike, sd: float) -> Aiding:
-    """Times (N,) at which the airframe is known to stand still, to ``sd`` m/s; beyond H."""
+    """Times at which the airframe is known to stand still; beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    sd
+        Standard deviation of each component of the velocity, which is zero, m/s.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    WildlabError
+        For shapes that do not fit, or a standard deviation that is not positive.
+    """
     return _aiding(kernels.VELOCITY, times, np.zeros(3), sd, np.zeros(3), "times of standing still")
 
 
@@ -149,11 +191,20 @@ def headings(times: ArrayLike, field_b: ArrayLike, sd: ArrayLike, declination: f
     times
         (N,) s.
     field_b
-        (N, 3) in b, of any unit, calibrated for hard and soft iron.
+        (N, 3) in b, of any unit, calibrated for hard and soft iron; rows with NaN are left out.
     sd
-        Of the heading that follows, rad: (N,) or one number.
+        Standard deviation of the heading that follows, rad: (N,) or one number.
     declination
         Of the field from true north, positive towards east, rad.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    WildlabError
+        For shapes that do not fit, or a standard deviation that is not positive.
     """
     spread = np.asarray(sd, float)
     spread = spread[:, None] if spread.ndim == 1 else spread

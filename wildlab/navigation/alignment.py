@@ -104,23 +104,27 @@ def align_at(
     time
         s.
     imu
-        Its mean specific force within ``window`` (s) around the time is taken as the direction of
-        the acceleration less gravity.
+        Its mean specific force within the window is taken as the direction of the acceleration less
+        gravity.
     moving, reference, sd
         See `Kinematics`, `Reference`, `InitialSd`.
     gravity
         m/s^2.
     gyro_bias
         (3,) rad/s in b.
+    window
+        How long the window is, s; the time is its middle.
 
     Returns
     -------
     InitialState
+        At that time, with an accelerometer bias of zero.
 
     Raises
     ------
     WildlabError
-        If there is no inertial sample within the window, or the directions do not give an attitude.
+        If the inertial samples cannot be used, none lies within the window, or the directions do not give
+        an attitude.
     """
     samples = checked_imu(imu)
     near = np.abs(samples.times - time) <= window / 2
@@ -152,16 +156,31 @@ def align_from_baseline(
 
     Parameters
     ----------
+    imu
+        Inertial measurements; fixes before the first of them are not used.
     times
         (N,) s, of both antennas' positions.
     p_first, p_second
-        (N, 3) m in n.
+        (N, 3) m in n; rows with NaN are left out.
     lever_first, lever_second
         (3,) m in b.
+    gravity
+        m/s^2.
     baseline_sd
         Of the difference of the positions, m: the standard deviation of the heading follows from it.
     sd
         Standard deviations that differ from those of `InitialSd`, by name.
+
+    Returns
+    -------
+    InitialState
+        At the first pair; the position is that of b, the velocity that of the first antenna.
+
+    Raises
+    ------
+    WildlabError
+        If fewer than three pairs of positions are left, the inertial samples cannot be used or none is near
+        the first pair, or no attitude follows from the baseline and the specific force.
     """
     t, p, other = np.asarray(times, float), np.asarray(p_first, float), np.asarray(p_second, float)
     arm, baseline_b = np.asarray(lever_first, float), np.asarray(lever_second, float) - lever_first
@@ -196,10 +215,28 @@ def align_from_course(
 
     Parameters
     ----------
+    imu
+        Inertial measurements; fixes outside them are not used.
     times, p_n, v_n
-        (N,) s, (N, 3) m and (N, 3) m/s, valid at those times (a latency taken off).
+        (N,) s, (N, 3) m in n and (N, 3) m/s in n, valid at those times (a latency taken off).
+    gravity
+        m/s^2.
     min_speed
         Level speed (m/s) from which a course counts.
+    sd
+        Standard deviations, by name, that differ from those of `InitialSd` with a ``heading_sd`` of 0.4 and a
+        ``level_sd`` of 0.1 rad.
+
+    Returns
+    -------
+    InitialState
+        At the first fix that is fast enough.
+
+    Raises
+    ------
+    WildlabError
+        If no fix within the inertial samples is fast enough, the samples cannot be used or none is near that
+        fix, or no attitude follows from its velocity and the specific force.
     """
     t, p, v = np.asarray(times, float), np.asarray(p_n, float), np.asarray(v_n, float)
     samples = checked_imu(imu).times
@@ -229,19 +266,31 @@ def find_rest(
     imu: ImuSamples, times: ArrayLike, v_n: ArrayLike, *, min_speed: float = 8.0, shortest: float = 10.0,
     longest: float = 30.0,
 ) -> tuple[float, float] | None:  # fmt: skip
-    """From when to when (s) it last stood still before it took off; None where it did not.
+    """When it last stood still before it took off.
 
     Still is a second in which neither force nor rate changes as it does in anybody's hands, and in which no
     fix moves. A long rest is cut to its end, since biases change while sensors warm up.
 
     Parameters
     ----------
+    imu
+        Inertial measurements, from before the flight on.
     times, v_n
-        As in :func:`align_from_course`.
+        (N,) s and (N, 3) m/s in n, as in :func:`align_from_course`.
     min_speed
         Level speed (m/s) from which it counts as having taken off.
     shortest, longest
         How long a rest must be and what it is cut to, s.
+
+    Returns
+    -------
+    tuple or None
+        From when to when, s; None where it did not stand still for so long.
+
+    Raises
+    ------
+    WildlabError
+        For inertial samples that cannot be used; see `timeline.checked_imu`.
     """
     t, v = np.asarray(times, float), np.asarray(v_n, float)
     samples = checked_imu(imu)
@@ -278,12 +327,30 @@ def align_at_rest(
 
     Parameters
     ----------
+    imu
+        Inertial measurements, from the rest until a fix moves.
     times, p_n, v_n
-        As in :func:`align_from_course`.
+        (N,) s, (N, 3) m in n and (N, 3) m/s in n, as in :func:`align_from_course`.
     rest
         From when to when it stands still, s; at least two inertial samples and one fix.
+    gravity
+        m/s^2.
     min_speed
         Level speed (m/s) from which a course counts.
+    sd
+        Standard deviations, by name, that differ from those of `InitialSd` with a ``gyro_bias_sd`` of
+        0.002 rad/s.
+
+    Returns
+    -------
+    InitialState
+        At the inertial sample in the middle, at the mean of the fixes during the rest, with no velocity.
+
+    Raises
+    ------
+    WildlabError
+        If the rest has fewer than two inertial samples or no fix, no fix behind it moves within the inertial
+        samples, these cannot be used, or the specific force is along the nose.
     """
     t, p, v = np.asarray(times, float), np.asarray(p_n, float), np.asarray(v_n, float)
     samples = checked_imu(imu)

@@ -28,6 +28,15 @@ def signs_of_trouble(found: Navigation, aiding: Sequence[Aiding]) -> list[str]:
     ----------
     found, aiding
         What `mekf.run_mekf` gave, and what it was given.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    ValueError
+        Where there are not as many sources of aiding as the estimate had.
     """
     return [*_misfits(found, aiding), *_biases(found), *_postures(found), *_absences(found, aiding)]
 

@@ -18,15 +18,25 @@ CORRELATED = 50
 
 
 def hard_iron(field_b: ArrayLike) -> Array:
-    """The part of the field that turns with the airframe (3,), in the unit of ``field_b`` (N, 3).
+    """The part of the field that turns with the airframe.
 
     The Earth's field has one length, so measurements lie on a sphere around it: its centre by linear least
-    squares. Rows with NaN are left out.
+    squares.
+
+    Parameters
+    ----------
+    field_b
+        (N, 3) in b, as measured, of any unit; rows with NaN are left out.
+
+    Returns
+    -------
+    (3,) in b, in the unit of ``field_b``.
 
     Raises
     ------
     WildlabError
-        Where the measurements cover too little of a sphere to say where its centre is.
+        Where there are fewer than ten measurements, or they cover too little of a sphere to say where its
+        centre is.
     """
     m = np.asarray(field_b, float)
     m = m[np.isfinite(m).all(axis=1)]
@@ -48,7 +58,19 @@ def hard_iron(field_b: ArrayLike) -> Array:
 
 
 def earth_field(declination: float, inclination: float) -> Array:
-    """Direction of the Earth's field in n, (3,): turned from north towards east, then down (rad)."""
+    """Direction of the Earth's field.
+
+    Parameters
+    ----------
+    declination
+        From true north, positive towards east, rad.
+    inclination
+        From the horizontal, positive downwards, rad.
+
+    Returns
+    -------
+    (3,) in n, of length one.
+    """
     level = np.cos(inclination)
     return np.array([level * np.cos(declination), level * np.sin(declination), np.sin(inclination)])
 
@@ -72,6 +94,11 @@ def share_turned(times: ArrayLike, field_b: ArrayLike, imu: ImuSamples, step: fl
     -------
     float
         One less the ratio of what is left unexplained to all change; NaN where nothing turns.
+
+    Raises
+    ------
+    WildlabError
+        For inertial samples that cannot be used; see `timeline.checked_imu`.
     """
     t, m = np.asarray(times, float), np.asarray(field_b, float)
     samples = checked_imu(imu)

@@ -293,9 +293,18 @@ def run_mekf(
 
 
 def pose_covariance(covariance: ArrayLike) -> Array:
-    """Position and attitude (rotation vector in b) out of the whole: (M, 15, 15) -> (M, 6, 6).
+    """Position and attitude out of the whole covariance.
 
     Four times the modified Rodrigues parameters are the rotation vector up to the third order of its size.
+
+    Parameters
+    ----------
+    covariance
+        (M, 15, 15), as `Navigation` has it.
+
+    Returns
+    -------
+    (M, 6, 6), of the position (m, in n) and of the attitude as a rotation vector (rad, in b).
     """
     P = np.asarray(covariance, float)
     keep = np.array([0, 1, 2, 6, 7, 8])
@@ -305,8 +314,19 @@ def pose_covariance(covariance: ArrayLike) -> Array:
 def log_likelihood(innovations: Innovations, since: float = -np.inf) -> float:
     """How likely the measurements were, up to a constant: what a latency or a noise may be chosen by.
 
-    ``since`` (s) leaves out the time before. Rejected measurements count as much as the others, or the choice
-    that rejects most would win.
+    Rejected measurements count as much as the others, or the choice that rejects most would win.
+
+    Parameters
+    ----------
+    innovations
+        Of the measurements, as `Navigation` has them.
+    since
+        Measurements before this time (s) are left out.
+
+    Returns
+    -------
+    float
+        The logarithm of the likelihood, without the constants that depend on the number of measurements only.
     """
     late = innovations.times >= since
     total = 0.0

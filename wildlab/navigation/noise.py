@@ -64,10 +64,23 @@ class AxisErrors(NamedTuple):
 
 
 def with_turn_on(noise: ImuNoise, accelerometer: float, gyro: float) -> ImuNoise:
-    """Noise whose biases also differ from one switching-on to the next (standard deviations, SI).
+    """Noise whose biases also differ from one switching-on to the next.
 
     A constant and a process of first order together are taken as one such process, with the variance of
     both and the spectral density that drives the second: over a flight, a constant that drifts a little.
+    Random walks (an infinite time) stay as they are.
+
+    Parameters
+    ----------
+    noise
+        Without the constants. Where the correlation time of a bias is finite, its standard deviation is
+        above zero.
+    accelerometer, gyro
+        Standard deviations of the constant parts of the biases, m/s^2 and rad/s.
+
+    Returns
+    -------
+    ImuNoise
     """
     biases: list[float] = []
     for sd, time, constant in ((*noise[2:4], accelerometer), (*noise[4:6], gyro)):
@@ -101,6 +114,11 @@ def from_data_sheet(
         In-run stability, deg/h.
     bias_time
         How long biases keep, s. Data sheets do not say.
+
+    Returns
+    -------
+    ImuNoise
+        In SI units, with that time for both biases.
     """
     return ImuNoise(
         velocity_random_walk / 60,

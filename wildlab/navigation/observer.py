@@ -68,8 +68,8 @@ class Gains(NamedTuple):
 class Observed(NamedTuple):
     """The estimate at M times; NaN outside and inside gaps.
 
-    ``specific_force`` (M, 3) is the estimate in n, less what accelerometers alone would say of it where
-    ``correction`` (M, 3), the observer's auxiliary state in n, is not zero.
+    ``correction`` (M, 3), m/s^2, is the observer's auxiliary state in n: what it adds to the specific force
+    that the accelerometers measure. The rest is as in `Navigation`.
     """
 
     times: Array
@@ -94,20 +94,82 @@ def _reference(times: ArrayLike, in_b: ArrayLike, in_n: ArrayLike) -> Aiding:
 def baseline_reference(
     times: ArrayLike, p_first: ArrayLike, p_second: ArrayLike, lever_first: ArrayLike, lever_second: ArrayLike
 ) -> Aiding:
-    """The vector from one antenna to the other, H (5.40): (N,) s, (N, 3) m in n each, (3,) m in b each."""
+    """The vector from one antenna to the other, H (5.40).
+
+    Parameters
+    ----------
+    times
+        (N,) s, of both antennas' positions.
+    p_first, p_second
+        (N, 3) m in n; rows with NaN are left out.
+    lever_first, lever_second
+        Of the antennas, (3,) m in b.
+
+    Returns
+    -------
+    Aiding
+        For :func:`run_observer` only.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit.
+    """
     in_b = np.asarray(lever_second, float) - np.asarray(lever_first, float)
     return _reference(times, in_b, np.asarray(p_second, float) - np.asarray(p_first, float))
 
 
 def field_reference(times: ArrayLike, field_b: ArrayLike, field_n: ArrayLike) -> Aiding:
-    """The magnetic field, calibrated, (N, 3) in b, and as it is there, (3,) in n; any units. Beyond H."""
+    """The magnetic field as the second vector. Beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    field_b
+        (N, 3) in b, of any unit, calibrated for hard and soft iron; rows with NaN are left out.
+    field_n
+        The field as it is there, (3,) in n, of any unit; see :func:`~wildlab.navigation.earth_field`.
+
+    Returns
+    -------
+    Aiding
+        For :func:`run_observer` only.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit.
+    """
     return _reference(times, field_b, field_n)
 
 
 def course_reference(
     times: ArrayLike, v_n: ArrayLike, min_speed: float = 8.0, latency: float = 0.0
 ) -> Aiding:
-    """The nose along the velocity (N, 3) over the ground, from ``min_speed`` (m/s) on. Beyond H."""
+    """The nose along the velocity over the ground. Beyond H.
+
+    Parameters
+    ----------
+    times
+        (N,) s, as stamped.
+    v_n
+        (N, 3) m/s in n; rows with NaN are left out.
+    min_speed
+        Level speed (m/s) from which a course counts.
+    latency
+        How long before its stamp a velocity was valid, s.
+
+    Returns
+    -------
+    Aiding
+        For :func:`run_observer` only.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit.
+    """
     v = np.array(v_n, float)
     v[~(np.hypot(v[:, 0], v[:, 1]) >= min_speed)] = np.nan
     return _reference(np.asarray(times, float) - latency, [1.0, 0.0, 0.0], v)
@@ -192,8 +254,15 @@ def run_observer(
         Positions, and velocities where there are any, as from `aiding`; and a second vector from
         :func:`baseline_reference`, :func:`field_reference` or :func:`course_reference`. Without one, the
         heading hangs on the estimated specific force alone, which shows it in turns only.
+    gains
+        How it is tuned; without them, as `Gains` has it.
     max_gap
         Intervals between inertial samples longer than this (s) are crossed in a straight line.
+
+    Returns
+    -------
+    Observed
+        At the output times; see there.
 
     Raises
     ------

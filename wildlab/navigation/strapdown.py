@@ -46,10 +46,16 @@ def integrate_strapdown(
     imu
         N samples, their biases taken off.
     position, velocity, quaternion
-        At the first sample: (3,) m, (3,) m/s, (4,) w, x, y, z.
+        At the first sample: (3,) m in n, (3,) m/s in n, (4,) w, x, y, z from b to n.
+    earth
+        What pulls, and how n turns: `gravity.local_earth`, or `gravity.flat_earth` as in H.
     max_gap
         Longest interval between samples (s) that is integrated. Behind a longer one nothing is known: the
         rows are NaN, and ``gaps`` says where.
+
+    Returns
+    -------
+    DeadReckoning
 
     Raises
     ------

@@ -22,7 +22,7 @@ def coordinated_attitude(
     """The attitude in which a fixed wing flies a path: nose into the oncoming air, banked into the turn.
 
     Coordinated flight: no sideslip and no specific force along y of the body, so that in still air a level
-    circle has ``tan(bank) = speed^2 / (gravity * radius)``. ``trim_pitch`` (rad) is the angle of attack.
+    circle has ``tan(bank) = speed^2 / (gravity * radius)``.
 
     Parameters
     ----------
@@ -30,6 +30,10 @@ def coordinated_attitude(
         Of b in n, (N, 3), m/s and m/s^2.
     wind
         Velocity of the air in n, (3,), m/s.
+    trim_pitch
+        Angle of attack, rad: how far the nose is above the oncoming air.
+    gravity
+        m/s^2.
 
     Returns
     -------
@@ -51,7 +55,18 @@ def fixed_wing_trajectory(
 ) -> Trajectory:
     """Motion along a path in coordinated flight, and gusts about it.
 
-    ``gusts`` are small roll, pitch and yaw (rad) about the body's own axes, as control leaves them.
+    Parameters
+    ----------
+    path
+        Times (N,) s -> position, velocity and acceleration of b in n, (N, 3) m, m/s and m/s^2.
+    wind, trim_pitch, gravity
+        As for :func:`coordinated_attitude`.
+    gusts
+        Small roll, pitch and yaw (rad) about the body's own axes, as control leaves them; None is none.
+
+    Returns
+    -------
+    Times (N,) s -> `Motion`.
     """
 
     def motion(times: Array) -> Motion:
@@ -76,16 +91,24 @@ def thrust_aligned_trajectory(
     """Motion of what leans no more than its own acceleration asks for, whichever way its nose points.
 
     A multicopter's thrust points along its specific force, so it leans forward to go faster and sideways to
-    turn. With an infinite ``gravity`` it does not lean: a gondola that hangs level but for gusts.
+    turn.
 
     Parameters
     ----------
+    path
+        Times (N,) s -> position, velocity and acceleration of b in n, (N, 3) m, m/s and m/s^2.
     heading
-        Where the nose points, times (N,) s -> (N,) rad.
+        Where the nose points, times (N,) s -> (N,) rad, from north towards east.
     trim_pitch
         Pitch in steady motion, rad: below zero for a multicopter that leans against the air.
+    gravity
+        m/s^2. With an infinite one it does not lean: a gondola that hangs level but for gusts.
     gusts
         As for :func:`fixed_wing_trajectory`.
+
+    Returns
+    -------
+    Times (N,) s -> `Motion`.
     """
 
     def motion(times: Array) -> Motion:

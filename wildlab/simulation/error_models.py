@@ -20,6 +20,23 @@ def stream(seed: int, name: str) -> np.random.Generator:
     """The random numbers of one sensor, independent of those of every other.
 
     Keyed by the sensor's name rather than by a running number: a new sensor changes nobody else's noise.
+
+    Parameters
+    ----------
+    seed
+        Of the flight, a whole number from 0.
+    name
+        Of the sensor, or of whatever else is random.
+
+    Returns
+    -------
+    numpy.random.Generator
+        The same numbers for the same seed and name.
+
+    Raises
+    ------
+    ValueError
+        Where the seed is negative.
     """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(name.encode()),)))
 
@@ -40,10 +57,17 @@ def gauss_markov(
         Time between two, s.
     sd, correlation_time
         Standard deviation (in the error's unit) and correlation time (s), scalars or (K,).
+    rng
+        Where the random numbers come from; see :func:`stream`.
 
     Returns
     -------
-    (N, K).
+    (N, K), in the error's unit; K is 1 where both are scalars.
+
+    Raises
+    ------
+    ValueError
+        Where standard deviations and correlation times are not as many, or ``count`` is negative.
     """
     spread, tau = np.broadcast_arrays(np.atleast_1d(np.asarray(sd, float)), np.atleast_1d(correlation_time))
     draws = rng.standard_normal((count, len(spread)))

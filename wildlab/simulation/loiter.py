@@ -37,15 +37,23 @@ def loiter_path(
     Parameters
     ----------
     centre
-        North and east of the centre, m.
+        North and east of the centre, (2,) m.
     radius, altitude
         Metres; the altitude above the origin of n.
     airspeed
         m/s, above the speed of the wind.
     wind
-        Velocity of the air over the ground, north and east, m/s.
+        Velocity of the air over the ground, north and east, (2,) m/s.
+    turn
+        Which way round, seen from above.
     start_angle
         Bearing of the airframe from the centre at time 0, rad, from north towards east.
+    radius_error, altitude_error
+        Control errors, m: how far outside of the circle, and how far above the altitude, it is; None is none.
+
+    Returns
+    -------
+    Times (N,) s -> position, velocity and acceleration of b in n, (N, 3) m, m/s and m/s^2.
 
     Raises
     ------

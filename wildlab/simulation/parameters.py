@@ -172,12 +172,28 @@ class TwinParameters(Strict):
 
 
 def twin_names() -> list[str]:
-    """Names of the twins that come with wildlab."""
+    """Names of the twins that come with wildlab.
+
+    Returns
+    -------
+    list of str
+        In alphabetical order.
+    """
     return sorted(path.stem for path in TWINS.glob("*.toml"))
 
 
 def load_twin(name_or_path: str | Path) -> TwinParameters:
     """Parameters of a twin, by its name among those that come with wildlab, or from a file.
+
+    Parameters
+    ----------
+    name_or_path
+        A text of at most 100 letters, digits, ``-`` and ``_`` that begins with a letter or a digit is a name;
+        any other text, and every ``Path``, is a TOML file like those in ``data/twins``.
+
+    Returns
+    -------
+    TwinParameters
 
     Raises
     ------
@@ -250,8 +266,21 @@ def _each(group: str, part: Strict) -> Iterator[tuple[str, str, Parameter]]:
 def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
     """Every parameter of a twin, for a report.
 
-    Columns, all of them text: ``parameter``, ``value``, ``unit``, ``status`` (published or chosen) and
-    ``because`` (the source, and the reason where there is one).
+    Parameters
+    ----------
+    twin
+        Its parameters, or its name or file as for :func:`load_twin`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per parameter. Columns, all of them text: ``parameter``, ``value``, ``unit``, ``status``
+        (published or chosen) and ``because`` (the source, and the reason where there is one).
+
+    Raises
+    ------
+    WildlabError
+        As :func:`load_twin`, where it is given a name or a file.
     """
     parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
     return pd.DataFrame(

@@ -14,7 +14,24 @@ from wildlab.simulation.trajectory import Signal
 
 
 def target_path(target: Target, seed: int) -> Signal:
-    """Where a target is in n: times (N,) s -> (N, 3) m. Without a motion it stays above the origin."""
+    """Where a target is. Without a motion it stays at its height above the origin of n.
+
+    Parameters
+    ----------
+    target
+        Its parameters, from a twin's.
+    seed
+        Of the flight, a whole number from 0: how the target deviates from its course follows from it.
+
+    Returns
+    -------
+    Times (N,) s -> position in n, (N, 3) m.
+
+    Raises
+    ------
+    ValueError
+        Where the target moves and the seed is negative.
+    """
     motion, down = target.motion, -target.height.si
     if motion is None:
         return lambda times: np.broadcast_to([0.0, 0.0, down], (len(np.asarray(times)), 3))

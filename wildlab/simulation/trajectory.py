@@ -60,16 +60,38 @@ def turned(motion: Motion, disturbance: AttitudeDisturbance) -> Motion:
 
 
 def attitude_along(trajectory: Trajectory) -> Signal:
-    """Of a trajectory the attitude alone: times (N,) s -> ``R_nb`` (N, 3, 3)."""
+    """Of a trajectory the attitude alone.
+
+    Parameters
+    ----------
+    trajectory
+        Times (N,) s -> `Motion`.
+
+    Returns
+    -------
+    Times (N,) s -> ``R_nb`` (N, 3, 3).
+    """
     return lambda times: trajectory(times).R_nb
 
 
 def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Array:
-    """Angular rate of b against n, in b. (N,) s -> (N, 3) rad/s.
+    """Angular rate of b against n, in b.
 
-    By a central difference of fourth order of the attitude, times (N,) s -> ``R_nb`` (N, 3, 3), which is
-    known in closed form: for motion with periods of two seconds and more the error is below 1e-8 of the
-    rate's own size.
+    By a central difference of fourth order of the attitude, which is known in closed form: for motion with
+    periods of two seconds and more the error is below 1e-8 of the rate's own size.
+
+    Parameters
+    ----------
+    attitude
+        Times (N,) s -> ``R_nb`` (N, 3, 3); asked up to two steps before and after each time.
+    times
+        (N,) s.
+    step
+        Of the difference, s.
+
+    Returns
+    -------
+    (N, 3) rad/s, in b.
     """
     t = np.asarray(times, float)
     rates = np.empty((len(t), 3))
@@ -79,6 +101,18 @@ def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Arr
 
 
 def specific_forces(motion: Motion, gravity: float = GRAVITY) -> Array:
-    """What ideal accelerometers feel, in b. (N, 3) m/s^2."""
+    """What ideal accelerometers feel: the acceleration less gravity.
+
+    Parameters
+    ----------
+    motion
+        Of b at N times.
+    gravity
+        m/s^2, straight down in n.
+
+    Returns
+    -------
+    (N, 3) m/s^2, in b.
+    """
     force = motion.acceleration - np.array([0.0, 0.0, gravity])
     return np.asarray((np.swapaxes(motion.R_nb, -1, -2) @ force[..., None])[..., 0])

@@ -59,17 +59,42 @@ def simulate_twin(name_or_path: str | Path, seed: int, without: Collection[str] 
     without
         Tables to leave out, to save time: any of ``OPTIONAL_TABLES``. The others are the same without them.
 
+    Returns
+    -------
+    Flight
+
     Raises
     ------
     WildlabError
-        Where the twin or one of its parameters is unusable, the seed is negative, or the target does not come
-        into view often enough.
+        Where the twin or one of its parameters is unusable, its course cannot be flown, the seed is no whole
+        number from 0 and below 2^63, ``without`` names another table, or what the twin looks for does not
+        come into view often enough.
     """
     return simulate(load_twin(name_or_path), seed, without)
 
 
 def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> Flight:
-    """As :func:`simulate_twin`, from parameters in memory."""
+    """As :func:`simulate_twin`, from parameters in memory.
+
+    Parameters
+    ----------
+    twin
+        As :func:`~wildlab.simulation.load_twin` gives it.
+    seed
+        A whole number from 0.
+    without
+        Tables to leave out: any of ``OPTIONAL_TABLES``.
+
+    Returns
+    -------
+    Flight
+
+    Raises
+    ------
+    WildlabError
+        Where the seed is no whole number from 0 and below 2^63, ``without`` names another table, the course
+        cannot be flown, or what the twin looks for does not come into view often enough.
+    """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**63:
         raise WildlabError(f"{seed!r} is not a seed", "give a whole number from 0", field="seed")
     if unknown := sorted(set(without) - set(OPTIONAL_TABLES)):
