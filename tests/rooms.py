@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -46,7 +47,8 @@ def lacking(name: str, thing: Any) -> list[str]:
     wanted += [] if signature.return_annotation in ("None", None, "NoReturn") else ["Returns"]
     headings = {one: f"\n{one}\n{'-' * len(one)}\n" for one in wanted}
     found = [f"{name}: no section {one}" for one, heading in headings.items() if heading not in f"\n{text}\n"]
-    body = text.partition("\nParameters\n")[2]
+    # Up to the next heading: an example that names a parameter does not describe it.
+    body = re.split(r"\n\n\w+\n-{4,}\n", text.partition("\nParameters\n")[2])[0]
     parameters = [one for one in signature.parameters if "Parameters" in wanted]
     listed = {
         word.strip().lstrip("*")

@@ -34,6 +34,13 @@ def test_a_gate_is_a_probability(wrong):
         by_mekf(gate_probability=wrong)
 
 
+def test_the_filter_refuses_what_only_the_observer_takes():
+    """Its kernel looks limits up by the kind of a measurement, and would read beyond them."""
+    foreign = AIDING[0]._replace(kind=3)
+    with pytest.raises(WildlabError, match=r"^aiding\[1\]: a direction in the body .* of the observer only"):
+        run_mekf(IMU, START, STIM300, flat_earth(), [AIDING[0], foreign], [0.9])
+
+
 def spoilt(array, at, value):
     wrong = array.copy()
     wrong[at] = value

@@ -151,6 +151,13 @@ def prepare(
 ) -> MekfInputs:  # fmt: skip
     """Timeline, measurements in order of time, and all numbers of the filter."""
     check_initial(start)
+    for row, one in enumerate(aiding):
+        if one.kind not in (kernels.POSITION, kernels.VELOCITY, kernels.HEADING):
+            raise WildlabError(
+                "a direction in the body beside one in n is a measurement of the observer only",
+                "leave it out, or give a magnetometer's headings to this filter",
+                field=f"aiding[{row}]",
+            )
     line, gaps = set_out(imu, start.time, aiding, output_times, outages.max_gap)
     beyond, extra = _extra(aiding, axes)
     state = np.concatenate([start.state, np.zeros(len(extra))])
