@@ -9,6 +9,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
 - `track_errors.track_errors`, `summarise_track`: how far is a track from the truth?
 - `ospa`, `gospa`: how far is a set of tracks?
+- `mean_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
   err.
 """
@@ -32,6 +33,7 @@ from wildlab.evaluation.errors import (
     summarise,
 )
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
+from wildlab.evaluation.runs import Interval, mean_interval, share_interval
 from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
 from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
 from wildlab.evaluation.whiteness import (
@@ -48,6 +50,7 @@ __all__ = [
     "Average",
     "ErrorSummary",
     "Gospa",
+    "Interval",
     "Ospa",
     "PoseNoise",
     "Scatter",
@@ -62,6 +65,7 @@ __all__ = [
     "estimate_pose_noise",
     "gospa",
     "innovation_whiteness",
+    "mean_interval",
     "nees",
     "nis",
     "ospa",
@@ -69,6 +73,7 @@ __all__ = [
     "position_nees",
     "scatter_by_image",
     "share_inside",
+    "share_interval",
     "summarise",
     "summarise_track",
     "white_bound",

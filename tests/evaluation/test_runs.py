@@ -1,0 +1,43 @@
+"""Intervals for a mean and for a share of independent runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, ttest_1samp
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation import mean_interval, share_interval
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.95])
+def test_mean_is_students(probability: float) -> None:
+    values = np.array([3.0, 5.0, 4.5, 9.0])
+    known = ttest_1samp(values, 0.0).confidence_interval(probability)
+    found = mean_interval([*values, np.nan], probability)
+    assert found == pytest.approx((values.mean(), known.low, known.high), rel=1e-12)
+
+
+def test_mean_is_held_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    found = [mean_interval(10 + 4 * rng.standard_normal(5)) for _ in range(4000)]
+    held = np.mean([one.low <= 10 <= one.high for one in found])
+    assert held == pytest.approx(0.95, abs=0.014)  # four standard deviations of the share
+
+
+@pytest.mark.parametrize(("count", "runs"), [(0, 8), (3, 8), (8, 8), (170, 200)])
+@pytest.mark.parametrize("probability", [0.9, 0.95])
+def test_share_is_that_of_clopper_and_pearson(count: int, runs: int, probability: float) -> None:
+    known = binomtest(count, runs).proportion_ci(probability, method="exact")
+    assert share_interval(count, runs, probability) == pytest.approx(
+        (count / runs, known.low, known.high), abs=1e-9
+    )
+
+
+def test_what_has_no_interval_is_refused() -> None:
+    for values, probability in (([1.0], 0.95), ([1.0, np.nan], 0.95), ([1.0, 2.0], 1.0)):
+        with pytest.raises(WildlabError, match="No interval for the mean"):
+            mean_interval(values, probability)
+    for count, runs, probability in ((0, 0, 0.95), (-1, 5, 0.95), (6, 5, 0.95), (1, 5, 0.0)):
+        with pytest.raises(WildlabError, match=f"No interval for {count} of {runs} runs"):
+            share_interval(count, runs, probability)

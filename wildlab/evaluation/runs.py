@@ -1,0 +1,98 @@
+"""What a number of independent runs says: intervals for a mean and for a share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import beta, t
+
+from wildlab.errors import WildlabError
+
+
+class Interval(NamedTuple):
+    """An estimate, and the two-sided interval about it."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
+    """Mean of what independent runs gave, with Student's interval.
+
+    Neighbouring moments of one run are not independent: give one value for each run.
+
+    Parameters
+    ----------
+    values
+        (N,), one for each run, in any unit; NaN are left out.
+    probability
+        With which the interval holds the mean over all such runs.
+
+    Returns
+    -------
+    Interval
+        In the unit of the values.
+
+    Raises
+    ------
+    WildlabError
+        If fewer than two values are known, or ``probability`` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in mean_interval([1.0, 2.0, 3.0])]
+    [2.0, -0.48, 4.48]
+    """
+    array = np.asarray(values, float)
+    known = array[np.isfinite(array)]
+    if len(known) < 2 or not 0 < probability < 1:
+        raise WildlabError(
+            f"no interval for the mean of {len(known)} values with probability {probability}",
+            "give two runs or more, and a probability between 0 and 1",
+        )
+    mean = float(known.mean())
+    half = float(t.ppf((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known)))
+    return Interval(mean, mean - half, mean + half)
+
+
+def share_interval(count: int, runs: int, probability: float = 0.95) -> Interval:
+    """Share of independent runs of which something is true, with the interval of Clopper and Pearson.
+
+    It holds the share of all such runs with at least that probability, for few runs with a higher one.
+
+    Parameters
+    ----------
+    count
+        Of how many runs it is true.
+    runs
+        How many there are.
+    probability
+        Between 0 and 1.
+
+    Returns
+    -------
+    Interval
+        From 0 to 1.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no run, ``count`` is not among them, or ``probability`` not between 0 and 1.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in share_interval(8, 10)]
+    [0.8, 0.44, 0.97]
+    """
+    if runs < 1 or not 0 <= count <= runs or not 0 < probability < 1:
+        raise WildlabError(
+            f"no interval for {count} of {runs} runs with probability {probability}",
+            "give at least one run, no more than all of them, and a probability between 0 and 1",
+        )
+    tail = (1 - probability) / 2
+    low = float(beta.ppf(tail, count, runs - count + 1)) if count > 0 else 0.0
+    high = float(beta.ppf(1 - tail, count + 1, runs - count)) if count < runs else 1.0
+    return Interval(count / runs, low, high)
