@@ -14,12 +14,12 @@ from wildlab.pipeline.sensor_tracks import (
     FILTERS,
     GATE,
     PATIENCE_S,
-    Followed,
+    SensorTrack,
     follow_flight,
     start_near,
     table,
 )
-from wildlab.pipeline.sensor_tuning import REACH, Tuning, errors_near, tune
+from wildlab.pipeline.sensor_tuning import REACH, SensorTuning, errors_near, tune
 from wildlab.studies.autoferry.comparison import beside_white, check_claims, gains, off_ideal, pooled
 
 KEYS = ["sensor", "target"]
@@ -102,7 +102,7 @@ def make(
     return Flight(manifest, {"own": nav}, tables)
 
 
-def by_filter(followed: list[Followed], target: str = "one") -> pd.DataFrame:
+def by_filter(followed: list[SensorTrack], target: str = "one") -> pd.DataFrame:
     rows = table(followed)
     return rows[rows["target"] == target].set_index("filter")
 
@@ -235,8 +235,8 @@ def test_a_bearing_sensor_that_moves_sees_where_a_target_is():
     assert (rows["share_followed"] > 0.95).all()
 
 
-def quiet(**changes: float) -> Tuning:
-    base = Tuning("lidar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100)
+def quiet(**changes: float) -> SensorTuning:
+    base = SensorTuning("lidar", "position", 0, 0, 0, 2.0, 0.8, 5.0, 1.5, 0.1, 0.01, 100, 50, 0.5, 100)
     return base._replace(**changes)
 
 

@@ -12,7 +12,7 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 from wildlab.pipeline.sensor_tracks import FILTERS, follow_flight, table
-from wildlab.pipeline.sensor_tuning import Tuning, tune
+from wildlab.pipeline.sensor_tuning import SensorTuning, tune
 from wildlab.studies.autoferry.comparison import gains, pooled
 
 pytestmark = pytest.mark.slow
@@ -28,24 +28,24 @@ def flights(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathF
 
 
 @pytest.fixture(scope="module")
-def tunings(flights: dict[int, Flight]) -> dict[str, Tuning]:
+def tunings(flights: dict[int, Flight]) -> dict[str, SensorTuning]:
     return {sensor: tune(flights[2], sensor) for sensor in ("lidar", "radar", "ir", "eo")}
 
 
 @pytest.fixture(scope="module")
-def tracks(flights: dict[int, Flight], tunings: dict[str, Tuning]) -> pd.DataFrame:
+def tracks(flights: dict[int, Flight], tunings: dict[str, SensorTuning]) -> pd.DataFrame:
     return pd.concat(
         [table(follow_flight(flight, tunings)).assign(case=number) for number, flight in flights.items()]
     )
 
 
-def test_radar_stamps_are_late_by_one_to_three_seconds(tunings: dict[str, Tuning]) -> None:
+def test_radar_stamps_are_late_by_one_to_three_seconds(tunings: dict[str, SensorTuning]) -> None:
     # So says who prepared the data set; the sensor stamps what it has finished, not what it has begun.
     assert -3.0 <= tunings["radar"].offset_s <= -1.0
     assert tunings["radar"].offset_low_s <= tunings["radar"].offset_s <= tunings["radar"].offset_high_s
 
 
-def test_errors_are_coloured(tunings: dict[str, Tuning]) -> None:
+def test_errors_are_coloured(tunings: dict[str, SensorTuning]) -> None:
     for tuning in tunings.values():
         assert tuning.next_correlation > 0.5
         assert tuning.correlation_time_s > 2 * tuning.interval_s

@@ -7,21 +7,21 @@ import pandas as pd
 import pytest
 
 from wildlab.evaluation.consistency import chi_square_interval
-from wildlab.pipeline.sensor_tracks import COLUMNS, Followed, table
-from wildlab.pipeline.sensor_tuning import Tuning
+from wildlab.pipeline.sensor_tracks import COLUMNS, SensorTrack, table
+from wildlab.pipeline.sensor_tuning import SensorTuning
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies.autoferry import charts as charts
 from wildlab.studies.autoferry import text as words
 from wildlab.studies.autoferry.comparison import beside_white, gains
 
-LIDAR = Tuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
-CAMERA = Tuning(
+LIDAR = SensorTuning("lidar", "position", -0.9, -1.1, -0.8, 3.0, 0.9, 20.0, 1.2, 1.5, 0.0, 100, 50, 0.5, 300)
+CAMERA = SensorTuning(
     "eo", "bearing", -1.0, -2.0, 0.5, np.radians(2), 0.8, 5.0, 0.0, 0.0, np.radians(1), 100, 50, 0.2, 9
 )
 
 
-def track(sensor: str, target: str, name: str, error: float, nees: float, seed: int = 0) -> Followed:
+def track(sensor: str, target: str, name: str, error: float, nees: float, seed: int = 0) -> SensorTrack:
     rng = np.random.default_rng(seed)
     n, m = 60, 1 if sensor == "eo" else 2
     estimate = np.column_stack([np.arange(n), np.zeros(n), np.ones(n), np.zeros(n)])
@@ -30,13 +30,13 @@ def track(sensor: str, target: str, name: str, error: float, nees: float, seed: 
     nis = np.sum(innovation**2, axis=1)
     values = nees * rng.uniform(0.5, 1.5, n)
     known = np.ones(n, bool)
-    return Followed(
+    return SensorTrack(
         sensor, target, name, np.arange(n) * 0.5, estimate, errors, values, innovation, nis, known
     )
 
 
 @pytest.fixture
-def followed() -> list[Followed]:
+def followed() -> list[SensorTrack]:
     return [
         track("lidar", "a", "kf", 4.0, 30.0, 1),
         track("lidar", "a", "coloured", 4.1, 3.0, 2),
@@ -49,7 +49,7 @@ def followed() -> list[Followed]:
 
 
 @pytest.fixture
-def tracks(followed: list[Followed]) -> pd.DataFrame:
+def tracks(followed: list[SensorTrack]) -> pd.DataFrame:
     return table(followed).assign(case="scenario-3")
 
 
@@ -126,7 +126,7 @@ def test_sentences_say_what_the_numbers_say(tracks: pd.DataFrame) -> None:
 
 
 def test_nees_over_time_shows_each_filter_and_the_band(
-    followed: list[Followed], tracks: pd.DataFrame
+    followed: list[SensorTrack], tracks: pd.DataFrame
 ) -> None:
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
     rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
@@ -144,7 +144,9 @@ def test_nees_over_time_shows_each_filter_and_the_band(
     assert "95 percent band" in alt
 
 
-def test_innovations_beside_the_band_of_white_noise(followed: list[Followed], tracks: pd.DataFrame) -> None:
+def test_innovations_beside_the_band_of_white_noise(
+    followed: list[SensorTrack], tracks: pd.DataFrame
+) -> None:
     mine = [one for one in followed if (one.sensor, one.target) == ("lidar", "a")]
     rows = tracks[(tracks["sensor"] == "lidar") & (tracks["target"] == "a")]
     figure, *_ = charts.innovations_shown("lidar", mine, rows)

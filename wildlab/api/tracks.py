@@ -15,7 +15,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series
 from wildlab.pipeline.follow import ACCELERATION, FILTERS, START_SPEED, Filter, usual_tuning
 from wildlab.pipeline.georeference import assumed_deviations
-from wildlab.pipeline.navigate import Navigated, Tuning, navigate_mekf, navigate_observer
+from wildlab.pipeline.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_errors import (
     REFERENCES,
     Errors,
@@ -78,7 +78,7 @@ class Navigation(Brief):
         return Summary(f"Navigation of {self.flight.name}", rows)
 
 
-def navigate(flight: Flight, method: Method = "mekf", tuning: Tuning | None = None) -> Navigation:
+def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None = None) -> Navigation:
     """Find a flight's poses from its inertial samples and satellite positions.
 
     Velocities of the receiver are used where there are any. Poses are found at the frames, and at the times

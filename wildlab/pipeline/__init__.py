@@ -27,7 +27,13 @@ if TYPE_CHECKING:
         pose_errors,
         truth_of,
     )
-    from wildlab.pipeline.navigate import PUBLISHED_LIKE, Navigated, Tuning, navigate_mekf, navigate_observer
+    from wildlab.pipeline.navigate import (
+        PUBLISHED_LIKE,
+        MekfTuning,
+        Navigated,
+        navigate_mekf,
+        navigate_observer,
+    )
     from wildlab.pipeline.navigation_errors import Errors, errors_against
     from wildlab.pipeline.track import (
         CvTuning,
@@ -49,7 +55,7 @@ else:
             "evaluate": ("errors_of", "score_points", "recorded_answers"),
             "follow": ("FILTERS", "usual_tuning"),
             "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
-            "navigate": ("Navigated", "PUBLISHED_LIKE", "Tuning", "navigate_mekf", "navigate_observer"),
+            "navigate": ("Navigated", "PUBLISHED_LIKE", "MekfTuning", "navigate_mekf", "navigate_observer"),
             "navigation_errors": ("Errors", "errors_against"),
             "track": (
                 "CvTuning",
@@ -72,12 +78,12 @@ __all__ = [
     "Calibrated",
     "CvTuning",
     "Errors",
+    "MekfTuning",
     "Navigated",
     "Observations",
     "Scored",
     "Series",
     "Sighting",
-    "Tuning",
     "calibrate_flight",
     "covariances_of",
     "errors_against",

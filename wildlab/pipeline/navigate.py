@@ -65,7 +65,7 @@ class Navigated(NamedTuple):
     signs: tuple[str, ...] = ()
 
 
-class Tuning(NamedTuple):
+class MekfTuning(NamedTuple):
     """Noise that a filter is told of in place of what the flight states.
 
     Attributes
@@ -89,16 +89,16 @@ class Tuning(NamedTuple):
 #: 7 cm and 1.35, 1.30 and 2.65 deg. It was found from those figures alone, not from any error of a twin. Its
 #: walks are far above a data sheet's: vibration, flexing, and what else a sheet leaves out. It is the one for
 #: tracking, on all flights: from hundreds of metres attitudes make the error, and theirs hardly differ.
-PUBLISHED_LIKE = Tuning(0.1, 1.2, 0.2, 0.2)
+PUBLISHED_LIKE = MekfTuning(0.1, 1.2, 0.2, 0.2)
 
 #: The same for H 7.5.4, flight 1: "the IMU was weighted more in the navigation filter", for its turns, and
 #: positions count for little. Printed are 43, 43 and 68 cm and 1.22, 1.24 and 2.63 deg; here come out 43, 43
 #: and 69 cm and 1.20, 1.20 and 2.73 deg.
-PUBLISHED_LIKE_TURNING = Tuning(0.38, 0.46, 1.5, 2.9)
+PUBLISHED_LIKE_TURNING = MekfTuning(0.38, 0.46, 1.5, 2.9)
 #: The same for flight 2: 87, 87 and 142 cm and 1.73, 1.78 and 2.48 deg printed, 89, 89 and 142 cm and 1.73,
 #: 1.69 and 2.57 deg here. The text does not say that it was tuned otherwise than flight 1; with flight 1's
 #: tuning its deviations come out like those of flight 1.
-PUBLISHED_LIKE_LONG = Tuning(0.25, 0.75, 3.6, 8.5)
+PUBLISHED_LIKE_LONG = MekfTuning(0.25, 0.75, 3.6, 8.5)
 
 
 def navigate_mekf(
@@ -107,7 +107,7 @@ def navigate_mekf(
     *,
     velocity: bool = True,
     magnetometer: bool = False,
-    tuning: Tuning | None = None,
+    tuning: MekfTuning | None = None,
 ) -> Navigated:
     """Poses with covariance by the error-state filter of H 7.3.
 

@@ -33,7 +33,7 @@ from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
-from wildlab.pipeline.sensor_tuning import REACH, Tuning, errors_near
+from wildlab.pipeline.sensor_tuning import REACH, SensorTuning, errors_near
 from wildlab.tracking.coloured import run_coloured, thin
 from wildlab.tracking.maritime import bearings_from, positions_from, white_acceleration
 from wildlab.tracking.run import Start, Track, run_filter
@@ -61,7 +61,7 @@ PATIENCE_S = 10.0
 LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
 
 
-class Followed(NamedTuple):
+class SensorTrack(NamedTuple):
     """One target followed by one filter.
 
     Row by row of the scans: ``estimate`` (N, 4) north, east, velocities, NaN without a track; ``error``
@@ -81,7 +81,7 @@ class Followed(NamedTuple):
     known: NDArray[np.bool_]
 
 
-def follow_flight(flight: Flight, tunings: Mapping[str, Tuning]) -> list[Followed]:
+def follow_flight(flight: Flight, tunings: Mapping[str, SensorTuning]) -> list[SensorTrack]:
     """Every target with truth, by every sensor that has a tuning, with every filter.
 
     A target that a sensor never saw near its true place has no track: all rows are NaN.
@@ -101,7 +101,9 @@ def follow_flight(flight: Flight, tunings: Mapping[str, Tuning]) -> list[Followe
     return found
 
 
-def follow(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> list[Followed]:
+def follow(
+    scans: Scans, truth: Truth, tuning: SensorTuning, others: Sequence[Truth] = ()
+) -> list[SensorTrack]:
     """One target by one sensor, with every filter of its kind; ``others`` are targets not to start on."""
     begin = start_near(scans, truth, tuning, others)
     if begin is None:
@@ -146,7 +148,9 @@ def follow(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Truth] =
     return [_score(scans, truth, name, track, begun, last) for name, track in tracks.items()]
 
 
-def start_near(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Truth] = ()) -> Start | None:
+def start_near(
+    scans: Scans, truth: Truth, tuning: SensorTuning, others: Sequence[Truth] = ()
+) -> Start | None:
     """Where a track starts: at the first detection within reach of the target's true place, at rest.
 
     One that lies nearer to one of the ``others`` is not taken. The detection itself is not used up: the start
@@ -177,7 +181,11 @@ def start_near(scans: Scans, truth: Truth, tuning: Tuning, others: Sequence[Trut
 
 
 def _coloured(
-    times: Array, own: Array, tuning: Tuning, motion: Callable[[float], tuple[Array, Array]], begin: Start
+    times: Array,
+    own: Array,
+    tuning: SensorTuning,
+    motion: Callable[[float], tuple[Array, Array]],
+    begin: Start,
 ) -> Track:
     gap = max(LONGEST_GAP_S, LONGEST_GAP_LOOKS * tuning.interval_s)
     used = np.flatnonzero(np.isfinite(own[:, 0]))
@@ -199,7 +207,7 @@ def _last_row(times: Array, used: NDArray[np.bool_], start: float) -> int:
 
 def _score(
     scans: Scans, truth: Truth, name: str, track: Track, begun: NDArray[np.bool_], last: int
-) -> Followed:
+) -> SensorTrack:
     x, innovation, nis = track.x.copy(), track.innovation.copy(), track.nis.copy()
     x[last:] = np.nan
     # The first detection is where the track was put: it surprises nobody.
@@ -210,15 +218,15 @@ def _score(
     error = np.where(np.isfinite(x), where - x, np.nan)
     nees = position_nees(error[:, :2], track.P[:, :2, :2], truth.covariance)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    return Followed(scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known)
+    return SensorTrack(scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known)
 
 
-def _nothing(scans: Scans, truth: Truth, name: str) -> Followed:
+def _nothing(scans: Scans, truth: Truth, name: str) -> SensorTrack:
     n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
     nan = np.full(n, np.nan)
-    return Followed(
+    return SensorTrack(
         scans.sensor, truth.target, name, scans.times, empty, empty, nan, np.full((n, m), np.nan), nan, known
     )
 
@@ -237,7 +245,7 @@ COLUMNS = {
 }
 
 
-def table(followed: list[Followed]) -> pd.DataFrame:
+def table(followed: list[SensorTrack]) -> pd.DataFrame:
     """One row for each track, its columns those of `COLUMNS` and:
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, scans with a track and
@@ -249,7 +257,7 @@ def table(followed: list[Followed]) -> pd.DataFrame:
     return pd.DataFrame([_row(one) for one in followed])
 
 
-def _row(one: Followed) -> dict[str, object]:
+def _row(one: SensorTrack) -> dict[str, object]:
     summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
     m = one.innovation.shape[1]
     used = one.innovation[np.isfinite(one.nis)]

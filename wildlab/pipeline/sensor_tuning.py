@@ -34,7 +34,7 @@ FEWEST = 20
 DROP = 1.92
 
 
-class Tuning(NamedTuple):
+class SensorTuning(NamedTuple):
     """One sensor, as a flight with truth shows it.
 
     Attributes
@@ -117,7 +117,7 @@ class _Errors(NamedTuple):
     scans: Scans
 
 
-def tune(flight: Flight, sensor: str) -> Tuning:
+def tune(flight: Flight, sensor: str) -> SensorTuning:
     """Estimate everything of a sensor from one flight with truth.
 
     Raises
@@ -148,7 +148,7 @@ def tune(flight: Flight, sensor: str) -> Tuning:
     distance = np.concatenate(
         [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
     )
-    return Tuning(
+    return SensorTuning(
         sensor,
         scans.kind,
         offset,

@@ -22,7 +22,7 @@ from wildlab.reporting.charts.tracks import (
 )
 from wildlab.reporting.report import Report
 from wildlab.studies import monte_carlo
-from wildlab.studies.linear_vs_nonlinear.trial import Followed
+from wildlab.studies.linear_vs_nonlinear.trial import ScoredTrack
 
 Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def periods(seen: Sighting) -> int:
     return int((np.diff(seen.times[seen.seen]) > GAP_S).sum()) + 1
 
 
-def on_rows(seen: Sighting, followed: Followed) -> Array:
+def on_rows(seen: Sighting, followed: ScoredTrack) -> Array:
     """(N,) NIS at the frames of a sighting, also of a filter that went over its detections alone."""
     nis = followed.scored.nis
     if len(nis) == len(seen.times):
@@ -103,13 +103,13 @@ def on_rows(seen: Sighting, followed: Followed) -> Array:
     return result
 
 
-def whiteness_of(followed: Followed) -> Whiteness:
+def whiteness_of(followed: ScoredTrack) -> Whiteness:
     """Of a track's innovations, over `LAGS`."""
     return innovation_whiteness(followed.track.innovation, LAGS)
 
 
 def show_paths(
-    report: Report, seen: Sighting, followed: Mapping[str, Followed], figures: Mapping[str, str]
+    report: Report, seen: Sighting, followed: Mapping[str, ScoredTrack], figures: Mapping[str, str]
 ) -> None:
     """The paths of aircraft and target, and the tracks beside the truth.
 
@@ -156,7 +156,7 @@ def show_paths(
 
 
 def show_errors(
-    report: Report, seen: Sighting, followed: Mapping[str, Followed], figures: Mapping[str, str]
+    report: Report, seen: Sighting, followed: Mapping[str, ScoredTrack], figures: Mapping[str, str]
 ) -> None:
     """Errors in position over time, and speed and course; ``figures`` as in `show_paths`."""
     times, names = seen.times - seen.times[0], names_of(followed)
@@ -201,7 +201,7 @@ def show_errors(
 
 
 def show_consistency(
-    report: Report, seen: Sighting, followed: Mapping[str, Followed], figures: Mapping[str, str]
+    report: Report, seen: Sighting, followed: Mapping[str, ScoredTrack], figures: Mapping[str, str]
 ) -> None:
     """NEES and NIS over time with the 95 % band; ``figures`` as in `show_paths`."""
     times, bounds = seen.times - seen.times[0], chi_square_interval(2)
@@ -230,7 +230,7 @@ def show_consistency(
 
 def show_correlations(
     report: Report,
-    followed: Mapping[str, Followed],
+    followed: Mapping[str, ScoredTrack],
     figures: Mapping[str, str],
     axes: tuple[str, str],
     letter: str = "",

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import Followed
+from wildlab.pipeline.sensor_tracks import SensorTrack
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -39,7 +39,7 @@ MARGIN_M = 40.0
 LAGS = 20
 
 
-def map_shown(case: str, flight: Flight, followed: Sequence[Followed], tracks: pd.DataFrame) -> Shown:
+def map_shown(case: str, flight: Flight, followed: Sequence[SensorTrack], tracks: pd.DataFrame) -> Shown:
     """The map of a flight, with how many of its tracks stay with their boat."""
     rows = tracks[(tracks["case"] == case) & tracks["filter"].isin(ON_MAPS) & tracks["rmse"].notna()]
     stay = {
@@ -56,7 +56,7 @@ def map_shown(case: str, flight: Flight, followed: Sequence[Followed], tracks: p
     )
 
 
-def nees_shown(sensor: str, followed: Sequence[Followed], tracks: pd.DataFrame) -> Shown:
+def nees_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.DataFrame) -> Shown:
     """NEES over time of one boat by one sensor, with how much of the time it is inside the band.
 
     ``tracks`` are the rows of that boat and sensor.
@@ -73,7 +73,7 @@ def nees_shown(sensor: str, followed: Sequence[Followed], tracks: pd.DataFrame) 
     )
 
 
-def innovations_shown(sensor: str, followed: Sequence[Followed], tracks: pd.DataFrame) -> Shown:
+def innovations_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.DataFrame) -> Shown:
     """Autocorrelation of the innovations with white noise assumed, and differenced; arguments as above."""
     pair = [one for one in followed if one.filter in ("kf", "coloured")]
     axes = tracks.set_index("filter")[["lag1_autocorrelation_north", "lag1_autocorrelation_east"]]
@@ -137,7 +137,7 @@ def mean_nees_shown(tracks: pd.DataFrame) -> Shown:
     )
 
 
-def track_map(flight: Flight, followed: Sequence[Followed], title: str) -> Figure:
+def track_map(flight: Flight, followed: Sequence[SensorTrack], title: str) -> Figure:
     """Ways of the boats (black), of the platform (grey) and of each sensor's tracks, in local metres."""
     fig, ax = new_figure(5.8, 5.0)
     truth, (_, nav) = flight.table("truth"), flight.pose_source()
@@ -174,7 +174,7 @@ def track_map(flight: Flight, followed: Sequence[Followed], title: str) -> Figur
     return fig
 
 
-def nees_chart(followed: Sequence[Followed], title: str) -> Figure:
+def nees_chart(followed: Sequence[SensorTrack], title: str) -> Figure:
     """NEES of the position over time on a logarithmic axis, one line for each filter, with the 95 % band."""
     fig, ax = new_figure(5.6, 3.6)
     for one in followed:
@@ -189,7 +189,7 @@ def nees_chart(followed: Sequence[Followed], title: str) -> Figure:
     return fig
 
 
-def innovations_chart(followed: Sequence[Followed], title: str) -> Figure:
+def innovations_chart(followed: Sequence[SensorTrack], title: str) -> Figure:
     """Autocorrelation of the innovations, north solid and east dashed, with the band of white noise."""
     fig, ax = new_figure(5.6, 3.6)
     bound = 0.0

@@ -9,7 +9,7 @@ import pandas as pd
 
 from wildlab.flight.store import Flight
 from wildlab.pipeline.sensor_tracks import ACCELERATION_DENSITY, COLUMNS, PATIENCE_S
-from wildlab.pipeline.sensor_tuning import REACH, Tuning
+from wildlab.pipeline.sensor_tuning import REACH, SensorTuning
 from wildlab.reporting.report import Report
 from wildlab.studies.autoferry.comparison import PRICE, WHITES, beside_white, check_claims
 
@@ -84,7 +84,7 @@ def record_tracks(report: Report, table: pd.DataFrame) -> None:
         report.metric("detections_used", subject, int(row["detections"]), "1")
 
 
-def record_tunings(report: Report, tunings: Mapping[str, Tuning]) -> pd.DataFrame:
+def record_tunings(report: Report, tunings: Mapping[str, SensorTuning]) -> pd.DataFrame:
     """Record what was fitted of each sensor, and return it as a table."""
     rows = []
     for sensor, one in tunings.items():
@@ -289,7 +289,7 @@ nearest detection in a 99 % gate, a track dropped after {PATIENCE_S:g} s without
 linear filter, bearings through the extended one, started at the mean distance that {first} shows. All filters
 of a track get the same detections, those that the filter with white noise let in.
 
-Tuning, on {first} alone: the detection nearest to a boat within {REACH["position"]:g} m or
+SensorTuning, on {first} alone: the detection nearest to a boat within {REACH["position"]:g} m or
 {np.degrees(REACH["bearing"]):g}° is taken for its own. The clock offset is the one with the least sum of
 squared errors. $\sigma$ is their root mean square, standing part included; their autocorrelation is fitted by
 $c\, e^{{-t/\tau}}$. Differencing takes $F_c = e^{{-T/\tau}}$ and the variance that $e_2 - F_c e_1$ then has

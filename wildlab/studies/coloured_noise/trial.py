@@ -18,8 +18,8 @@ from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.pipeline.track import CvTuning, Sighting, evaluate_track, follow_positions
 from wildlab.studies.linear_vs_nonlinear.trial import (
     OBSERVER,
-    Followed,
     Numbers,
+    ScoredTrack,
     as_in_frames,
     bounds_of,
     fly_sighting,
@@ -52,7 +52,7 @@ class SingerTuning(NamedTuple):
         return singer_variance(self.max_acceleration, self.p_max, self.p_zero)
 
 
-class Tuning(NamedTuple):
+class FilterTunings(NamedTuple):
     """A column of filters of H tables 7.1 and 7.3."""
 
     cv: CvTuning
@@ -62,13 +62,13 @@ class Tuning(NamedTuple):
 #: No filter here works on pixels.
 _NO_PIXELS = float("nan")
 #: H table 7.1.
-FAST = Tuning(
+FAST = FilterTunings(
     CvTuning(acceleration=0.05, position_0=10.0, velocity_0=100.0, measurement=7.0, pixel=_NO_PIXELS),
     SingerTuning(max_acceleration=0.01, alpha=0.1, p_max=0.05, p_zero=0.7, acceleration_0=0.01),
 )
 #: H table 7.3. Its P(0) of filter 2 prints 0.01 for the acceleration, where table 7.1 prints 0.01^2: taken as
 #: printed, a variance, (0.1 m/s^2)^2.
-DRIFTING = Tuning(
+DRIFTING = FilterTunings(
     CvTuning(acceleration=0.01, position_0=13.0, velocity_0=1.0, measurement=13.0, pixel=_NO_PIXELS),
     SingerTuning(max_acceleration=0.002, alpha=0.1, p_max=0.05, p_zero=0.7, acceleration_0=0.1),
 )
@@ -78,7 +78,7 @@ TUNINGS = {"fast-vessel": FAST, "drifting-vessel": DRIFTING}
 GAIN = 0.05
 
 
-def tuning_of(twin: str) -> Tuning:
+def tuning_of(twin: str) -> FilterTunings:
     """The tuning of the flight that a twin stands for.
 
     Raises
@@ -94,7 +94,7 @@ def tuning_of(twin: str) -> Tuning:
     return TUNINGS[twin]
 
 
-def follow_singer(seen: Sighting, tuning: Tuning) -> Track:
+def follow_singer(seen: Sighting, tuning: FilterTunings) -> Track:
     """Filter 2: Singer's motion, over the detections alone.
 
     The model is continuous in time, so that the frames in between change nothing.
@@ -108,7 +108,7 @@ def follow_singer(seen: Sighting, tuning: Tuning) -> Track:
     )  # fmt: skip
 
 
-def follow_coloured(seen: Sighting, tuning: Tuning) -> Track:
+def follow_coloured(seen: Sighting, tuning: FilterTunings) -> Track:
     """Filter 3: differences of measurements a second apart at most, H (7.7)-(7.12); over detections alone."""
     rows = seen.seen
     return run_coloured(
@@ -117,14 +117,14 @@ def follow_coloured(seen: Sighting, tuning: Tuning) -> Track:
     )  # fmt: skip
 
 
-def follow(seen: Sighting, tuning: Tuning) -> dict[str, Followed]:
+def follow(seen: Sighting, tuning: FilterTunings) -> dict[str, ScoredTrack]:
     """A sighting through the three filters."""
     tracks = {
         "cv": follow_positions(seen, tuning.cv),
         "singer": follow_singer(seen, tuning),
         "coloured": follow_coloured(seen, tuning),
     }
-    return {subject: Followed(one, evaluate_track(seen, one)) for subject, one in tracks.items()}
+    return {subject: ScoredTrack(one, evaluate_track(seen, one)) for subject, one in tracks.items()}
 
 
 def trial(seed: int, *, twin: str) -> Numbers:

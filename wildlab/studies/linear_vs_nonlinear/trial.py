@@ -89,7 +89,7 @@ UNITS = {
 TABLE_NAMES = ("mean_north", "mean_east", "mae", "nees", "nis")
 
 
-class Followed(NamedTuple):
+class ScoredTrack(NamedTuple):
     """One filter's track of a sighting, and how it was scored."""
 
     track: Track
@@ -190,18 +190,18 @@ FILTERS: dict[str, Callable[[Sighting, CvTuning], Track]] = {
 
 def follow(
     seen: Sighting, tuning: CvTuning, subjects: tuple[str, ...] = (*PUBLISHED, *BESIDE)
-) -> dict[str, Followed]:
+) -> dict[str, ScoredTrack]:
     """A sighting through the filters of these names.
 
     The unscented filter and the multiple models run over the detections alone, with `as_in_frames`.
     """
     tracks = {subject: FILTERS[subject](seen, tuning) for subject in subjects}
     return {
-        subject: Followed(one, evaluate_track(seen, one, AXES[subject])) for subject, one in tracks.items()
+        subject: ScoredTrack(one, evaluate_track(seen, one, AXES[subject])) for subject, one in tracks.items()
     }
 
 
-def numbers_of(seen: Sighting, followed: dict[str, Followed]) -> Numbers:
+def numbers_of(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
     """What is compared over flights: the numbers of `evaluate_track` by filter.
 
     The subject ``measurements`` has those of `evaluate_measurements`, and ``detections``, how many there are.

@@ -63,7 +63,7 @@ METRICS |= {
 }
 
 
-class Followed(NamedTuple):
+class VesselEstimates(NamedTuple):
     """A vessel's estimates at N detections.
 
     Attributes
@@ -107,7 +107,7 @@ def subset_of(scored: pd.DataFrame) -> pd.DataFrame:
     return scored[scored["group"] == SUBSET]
 
 
-def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> Followed:
+def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> VesselEstimates:
     """The Kalman filter with constant velocity on scored points, started on the first one with zero speed.
 
     H 6.2, with the tuning above. ``longest_step`` (s) is how long an acceleration is held; infinity: from one
@@ -126,7 +126,7 @@ def follow(scored: pd.DataFrame, longest_step: float = STEP_S) -> Followed:
         start_from_first(times, xy, SD_POSITION_0, SD_VELOCITY_0),
     )
     stated = np.sqrt(np.trace(track.P[:, :2, :2], axis1=1, axis2=2))
-    return Followed(times, measured, track.x[:, :2] - (xy - measured), stated)
+    return VesselEstimates(times, measured, track.x[:, :2] - (xy - measured), stated)
 
 
 def true_positions(flight: Flight, scored: pd.DataFrame) -> Array:
