@@ -8,8 +8,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-#: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
-DOCUMENTED = (
+#: Rooms that import what they offer when it is asked for.
+LAZY = (
     "wildlab",
     "wildlab.flight",
     "wildlab.flight.checks",
@@ -17,18 +17,19 @@ DOCUMENTED = (
     "wildlab.pipeline",
     "wildlab.reporting",
 )
+#: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
+DOCUMENTED = (
+    *LAZY,
+    *("wildlab.tracking", "wildlab.evaluation"),
+)
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (
     *DOCUMENTED,
     "wildlab.api",
     "wildlab.geometry",
-    "wildlab.tracking",
     "wildlab.navigation",
-    "wildlab.evaluation",
     "wildlab.simulation",
 )
-#: Rooms that import what they offer when it is asked for.
-LAZY = DOCUMENTED
 
 
 def offered(room: str) -> Iterator[tuple[str, Any]]:

@@ -6,6 +6,7 @@ import doctest
 import importlib
 import pkgutil
 from types import ModuleType
+from typing import get_origin
 
 import pytest
 
@@ -48,7 +49,10 @@ def test_a_wrong_example_is_found() -> None:
 def test_what_a_room_offers_is_documented(room: str) -> None:
     found = [fault for name, thing in offered(room) for fault in lacking(f"{room}.{name}", thing)]
     found += [
-        f"{name}: nothing said" for name, thing in offered(room) if callable(thing) and not thing.__doc__
+        f"{name}: nothing said"
+        for name, thing in offered(room)
+        # A name for a type (`Motion`) can be called too, but has no docstring to write in.
+        if callable(thing) and get_origin(thing) is None and not thing.__doc__
     ]
     assert found == []
 

@@ -26,6 +26,8 @@ def chi_square_interval(dof: int, probability: float = 0.95, runs: float = 1) ->
     ----------
     dof
         Number of states (NEES) or of elements of a measurement (NIS).
+    probability
+        Of the whole interval; half of the rest lies on either side.
     runs
         Of how many independent runs the value is the mean; their sum has ``runs * dof`` degrees of freedom.
         For a mean over the time of one run: as many as its correlated values are worth, which need not be
@@ -166,7 +168,24 @@ def position_nees(
 
 
 def nis(innovations: ArrayLike, covariances: ArrayLike) -> Array:
-    """Normalised innovation squared, H (3.12); shapes as in `nees`."""
+    """Normalised innovation squared, H (3.12): ``v' S^-1 v``.
+
+    Parameters
+    ----------
+    innovations
+        (N, m), angles wrapped, in the measurement's units. A row with NaN (no measurement) gives NaN.
+    covariances
+        (N, m, m) of the innovations, ``S``, or (m, m) for all; in the units squared.
+
+    Returns
+    -------
+    (N,), m degrees of freedom.
+
+    Raises
+    ------
+    WildlabError
+        As `nees`.
+    """
     return nees(innovations, covariances)
 
 
@@ -189,17 +208,22 @@ class Average(NamedTuple):
 
 
 def average(values: ArrayLike, dof: int, worth: float | None = None) -> Average:
-    """Mean over the known values (N,), and the interval in which that of a consistent filter lies.
+    """Mean over the known values, and the interval in which that of a consistent filter lies.
 
     Parameters
     ----------
     values
-        NEES or NIS; NaN where not known.
+        (N,) NEES or NIS; NaN where not known.
     dof
         Degrees of freedom of each; what the mean should be.
     worth
         How many independent values they are worth, at least one: all of them for independent runs, which is
         taken where it is left out. Neighbouring moments of one run share their error and are worth fewer.
+
+    Returns
+    -------
+    Average
+        Its mean is NaN where no value is known.
 
     Raises
     ------
@@ -215,7 +239,19 @@ def average(values: ArrayLike, dof: int, worth: float | None = None) -> Average:
 
 
 def share_inside(values: ArrayLike, interval: tuple[float, float]) -> float:
-    """Share of the known values inside an interval; NaN where none is known."""
+    """Share of the known values inside an interval.
+
+    Parameters
+    ----------
+    values
+        (N,); NaN where not known.
+    interval
+        Low and high end, in the unit of the values; both belong to it.
+
+    Returns
+    -------
+    From 0 to 1; NaN where no value is known.
+    """
     array = np.asarray(values, dtype=float)
     known = array[np.isfinite(array)]
     return float(np.mean((known >= interval[0]) & (known <= interval[1]))) if len(known) else float("nan")

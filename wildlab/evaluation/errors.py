@@ -29,7 +29,18 @@ class ErrorSummary(NamedTuple):
 
 
 def summarise(errors: ArrayLike) -> ErrorSummary:
-    """Summary of errors (N, 2) north-east, metres; rows with NaN are left out. All NaN where none is left."""
+    """Summary of horizontal errors.
+
+    Parameters
+    ----------
+    errors
+        (N, 2) north, east in n, m; rows with NaN are left out.
+
+    Returns
+    -------
+    ErrorSummary
+        All NaN beside an ``n`` of 0 where no row is left. Biases have the sign of the errors.
+    """
     e = np.asarray(errors, float).reshape(-1, 2)
     e = e[np.isfinite(e).all(axis=1)]
     if not len(e):
@@ -68,9 +79,14 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     Parameters
     ----------
     errors
-        (N, 2) metres.
+        (N, 2) north, east in n, m; rows with NaN are left out.
     image
-        (N,) which image each belongs to.
+        (N,) which image each belongs to: numbers or names.
+
+    Returns
+    -------
+    Scatter
+        All NaN where fewer than two images are left, or none has more than one error.
     """
     e = np.asarray(errors, float).reshape(-1, 2)
     keep = np.isfinite(e).all(axis=1)
@@ -99,14 +115,31 @@ def bootstrap_interval(
     draws: int = 1000,
     level: float = 0.9,
 ) -> tuple[float, float]:
-    """Interval for a statistic of errors (N, 2), by drawing whole images again and again.
+    """Interval for a statistic of errors, by drawing whole images again and again.
 
     Errors of one image share its pose: drawing single clicks would give intervals that are far too narrow.
-    ``image`` may name anything that shares its error, a minute of a flight for instance.
+
+    Parameters
+    ----------
+    statistic
+        Takes errors (M, 2) and gives a number. M changes from draw to draw where images have different
+        numbers of errors.
+    errors
+        (N, 2) north, east in n, m; rows with NaN are left out.
+    image
+        (N,) which image each belongs to. It may name anything that shares its error, a minute of a flight
+        for instance.
+    rng
+        What the images are drawn with.
+    draws
+        How often, at least once. Each draws as many images as there are, with replacement.
+    level
+        Share of the draws that the interval holds, between 0 and 1.
 
     Returns
     -------
-    Lower and upper end of the middle ``level`` of the draws.
+    low, high
+        Ends of the middle ``level`` of the draws, in the unit of the statistic; NaN where no error is left.
     """
     e = np.asarray(errors, float).reshape(-1, 2)
     keep = np.isfinite(e).all(axis=1)

@@ -55,17 +55,22 @@ def estimate_pose_noise(
     Parameters
     ----------
     errors
-        (N, 2) north-east, metres, computed minus known.
+        (N, 2) north-east in n, metres, computed minus known. A row with NaN here, in ``derivatives`` or in
+        ``noise`` is left out.
     derivatives
-        (N, 2, 6) of each point with respect to north, east, down, roll, pitch, yaw.
+        (N, 2, 6) of each point with respect to north, east, down (m) and roll, pitch, yaw (rad).
     pixel_derivatives
-        (N, 2, 2) of each point with respect to its pixel.
+        (N, 2, 2) of each point with respect to its pixel, m per pixel.
     noise
-        (N, 2, 2) covariance of what else is each point's own and known: plane height, survey.
+        (N, 2, 2) covariance, m^2, of what else is each point's own and known: plane height, survey.
     image
         (N,) which image each belongs to.
     assumed
-        Standard deviations by :data:`KINDS` about which the prior lies.
+        Standard deviations by :data:`KINDS` about which the prior lies, above zero: m, rad, pixels.
+
+    Returns
+    -------
+    PoseNoise
 
     Raises
     ------

@@ -44,11 +44,16 @@ def ospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 2
     Parameters
     ----------
     truth, estimates
-        (M, k) and (N, k); either may be empty.
+        (M, k) and (N, k), in one unit; either may be empty.
     cutoff
-        Distance from which a target counts as missed; what each surplus point costs.
+        Distance from which a target counts as missed, in that unit; what each surplus point costs.
     order
         p of the metric, at least 1: the higher, the more an outlier costs.
+
+    Returns
+    -------
+    Ospa
+        All zero where both sets are empty.
 
     Raises
     ------
@@ -69,9 +74,27 @@ def gospa(truth: ArrayLike, estimates: ArrayLike, cutoff: float, order: float = 
     """Generalised OSPA (Rahmathullah, Garcia-Fernandez and Svensson 2017) with alpha = 2.
 
     A sum over the targets, not a mean; with alpha = 2 it falls into localisation, missed and false targets. A
-    pair further apart than ``cutoff`` is not a pair: it is a missed target and a false one.
+    pair as far apart as ``cutoff``, or further, is not a pair: it is a missed target and a false one.
 
-    Parameters and errors as `ospa`; each missed and each false target costs ``cutoff ** order / 2``.
+    Parameters
+    ----------
+    truth, estimates
+        (M, k) and (N, k), in one unit; either may be empty.
+    cutoff
+        Distance from which a target counts as missed and an estimate as false, in that unit; to the power of
+        ``order``, each costs half of it.
+    order
+        p of the metric, at least 1: the higher, the more an outlier costs.
+
+    Returns
+    -------
+    Gospa
+        All zero where both sets are empty.
+
+    Raises
+    ------
+    WildlabError
+        As `ospa`.
     """
     cost, _, _ = _costs(truth, estimates, cutoff, order)
     rows, columns = linear_sum_assignment(cost)

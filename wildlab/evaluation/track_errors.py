@@ -48,6 +48,10 @@ def track_errors(truth: ArrayLike, estimate: ArrayLike) -> TrackErrors:
     estimate
         (N, 4) likewise; NaN where there is no track.
 
+    Returns
+    -------
+    TrackErrors
+
     Raises
     ------
     WildlabError
@@ -108,7 +112,19 @@ class TrackSummary(NamedTuple):
 
 
 def summarise_track(errors: TrackErrors) -> TrackSummary:
-    """Summary over the rows that have both a truth and an estimate; NaN where there is none."""
+    """One line about a track.
+
+    Parameters
+    ----------
+    errors
+        From `wildlab.evaluation.track_errors.track_errors`: m, m/s and rad, truth minus estimate.
+
+    Returns
+    -------
+    TrackSummary
+        Of the position over the ``n`` rows that have both a truth and an estimate; along, across, speed and
+        course each over the rows where it is known. NaN where there is no row.
+    """
     known = ~(errors.no_truth | errors.no_estimate)
     e = errors.position[known]
     distance = np.hypot(*e.T)

@@ -14,9 +14,20 @@ Array = NDArray[np.float64]
 
 
 def autocorrelation(series: ArrayLike, max_lag: int) -> Array:
-    """Sample autocorrelation of a series (T,) at lags 0..max_lag, mean removed, divided by its lag 0.
+    """Sample autocorrelation of a series, mean removed, divided by its lag 0.
 
-    Returns (max_lag + 1,). NaN for a constant series.
+    Parameters
+    ----------
+    series
+        (T,) at equal intervals, without NaN.
+    max_lag
+        The largest lag, counted in samples.
+
+    Returns
+    -------
+    (max_lag + 1,)
+        At lags 0..max_lag, the first one 1. A constant series has none: NaN, or what rounding in its mean
+        makes of it.
     """
     x = np.asarray(series, float)
     x = x - x.mean()
@@ -28,14 +39,37 @@ def autocorrelation(series: ArrayLike, max_lag: int) -> Array:
 
 
 def white_bound(n: int, level: float = 0.95) -> float:
-    """Magnitude that autocorrelations of ``n`` white samples stay below with probability ``level``, each."""
+    """Magnitude that autocorrelations of white samples stay below with probability ``level``, each.
+
+    Parameters
+    ----------
+    n
+        How many samples they are from; the bound holds where they are many.
+    level
+        Between 0 and 1.
+
+    Returns
+    -------
+    float
+    """
     return float(norm.ppf((1 + level) / 2) / np.sqrt(n))
 
 
 def effective_sample_size(series: ArrayLike, max_lag: int) -> float:
-    """How many independent samples a correlated series (T,) is worth for its mean.
+    """How many independent samples a correlated series is worth for its mean.
 
     ``T / (1 + 2 sum of autocorrelations)``, summed up to the first one that is not positive.
+
+    Parameters
+    ----------
+    series
+        (T,) at equal intervals, without NaN.
+    max_lag
+        The largest lag that is summed, counted in samples.
+
+    Returns
+    -------
+    At most T.
     """
     x = np.asarray(series, float)
     r = autocorrelation(x, max_lag)[1:]
@@ -60,10 +94,21 @@ class Whiteness(NamedTuple):
 
 
 def innovation_whiteness(innovations: ArrayLike, lags: int) -> Whiteness:
-    """The third criterion of H 3.5 for a sequence of innovations (N, m).
+    """The third criterion of H 3.5 for a sequence of innovations.
 
     Rows with NaN (no measurement) are left out, so that lags count measurements. Where the covariances of
     the innovations differ much, whiten them first (`wildlab.evaluation.consistency.whiten`).
+
+    Parameters
+    ----------
+    innovations
+        (N, m), in the measurement's units, angles wrapped.
+    lags
+        How many lags are tested, from 1 on.
+
+    Returns
+    -------
+    Whiteness
 
     Raises
     ------
@@ -91,11 +136,21 @@ def innovation_whiteness(innovations: ArrayLike, lags: int) -> Whiteness:
 
 
 def portmanteau(series: ArrayLike, lags: int) -> tuple[float, float]:
-    """Hosking's statistic over lags 1..``lags`` of a series (T, m), and the probability of a larger one if
-    white.
+    """Hosking's statistic over several lags of a series, and the probability of a larger one if white.
 
     The test of Ljung and Box for several elements at once, correlations between them included; for one
     element it is theirs. Chi-square with ``m^2 lags`` degrees of freedom.
+
+    Parameters
+    ----------
+    series
+        (T, m) at equal intervals, without NaN.
+    lags
+        The statistic is over lags 1..``lags``, counted in samples; fewer than T.
+
+    Returns
+    -------
+    The statistic, and the probability.
     """
     x = np.asarray(series, float)
     x = x - x.mean(axis=0)

@@ -73,19 +73,19 @@ def distances(
     Parameters
     ----------
     expected
-        Prediction of the sensor at the track's predicted position, (..., m).
+        Prediction of the sensor at the track's predicted position, (..., m), in the sensor's units.
     angles
         Which elements are angles, see `Sensor`.
     P
-        (..., n, n) predicted covariance.
+        (..., n, n) predicted covariance; north and east, m, are the first two states.
     detections
-        (..., K, m).
+        (..., K, m), in the sensor's units; NaN where there is none.
     R
-        (m, m), or anything that fits (..., m, m).
+        Noise of a detection, (m, m), or anything that fits (..., m, m): one for all K.
 
     Returns
     -------
-    NaN where the sensor cannot see the target or a detection is NaN.
+    (..., K), NaN where the sensor cannot see the target or a detection is NaN.
     """
     z, P = np.asarray(detections, float), np.asarray(P, float)
     H = on_state(expected.H_position, P.shape[-1])
@@ -104,7 +104,7 @@ def nearest_within(nis: ArrayLike, gate_probability: float, m: int) -> NDArray[n
     Parameters
     ----------
     nis
-        (..., K), NaN where there is nothing to compare.
+        (..., K), K at least one; NaN where there is nothing to compare.
     gate_probability
         Probability that the target's own measurement is let in, in (0, 1]; 1 is no gate.
     m

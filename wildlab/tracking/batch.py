@@ -69,9 +69,10 @@ def run_batch(
     times
         (N,) s, in order.
     measurements
-        (B, N, 2); rows of NaN are frames without a detection.
+        (B, N, 2) positions north, east in n, m, or with ``view`` pixels u, v; rows of NaN are frames without
+        a detection.
     R
-        (2, 2), (N, 2, 2) or (B, N, 2, 2).
+        (2, 2), (N, 2, 2) or (B, N, 2, 2), in m^2 or pixels squared.
     motion
         A model with four states.
     start
@@ -79,17 +80,23 @@ def run_batch(
     view
         The camera; None: the measurements are positions.
     pose
-        Its covariance is (N, 6, 6) or (B, N, 6, 6).
+        Uncertainty of the poses; its covariance is (N, 6, 6) or (B, N, 6, 6), m and rad. None: poses are
+        taken as true.
     gate_probability
         As in `wildlab.tracking.run.run_filter`.
     rows
         (M,) the rows after which estimates are kept; all when not given. Long flights of many runs fill the
         memory with covariances, and writing them takes as long as computing them.
 
+    Returns
+    -------
+    BatchTracks
+        Estimates of each run after the kept rows, innovation and NIS of all rows.
+
     Raises
     ------
     WildlabError
-        As `run_filter`; and for a camera that distorts.
+        As `run_filter`; and for measurements that are not (B, N, 2), or a camera that distorts.
     """
     z = np.asarray(measurements, float)
     R = np.asarray(R, float)

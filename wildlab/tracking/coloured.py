@@ -70,16 +70,34 @@ def run_coloured(
 
     Parameters
     ----------
+    times
+        (N,) s, in order.
     positions
-        (N, 2) north, east.
+        (N, 2) north, east in n, m; rows of NaN are frames without a detection.
     R_w
-        (2, 2) or (N, 2, 2): of the noise that drives the correlated one, H (7.5).
+        (2, 2) or (N, 2, 2), m^2: of the noise that drives the correlated one, H (7.5).
+    motion
+        From `wildlab.tracking.motion`, of n states.
+    start
+        ``x`` (n,) and ``P`` (n, n). Its row is the first measurement of a difference.
     F_c
-        (2, 2), the correlated noise's transition from one measurement to the next; identity in H.
+        (2, 2), the correlated noise's transition from one measurement to the next; identity in H, and where
+        it is left out.
     longest_gap
         s, H 7.2.2.
-    times, motion, start, gate_probability, output_times
-        As in `wildlab.tracking.run.run_filter`; the start's row is the first measurement of a difference.
+    gate_probability
+        Probability that the target's own difference is let in, H (3.9), in (0, 1]; 1 is no gate.
+    output_times
+        (M,) s, in order; the measurements' own when not given.
+
+    Returns
+    -------
+    Track
+
+    Raises
+    ------
+    WildlabError
+        As `wildlab.tracking.run.run_filter`; and for several detections in a frame.
     """
     given = checked(times, positions, R_w, gate_probability, output_times)
     check_start(start)
@@ -126,10 +144,22 @@ def run_coloured(
 
 
 def thin(times: ArrayLike, interval: float, usable: ArrayLike | None = None) -> NDArray[np.bool_]:
-    """Which of N measurements, in order of time, to keep so that no two are closer than ``interval`` (s).
+    """Which of N measurements, in order of time, to keep so that no two are closer than ``interval``.
 
-    The first is kept, then the first at least ``interval`` after the last kept. Rows that are not ``usable``
-    (N,) are neither kept nor counted.
+    The first is kept, then the first at least ``interval`` after the last kept.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order. Rows without a time are not kept.
+    interval
+        s.
+    usable
+        (N,) bool: rows that are not are neither kept nor counted. All are when it is left out.
+
+    Returns
+    -------
+    (N,) bool: the rows to keep.
     """
     t = np.asarray(times, float)
     ready = np.isfinite(t) if usable is None else np.isfinite(t) & np.asarray(usable, bool)

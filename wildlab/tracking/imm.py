@@ -94,21 +94,40 @@ def run_imm(
 ) -> ModeTrack:
     """Interacting multiple models over extended filters, H 3.2.3.
 
+    All models start alike and equally probable. Innovation, ``S`` and NIS are the mixture's.
+
     Parameters
     ----------
+    times
+        (N,) s, in order.
+    measurements
+        (N, m) in the sensor's units; rows of NaN are frames without a detection.
+    R
+        (m, m) or (N, m, m), in the sensor's units squared.
+    sensor
+        From `wildlab.tracking.measurement`, with a pose for each row.
     motions
-        K >= 2 models of the same states.
+        K >= 2 models of the same n states.
     mean_stay
         (K,) s that each lasts on average; it is left for each of the others alike. The probabilities of
         switching over a step follow from it for any step.
-    times, measurements, R, sensor, start, gate_probability, output_times
-        As in `wildlab.tracking.run.run_filter`, (N, m) measurements. All models start alike and equally
-        probable. Innovation, ``S`` and NIS are the mixture's.
+    start
+        ``x`` (n,) and ``P`` (n, n), see `wildlab.tracking.run.Start`.
+    gate_probability
+        Probability that the target's own measurement is let in, H (3.9), in (0, 1]; 1 is no gate.
+    output_times
+        (M,) s, in order; the measurements' own when not given.
+
+    Returns
+    -------
+    ModeTrack
+        The mixture's track, and how probable each model was after each row.
 
     Raises
     ------
     WildlabError
-        As `run_filter`; fewer than two models, or not one ``mean_stay`` above zero for each.
+        As `wildlab.tracking.run.run_filter`; several detections in a frame; fewer than two models, or not
+        one ``mean_stay`` above zero for each.
     """
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)

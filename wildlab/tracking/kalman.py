@@ -73,9 +73,14 @@ def filter_at_rest(measurements: ArrayLike, R: ArrayLike) -> Filtered:
     Parameters
     ----------
     measurements
-        (T, m) positions in order of time.
+        (T, m) positions in order of time, m; rows with NaN are not used.
     R
-        (T, m, m) their covariances.
+        (T, m, m) their covariances, m^2; rows with NaN are not used either.
+
+    Returns
+    -------
+    Filtered
+        Estimates and covariances after each row, NaN before the first used.
     """
     z, R = np.asarray(measurements, float), np.asarray(R, float)
     T, m = z.shape

@@ -165,7 +165,13 @@ def predict_range_bearing(position: ArrayLike, platform: ArrayLike, yaw: ArrayLi
 
 
 def positions() -> Sensor:
-    """Georeferenced positions (north, east), H (6.3). They have no pose left that could be wrong."""
+    """Georeferenced positions (north, east), H (6.3). They have no pose left that could be wrong.
+
+    Returns
+    -------
+    Sensor
+        Of (2,) metres in n, for any number of rows.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
         return Prediction(np.array(position, float), np.eye(2), np.zeros((2, 6)))
@@ -200,7 +206,20 @@ def _platform_rows(platform: ArrayLike, yaw: ArrayLike) -> int | None:
 
 
 def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
-    """Pixels (u, v) of a target on the plane (scalar or (N,) down coordinate), one pose per row.
+    """Pixels (u, v) of a target on a horizontal plane, H (6.4).
+
+    Parameters
+    ----------
+    poses
+        Of the camera, one for each of N rows, or one for all.
+    plane_down
+        Down coordinate in n of the plane that the target is on, m: a scalar, or (N,).
+
+    Returns
+    -------
+    Sensor
+        Of (2,) pixels, NaN for a target that is not in front of the camera; for N rows, or for any number
+        where pose and plane are the same for all.
 
     Raises
     ------
@@ -215,7 +234,29 @@ def pixels(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
 
 
 def azimuths_elevations(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
-    """Azimuth and elevation in c (radians), as `azimuth_elevation_of_pixel` gives them; else as `pixels`."""
+    """Azimuth and elevation in c of a target on a horizontal plane, H (6.9).
+
+    Measurements for it come from `wildlab.tracking.measurement.azimuth_elevation_of_pixel`.
+
+    Parameters
+    ----------
+    poses
+        Of the camera, one for each of N rows, or one for all.
+    plane_down
+        Down coordinate in n of the plane that the target is on, m: a scalar, or (N,).
+
+    Returns
+    -------
+    Sensor
+        Of (2,) azimuth and elevation, rad, NaN for a target that is not in front of the camera or lies on
+        its axis; for N rows, or for any number where pose and plane are the same for all. Differences of the
+        azimuth are wrapped.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of planes than of poses.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
         return predict_azimuth_elevation(position, poses.take(row), _row(plane_down, row, 0))
@@ -224,7 +265,27 @@ def azimuths_elevations(poses: CameraPoses, plane_down: ArrayLike) -> Sensor:
 
 
 def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
-    """Range and bearing from a platform at (N, 2) north, east with (N,) yaw."""
+    """Range and bearing of a target, seen from a level platform.
+
+    Parameters
+    ----------
+    platform
+        (N, 2) north, east of the sensor in n, m; or (2,) for all rows.
+    yaw
+        (N,) or a scalar: of the platform, rad clockwise from north; zero where bearings are measured from
+        north.
+
+    Returns
+    -------
+    Sensor
+        Of (2,) range, m, and bearing, rad clockwise from the bow; NaN at zero range. For N rows, or for any
+        number where position and yaw are the same for all. Differences of the bearing are wrapped.
+
+    Raises
+    ------
+    WildlabError
+        Where both have rows, and not equally many.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
         return predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))
@@ -233,7 +294,26 @@ def ranges_bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
 
 
 def bearings(platform: ArrayLike, yaw: ArrayLike) -> Sensor:
-    """Bearing alone, (N, 1), from a platform at (N, 2) north, east with (N,) yaw."""
+    """Bearing alone of a target, seen from a level platform.
+
+    Parameters
+    ----------
+    platform
+        (N, 2) north, east of the sensor in n, m; or (2,) for all rows.
+    yaw
+        (N,) or a scalar: of the platform, rad clockwise from north; zero where bearings are measured from
+        north.
+
+    Returns
+    -------
+    Sensor
+        Of (1,) bearing, as `ranges_bearings`; measurements for it are (N, 1).
+
+    Raises
+    ------
+    WildlabError
+        Where both have rows, and not equally many.
+    """
 
     def predict(row: int, position: Array) -> Prediction:
         both = predict_range_bearing(position, _row(platform, row, 1), _row(yaw, row, 0))

@@ -37,7 +37,23 @@ def _both(axis: Array) -> Array:
 
 
 def rest(dt: float) -> tuple[Array, Array]:
-    """A target that does not move, state ``[pN, pE]`` (H 5.6.1)."""
+    """A target that does not move, state ``[pN, pE]`` (H 5.6.1).
+
+    Parameters
+    ----------
+    dt
+        s.
+
+    Returns
+    -------
+    F, Q
+        (2, 2) each, the identity and zero.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
+    """
     _check_step(dt)
     return np.eye(2), np.zeros((2, 2))
 
@@ -45,15 +61,49 @@ def rest(dt: float) -> tuple[Array, Array]:
 def random_walk(dt: float, density: float) -> tuple[Array, Array]:
     """Position driven by white velocity, state ``[pN, pE]``: ``Q = density^2 dt``.
 
-    ``density`` in m/sqrt(s): the standard deviation that grows in a second. The random walk that F 4.1.2
-    means, for any step.
+    The random walk that F 4.1.2 means, for any step.
+
+    Parameters
+    ----------
+    dt
+        s.
+    density
+        m/sqrt(s): the standard deviation that grows in a second, the same north and east.
+
+    Returns
+    -------
+    F, Q
+        (2, 2) each, ``Q`` in m^2.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
     """
     _check_step(dt)
     return np.eye(2), density**2 * dt * np.eye(2)
 
 
 def constant_position(dt: float, sd_velocity: float) -> tuple[Array, Array]:
-    """F (4.5): a velocity (m/s) drawn anew for each step and held over it, state ``[pN, pE]``."""
+    """F (4.5): a velocity (m/s) drawn anew for each step and held over it, state ``[pN, pE]``.
+
+    Parameters
+    ----------
+    dt
+        s.
+    sd_velocity
+        Standard deviation of that velocity, m/s, the same north and east.
+
+    Returns
+    -------
+    F, Q
+        (2, 2) each, ``Q`` in m^2.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
+    """
     _check_step(dt)
     return np.eye(2), (sd_velocity * dt) ** 2 * np.eye(2)
 
@@ -62,6 +112,23 @@ def constant_velocity(dt: float, sd_acceleration: float) -> tuple[Array, Array]:
     """H (6.1)-(6.2): an acceleration (m/s^2) drawn anew for each step and held over it.
 
     State ``[pN, pE, vN, vE]``. ``Q`` has rank two.
+
+    Parameters
+    ----------
+    dt
+        s.
+    sd_acceleration
+        Standard deviation of that acceleration, m/s^2, the same north and east.
+
+    Returns
+    -------
+    F, Q
+        (4, 4) each, in m and s.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
     """
     _check_step(dt)
     gamma = np.array([dt * dt / 2, dt])
@@ -94,9 +161,19 @@ def singer(dt: float, alpha: float, variance: float, printed: bool = False) -> t
     alpha
         Inverse of the manoeuvre's time constant, 1/s; zero is constant acceleration without noise.
     variance
-        Stationary variance of the acceleration, see `singer_variance`.
+        Stationary variance of the acceleration, (m/s^2)^2, see `singer_variance`.
     printed
         Use the ``Q`` printed as H (7.4), the limit for small ``alpha dt``, instead of the exact one.
+
+    Returns
+    -------
+    F, Q
+        (6, 6) each, in m and s.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite.
     """
     _check_step(dt)
     # In units of the step (T^2, T, 1) all numbers are near one, and only a = alpha T is left of the model.
@@ -126,6 +203,25 @@ def in_steps(dt: float, motion: Motion, longest: float) -> tuple[Array, Array]:
 
     For models that hold their noise over a step, where the measurements pause: what the filter would have
     got to by predicting at the camera's rate.
+
+    Parameters
+    ----------
+    dt
+        The whole step, s.
+    motion
+        The model that is asked for one of the equal steps.
+    longest
+        s, above zero.
+
+    Returns
+    -------
+    F, Q
+        (n, n) each, over the whole step, in the order and units of ``motion``.
+
+    Raises
+    ------
+    WildlabError
+        For a step that is negative or not finite, or a ``longest`` that is not above zero.
     """
     _check_step(dt)
     if not longest > 0:

@@ -105,11 +105,19 @@ def start_from_first(
     times
         (N,) s.
     positions
-        (N, 2) or (N, 3): north, east; the first row without NaN is taken.
+        (N, 2) or (N, 3): north, east in n, m, and what is not looked at; the first row with a time and
+        without NaN is taken.
     sd_position, sd_velocity
         m and m/s, the same north and east.
     n
-        Number of states: 2, 4 or 6; with six, give ``sd_acceleration`` (m/s^2) too.
+        Number of states: 2, 4 or 6.
+    more
+        ``sd_acceleration``, m/s^2, with six states; zero where it is left out. No other name is looked at.
+
+    Returns
+    -------
+    Start
+        At the time of that row, which is not used again, with a diagonal ``P`` (n, n).
 
     Raises
     ------
@@ -152,10 +160,11 @@ def run_filter(
     times
         (N,) s, in order. Equal times are two measurements at once, and both are used.
     measurements
-        (N, m); or (N, K, m) with up to K detections in a frame, NaN where there are fewer: the nearest by
-        NIS is used. Rows of NaN are frames without a detection.
+        (N, m) in the sensor's units; or (N, K, m) with up to K detections in a frame, NaN where there are
+        fewer: the nearest by NIS is used. Rows of NaN are frames without a detection.
     R
-        (m, m), (N, m, m) or (N, K, m, m).
+        (m, m), (N, m, m) or (N, K, m, m), in the sensor's units squared. A measurement whose ``R`` has NaN is
+        not used.
     sensor
         From `wildlab.tracking.measurement`, with a pose for each row.
     motion
@@ -173,13 +182,14 @@ def run_filter(
     Returns
     -------
     Track
+        Estimates at ``output_times``, and innovation, ``S`` and NIS of every row.
 
     Raises
     ------
     WildlabError
-        Naming field and row: times out of order, an ``R`` or an ``S`` that is not positive definite, a start
-        that is not finite or whose ``P`` is no covariance, poses of another length than the measurements, a
-        ``gate_probability`` outside (0, 1].
+        Naming field and row: shapes that do not fit each other, times missing or out of order, an ``R`` or
+        an ``S`` that is not positive definite, a start that is not finite or whose ``P`` is no covariance,
+        poses of another length than the measurements, a ``gate_probability`` outside (0, 1].
 
     Examples
     --------

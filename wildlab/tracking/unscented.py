@@ -38,12 +38,45 @@ def run_unscented(
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
-    """Unscented Kalman filter; arguments and result as for `wildlab.tracking.run.run_filter`, (N, m) only.
+    """Unscented Kalman filter, on one detection per row.
 
     Sigma points at ``sqrt(n)`` standard deviations, all of one weight and none in the middle (alpha 1, beta
     0, kappa 0: the cubature rule). No weight is negative, so no covariance can be; a larger beta is for
     points close to the middle, and would count the bend twice here. A row is left out when any point is
     behind the camera.
+
+    Parameters
+    ----------
+    times
+        (N,) s, in order.
+    measurements
+        (N, m) in the sensor's units; rows of NaN are frames without a detection.
+    R
+        (m, m) or (N, m, m), in the sensor's units squared.
+    sensor
+        From `wildlab.tracking.measurement`, with a pose for each row.
+    motion
+        From `wildlab.tracking.motion`, of n states.
+    start
+        ``x`` (n,) and ``P`` (n, n), which must be positive definite: sigma points need its root.
+    gate_probability
+        Probability that the target's own measurement is let in, H (3.9), in (0, 1]; 1 is no gate.
+    output_times
+        (M,) s, in order; the measurements' own when not given.
+
+    Returns
+    -------
+    Track
+
+    Raises
+    ------
+    WildlabError
+        Naming field and row: shapes that do not fit each other, times missing or out of order, several
+        detections in a frame, an ``R`` that is not positive definite, a start that is not finite or whose
+        ``P`` is no covariance, poses of another length than the measurements, a ``gate_probability`` outside
+        (0, 1].
+    numpy.linalg.LinAlgError
+        For a covariance that is not positive definite: a start without variance in some direction.
     """
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)
