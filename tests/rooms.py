@@ -20,15 +20,13 @@ LAZY = (
 #: Rooms whose names are all documented, with parameters, what comes back, and an example where one helps.
 DOCUMENTED = (
     *LAZY,
+    *("wildlab.geometry", "wildlab.navigation", "wildlab.simulation"),
     *("wildlab.tracking", "wildlab.evaluation"),
 )
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (
     *DOCUMENTED,
     "wildlab.api",
-    "wildlab.geometry",
-    "wildlab.navigation",
-    "wildlab.simulation",
 )
 
 
