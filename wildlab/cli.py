@@ -69,6 +69,7 @@ def list_(out: Path | None, as_json: bool) -> None:
     Example:
       wildlab list
     """
+    from wildlab.flight.catalog import is_fetched
     from wildlab.reporting.status import REPRODUCED
     from wildlab.runner.catalogue import load_studies
     from wildlab.runner.status import as_plain, study_status
@@ -79,10 +80,23 @@ def list_(out: Path | None, as_json: bool) -> None:
         return
     rows = []
     for one in statuses:
-        numbers = f"{one.count(REPRODUCED)} of {len(one.numbers)}" if one.numbers else "-"
+        done, data = one.state == "done", one.study.dataset
         holding = sum(claim.verdict == "holds" for claim in one.claims)
-        claims = f"{holding} of {len(one.claims)}" if one.claims else "-"
-        rows.append([one.study.name, one.study.kind, one.state, numbers, claims, one.study.title])
+        # What has not been run has neither come out nor failed to.
+        numbers = f"{one.count(REPRODUCED)} of {len(one.numbers)}" if done else f"{len(one.numbers)} printed"
+        claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} printed"
+        first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
+        state = f"{one.state}{first}"
+        rows.append(
+            [
+                one.study.name,
+                one.study.kind,
+                state,
+                numbers if one.numbers else "-",
+                claims if one.claims else "-",
+                one.study.title,
+            ]
+        )
     print_table(["study", "kind", "state", "reproduced", "claims hold", "question"], rows)
 
 
@@ -257,6 +271,7 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
 
     import_flight(recipe, source, into, overwrite=overwrite)
     click.echo(shown(into))
+    click.echo(f'Next: wildlab check "{shown(into)}"', err=True)
 
 
 @wildlab.command()

@@ -72,7 +72,10 @@ def test_runs_of_a_slow_study_are_fewer_as_it_says(tmp_path: Path) -> None:
 def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path: Path) -> None:
     assert jobs(tmp_path, "sensitivity", "consistency-bounds")[1] == {}
     look = make_job(STUDIES["static-point"], reports=tmp_path, seeds=7, first_look=True)
-    assert look.first_look == {} and look.parameters["seeds"] == 7
+    assert look.first_look == {"seeds": (7, 100)} and look.parameters["seeds"] == 7
+    assert look.again == "wildlab run static-point", "which gives the full numbers"
+    for enough in (100, 101):
+        assert make_job(STUDIES["static-point"], reports=tmp_path, seeds=enough).first_look == {}
 
 
 def test_first_looks_in_words() -> None:

@@ -296,7 +296,29 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
     assert "<b>1 / 1</b><span>claims hold</span>" in whole and "first look</span>" not in whole
 
 
-@pytest.mark.parametrize("said", [[1], {"seeds": 5}, {"seeds": [5]}, {"seeds": ["<b>", 1]}, "5", None])
-def test_nonsense_about_a_first_look_does_not_stop_the_ledger(tmp_path: Path, said: Any) -> None:
+@pytest.mark.parametrize("said", [[1], {"seeds": 5}, {"seeds": [5]}, {"seeds": ["<b>", 1]}, "5", True])
+def test_nonsense_about_a_first_look_counts_as_no_full_report(tmp_path: Path, said: Any) -> None:
     first_look(tmp_path, first_look=said)
+    assert study_status(a_study(), tmp_path).state == "broken off"
+    first_look(tmp_path, first_look=None)
     assert study_status(a_study(), tmp_path).state == "done"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("metrics.json", '"study": "s"', '"study": "other"'),
+        ("metrics.json", '"seeds": 5', '"seeds": "5"'),
+        ("metrics.json", '"seeds": 5', '"seeds": -5'),
+        ("metrics.json", "", "[" * 100_000),
+        ("status.json", "", "[" * 100_000),
+    ],
+)
+def test_a_damaged_report_is_one_to_be_run_again(tmp_path: Path, name: str, old: str, new: str) -> None:
+    first_look(tmp_path, first_look={})
+    (path,) = tmp_path.rglob(name)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new) if old else new, encoding="utf-8")
+    one = study_status(a_study(), tmp_path)
+    assert one.state == "broken off" and "broken off" in ledger_page([one])

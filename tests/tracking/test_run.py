@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.tracking.poses import CAMERA, overflight, turned
 from wildlab.errors import WildlabError
@@ -262,3 +263,15 @@ def test_covariance_stays_one_over_a_hundred_thousand_updates():
     track = run_filter(times, rng.normal(0, 1, (n, 2)), 1e-4 * R2, m.positions(), CV, START)
     assert np.array_equal(track.P, np.swapaxes(track.P, 1, 2))
     assert np.linalg.eigvalsh(track.P).min() > 0
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.95, 0.999])
+def test_the_gate_stands_at_the_chi_square_of_its_probability(probability):
+    """A measurement a hair inside is used and one a hair outside is not; 1 lets everything in."""
+    start = Start(0.0, np.zeros(2), np.eye(2))
+    limit = chi2.ppf(probability, 2)
+    for factor, given, used in ((0.999, probability, True), (1.001, probability, False), (9.0, 1.0, True)):
+        z = np.array([[np.sqrt(2.0 * limit * factor), 0.0]])  # S is two: one of the start, one of R
+        track = run_filter([0.0], z, np.eye(2), m.positions(), rest, start, gate_probability=given)
+        assert track.nis[0] == pytest.approx(limit * factor)
+        assert bool(track.used[0]) is used

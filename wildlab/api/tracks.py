@@ -30,6 +30,10 @@ from wildlab.tracking.run import Track
 Method = Literal["mekf", "observer"]
 
 
+#: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
+FEW_INDEPENDENT = 30.0
+
+
 @dataclass(frozen=True, repr=False)
 class Navigation(Brief):
     """Poses from inertial samples and satellite positions.
@@ -171,7 +175,8 @@ class Tracked(Brief):
         ]
         if self.scored is not None:
             n = self.scored.numbers
-            rows.append(("distance from the truth", f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS"))
+            far = f"{n['mae']:.2f} m mean, {n['rmse']:.2f} m RMS, with or without a detection"
+            rows.append(("distance from the truth", far))
             rows.append(("mean NEES and NIS", f"{n['nees']:.2f} and {n['nis']:.2f} (see consistency)"))
         return Summary(f"Track on {self.flight.name}", rows)
 
@@ -281,6 +286,8 @@ class Consistency(Brief):
         rows = []
         for name, a in self.means.items():
             verdict = "consistent" if a.inside else "overconfident" if a.mean > a.high else "too cautious"
+            if not a.inside and a.worth < FEW_INDEPENDENT:
+                verdict += ", but on few independent values"
             count = f"{a.n}, worth {a.worth:.0f}"
             dof = str(self.series[name][0].dof)
             rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, verdict))
@@ -293,8 +300,9 @@ def consistency(*results: Tracked | Navigation) -> Consistency:
 
     Of a track: the NEES of its position (two degrees of freedom) and the NIS of its detections (two). Of a
     navigation: the NEES of position, velocity and attitude (three each) in that part of the flight which
-    counts. Values of one run are correlated, so each run counts as what its values are worth; an interval is
-    never narrower than they allow.
+    counts. Values of one run are correlated, so each run counts as what its values are worth. That is an
+    estimate from the same values: where it is below `FEW_INDEPENDENT`, an honest filter's mean falls outside
+    of the interval not in 5 % of cases but in 10 to 30 %, and the verdict says so. More runs help.
 
     Parameters
     ----------

@@ -297,7 +297,7 @@ def _refuse(target: Path, overwrite: bool) -> None:
             file=target,
         )
     if there and not overwrite:
-        fix = "choose another folder, or ask to overwrite it"
+        fix = "choose another folder, or overwrite it (--overwrite; in Python overwrite=True)"
         raise WildlabError("there is a flight in this folder already", fix, file=target)
     known = {FILE_NAME, TERRAIN, *(f"{name}.parquet" for name in TABLES)}
     for name in there:

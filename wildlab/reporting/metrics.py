@@ -185,6 +185,9 @@ def document(
     """The whole content of ``metrics.json``; a name and subject, or a claim, that comes twice is an error."""
     if kind not in KINDS:
         raise WildlabError(f"the kind {kind!r} is unknown", f"use one of: {', '.join(KINDS)}", field="kind")
+    for field, number in (("seed", seed), ("seeds", seeds)):
+        if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 0):
+            raise WildlabError(f"{field} is {number!r}", "give a whole number, or None", field=field)
     metrics, claims = list(metrics), list(claims)
     seen: set[tuple[str, ...]] = set()
     for key in [(m["name"], m["subject"]) for m in metrics] + [(c["id"],) for c in claims]:
@@ -235,7 +238,7 @@ def read_metrics(path: Path) -> dict[str, Any]:
             metrics=[metric(**entry) for entry in raw["metrics"]],
             claims=[claim(**entry) for entry in raw["claims"]],
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise WildlabError(
             f"this is not a metrics file ({type(error).__name__}: {error})", "run the study again", file=path
         ) from error

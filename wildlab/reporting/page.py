@@ -143,8 +143,8 @@ def first_look_notice(look: str, again: str) -> str:
         What to type for the full numbers.
     """
     return (
-        f'<p class="look"><span class="pill part">first look</span> {escape(look)}. The full numbers follow, '
-        f"as long as <code>make reports</code> runs; or type <code>{escape(again)}</code>.</p>"
+        f'<p class="look"><span class="pill part">first look</span> {escape(look)}. '
+        f"For the full numbers: <code>make reports</code>, or <code>{escape(again)}</code>.</p>"
     )
 
 

@@ -162,7 +162,9 @@ def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
     """
     if name in studies:
         return studies[name]
-    near = difflib.get_close_matches(name, studies, n=1)
+    alike = [known for known in studies if name and name in known]
+    near = alike or difflib.get_close_matches(name, studies, n=1)
+    words = " or ".join(repr(known) for known in near)
     raise WildlabError(
-        f"there is no study {name!r}", f"did you mean {near[0]!r}" if near else "see: wildlab list"
+        f"there is no study {name!r}", f"did you mean {words}?" if near else "see: wildlab list"
     )

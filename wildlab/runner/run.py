@@ -56,7 +56,8 @@ def make_job(
     again
         What to type to run it again, where that is not `wildlab run STUDY`.
     first_look
-        With no more flights and runs than a first look takes; the job says so in its ``first_look``.
+        With no more flights and runs than a first look takes; the job says so in its ``first_look``, as it
+        does where ``seeds`` are fewer than the study's own.
 
     Raises
     ------
@@ -66,10 +67,14 @@ def make_job(
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
     again = again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}")
+    reductions = study.reductions() if first_look and seeds is None else {}
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
-        again += "" if seeds is None else f" --seeds {seeds}"
-    reductions = study.reductions() if first_look and seeds is None else {}
+        if seeds is not None and seeds < study.seeds:
+            # Whoever asks for fewer flights gets a first look as well: the page and the ledger say so.
+            reductions = {"seeds": (seeds, study.seeds)}
+        else:
+            again += "" if seeds is None else f" --seeds {seeds}"
     parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])

@@ -32,7 +32,10 @@ def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> 
         try:
             metrics = read_metrics(folder / "metrics.json")
         except WildlabError:
-            state, reason = "broken off", ""
+            metrics = None
+        # What cannot be read, or is of another study, must not count as this one's full numbers.
+        if metrics is None or metrics["study"] != study.name or (status.get("first_look") and not look):
+            state, reason, metrics = "broken off", "", None
     if state == "done" and look:
         state = FIRST_LOOK
     return StudyStatus(
@@ -75,9 +78,9 @@ def _status(folder: Path) -> dict[str, Any]:
     try:
         status = json.loads(path.read_text(encoding="utf-8"))
         seconds = status.get("seconds")
-        if status["state"] not in ("done", "failed") or not isinstance(seconds, (int, float)):
+        if status["state"] not in ("done", "failed") or not math.isfinite(seconds):
             raise ValueError
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {"state": "broken off"}
     return dict(status)
 

@@ -38,7 +38,7 @@ LIMITS = [
 
 
 def summary(spread: pd.DataFrame) -> list[str]:
-    """Three sentences on what `wildlab.studies.slow_vessel.trial.fly` gives, one row for each flight."""
+    """Three sentences on what `wildlab.studies.slow_vessel.trial.trial` gives, one row for each flight."""
     middle = spread.median()
     reference, track = middle["reference", "mae"], middle["filter", "mean"]
     images = middle["observer", "mae"]
