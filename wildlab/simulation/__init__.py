@@ -82,4 +82,5 @@ def __getattr__(name: str) -> object:
     """A public name from where it stands: a table of parameters does not wait for compiled code to load."""
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)
+    found = globals()[name] = getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)
+    return found  # the next time it is simply there
