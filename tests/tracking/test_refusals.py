@@ -114,20 +114,20 @@ def test_a_pose_for_each_measurement():
         m.ranges_bearings(np.zeros((N + 1, 2)), np.zeros(N + 1)),
         positions_from(np.ones((N + 1, 2)), np.zeros((N + 1, 2))),
     ):
-        with pytest.raises(WildlabError, match=r"^poses of the sensor: 6 rows for 5 rows of measurements"):
+        with pytest.raises(WildlabError, match=r"^sensor: 6 rows for 5 rows of measurements"):
             run_filter(TIMES, Z, R, sensor, CV, START)
     for sensor in (
         m.bearings(np.zeros((N - 1, 2)), np.zeros(N - 1)),
         bearings_from(np.ones((N - 1, 2)), np.zeros((N - 1, 2))),
     ):
-        with pytest.raises(WildlabError, match=r"^poses of the sensor: 4 rows for 5 rows of measurements"):
+        with pytest.raises(WildlabError, match=r"^sensor: 4 rows for 5 rows of measurements"):
             run_filter(TIMES, Z[:, :1], R[:1, :1], sensor, CV, START)
     sensor = m.pixels(poses, 0.0)
     for run in (
         lambda: run_unscented(TIMES, Z, R, sensor, CV, START),
         lambda: run_imm(TIMES, Z, R, sensor, [CV, CV], [5.0, 5.0], START),
     ):
-        with pytest.raises(WildlabError, match=r"^poses of the sensor: 6 rows"):
+        with pytest.raises(WildlabError, match=r"^sensor: 6 rows"):
             run()
 
 

@@ -131,7 +131,7 @@ def run_imm(
     """
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)
-    check_rows(sensor.rows, len(given.times), "poses of the sensor")
+    check_rows(sensor.rows, len(given.times), "sensor")
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(

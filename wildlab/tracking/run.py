@@ -205,7 +205,7 @@ def run_filter(
     """
     given = checked(times, measurements, R, gate_probability, output_times)
     check_start(start)
-    check_rows(sensor.rows, len(given.times), "poses of the sensor")
+    check_rows(sensor.rows, len(given.times), "sensor")
     if pose is not None and np.shape(pose.covariance) != (len(given.times), 6, 6):
         raise WildlabError(
             f"shape {np.shape(pose.covariance)} for {len(given.times)} rows of measurements",

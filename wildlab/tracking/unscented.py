@@ -80,7 +80,7 @@ def run_unscented(
     """
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)
-    check_rows(sensor.rows, len(given.times), "poses of the sensor")
+    check_rows(sensor.rows, len(given.times), "sensor")
     n, m = len(start.x), given.z.shape[2]
     angles = np.array(sensor.angles)
 
