@@ -72,7 +72,7 @@ def list_(out: Path | None, as_json: bool) -> None:
     from wildlab.flight.catalog import is_fetched
     from wildlab.reporting.status import REPRODUCED
     from wildlab.runner.catalogue import load_studies
-    from wildlab.runner.status import as_plain, study_status
+    from wildlab.runner.record.status import as_plain, study_status
 
     statuses = [study_status(study, _reports(out)) for study in load_studies().values()]
     if as_json:

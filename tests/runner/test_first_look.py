@@ -20,15 +20,16 @@ from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.page import first_look_notice
+from wildlab.reporting.status import look_words
 from wildlab.runner import run as running
 from wildlab.runner.catalogue import FIRST_LOOK_SEEDS, load_studies
 from wildlab.runner.first_look import THERE, has_whole_report, plan_passes, quick_first
-from wildlab.runner.job import Job, look_words
-from wildlab.runner.progress import Tally, shown
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.progress import Tally, shown
+from wildlab.runner.processes.scheduling import Outcome, _Scheduler, _waiting
+from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool, _ToRunner
 from wildlab.runner.run import make_job, run_studies
-from wildlab.runner.scheduling import Outcome, _Scheduler, _waiting
-from wildlab.runner.seeds import SeedWork, read_seed, write_seed
-from wildlab.runner.worker_pool import SeedResult, WorkerPool, _ToRunner
+from wildlab.runner.seeds.kept import SeedWork, read_seed, write_seed
 
 STUDIES = load_studies(NOTEBOOKS / "studies.toml")
 

@@ -248,7 +248,7 @@ def test_a_flight_of_the_readers_own_stands_alone(tmp_path: Path, make_flight: C
 
 
 def test_provenance_names_every_flight(tmp_path: Path, make_flight: Callable[..., Flight]) -> None:
-    from wildlab.runner import provenance
+    from wildlab.runner.record import provenance
 
     for name in ("first", "second"):
         save_flight(make_flight(name=name), tmp_path / name)

@@ -14,8 +14,8 @@ from wildlab.reporting import html, metrics
 from wildlab.reporting.ledger import ledger_page, strip
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
-from wildlab.runner.front_page import build_ledger
-from wildlab.runner.status import as_plain, study_status
+from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.record.status import as_plain, study_status
 
 PUBLISHED = """
 [[number]]

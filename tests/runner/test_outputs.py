@@ -21,9 +21,10 @@ from wildlab.files import write_atomic, write_json
 from wildlab.paths import ROOT
 from wildlab.reporting import privacy
 from wildlab.reporting.failure import step_of
-from wildlab.runner import outputs, provenance
 from wildlab.runner.catalogue import STANDARD_PARAMETERS
 from wildlab.runner.notebooks import check_notebook, plain_parameters
+from wildlab.runner.processes import outputs
+from wildlab.runner.record import provenance
 
 DONE = {"study": "s", "state": "done", "reason": "", "seconds": 1.0}
 

@@ -18,7 +18,7 @@ from rich.console import Console
 from tests.notebooks import OPEN, notebook, write
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.processes import socket_folder
+from wildlab.runner.processes.ending import socket_folder
 from wildlab.runner.run import Outcome, run_studies
 
 pytestmark = pytest.mark.slow

@@ -18,12 +18,14 @@ from rich.console import Console
 
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.paths import NOTEBOOKS
-from wildlab.runner import cluster, fingerprint
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.progress import shown
+from wildlab.runner.processes import cluster
+from wildlab.runner.processes.progress import shown
+from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.processes.worker_pool import WorkerPool, answer
 from wildlab.runner.run import _notes
-from wildlab.runner.scheduling import Outcome
-from wildlab.runner.seeds import (
+from wildlab.runner.seeds import fingerprint
+from wildlab.runner.seeds.kept import (
     SeedWork,
     failed_seeds,
     make_work,
@@ -34,7 +36,6 @@ from wildlab.runner.seeds import (
     write_seed,
 )
 from wildlab.runner.trials import trials_table
-from wildlab.runner.worker_pool import WorkerPool, answer
 from wildlab.studies import protocol
 
 PARAMETERS = {"twin": "static-antenna", "not its own": 3}

@@ -153,7 +153,7 @@ def report_page(
     Parameters
     ----------
     footer
-        HTML of the provenance line (`wildlab.runner.provenance.footer`).
+        HTML of the provenance line (`wildlab.runner.record.provenance.footer`).
     ledger
         Where the page of all studies lies, seen from the report; "" leaves the link out.
     notice

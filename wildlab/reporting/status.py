@@ -9,7 +9,7 @@ Nothing is claimed of a first look either, whose numbers come from fewer flights
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 REPRODUCED, DIFFERS, NOT_JUDGED, MISSING = "reproduced", "differs", "not judged", "not reproduced yet"
 #: The state of a study of which only a first look is there, and the verdict on whatever it has a number for.
@@ -118,3 +118,15 @@ def verdict_on(
     if low is not None and high is not None and low - 1e-9 <= published <= high + 1e-9:
         return REPRODUCED
     return NOT_JUDGED if within is None and (low is None or high is None) else DIFFERS
+
+
+def look_words(first_look: Any) -> str:
+    """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
+    try:
+        parts = [
+            f"{int(few)} of {int(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
+            for name, (few, whole) in first_look.items()
+        ]
+    except (AttributeError, TypeError, ValueError):
+        return ""
+    return ", ".join(parts)

@@ -1,4 +1,6 @@
-"""What runs when, and what a run leaves behind: the catalogue of studies, processes, kept seeds, provenance.
+"""What runs when, and what a run leaves behind.
 
-It runs what the protocol of `wildlab.studies` offers, and names no case.
+Here: the catalogue of studies, the flights they need, and the commands that run them. `seeds` keeps what was
+computed, `processes` computes it, `record` says what there is. None of them names a case: they run what the
+protocol of `wildlab.studies` offers.
 """

@@ -14,9 +14,9 @@ from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.job import Job
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.scheduling import Outcome
 
 
 def evaluate_flight(

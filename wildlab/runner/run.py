@@ -19,15 +19,15 @@ from rich.console import Console
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_study, load_studies
-from wildlab.runner.fingerprint import code_key, page_key
 from wildlab.runner.first_look import plan_passes, quick_first
-from wildlab.runner.front_page import build_ledger
-from wildlab.runner.job import Job
 from wildlab.runner.notebooks import check_notebook, plain_parameters
-from wildlab.runner.processes import socket_folder
-from wildlab.runner.progress import outcome_line, pass_line, shown
-from wildlab.runner.scheduling import Listener, Outcome, run_jobs
-from wildlab.runner.seeds import SeedWork, make_work
+from wildlab.runner.processes.ending import socket_folder
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.progress import outcome_line, pass_line, shown
+from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
+from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.seeds.fingerprint import code_key, page_key
+from wildlab.runner.seeds.kept import SeedWork, make_work
 
 
 def make_job(
@@ -62,7 +62,7 @@ def make_job(
     Raises
     ------
     WildlabError
-        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.make_work`.
+        As `check_notebook`, `plain_parameters` and `wildlab.runner.seeds.kept.make_work`.
     """
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)

@@ -10,8 +10,8 @@ import pandas as pd
 
 from wildlab.errors import RunFailed
 from wildlab.paths import REPORTS
-from wildlab.runner.seeds import SeedWork, failed_seeds, make_work, missing_seeds, read_seed
-from wildlab.runner.worker_pool import WorkerPool
+from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.seeds.kept import SeedWork, failed_seeds, make_work, missing_seeds, read_seed
 
 
 def trials_table(

@@ -24,15 +24,21 @@ from wildlab.files import write_atomic
 from wildlab.paths import NOTEBOOKS, PACKAGE, REPORTS
 from wildlab.reporting.notebook_file import read_notebook
 from wildlab.runner.catalogue import load_studies
-from wildlab.runner.fingerprint import code_key
-from wildlab.runner.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
-from wildlab.runner.job import Job
-from wildlab.runner.processes import socket_folder
-from wildlab.runner.progress import shown
-from wildlab.runner.scheduling import Outcome, run_jobs
+from wildlab.runner.processes.ending import socket_folder
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.progress import shown
+from wildlab.runner.processes.scheduling import Outcome, run_jobs
+from wildlab.runner.record.front_page import build_ledger, title_of, tutorial_links, tutorial_notebooks
+from wildlab.runner.seeds.fingerprint import code_key
 
-#: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.fingerprint`).
-_SHOWING = ("api/*.py", "reporting/**/*.py", "brief.py", "runner/tutorials.py", "runner/notebook_process.py")
+#: What a tutorial shows comes out of these besides the rooms below them (`wildlab.runner.seeds.fingerprint`).
+_SHOWING = (
+    "api/*.py",
+    "reporting/**/*.py",
+    "brief.py",
+    "runner/tutorials.py",
+    "runner/processes/notebook_process.py",
+)
 _PACKAGES = ("matplotlib", "nbconvert", "latex2mathml")
 
 

@@ -19,7 +19,7 @@ from wildlab.files import write_atomic, write_json
 from wildlab.reporting.failure import failure_page, step_of
 from wildlab.reporting.notebook_file import nbformat, read_notebook
 from wildlab.reporting.privacy import clean_notebook, clean_text
-from wildlab.runner.job import Failure, Job
+from wildlab.runner.processes.job import Failure, Job
 
 #: What a run may leave in a report's folder, besides ``figures/``. Anything else there is not ours, and
 #: stays.

@@ -12,9 +12,8 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.published import FOLDER, load_claims, load_published
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, verdict_on
+from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, look_words, verdict_on
 from wildlab.runner.catalogue import StudyEntry
-from wildlab.runner.job import look_words
 
 
 def study_status(study: StudyEntry, reports: Path, published: Path = FOLDER) -> StudyStatus:

@@ -14,9 +14,9 @@ from types import TracebackType
 from typing import Any, cast
 
 from wildlab.errors import RunFailed, WildlabError
-from wildlab.runner.job import Failure
-from wildlab.runner.seeds import SeedWork
-from wildlab.runner.worker_pool import SeedResult, answer, keep
+from wildlab.runner.processes.job import Failure
+from wildlab.runner.processes.worker_pool import SeedResult, answer, keep
+from wildlab.runner.seeds.kept import SeedWork
 
 _ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[\w.-]+):\d{1,5}")
 #: How long a scheduler may take to answer at first, in seconds.
@@ -26,7 +26,7 @@ RETRIES = 2
 
 
 class Cluster:
-    """A cluster in place of a `wildlab.runner.worker_pool.WorkerPool`: takes no process of this machine's.
+    """A cluster in place of a `worker_pool.WorkerPool`: takes no process of this machine's.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.notebook_file import read_notebook
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
-from wildlab.runner.provenance import git_state
-from wildlab.runner.status import study_status
+from wildlab.runner.record.provenance import git_state
+from wildlab.runner.record.status import study_status
 
 
 def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:

@@ -21,7 +21,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
-from wildlab.runner.fingerprint import code_key, trial_key
+from wildlab.runner.seeds.fingerprint import code_key, trial_key
 from wildlab.studies.protocol import Values, find_case
 
 #: Folder of the store among the reports.
@@ -41,7 +41,7 @@ class SeedWork:
     case
         Whose trial it is (`wildlab.studies.protocol`).
     code, key
-        `code_key` and `trial_key` of `wildlab.runner.fingerprint`.
+        `code_key` and `trial_key` of `wildlab.runner.seeds.fingerprint`.
     seeds
         All of them, whether they are there already or not; without the one whose flight the figures show.
     """

@@ -21,8 +21,8 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.paths import ROOT
-from wildlab.runner.job import Failure, Job, look_words
-from wildlab.runner.processes import end_below
+from wildlab.runner.processes.ending import end_below
+from wildlab.runner.processes.job import Failure, Job
 
 #: ZeroMQ's limit for the path of a socket is 107 characters on Linux and 103 on macOS.
 _LONGEST_SOCKET_FOLDER = 95
@@ -86,8 +86,9 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting import html, metrics, privacy
     from wildlab.reporting.notebook_file import read_notebook
     from wildlab.reporting.page import first_look_notice
-    from wildlab.runner import provenance
+    from wildlab.reporting.status import look_words
     from wildlab.runner.catalogue import OTHERS
+    from wildlab.runner.record import provenance
 
     started = time.monotonic()
     folder = Path(job.work)
@@ -144,7 +145,7 @@ def _tutorial(pipe: connection.Connection, job: Job) -> None:
     from wildlab.reporting import privacy
     from wildlab.reporting.notebook_file import read_notebook
     from wildlab.reporting.tutorial import tutorial_page
-    from wildlab.runner import provenance
+    from wildlab.runner.record import provenance
 
     pipe.send(("stage", "notebook"))
     executed = Path(job.work) / "notebook.ipynb"

@@ -17,13 +17,13 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
-from wildlab.runner.cluster import Cluster
-from wildlab.runner.job import Failure, Job
-from wildlab.runner.notebook_process import run_notebook
-from wildlab.runner.outputs import clear, install, leave_failure, log_of, sweep
-from wildlab.runner.processes import end_tree, one_thread
-from wildlab.runner.seeds import failed_seeds, missing_seeds, sweep_seeds
-from wildlab.runner.worker_pool import WorkerPool
+from wildlab.runner.processes.cluster import Cluster
+from wildlab.runner.processes.ending import end_tree, one_thread
+from wildlab.runner.processes.job import Failure, Job
+from wildlab.runner.processes.notebook_process import run_notebook
+from wildlab.runner.processes.outputs import clear, install, leave_failure, log_of, sweep
+from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.seeds.kept import failed_seeds, missing_seeds, sweep_seeds
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from wildlab.runner.seeds import SeedWork
+from wildlab.runner.seeds.kept import SeedWork
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Job:
     seeds: SeedWork | None = None
     #: What a first look takes less of, by parameter: (how many, of how many). Empty: the full numbers.
     first_look: dict[str, tuple[int, int]] = field(default_factory=dict)
-    #: What the page depends on, see `wildlab.runner.fingerprint.page_key`.
+    #: What the page depends on, see `wildlab.runner.seeds.fingerprint.page_key`.
     fingerprint: str = ""
     #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
     tutorial: bool = False
@@ -47,15 +47,3 @@ class Failure:
     reason: str
     step: str = ""
     details: str = ""
-
-
-def look_words(first_look: Any) -> str:
-    """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
-    try:
-        parts = [
-            f"{int(few)} of {int(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
-            for name, (few, whole) in first_look.items()
-        ]
-    except (AttributeError, TypeError, ValueError):
-        return ""
-    return ", ".join(parts)

@@ -22,10 +22,10 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
-from wildlab.runner.fingerprint import code_key
-from wildlab.runner.job import Failure
-from wildlab.runner.processes import end_tree, one_thread
-from wildlab.runner.seeds import SeedWork, write_seed
+from wildlab.runner.processes.ending import end_tree, one_thread
+from wildlab.runner.processes.job import Failure
+from wildlab.runner.seeds.fingerprint import code_key
+from wildlab.runner.seeds.kept import SeedWork, write_seed
 
 
 class SeedResult(NamedTuple):

@@ -1,0 +1,1 @@
+"""Processes: jobs, their schedule, workers and notebooks, what is shown meanwhile, and their outputs."""
