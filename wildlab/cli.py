@@ -63,14 +63,15 @@ def wildlab() -> None:
 @click.option("--out", type=FOLDER, help="Where the reports are.  [default: reports]")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, with every published number and ours.")
 def list_(out: Path | None, as_json: bool) -> None:
-    """The studies, and where each stands: published numbers, and how many came out again.
+    """The studies, and where each stands: published numbers, and how many agree.
 
     \b
     Example:
       wildlab list
     """
+    from wildlab.evaluation.printed import AGREES
+    from wildlab.evaluation.shares import HOLDS, MOSTLY
     from wildlab.flight.catalog import is_fetched
-    from wildlab.reporting.status import REPRODUCED
     from wildlab.runner.catalogue import load_studies
     from wildlab.runner.record.status import as_plain, study_status
 
@@ -81,9 +82,10 @@ def list_(out: Path | None, as_json: bool) -> None:
     rows = []
     for one in statuses:
         done, data = one.state == "done", one.study.dataset
-        holding = sum(claim.verdict == "holds" for claim in one.claims)
+        holding = sum(claim.verdict in (HOLDS, MOSTLY) for claim in one.claims)
         # What has not been run has neither come out nor failed to.
-        numbers = f"{one.count(REPRODUCED)} of {len(one.numbers)}" if done else f"{len(one.numbers)} printed"
+        count = len(one.counted)
+        numbers = f"{one.count(AGREES)} of {count}" if done else f"{count} printed"
         claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} printed"
         first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
         state = f"{one.state}{first}"
@@ -97,7 +99,7 @@ def list_(out: Path | None, as_json: bool) -> None:
                 one.study.title,
             ]
         )
-    print_table(["study", "kind", "state", "reproduced", "claims hold", "question"], rows)
+    print_table(["study", "kind", "state", "numbers agree", "claims hold", "question"], rows)
 
 
 @wildlab.command()
@@ -146,7 +148,8 @@ def run(
     """Run studies; each leaves a report, and the ledger shows them all.
 
     --all goes over them twice: first every report from few flights, then the full numbers in their place.
-    A study that is named runs once, in full. --seeds N is one pass over N flights.
+    A study that is named runs once, in full; the name of a case (schmidt) stands for all its studies.
+    --seeds N is one pass over N flights.
 
     What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
     seeds cost only those that are new. The numbers are the same for any --jobs.
@@ -154,6 +157,7 @@ def run(
     \b
     Examples:
       wildlab run sensitivity consistency-bounds
+      wildlab run schmidt --jobs 2
       wildlab run --all --jobs 4
       wildlab run --all --first-look
       wildlab run static-point --seeds 200 --jobs 4

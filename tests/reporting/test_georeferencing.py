@@ -9,7 +9,6 @@ from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.geometry.calibration import Calibration
 from wildlab.reporting import georeferencing
 from wildlab.reporting.report import open_report
-from wildlab.studies import monte_carlo as many
 
 
 @pytest.fixture
@@ -90,22 +89,6 @@ def test_what_was_not_estimated_is_said_with_its_partners(report):
     assert table.loc[0, "value"] == pytest.approx(np.degrees(0.02))
     assert table.loc[0, "verdict"] == "differs from zero"
     assert report._metrics[0]["name"] == "boresight_roll"
-
-
-def test_published_beside_flights():
-    spread = pd.DataFrame({("a", "mae"): [5.0, 1.0, 2.0, 3.0, 4.0]})
-    row = many.beside_published({("a", "mae"): 2.5}, spread, {"a": "A"}, ["mae"]).iloc[0]
-    assert (row["here"], row["difference"], row["drawn"], row["inside"]) == (3.0, 0.5, 5.0, "yes")
-    assert many.beside_published({("a", "mae"): 9.0}, spread, {"a": "A"}, ["mae"]).iloc[0]["inside"] == "no"
-
-
-def test_claims_are_decided_by_their_share_of_flights(report, monkeypatch):
-    claims = [{"id": i, "text": f"Claim {i}.", "source": "H 1"} for i in ("always", "never", "half")]
-    monkeypatch.setattr(many, "load_claims", lambda study: claims)
-    checks = {"always": np.ones(10), "never": np.zeros(10), "half": np.arange(10) < 6}
-    table = many.decide_claims(report, "made-up", checks)
-    assert table["verdict"].tolist() == ["holds", "does not hold", "cannot be decided"]
-    assert [c["fraction"] for c in report._claims] == [1.0, 0.0, 0.6]
 
 
 def test_lengths_in_words():

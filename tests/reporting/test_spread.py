@@ -67,11 +67,14 @@ def test_ranges_are_typeset_with_a_minus() -> None:
     ],
 )
 def test_tables_follow_the_number_of_flights(n: int, heading: str | None) -> None:
-    spread = pd.DataFrame({("a", "mae"): FLIGHTS[:n]})
-    table = monte_carlo.beside_published({("a", "mae"): 1e6}, spread, {"a": "A"}, ["mae"])
+    spread = pd.DataFrame({("kf", "mae"): FLIGHTS[:n]})
+    study = Study("x", ("kf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+    report = open_report(study="linear-vs-nonlinear-fast", kind="twin")
+    monte_carlo.record_spread(report, study, spread, {})
+    table = monte_carlo.beside_published(report, spread, {"kf": "A"}, ["mae"])
     for columns in (monte_carlo.published_columns(n), single_target.published_columns(n)):
         assert set(columns) <= set(table)
-        assert columns.get("range") == heading and ("inside" in columns) == (n > 1)
+        assert columns.get("range") == heading and ("below" in columns) == (n > 1)
         assert ("median" in columns["here"]) == (n > 1)
     assert table.loc[0, "range"] == range_words(FLIGHTS[:n])
 

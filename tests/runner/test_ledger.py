@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,9 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.reporting import html, metrics
-from wildlab.reporting.ledger import ledger_page, strip
+from wildlab.reporting.cases import load_cases
+from wildlab.reporting.ledger import ledger_page
+from wildlab.reporting.ledger_tables import place, strip
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
 from wildlab.runner.record.front_page import build_ledger
@@ -136,27 +139,167 @@ def test_a_misspelt_study_gets_a_hint() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "spread", "verdict"),
+    ("kind", "value", "spread", "verdict"),
     [
-        (8.05, {}, "reproduced"),
-        (8.06, {}, "differs"),
-        (9.9, {"low": 7.0, "high": 12.0}, "reproduced"),
-        (9.9, {"low": 8.0, "high": 12.0}, "differs"),
-        (None, {}, "not reproduced yet"),
+        ("calculated", 8.05, {}, "agrees"),
+        ("calculated", 8.06, {}, "differs"),
+        # The flights' spread says nothing of a calculation, and rounding nothing of a flight.
+        ("calculated", 9.9, {"low": 7.0, "high": 12.0}, "differs"),
+        ("one flight", 9.8, {"low": 9.7, "high": 9.9}, "agrees"),
+        ("one flight", 9.9, {"low": 7.0, "high": 12.0}, "possible"),
+        ("one flight", 9.9, {"low": 4.0, "high": 12.1}, "too vague to tell"),
+        ("one flight", 9.9, {"low": 8.0, "high": 12.0}, "differs"),
+        ("one flight", None, {}, "not reproduced yet"),
     ],
 )
-def test_when_a_number_counts_as_reproduced(
-    tmp_path: Path, value: float | None, spread: dict[str, float], verdict: str
+def test_when_a_number_agrees(
+    tmp_path: Path, kind: str, value: float | None, spread: dict[str, float], verdict: str
 ) -> None:
     ran(tmp_path / "reports", metrics.metric("error", "kf/all", value, "m", **spread))
-    one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
+    folder = published(tmp_path / "published", f'kind = "{kind}"\n{PUBLISHED}')
+    one = study_status(a_study(), tmp_path / "reports", folder)
     assert one.numbers[0].verdict == verdict
 
 
-def test_without_tolerance_or_spread_nothing_is_claimed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("here", "error", "n", "verdict"),
+    [
+        (88.2, 0.08, 10_000, "differs"),  # well inside of where single runs fall
+        (96.4, 0.08, 10_000, "agrees"),
+        (96.4, 0.08, None, "not judged"),
+        (96.4, None, 10_000, "not judged"),
+    ],
+)
+def test_a_mean_of_runs_is_held_against_a_mean(
+    tmp_path: Path, here: float, error: float | None, n: int | None, verdict: str
+) -> None:
+    row = '[[number]]\nstudy = "s"\nname = "success_rate"\nsubject = "a"\nvalue = 96.64\nunit = "%"\n'
+    row += 'source = "H table 1"\nwithin = 0.1\nruns = 10000\nkind = "mean of runs"\n'
+    entries = [metrics.metric("success_rate", "a", here, "%", n=n, low=70, high=100)]
+    entries += [] if error is None else [metrics.metric("success_rate_se", "a", error, "%")]
+    ran(tmp_path, *entries)
+    one = study_status(a_study(), tmp_path, published(tmp_path / "published", row))
+    assert one.numbers[0].verdict == verdict
+
+
+SIGNED = """signs = "undefined"
+[[number]]
+study = "s"
+name = "mae"
+subject = "kf"
+value = 9.4
+unit = "m"
+source = "H table 1"
+[[number]]
+study = "s"
+name = "mean_north"
+subject = "kf"
+value = -4.1
+unit = "m"
+source = "H table 1"
+"""
+
+
+def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path: Path) -> None:
+    entries = [
+        metrics.metric("mae", "kf", 9.4, "m", low=5, high=14),
+        metrics.metric("mean_north", "kf", 0.1, "m", low=-5, high=5, below=0.1),
+        metrics.metric("size_of_mean_north", "kf", 3.0, "m", low=0.2, high=5, below=0.8),
+    ]
+    folder = published(tmp_path / "published", SIGNED)
+    ran(tmp_path, *entries)
+    one = study_status(a_study(), tmp_path, folder)
+    number = one.numbers[1]
+    assert (number.published, number.here, number.low, number.below) == (4.1, 3.0, 0.2, 0.8)
+    assert number.verdict == "agrees" and "mean north, by size" in ledger_page([one])
+    ran(tmp_path, entries[0], metrics.metric("mean_north", "kf", -4.0, "m"))
+    assert study_status(a_study(), tmp_path, folder).numbers[1].here == 4.0
+
+
+def test_a_printed_number_is_counted_once_and_what_was_fitted_to_it_not_at_all(tmp_path: Path) -> None:
+    number = PUBLISHED.split("[[number]]")[1].replace("within = 0.15\n", "")
+    plain, tuned = (number.replace("kf/all", who) for who in ("plain", "tuned"))
+    text = f'[[number]]{plain}[[number]]{tuned}again = true\nfitted = "tuned to it"\n'
+    folder = published(tmp_path / "published", text)
+    ran(tmp_path, *(metrics.metric("error", who, 7.9, "m", low=7, high=8) for who in ("plain", "tuned")))
+    one = study_status(a_study(), tmp_path, folder)
+    assert [n.verdict for n in one.numbers] == ["agrees", "not judged"] and one.count("not judged") == 0
+    whole = ledger_page([one])
+    assert "<b>1 / 1</b><span>published numbers agree</span>" in whole
+    assert "tuned to it; counted once" in whole
+    assert "1 published number: 1 agree; 1 beside other tunings, not counted again" in whole
+
+
+def test_each_number_that_is_not_counted_is_counted_elsewhere() -> None:
+    for name in load_studies():
+        rows = load_published(name)
+        again = rows["again"].astype(bool)
+        counted = {tuple(row) for row in rows[~again][["source", "name", "value"]].to_numpy()}
+        for row in rows[again][["source", "name", "value"]].to_numpy():
+            assert tuple(row) in counted
+
+
+def test_strips_share_one_axis(tmp_path: Path) -> None:
+    """0.082 beside 0.08 lies where 8.2 beside 8 does, and 0.8 beside 0.08 far off."""
+    assert place(1.0) == 80 and place(2.0) - 80 == pytest.approx(80 - place(0.5))
+    assert place(2**0.5) - 80 == pytest.approx((place(2.0) - 80) / 2)
+
+    def dots(value: float, print_: float) -> list[str]:
+        row = PUBLISHED.split("[[claim]]")[0].replace("7.90", str(print_))
+        folder = published(tmp_path / f"p{print_}", row)
+        ran(tmp_path, metrics.metric("error", "kf/all", value, "m", low=value / 2, high=value * 2))
+        drawn = strip(study_status(a_study(), tmp_path, folder).numbers[0])
+        assert ("<path" in drawn) == (value / print_ > 8)
+        return re.findall(r'cx="([0-9.]+)"', drawn)
+
+    assert dots(0.082, 0.08) == dots(8.2, 8.0) == ["80.0", f"{place(1.025):.1f}"]
+    # Ours is not drawn at the print's place unless it lies there.
+    assert dots(0.16, 0.08) == ["80.0", f"{place(2):.1f}"] and dots(0.8, 0.08) == ["80.0"]
+
+
+def test_the_ledger_says_what_it_covers(tmp_path: Path) -> None:
+    cases = load_cases()
+    assert len(cases) == 23 and len({case.id for case in cases}) == 23
+    ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"))
+    one = study_status(a_study(case="gating"), tmp_path, published(tmp_path / "published"))
+    whole = ledger_page([one], cases=cases)
+    assert "have 23 case studies; 1 of them has a study here" in whole and "22 without one" in whole
+    assert "<code>replay</code>" in whole and "<code>gating</code>:" not in whole
+    path = tmp_path / "cases.toml"
+    path.write_text("[[case]]\nid = 1\n")
+    with pytest.raises(WildlabError, match="no list of cases"):
+        load_cases(path)
+
+
+def test_only_what_holds_counts_as_holding(tmp_path: Path) -> None:
+    """What is undecided is not held, what failed is not done, and ours are not the theses'."""
+    verdicts = ["holds", "holds on most flights", "undecided", "premise not met", "does not hold", "holds"]
+    text, claims = "", []
+    for i, verdict in enumerate(verdicts):
+        text += f'[[claim]]\nstudy = "s"\nid = "c{i}"\ntext = "T{i}."\nsource = "H 1"\n'
+        text += "own = true\n" * (i == 5)
+        share = {} if verdict == "premise not met" else {"fraction": 0.5, "low": 0.4, "high": 0.6}
+        claims.append(metrics.claim(f"c{i}", "x", verdict, seeds=200, met=50 + 150 * bool(share), **share))
+    ran(tmp_path, claims=claims)
+    ran(tmp_path, study="t", state="failed")
+    folder = published(tmp_path / "published", text)
+    statuses = [study_status(a_study(name=name), tmp_path, folder) for name in ("s", "t")]
+    whole = ledger_page(statuses)
+    assert "<b>1 / 2</b><span>studies done, 1 failed</span>" in whole
+    assert "<b>2 / 4</b><span>claims of the theses hold, on nearly all flights or on most; 1 without" in whole
+    assert "5 claims were tested on flights" in whole and "1 of all are ours" in whole
+    assert "50 % (40 to 60) of 200 flights" in whole and "50 of 200 flights meet the premise" in whole
+
+
+def test_without_tolerance_or_spread_no_difference_is_claimed(tmp_path: Path) -> None:
     ran(tmp_path / "reports", metrics.metric("error", "observer/all", 5.0, "m"))
     one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
-    assert one.numbers[1].verdict == "not judged" and one.numbers[1].difference == 0.0
+    assert one.numbers[1].verdict == "agrees" and one.numbers[1].difference == 0.0
+    ran(tmp_path / "reports", metrics.metric("error", "observer/all", 50.0, "m"))
+    one = study_status(a_study(), tmp_path / "reports", published(tmp_path / "published"))
+    assert one.numbers[1].verdict == "not judged" and "one flight here" in ledger_page([one])
+    folder = published(tmp_path / "calculated", f'kind = "calculated"\n{PUBLISHED}')
+    assert study_status(a_study(), tmp_path / "reports", folder).numbers[1].verdict == "not judged"
 
 
 def test_what_is_missing_says_why(tmp_path: Path) -> None:
@@ -198,8 +341,8 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
     ]
     whole = ledger_page(statuses, [("tuesday", "tuesday")])
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
-    assert "1 of 17 reproduced" not in whole and "25 % of 20 flights" in whole
-    assert "published 7.90, here 21.900, lowest to highest 5.000 to 23.000" in whole
+    assert "25 % of 20 flights" in whole
+    assert "published 7.90, here 21.900, ratio 2.77, lowest to highest 5.000 to 23.000" in whole
     html.examine(whole, "ledger")
     path = tmp_path / "index.html"
     path.write_text(whole, encoding="utf-8")
@@ -207,12 +350,12 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
 
 
 def test_long_tables_fold_behind_a_line_that_sums_them_up(tmp_path: Path) -> None:
-    first = PUBLISHED.split("[[number]]")[1].replace("7.90", "1.0")
+    first = PUBLISHED.split("[[number]]")[1].replace("7.90", "1.0") + 'kind = "calculated"\n'
     entries = [f"[[number]]{first}".replace("kf/all", f"a/{i}") for i in range(42)]
     folder = published(tmp_path / "published", "".join(entries))
     ran(tmp_path, *(metrics.metric("error", f"a/{i}", 1.1 + (i == 3), "m") for i in range(42)))
     status = study_status(a_study(), tmp_path, folder)
-    assert "<summary>41 of 42 within 0.15 m</summary>" in ledger_page([status])
+    assert "<summary>42 published numbers: 41 agree, 1 differ</summary>" in ledger_page([status])
 
 
 def test_build_ledger_works_before_anything_has_run(tmp_path: Path) -> None:
@@ -243,9 +386,7 @@ def test_a_band_is_called_what_it_is(
     entry = metrics.metric("error", "kf/all", 7.9, "m", low=7, high=8, n=n)
     ran(tmp_path, entry, kind=kind, seeds=seeds)
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
-    called = {
-        name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}</span>" in ledger_page([one])
-    }
+    called = {name for name in ("lowest to highest", "middle 90 %") if f"</i>{name}<i" in ledger_page([one])}
     assert called == {words}
     spoken = strip(one.numbers[0])
     assert f"{words.replace('%', 'percent')} 7.000 to 8.000" in spoken
@@ -255,7 +396,7 @@ def test_one_flight_has_no_band(tmp_path: Path) -> None:
     ran(tmp_path, metrics.metric("error", "kf/all", 7.9, "m"), seeds=1)
     one = study_status(a_study(), tmp_path, published(tmp_path / "published"))
     whole = ledger_page([one]).partition("<details><summary>How to read this")[0]
-    assert "<svg" not in whole and 'class="band"' not in whole and "1 flights" not in whole
+    assert "<rect" not in whole and 'class="band"' not in whole and "1 flights" not in whole
 
 
 def first_look(reports: Path, **more: Any) -> None:
@@ -272,13 +413,13 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
     one = study_status(a_study(), tmp_path, folder)
     assert (one.state, one.first_look, one.has_report) == ("first look", "5 of 200 flights", True)
     assert [number.verdict for number in one.numbers] == ["first look", "not reproduced yet"]
-    assert one.numbers[0].here == 7.9 and one.count("reproduced") == 0
+    assert one.numbers[0].here == 7.9 and one.count("agrees") == 0
     assert (one.claims[0].verdict, one.claims[0].fraction) == ("first look", 1.0)
     whole = ledger_page([one])
     for words in (
         "<b>0 / 1</b><span>studies done, 1 at a first look</span>",
-        "<b>0 / 2</b><span>published numbers reproduced; 2 wait for full numbers</span>",
-        "<b>0 / 1</b><span>claims hold; 1 wait for full numbers</span>",
+        "<b>0 / 0</b><span>published numbers agree; 2 without a verdict</span>",
+        "<b>0 / 0</b><span>claims of the theses hold, on nearly all flights or on most; 1 without a verdict<",
         "5 of 200 flights.",
         "<code>wildlab run s</code>",
         "Open the report",
@@ -286,14 +427,14 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
         '<span class="pill part">first look</span></td>',
     ):
         assert words in whole
-    for words in (">reproduced</span></td>", ">holds</span>", "not run yet"):
+    for words in (">agrees</span></td>", ">holds</span>", "not run yet"):
         assert words not in whole
     html.examine(whole, "ledger")
     assert as_plain(one)["first_look"] == "5 of 200 flights"
     first_look(tmp_path, first_look={})
     whole = ledger_page([study_status(a_study(), tmp_path, folder)])
-    assert "<b>1 / 2</b><span>published numbers reproduced</span>" in whole
-    assert "<b>1 / 1</b><span>claims hold</span>" in whole and "first look</span>" not in whole
+    assert "<b>1 / 1</b><span>published numbers agree; 1 without a verdict</span>" in whole
+    assert "<b>1 / 1</b><span>claims of the theses hold" in whole and "first look</span>" not in whole
 
 
 @pytest.mark.parametrize("said", [[1], {"seeds": 5}, {"seeds": [5]}, {"seeds": ["<b>", 1]}, "5", True])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import beta, t
+from scipy.stats import norm, t
 
 from wildlab.errors import WildlabError
 
@@ -59,9 +59,10 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
 
 
 def share_interval(count: int, runs: int, probability: float = 0.95) -> Interval:
-    """Share of independent runs of which something is true, with the interval of Clopper and Pearson.
+    """Share of independent runs of which something is true, with Wilson's score interval.
 
-    It holds the share of all such runs with at least that probability, for few runs with a higher one.
+    It holds the share of all such runs with about that probability, also for few runs and for shares near
+    zero and one.
 
     Parameters
     ----------
@@ -85,14 +86,14 @@ def share_interval(count: int, runs: int, probability: float = 0.95) -> Interval
     Examples
     --------
     >>> [round(x, 2) for x in share_interval(8, 10)]
-    [0.8, 0.44, 0.97]
+    [0.8, 0.49, 0.94]
     """
     if runs < 1 or not 0 <= count <= runs or not 0 < probability < 1:
         raise WildlabError(
             f"no interval for {count} of {runs} runs with probability {probability}",
             "give at least one run, no more than all of them, and a probability between 0 and 1",
         )
-    tail = (1 - probability) / 2
-    low = float(beta.ppf(tail, count, runs - count + 1)) if count > 0 else 0.0
-    high = float(beta.ppf(1 - tail, count + 1, runs - count)) if count < runs else 1.0
-    return Interval(count / runs, low, high)
+    share, z2 = count / runs, float(norm.ppf((1 + probability) / 2)) ** 2
+    centre = (share + z2 / (2 * runs)) / (1 + z2 / runs)
+    half = np.sqrt(z2 * (share * (1 - share) / runs + z2 / (4 * runs**2))) / (1 + z2 / runs)
+    return Interval(share, max(0.0, float(centre - half)), min(1.0, float(centre + half)))

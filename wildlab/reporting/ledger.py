@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
-from wildlab.reporting.page import TAGS, first_look_notice, page
-from wildlab.reporting.spread import MANY, spread_words
-from wildlab.reporting.status import (
+from wildlab.evaluation.printed import (
+    AGREES,
     DIFFERS,
-    FIRST_LOOK,
-    MISSING,
+    MARGINS,
     NOT_JUDGED,
-    REPRODUCED,
-    Claim,
-    Number,
-    StudyStatus,
+    POSSIBLE,
+    TOO_VAGUE,
+    WIDEST_FACTOR,
 )
-from wildlab.reporting.text import NOTHING, escape, inline, number, prose
+from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
+from wildlab.reporting.cases import Case
+from wildlab.reporting.ledger_tables import claims_table, numbers_table
+from wildlab.reporting.page import TAGS, first_look_notice, page
+from wildlab.reporting.published import CALCULATED
+from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
+from wildlab.reporting.text import NOTHING, escape, inline, prose
 
-#: A longer table is folded away behind a line that sums it up.
-LONGEST_TABLE = 12
 EXPLANATION = """
-A number counts as **reproduced** when ours lies within the tolerance stated beside the published one (for
-exact calculations, about the last digit printed), or when the published one lies in the middle 90 % of our
-simulated flights (of fewer than 30: between the lowest and the highest). Where there is neither, only the
-difference is shown: ours minus the published one.
+A printed number is one of three. An exact **calculation** agrees within what rounding leaves open. A **mean
+of runs** is compared with our mean, by both standard errors and a stated tolerance. **One flight's** figure
+is a single draw, which our simulated flights are held against:
+
+**agrees** when the median of our flights is within the margin of it; **possible** when it is not, and the
+printed number lies in the middle 90 % of our flights (of fewer than 30: between the lowest and the highest);
+**too vague to tell** when that is so, and this middle is wider than a factor of {widest:g}; **differs** when
+it lies outside. The margins are the same for all studies: {margins}. A signed mean whose sign the thesis does
+not define is compared by its size. A number that is listed beside several tunings is counted once.
+
+A **claim** is a sentence of a thesis. It **holds** when the 95 % interval of the share of flights on which it
+is true lies at or above 90 %, **holds on most flights** above 50 %, and **fails on most flights** or **does
+not hold** likewise below 50 % and 10 %; where the interval contains 50 % it is **undecided**. Where the
+simulated flights lack what the sentence is about, its **premise is not met** and it is not judged.
 
 A **first look** comes from fewer flights than the study's own. Its numbers are shown and count as nothing
 until the full ones are in.
@@ -33,14 +45,7 @@ until the full ones are in.
 The flights of the theses were never published. A **twin** is a simulated flight built from what the thesis
 prints about the real one; a **logged** flight is a real one from a public source.
 """
-_PILLS = {
-    REPRODUCED: "yes",
-    DIFFERS: "no",
-    "holds": "yes",
-    "does not hold": "no",
-    "cannot be decided": "part",
-    FIRST_LOOK: "part",
-}
+_ORDER = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS, NOT_JUDGED)
 
 
 def ledger_page(
@@ -49,6 +54,7 @@ def ledger_page(
     *,
     learn: Iterable[tuple[str, str]] = (),
     code: str = "",
+    cases: Sequence[Case] = (),
 ) -> str:
     """The whole page.
 
@@ -60,6 +66,8 @@ def ledger_page(
         Tutorials and reference, as (title, address).
     code
         Which code it was put together by, as HTML.
+    cases
+        Those of the theses, studied here or not.
     """
     studies, flights = list(studies), list(flights)
     body = [
@@ -67,6 +75,7 @@ def ledger_page(
         '<p class="sub">Every published number and claim of the two theses, and what became of it here.</p>',
         "</header>",
         _tiles(studies),
+        _coverage(studies, cases),
         *(_section(one) for one in studies),
     ]
     if flights:
@@ -88,32 +97,98 @@ def ledger_page(
 
 
 def _tiles(studies: list[StudyStatus]) -> str:
-    numbers = [one for study in studies for one in study.numbers]
-    claims = [one for study in studies for one in study.claims]
     done = [study for study in studies if study.state == "done"]
     failed = sum(study.state == "failed" for study in studies)
     looks = sum(study.state == FIRST_LOOK for study in studies)
-    reproduced = sum(study.count(REPRODUCED) for study in done)
-    holding = sum(one.verdict == "holds" for study in done for one in study.claims)
-    waiting = [study for study in studies if study.state != "done"]
     studied = "studies done" + (f", {looks} at a first look" if looks else "")
     studied += f", {failed} failed" if failed else ""
     tiles = [(f"{len(done)} / {len(studies)}", studied)]
-    if numbers:
-        words = "published numbers reproduced" + _waiting(sum(len(study.numbers) for study in waiting))
-        tiles.append((f"{reproduced} / {len(numbers)}", words))
-    if claims:
-        words = "claims hold" + _waiting(sum(len(study.claims) for study in waiting))
-        tiles.append((f"{holding} / {len(claims)}", words))
-    logged = sum(study.study.kind == "logged" for study in done)
+    # What waits for its study is in no denominator.
+    numbers = [one for study in done for one in study.counted if one.verdict != MISSING]
+    waiting = sum(len(study.counted) for study in studies) - len(numbers)
+    if numbers or waiting:
+        agree = sum(one.verdict == AGREES for one in numbers)
+        tiles.append((f"{agree} / {len(numbers)}", f"published numbers agree{_waiting(waiting)}"))
+    claims = [one for study in done for one in study.claims if one.verdict in SHARE_VERDICTS]
+    theirs = [one for one in claims if not one.own]
+    waiting = sum(not one.own for study in studies for one in study.claims) - len(theirs)
+    if theirs or waiting:
+        holding = sum(one.verdict in (HOLDS, MOSTLY) for one in theirs)
+        words = f"claims of the theses hold, on nearly all flights or on most{_waiting(waiting)}"
+        tiles.append((f"{holding} / {len(theirs)}", words))
     if any(study.study.kind == "logged" for study in studies):
+        logged = sum(study.study.kind == "logged" for study in done)
         tiles.append((str(logged), "done on logged flights"))
     return f'<ul class="tiles">{"".join(f"<li><b>{v}</b><span>{t}</span></li>" for v, t in tiles)}</ul>'
 
 
 def _waiting(count: int) -> str:
-    """How many are not decided, because their study has no full numbers yet."""
-    return f"; {count} wait for full numbers" if count else ""
+    """How many have no verdict: their study has not been run, or not in full, or says why it gives none."""
+    return f"; {count} without a verdict" if count else ""
+
+
+def _coverage(studies: list[StudyStatus], cases: Sequence[Case]) -> str:
+    """What all this is about: cases with and without a study, numbers by kind, claims, chance."""
+    parts = []
+    if cases:
+        there = {study.study.case for study in studies}
+        open_ones = [case for case in cases if case.id not in there]
+        built = len(cases) - len(open_ones)
+        items = "".join(
+            f"<li>{escape(case.section)} <code>{escape(case.id)}</code>: {escape(case.shows)}</li>"
+            for case in open_ones
+        )
+        parts.append(
+            f"<p>The two theses have {len(cases)} case studies; {built} of them "
+            f"{'has' if built == 1 else 'have'} a study here.</p>"
+        )
+        if open_ones:
+            parts.append(
+                f'<details class="plain"><summary>{len(open_ones)} without one</summary>'
+                f"<ul>{items}</ul></details>"
+            )
+    rows = [
+        (kind, Counter(one.verdict for one in numbers))
+        for kind, numbers in _by_kind(studies).items()
+        if numbers
+    ]
+    if rows:
+        columns = [v for v in (*_ORDER, MISSING, FIRST_LOOK) if any(counts[v] for _, counts in rows)]
+        heads = "".join(f'<th scope="col">{escape(column)}</th>' for column in ("all", *columns))
+        body = "".join(
+            f'<tr><th scope="row" class="text">{escape(kind)}</th><td>{sum(counts.values())}</td>'
+            + "".join(f"<td>{counts[column] or NOTHING}</td>" for column in columns)
+            + "</tr>"
+            for kind, counts in rows
+        )
+        parts.append(
+            '<div class="scroll" role="region" tabindex="0" aria-label="Published numbers by kind"><table>'
+            f'<thead><tr><th scope="col" class="text">published numbers</th>{heads}</tr></thead>'
+            f"<tbody>{body}</tbody></table></div>"
+        )
+    claims = [one for study in studies if study.state == "done" for one in study.claims]
+    decided = [one for one in claims if one.verdict in SHARE_VERDICTS and one.fraction is not None]
+    if decided:
+        own = sum(one.own for one in claims)
+        parts.append(
+            f"<p>{len(decided)} claims were tested on flights. If each lay just at the border of its "
+            f"verdict, chance would make {expected_wrong(len(decided)):.1f} of these verdicts wrong "
+            "on average; most lie further from it. Claims of one study share their flights."
+            + (f" {own} of all are ours and not a thesis's: they are not counted above." if own else "")
+            + "</p>"
+        )
+    return f"<section><h2>What this covers</h2>{''.join(parts)}</section>" if parts else ""
+
+
+def _by_kind(studies: list[StudyStatus]) -> dict[str, list[Number]]:
+    """Counted numbers by what they are, and by what they are held against."""
+    found: dict[str, list[Number]] = {}
+    for study in studies:
+        for one in study.counted:
+            on = {"twin": ", on simulated flights", "logged": ", on logged flights"}.get(study.study.kind, "")
+            words = one.kind if one.kind == CALCULATED else f"{one.kind}{on}"
+            found.setdefault(words, []).append(one)
+    return found
 
 
 def _section(one: StudyStatus) -> str:
@@ -124,8 +199,8 @@ def _section(one: StudyStatus) -> str:
         f'<section><h2 id="{escape(study.name)}">{escape(study.title)}</h2>',
         f'<p class="sub">{tag}<code>{escape(study.name)}</code>{answers}</p>',
         _state(one),
-        _numbers(one),
-        _claims(one.claims),
+        numbers_table(one),
+        claims_table(one.claims),
     ]
     if one.has_report:
         words = "Open the report" if one.ran else "See what went wrong"
@@ -161,146 +236,13 @@ def _state(one: StudyStatus) -> str:
     return ""
 
 
-def _numbers(one: StudyStatus) -> str:
-    if not one.numbers:
-        return ""
-    spread = any(n.low is not None and n.high is not None for n in one.numbers)
-    ran, words = one.ran, _spread_words(one)
-    head = ["quantity", "published"]
-    if ran:
-        head += ["here", "difference"]
-    if spread:
-        over = f"{one.seeds} flights" if one.seeds and one.seeds > 1 else "spread"
-        head.append(
-            f'{over} <span class="key"><i class="hollow"></i>published<i class="full"></i>here'
-            f'<i class="band"></i>{words}</span>'
-        )
-    if ran:
-        head.append("")
-    heads = "".join(
-        f'<th scope="col"{_text(i == 0)}>{h}</th>' if h else '<td class="text"></td>'
-        for i, h in enumerate(head)
-    )
-    rows = "".join(_row(n, ran=ran, spread=spread) for n in one.numbers)
-    label = escape(f"Published numbers of {one.study.name}")
-    table = (
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{label}"><table>'
-        f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
-    )
-    summary = _summary(one)
-    if not ran or len(one.numbers) > LONGEST_TABLE:
-        return f'<details class="plain"><summary>{summary}</summary>{table}</details>'
-    return table
-
-
-def _spread_words(one: StudyStatus) -> str:
-    """What the bands of a study's table are called."""
-    return spread_words(min((n.over for n in one.numbers if n.over is not None), default=MANY)).key
-
-
-def _summary(one: StudyStatus) -> str:
-    count = len(one.numbers)
-    if one.state == FIRST_LOOK:
-        return f"{count} published number{'s' * (count > 1)} beside a first look"
-    if one.state != "done":
-        return f"{count} published number{'s' * (count > 1)} waiting for it"
-    tolerances = {(n.within, n.unit) for n in one.numbers}
-    if len(tolerances) == 1 and (within := one.numbers[0].within) is not None:
-        near = sum(n.here is not None and abs(n.here - n.published) <= within + 1e-9 for n in one.numbers)
-        return f"{near} of {count} within {within:g} {escape(one.numbers[0].unit)}".strip()
-    parts = [f"{one.count(REPRODUCED)} of {count} reproduced"]
-    parts += [
-        f"{one.count(verdict)} {words}"
-        for verdict, words in (
-            (DIFFERS, "differ"),
-            (NOT_JUDGED, "not judged"),
-            (MISSING, "not reproduced yet"),
-        )
-        if one.count(verdict)
-    ]
-    return ", ".join(parts)
-
-
-def _row(n: Number, *, ran: bool, spread: bool) -> str:
-    quantity = f"{escape(n.name.replace('_', ' '))}, {escape(n.subject)}"
-    unit = f" {escape(n.unit)}" if n.unit else ""
-    cells = [
-        f'<th scope="row" class="text">{quantity} <span class="dim source">{escape(n.source)}</span></th>',
-        f"<td>{number(n.published, n.digits)}{unit}</td>",
-    ]
-    if ran and n.here is None:
-        reason = f" ({escape(n.reason)})" if n.reason else ""
-        span = 3 + spread
-        return f'<tr>{"".join(cells)}<td colspan="{span}" class="text dim">{MISSING}{reason}</td></tr>'
-    if ran:
-        cells += [f"<td>{number(n.here, n.digits + 1)}{unit}</td>", f"<td>{_signed(n)}</td>"]
-    if spread:
-        cells.append(f"<td>{strip(n)}</td>")
-    if ran:
-        pill = f'<span class="pill {_PILLS[n.verdict]}">{n.verdict}</span>' if n.verdict in _PILLS else ""
-        cells.append(f'<td class="text">{pill or NOTHING}</td>')
-    return f"<tr>{''.join(cells)}</tr>"
-
-
-def strip(n: Number) -> str:
-    """The spread over flights as a small picture: published hollow, ours filled, the spread a band."""
-    known = [value for value in (n.published, n.here, n.low, n.high) if value is not None]
-    if n.low is None or n.high is None or n.here is None:
-        return NOTHING
-    least, most = min(known), max(known)
-    scale = 144 / (most - least) if most > least else 0.0
-
-    def x(value: float) -> str:
-        return f"{8 + (value - least) * scale:.1f}"
-
-    width = max(2.0, (n.high - n.low) * scale)
-    bounds = spread_words(n.over or MANY).key.replace("%", "percent")
-    words = (
-        f"published {number(n.published, n.digits)}, here {number(n.here, n.digits + 1)}, "
-        f"{bounds} {number(n.low, n.digits + 1)} to {number(n.high, n.digits + 1)}"
-    )
-    return (
-        f'<svg width="160" height="18" viewBox="0 0 160 18" role="img" aria-label="{escape(words)}">'
-        '<line x1="4" x2="156" y1="9" y2="9" stroke="#dce1e6"/>'
-        f'<rect x="{x(n.low)}" y="6" width="{width:.1f}" height="6" rx="3" fill="#9cc7e0"/>'
-        f'<circle cx="{x(n.here)}" cy="9" r="4" fill="#0072b2"/>'
-        f'<circle cx="{x(n.published)}" cy="9" r="4.6" fill="none" stroke="#18222d" stroke-width="1.6"/>'
-        "</svg>"
-    )
-
-
-def _claims(claims: list[Claim]) -> str:
-    if not claims:
-        return ""
-    rows = []
-    for one in claims:
-        on = ""
-        if one.fraction is not None:
-            on = f"{100 * one.fraction:.0f} %" + (f" of {one.seeds} flights" if one.seeds else " of flights")
-        elif one.seeds:
-            on = f"over {one.seeds} runs"
-        source = f' <span class="dim source">{escape(one.source)}</span>' if one.source else ""
-        pill = f'<span class="pill {_PILLS.get(one.verdict, "")}">{escape(one.verdict)}</span>'
-        rows.append(
-            # The verdict stands beside the claim: on a phone the last column may be out of sight.
-            f'<tr><th scope="row" class="text wide">{escape(one.text)}{source}</th>'
-            f'<td class="text">{pill}</td><td>{on}</td></tr>'
-        )
-    return (
-        '<div class="scroll" role="region" tabindex="0" aria-label="Claims"><table><thead><tr>'
-        '<th scope="col" class="text">claim</th><th scope="col" class="text">verdict</th>'
-        f'<th scope="col">tested on</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
-    )
-
-
 def _explanation() -> str:
-    return f"<details><summary>How to read this</summary>{prose(EXPLANATION)}</details>"
+    margins = "; ".join(_margin_words(kind, *margin) for kind, margin in MARGINS.items())
+    text = EXPLANATION.format(margins=margins, widest=WIDEST_FACTOR)
+    return f"<details><summary>How to read this</summary>{prose(text)}</details>"
 
 
-def _signed(n: Number) -> str:
-    shown = number(n.difference, n.digits + 1)
-    return f"+{shown}" if shown[0].isdigit() and float(shown) > 0 else shown
-
-
-def _text(yes: bool) -> str:
-    return ' class="text"' if yes else ""
+def _margin_words(kind: str, factor: float | None, difference: float | None) -> str:
+    if factor is not None:
+        return f"{kind}, a factor of {factor:g}"
+    return f"{kind}, {difference:g}" + (" of the size of the errors" if kind == "signed mean" else "")

@@ -3,12 +3,16 @@
 ::
 
     {"study", "flight", "kind": "logged"|"twin"|"computed", "seed", "seeds",
-     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high"}],
-     "claims":  [{"id", "text", "verdict", "fraction", "seeds"}]}
+     "metrics": [{"name", "subject", "value", "unit", "n", "published", "source", "low", "high", "below"}],
+     "claims":  [{"id", "text", "verdict", "fraction", "seeds", "low", "high", "met", "half", "twice",
+                  "difference", "difference_low", "difference_high"}]}
 
 A value that could not be computed is ``null``. ``low`` and ``high`` bound the spread over ``seeds`` flights
 (or over ``n`` runs of one): the middle 90 % of 30 or more, the lowest and the highest of fewer, ``null`` for
-one. Where there are no flights to go over they bound the middle 90 % of draws with replacement. ``seeds`` is
+one. Where there are no flights to go over they bound the middle 90 % of draws with replacement. ``below`` is
+the share of the flights that lie below the published number. Of a claim, ``fraction`` is the share of the
+``met`` flights that meet its premise, ``low`` and ``high`` its 95 % interval; ``half`` and ``twice`` the
+verdicts at other thresholds; ``difference`` the paired mean difference with its interval. ``seeds`` is
 how many flights the numbers come from; ``first_look`` in ``status.json`` beside it says where those are fewer
 than the study's own.
 """
@@ -23,11 +27,12 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
 from wildlab.files import write_json
 
 KINDS = ("logged", "twin", "computed")
-VERDICTS = ("holds", "does not hold", "cannot be decided")
-NUMBERS = ("value", "published", "low", "high", "fraction")
+VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE)
+NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _SUBJECT = re.compile(r"\S+")
@@ -69,6 +74,7 @@ def metric(
     source: str | None = None,
     low: Any = None,
     high: Any = None,
+    below: Any = None,
 ) -> dict[str, Any]:
     """One entry of ``metrics``, checked.
 
@@ -88,6 +94,8 @@ def metric(
         The printed number, and where it is printed.
     low, high
         Bounds of the value.
+    below
+        Share of the flights that lie below the printed number.
 
     Returns
     -------
@@ -122,14 +130,30 @@ def metric(
         "source": None if source is None else str(source),
         "low": plain_number(low, f"the low bound of {what}"),
         "high": plain_number(high, f"the high bound of {what}"),
+        "below": plain_number(below, f"the share below the published value of {what}"),
     }
     if entry["low"] is not None and entry["high"] is not None and entry["low"] > entry["high"]:
         raise WildlabError(f"the low bound of {what} is above the high one", "swap them", field="metrics")
     return entry
 
 
-def claim(id: str, text: str, verdict: str, *, fraction: Any = None, seeds: Any = None) -> dict[str, Any]:
-    """One entry of ``claims``, checked. ``fraction`` is the share of ``seeds`` flights on which it holds.
+def claim(
+    id: str,
+    text: str,
+    verdict: str,
+    *,
+    fraction: Any = None,
+    seeds: Any = None,
+    low: Any = None,
+    high: Any = None,
+    met: Any = None,
+    half: str | None = None,
+    twice: str | None = None,
+    difference: Any = None,
+    difference_low: Any = None,
+    difference_high: Any = None,
+) -> dict[str, Any]:
+    """One entry of ``claims``, checked.
 
     Parameters
     ----------
@@ -137,12 +161,14 @@ def claim(id: str, text: str, verdict: str, *, fraction: Any = None, seeds: Any 
         Of the claim, as the published file has it.
     text
         The claim itself.
-    verdict
-        ``"holds"`` or another of the known verdicts.
-    fraction
-        Between 0 and 1.
-    seeds
-        How many flights.
+    verdict, half, twice
+        ``"holds"`` or another of the known verdicts; at half and at twice the threshold, where it has one.
+    fraction, low, high
+        Share of the flights that meet the premise on which it is true, and its interval; between 0 and 1.
+    seeds, met
+        How many flights, and how many of them meet the premise.
+    difference, difference_low, difference_high
+        Of what is compared, with its interval.
 
     Returns
     -------
@@ -156,19 +182,32 @@ def claim(id: str, text: str, verdict: str, *, fraction: Any = None, seeds: Any 
     """
     if not isinstance(id, str) or not _SUBJECT.fullmatch(id):
         raise WildlabError(f"the claim id {id!r} is empty or has a blank", "use letters, digits, - and _")
-    if verdict not in VERDICTS:
-        raise WildlabError(
-            f"the verdict {verdict!r} of claim {id!r} is unknown", f"use one of: {', '.join(VERDICTS)}"
-        )
-    share = plain_number(fraction, f"the fraction of claim {id}")
-    if share is not None and not 0 <= share <= 1:
-        raise WildlabError(f"the fraction of claim {id!r} is {share}", "give a share from 0 to 1")
+    for one in (verdict, half, twice):
+        if one not in VERDICTS and (one is not None or one is verdict):
+            raise WildlabError(
+                f"the verdict {one!r} of claim {id!r} is unknown", f"use one of: {', '.join(VERDICTS)}"
+            )
+    shares = {
+        key: plain_number(value, f"the fraction of claim {id}")
+        for key, value in (("fraction", fraction), ("low", low), ("high", high))
+    }
+    for share in shares.values():
+        if share is not None and not 0 <= share <= 1:
+            raise WildlabError(f"the fraction of claim {id!r} is {share}", "give a share from 0 to 1")
     return {
         "id": id,
         "text": str(text),
         "verdict": verdict,
-        "fraction": share,
+        "fraction": shares["fraction"],
         "seeds": None if seeds is None else int(seeds),
+        "low": shares["low"],
+        "high": shares["high"],
+        "met": None if met is None else int(met),
+        "half": half,
+        "twice": twice,
+        "difference": plain_number(difference, f"the difference of claim {id}"),
+        "difference_low": plain_number(difference_low, f"the difference of claim {id}"),
+        "difference_high": plain_number(difference_high, f"the difference of claim {id}"),
     }
 
 

@@ -2,6 +2,9 @@
 
 ::
 
+    kind = "one flight"         # what the file's numbers are; a number may say otherwise
+    signs = "undefined"         # signed means are compared by size: nobody says which way round they are
+
     [[number]]
     study = "sensitivity"
     name = "horizontal_error"
@@ -9,18 +12,29 @@
     value = 5.3                 # as printed: 5.30 would mean two decimals
     unit = "m"
     source = "H table 5.1"
-    within = 0.15               # optional: how near counts as reproduced
+    within = 0.15               # optional: what rounding leaves open
+    runs = 10000                # of a mean of runs: how many
+    again = true                # the same printed number as another entry: shown, and counted there
+    fitted = "..."              # why ours may not be judged by it: something of ours was chosen by it
 
     [[claim]]
     study = "schmidt"
-    id = "skf-consistent"
-    text = "The Schmidt filter's NEES lies within the 95 % bounds."
+    id = "nis-similar"
+    text = "The NIS of both filters is similar."
     source = "H 7.5.3"
+    premise = "..."             # what the twin must have for the sentence to be tested at all
+    threshold = 0.25            # optional: what a vague word is taken to mean; shown at half and twice too
+    reason = "..."              # why that threshold
+    own = true                  # optional: a sentence of ours, not of a thesis
+
+A number's ``kind`` is "calculated", "mean of runs" or "one flight": `wildlab.evaluation.printed` compares
+each in its own way, one flight's by what the quantity is (`quantity_kind`).
 """
 
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from decimal import Decimal
 from pathlib import Path
@@ -45,8 +59,33 @@ _REQUIRED: dict[str, dict[str, Any]] = {
     },
     "claim": {"study": str, "id": str, "text": str, "source": str},
 }
-_OPTIONAL: dict[str, dict[str, Any]] = {"number": {"within": (Decimal, int)}, "claim": {}}
-_COLUMNS = ["name", "subject", "value", "digits", "unit", "source", "within"]
+_OPTIONAL: dict[str, dict[str, Any]] = {
+    "number": {
+        "within": (Decimal, int),
+        "kind": str,
+        "runs": int,
+        "again": bool,
+        "fitted": str,
+    },
+    "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool},
+}
+CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight"
+#: What a file says of all its numbers, and the words allowed; the first is taken where it says nothing.
+_OF_FILE = {"kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS), "signs": ("defined", "undefined")}
+_COLUMNS = [
+    *("name", "subject", "value", "digits", "unit", "source", "within"),
+    *("kind", "by_size", "runs", "again", "fitted"),
+]
+#: What a quantity is, by its name; the first pattern that fits.
+_QUANTITIES = (
+    (re.compile(r"(mean_)?sd_\w+"), "standard deviation"),
+    (re.compile(r"(nees|nis)(_\w+)?"), "NEES or NIS"),
+    (re.compile(r"mean_(north|east|down|ahead|right)"), "signed mean"),
+    (re.compile(r"(\w+_)?(rate|fraction|share)(_\w+)?"), "rate"),
+    (re.compile(r"(mae|rmse|\w*error)(_\w+)?"), "error size"),
+)
+#: Names of the size that a signed mean is compared with, the first that is printed for the same subject.
+SIZES = ("mae", "mean_error", "rmse")
 
 
 def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
@@ -63,7 +102,8 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     -------
     DataFrame
         ``name``, ``subject``, ``value`` (float), ``digits`` (decimals printed in the source), ``unit``,
-        ``source``, ``within`` (NaN where no tolerance is stated); no rows where the study has none.
+        ``source``, ``within`` and ``runs`` (NaN where none is stated), ``kind``, ``by_size`` (a signed mean
+        that is compared by its size), ``again``, ``fitted``; no rows where the study has none.
 
     Raises
     ------
@@ -81,6 +121,11 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
             "value": float(entry["value"]),
             "digits": _decimals(entry["value"]),
             "within": float(entry["within"]) if "within" in entry else math.nan,
+            "kind": entry["kind"],
+            "by_size": entry["signs"] == "undefined" and quantity_kind(entry["name"]) == "signed mean",
+            "runs": float(entry.get("runs", math.nan)),
+            "again": bool(entry.get("again", False)),
+            "fitted": entry.get("fitted", ""),
         }
         for entry in _entries("number", folder)
         if entry["study"] == study
@@ -95,8 +140,45 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     return frame
 
 
-def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, str]]:
-    """The claims of one study as ``{"study", "id", "text", "source"}``, in the order of the files.
+def quantity_kind(name: str) -> str:
+    """What the quantity of that name is: a key of `wildlab.evaluation.printed.MARGINS`.
+
+    Parameters
+    ----------
+    name
+        Of a metric.
+
+    Returns
+    -------
+    str
+        Empty where no margin is fixed for it.
+
+    Examples
+    --------
+    >>> quantity_kind("mean_sd_roll"), quantity_kind("mean_north"), quantity_kind("mae")
+    ('standard deviation', 'signed mean', 'error size')
+    """
+    return next((kind for pattern, kind in _QUANTITIES if pattern.fullmatch(name)), "")
+
+
+def published_rows(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
+    """The rows of `load_published`.
+
+    Parameters
+    ----------
+    study, folder
+        As for `load_published`.
+
+    Returns
+    -------
+    list of dict
+    """
+    return [dict(zip(_COLUMNS, row, strict=True)) for row in load_published(study, folder).to_numpy(object)]
+
+
+def load_claims(study: str, folder: Path = FOLDER) -> list[dict[str, Any]]:
+    """The claims of one study, in the order of the files, each with ``study``, ``id``, ``text`` and
+    ``source``, and ``premise``, ``threshold``, ``reason`` and ``own`` where it has them.
 
     Parameters
     ----------
@@ -120,15 +202,24 @@ def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
             content = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
         except (OSError, ValueError) as error:
             raise WildlabError(f"it cannot be read ({error})", "mend the file", file=path.name) from error
-        unknown = set(content) - set(_REQUIRED)
+        unknown = set(content) - set(_REQUIRED) - set(_OF_FILE)
         if unknown:
             raise WildlabError(
                 f"the table [[{min(unknown)}]] is unknown", "use [[number]] or [[claim]]", file=path.name
             )
+        of_file = {key: content.get(key, words[0]) for key, words in _OF_FILE.items()}
+        for key, value in of_file.items():
+            _check_word(key, value, path.name, key)
         for index, entry in enumerate(content.get(kind, []), 1):
             _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
-            entries.append(entry)
+            entries.append(of_file | entry if kind == "number" else entry)
     return entries
+
+
+def _check_word(key: str, value: Any, file: str, where: str) -> None:
+    words = _OF_FILE[key]
+    if value not in words:
+        raise WildlabError(f"{key!r} is {value!r}", f"use one of: {', '.join(words)}", file=file, field=where)
 
 
 def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> None:
@@ -141,10 +232,15 @@ def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> Non
             raise WildlabError(
                 f"the key {key!r} is unknown", f"use: {', '.join(types)}", file=file, field=where
             )
-        if not isinstance(value, types[key]) or isinstance(value, bool):
+        if not isinstance(value, types[key]) or (isinstance(value, bool) and types[key] is not bool):
             raise WildlabError(
-                f"{key!r} is {value!r}", "give text, or a number without quotes", file=file, field=where
+                f"{key!r} is {value!r}",
+                "give text in quotes, a number without, or true",
+                file=file,
+                field=where,
             )
+    if "kind" in entry:
+        _check_word("kind", entry["kind"], file, where)
     if kind == "number":
         if not math.isfinite(entry["value"]) or not math.isfinite(entry.get("within", 0)):
             raise WildlabError("a number is not finite", "give the printed value", file=file, field=where)

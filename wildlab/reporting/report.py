@@ -29,7 +29,7 @@ from wildlab.errors import WildlabError
 from wildlab.reporting import metrics as schema
 from wildlab.reporting.figures import FULL_SIZE, LEAST_SIZE, png_bytes, save_figure
 from wildlab.reporting.page import TAGS
-from wildlab.reporting.published import load_published
+from wildlab.reporting.published import published_rows
 from wildlab.reporting.text import NOTHING, escape, inline, maths, number, prose, slug
 
 LEVELS = ("good", "warn", "bad", "neutral")
@@ -115,8 +115,7 @@ class Report:
         self._claims: list[dict[str, Any]] = []
         self._figures: set[str] = set()
         self._tables = 0
-        published = load_published(study)
-        self._published = {(row["name"], row["subject"]): row for row in published.to_dict(orient="records")}
+        self._published = {(row["name"], row["subject"]): row for row in published_rows(study)}
 
     # -- the parts of a page
     # ------------------------------------------------------------------------------------
@@ -242,6 +241,7 @@ class Report:
         source: str | None = None,
         low: float | None = None,
         high: float | None = None,
+        below: float | None = None,
     ) -> None:
         """Record a number. ``published`` and ``source`` are looked up in ``data/published`` where not given.
 
@@ -261,15 +261,41 @@ class Report:
             source = known["source"] if source is None else source
         self._metrics.append(
             schema.metric(
-                name, subject, value, unit, n=n, published=published, source=source, low=low, high=high
+                name,
+                subject,
+                value,
+                unit,
+                n=n,
+                published=published,
+                source=source,
+                low=low,
+                high=high,
+                below=below,
             )
         )
 
-    def claim(
-        self, id: str, text: str, verdict: str, fraction: float | None = None, seeds: int | None = None
-    ) -> None:
-        """Record a claim of a thesis and whether it holds (on ``fraction`` of ``seeds`` flights)."""
-        self._claims.append(schema.claim(id, text, verdict, fraction=fraction, seeds=seeds))
+    def claim(self, id: str, text: str, verdict: str, **found: Any) -> None:
+        """Record a claim and the verdict on it; what else there is to record as `metrics.claim` has it."""
+        self._claims.append(schema.claim(id, text, verdict, **found))
+
+    @property
+    def claims(self) -> list[dict[str, Any]]:
+        """The claims recorded so far."""
+        return list(self._claims)
+
+    @property
+    def recorded(self) -> dict[tuple[str, str], dict[str, Any]]:
+        """The numbers recorded so far, by name and subject."""
+        return {(entry["name"], entry["subject"]): entry for entry in self._metrics}
+
+    @property
+    def published(self) -> dict[tuple[str, str], float]:
+        """What is published for the study, by name and subject."""
+        return {key: float(row["value"]) for key, row in self._published.items()}
+
+    def printed(self, name: str, subject: str) -> dict[str, Any] | None:
+        """What is published for a number: a row of `wildlab.reporting.published.load_published`, or None."""
+        return self._published.get((name, subject))
 
     def save(self) -> None:
         """Write ``metrics.json`` into the report's folder; where there is none, only check the numbers."""

@@ -72,6 +72,12 @@ def bounds_of(values: pd.Series) -> tuple[float, float]:
     return float(values.quantile(0.05)), float(values.quantile(0.95))
 
 
+def share_below(values: pd.Series, printed: float) -> float:
+    """Which share of the flights lies below a printed number, those on it by halves; NaN for none known."""
+    known = values[np.isfinite(values)]
+    return float(((known < printed).mean() + (known <= printed).mean()) / 2) if len(known) else np.nan
+
+
 def range_words(values: ArrayLike, decimals: int = 1) -> str:
     """The bounds of ``values`` (N,) as "6.1 to 13.0"; nothing for one flight."""
     column = pd.Series(np.asarray(values, float))

@@ -1,9 +1,8 @@
 """What became of a study: every published number and claim beside what came out here.
 
-A published number counts as *reproduced* when our value lies within the tolerance that `data/published`
-states for it, or when the published value lies in the middle 90 % of our simulated flights, of fewer than 30
-between the lowest and the highest. Where there is neither, the difference is shown and nothing is claimed.
-Nothing is claimed of a first look either, whose numbers come from fewer flights than the study's own.
+The verdicts on numbers are those of `wildlab.evaluation.printed`, on claims those of
+`wildlab.evaluation.shares`. Nothing is claimed of a first look, whose numbers come from fewer flights than
+the study's own.
 """
 
 from __future__ import annotations
@@ -11,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-REPRODUCED, DIFFERS, NOT_JUDGED, MISSING = "reproduced", "differs", "not judged", "not reproduced yet"
+#: The verdict on a number that no run has given yet.
+MISSING = "not reproduced yet"
 #: The state of a study of which only a first look is there, and the verdict on whatever it has a number for.
 FIRST_LOOK = "first look"
 
@@ -23,6 +23,8 @@ class ListedStudy(Protocol):
     def name(self) -> str: ...
     @property
     def title(self) -> str: ...
+    @property
+    def case(self) -> str | None: ...
     @property
     def section(self) -> str: ...
     @property
@@ -37,7 +39,11 @@ class ListedStudy(Protocol):
 
 @dataclass(frozen=True)
 class Number:
-    """A published number and ours. ``difference`` is ours minus theirs; None where we have none."""
+    """A published number and ours.
+
+    Where it is compared by its size, ``published``, ``here`` and the bounds are sizes. ``difference`` is ours
+    minus theirs, ``ratio`` ours to theirs; None where we have none, or where one is not above zero.
+    """
 
     name: str
     subject: str
@@ -51,6 +57,15 @@ class Number:
     within: float | None
     verdict: str
     reason: str = ""
+    #: "calculated", "mean of runs" or "one flight".
+    kind: str = "one flight"
+    ratio: float | None = None
+    #: The share of our flights that are below the published number, and the upper bound of ours to the lower.
+    below: float | None = None
+    spread: float | None = None
+    by_size: bool = False
+    #: The same printed number as another entry: counted there.
+    again: bool = False
     #: Over how many flights ``low`` and ``high`` are; None where they are of another kind.
     over: int | None = None
 
@@ -69,6 +84,13 @@ class Claim:
     verdict: str
     fraction: float | None = None
     seeds: int | None = None
+    #: The 95 % interval of the share, and how many flights meet the premise.
+    low: float | None = None
+    high: float | None = None
+    met: int | None = None
+    premise: str = ""
+    #: A sentence of ours, not of a thesis.
+    own: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,31 +115,14 @@ class StudyStatus:
         """Whether there are numbers."""
         return self.state in ("done", FIRST_LOOK)
 
+    @property
+    def counted(self) -> list[Number]:
+        """The numbers that are counted here: each printed number once."""
+        return [number for number in self.numbers if not number.again]
+
     def count(self, verdict: str) -> int:
-        """How many of the numbers have that verdict."""
-        return sum(number.verdict == verdict for number in self.numbers)
-
-
-def verdict_on(
-    here: float | None, published: float, within: float | None, low: float | None, high: float | None
-) -> str:
-    """Whether a number of ours reproduces a published one.
-
-    Parameters
-    ----------
-    within
-        The tolerance stated for it, where one is.
-    low, high
-        The bounds over flights (`wildlab.reporting.spread.bounds_of`), where there were several.
-    """
-    if here is None:
-        return MISSING
-    # A hair of slack: 5.45 - 5.3 is 0.1500000000000004.
-    if within is not None and abs(here - published) <= within + 1e-9:
-        return REPRODUCED
-    if low is not None and high is not None and low - 1e-9 <= published <= high + 1e-9:
-        return REPRODUCED
-    return NOT_JUDGED if within is None and (low is None or high is None) else DIFFERS
+        """How many of the counted numbers have that verdict."""
+        return sum(number.verdict == verdict for number in self.counted)
 
 
 def look_words(first_look: Any) -> str:

@@ -152,6 +152,19 @@ def load_studies(path: Path = NOTEBOOKS / "studies.toml") -> dict[str, StudyEntr
     return studies
 
 
+def find_studies(name: str, studies: dict[str, StudyEntry]) -> list[StudyEntry]:
+    """The study of that name, or all studies of the case of that name.
+
+    Raises
+    ------
+    WildlabError
+        If there is neither; names the nearest study.
+    """
+    if name not in studies and (of_case := [study for study in studies.values() if study.case == name]):
+        return of_case
+    return [find_study(name, studies)]
+
+
 def find_study(name: str, studies: dict[str, StudyEntry]) -> StudyEntry:
     """The study of that name.
 

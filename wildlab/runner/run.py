@@ -18,7 +18,7 @@ from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_study, load_studies
+from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_studies, load_studies
 from wildlab.runner.first_look import plan_passes, quick_first
 from wildlab.runner.notebooks import check_notebook, plain_parameters
 from wildlab.runner.processes.ending import socket_folder
@@ -140,7 +140,7 @@ def run_studies(
     timeout_s: float | None = None,
     console: Console | None = None,
 ) -> list[Outcome]:
-    """Run studies by name, or all, and keep the ledger up to date: it is written first, and after each study.
+    """Run studies by name or case, or all. The ledger is written first, and after each study.
 
     Parameters
     ----------
@@ -177,7 +177,9 @@ def run_studies(
     """
     studies = load_studies(notebooks / "studies.toml")
     chosen = (
-        list(studies.values()) if everything else [find_study(name, studies) for name in dict.fromkeys(names)]
+        list(studies.values())
+        if everything
+        else list({study.name: study for name in names for study in find_studies(name, studies)}.values())
     )
     if not chosen:
         raise WildlabError("no study was named", "name one (see: wildlab list), or say --all")

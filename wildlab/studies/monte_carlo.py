@@ -1,4 +1,4 @@
-"""Parts of a report on many simulated flights: published beside reproduced, and the verdicts on claims."""
+"""Parts of a report on many simulated flights: published beside ours, and the verdicts on claims."""
 
 from __future__ import annotations
 
@@ -9,17 +9,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.reporting.published import load_claims
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import HOLDS, NO_PREMISE, Check, decide, paired_difference
+from wildlab.reporting.published import load_claims, quantity_kind
 from wildlab.reporting.report import Report
-from wildlab.reporting.spread import bounds_of, range_words, spread_words
+from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
+from wildlab.reporting.verdicts import judge, recorded_for, size_name
 from wildlab.studies.protocol import Study
 
-#: Share of the flights on which a claim must be true to hold, and below which it does not.
-HOLDS, FAILS = 0.9, 0.5
-
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
-PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "difference", "drawn"), 2)
-CLAIM_COLUMNS = {"claim": "claim", "source": "where", "verdict": "verdict", "share": "flights (%)"}
+PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "ratio", "drawn"), 2)
+CLAIM_COLUMNS = {
+    "claim": "claim",
+    "source": "where",
+    "verdict": "verdict",
+    "share": "true on",
+    "difference": "difference, mean",
+    "premise": "premise",
+    "threshold": "at half and twice the threshold",
+}
 
 
 def published_columns(n: int) -> dict[str, str]:
@@ -30,24 +38,28 @@ def published_columns(n: int) -> dict[str, str]:
             "quantity": "quantity (m)",
             "published": "published",
             "here": "here, one flight",
-            "difference": "difference",
+            "ratio": "ratio",
+            "verdict": "verdict",
         }
     return {
         "subject": "pose",
         "quantity": "quantity (m)",
         "published": "published",
         "here": "here, median",
-        "difference": "difference",
+        "ratio": "ratio",
         "range": spread_words(n).heading,
-        "inside": "published inside",
+        "below": "flights below the print",
+        "verdict": "verdict",
         "drawn": "flight drawn",
     }
 
 
 def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping[str, int]) -> None:
-    """Record medians over flights, and as their range what `bounds_of` gives.
+    """Record medians over flights, as their range what `bounds_of` gives, and the flights below the print.
 
-    A quantity that only the flight drawn has, which stands first, is recorded from that one alone.
+    A signed mean that is published is recorded by its size as well, which is what it is compared by where
+    the thesis does not define its sign. A quantity that only the flight drawn has, which stands first, is
+    recorded from that one alone.
 
     Parameters
     ----------
@@ -65,66 +77,175 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         if named is None:
             continue
         name, subject, unit = named
-        values = spread[key]
+        values, printed = spread[key], report.printed(name, subject)
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1)
             continue
-        low, high = bounds_of(values)
-        report.metric(name, subject, values.median(), unit, n=n.get(subject), low=low, high=high)
+        value = None if printed is None else float(printed["value"])
+        _record(report, name, subject, values, unit, n.get(subject), value)
+        if value is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
+            _record(report, size_name(name), subject, values.abs(), unit, n.get(subject), abs(value))
+
+
+def _record(
+    report: Report,
+    name: str,
+    subject: str,
+    values: pd.Series,
+    unit: str,
+    n: int | None,
+    printed: float | None,
+) -> None:
+    low, high = bounds_of(values)
+    below = None if printed is None else share_below(values, printed)
+    report.metric(name, subject, values.median(), unit, n=n, low=low, high=high, below=below)
 
 
 def beside_published(
-    published: Mapping[tuple[str, str], float],
-    spread: pd.DataFrame,
-    subjects: Mapping[str, str],
-    names: Sequence[str],
+    report: Report, spread: pd.DataFrame, subjects: Mapping[str, str], names: Sequence[str]
 ) -> pd.DataFrame:
-    """Published numbers beside the median over flights, the bounds of their spread, and the first flight.
+    """Published numbers beside what was recorded for them, with the verdict, and the first flight's.
 
     Parameters
     ----------
-    published
-        Values by (subject, name).
+    report
+        What `record_spread` has recorded in.
     spread
         One row for each flight, the drawn one first; columns are (subject, name).
     subjects
         Words for each subject.
     names
         Which quantities, in order.
+
+    Raises
+    ------
+    WildlabError
+        If one of them is not published.
     """
     rows = []
     for subject, words in subjects.items():
         for name in names:
-            values, printed = spread[subject, name], published[subject, name]
-            low, high = bounds_of(values)
+            row = report.printed(name, subject)
+            if row is None:
+                raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
+            compared = judge(row, report.recorded, report.published)
+            found, by_size = recorded_for(row, report.recorded), bool(row["by_size"])
+            values = spread[subject, name].abs() if by_size else spread[subject, name]
+            below = found.get("below")
             rows.append(
                 {
                     "subject": words,
-                    "quantity": {"mae": "mean error"}.get(name, name.replace("_", " ").replace("sd", "SD")),
-                    "published": printed,
-                    "here": values.median(),
-                    "difference": values.median() - printed,
-                    "range": range_words(values),
-                    "inside": "yes" if low <= printed <= high else "no",
+                    "quantity": {"mae": "mean error"}.get(name, name.replace("_", " ").replace("sd", "SD"))
+                    + (", by size" if by_size else ""),
+                    "published": abs(row["value"]) if by_size else row["value"],
+                    "here": found.get("value", np.nan),
+                    "ratio": np.nan if compared is None or compared.ratio is None else compared.ratio,
+                    "range": range_words(values, 2 if np.nanmax(values, initial=0.0) < 2 else 1),
+                    "below": "" if below is None else f"{100 * below:.0f} %",
+                    "verdict": "" if compared is None else compared.verdict,
                     "drawn": values.iloc[0],
                 }
             )
     return pd.DataFrame(rows)
 
 
-def decide_claims(report: Report, study: str, checks: Mapping[str, ArrayLike]) -> pd.DataFrame:
-    """Record the verdict on each published claim of a study, and return them as a table.
+def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
+    """Record the verdict on each claim of a study, and return them as a table of `CLAIM_COLUMNS`.
 
-    ``checks`` says for each claim's id on which flights it is true, (seeds,) bool. A claim holds where it is
-    true on 90 % of the flights, and does not below half of them; in between it cannot be decided.
+    Parameters
+    ----------
+    checks
+        By the claim's id what the flights give for it, or (flights,) bools: of which it is true. The
+        thresholds of vague words are those of ``data/published``.
+
+    Raises
+    ------
+    WildlabError
+        If a claim has no check, or a check needs a threshold that is not stated.
     """
     rows = []
     for claim in load_claims(study):
-        true = np.asarray(checks[claim["id"]], bool)
-        share = float(true.mean())
-        verdict = "holds" if share >= HOLDS else "does not hold" if share < FAILS else "cannot be decided"
-        report.claim(claim["id"], claim["text"], verdict, fraction=share, seeds=len(true))
+        if claim["id"] not in checks:
+            raise WildlabError(
+                f"nothing was computed for the claim {claim['id']!r}",
+                "give it a check, or take it out of data/published",
+                field=study,
+            )
+        check = Check.of(checks[claim["id"]])
+        threshold = None if "threshold" not in claim else float(claim["threshold"])
+        found = decide(check.holds(threshold), check.premise)
+        at = {}
+        if threshold is not None and found.verdict != NO_PREMISE:
+            at = {
+                key: decide(check.holds(times * threshold), check.premise).verdict
+                for key, times in (("half", 0.5), ("twice", 2.0))
+            }
+        apart = None
+        if check.first is not None and check.second is not None:
+            apart = paired_difference(check.first, check.second)
+        share = found.share
+        report.claim(
+            claim["id"],
+            claim["text"],
+            found.verdict,
+            fraction=None if share is None else share.estimate,
+            low=None if share is None else share.low,
+            high=None if share is None else share.high,
+            seeds=found.flights,
+            met=found.met,
+            half=at.get("half"),
+            twice=at.get("twice"),
+            difference=None if apart is None else apart.estimate,
+            difference_low=None if apart is None else apart.low,
+            difference_high=None if apart is None else apart.high,
+        )
         rows.append(
-            {"claim": claim["text"], "source": claim["source"], "verdict": verdict, "share": 100 * share}
+            {
+                "claim": claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else ""),
+                "source": claim["source"],
+                "verdict": found.verdict,
+                "share": _share_words(found),
+                "difference": "" if apart is None else _difference_words(apart, check.unit),
+                "premise": _premise_words(claim.get("premise", ""), check, found),
+                "threshold": _threshold_words(threshold, at, claim.get("reason", "")),
+            }
         )
     return pd.DataFrame(rows)
+
+
+def holding(report: Report, *ids: str) -> bool:
+    """Whether every one of these claims has come out as one that holds; `decide_claims` has to have run."""
+    verdicts = {claim["id"]: claim["verdict"] for claim in report.claims}
+    return all(verdicts.get(one) == HOLDS for one in ids)
+
+
+def _share_words(found: Any) -> str:
+    if found.share is None:
+        return f"{found.met} of {found.flights} flights meet the premise"
+    low, high = (100 * end for end in found.share[1:])
+    of = f"{found.true} of {found.met}"
+    beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
+    return f"{of} ({low:.0f} to {high:.0f} %){beyond}"
+
+
+def _difference_words(apart: Any, unit: str) -> str:
+    digits = 1 if abs(apart.estimate) >= 10 else 2
+    mean, low, high = (f"{value:.{digits}f}".replace("-", "−") for value in apart)
+    return f"{mean} ({low} to {high}) {unit}".rstrip()
+
+
+def _premise_words(premise: str, check: Check, found: Any) -> str:
+    if not premise:
+        return ""
+    if check.premise is None:
+        return premise
+    return f"{premise}: {found.met} of {found.flights} flights"
+
+
+def _threshold_words(threshold: float | None, at: Mapping[str, str], reason: str) -> str:
+    if threshold is None:
+        return ""
+    why = f" ({reason})" if reason else ""
+    if not at:
+        return f"{threshold:g}{why}"
+    return f"at {threshold / 2:g} {at['half']}, at {2 * threshold:g} {at['twice']}; taken: {threshold:g}{why}"

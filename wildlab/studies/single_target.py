@@ -72,14 +72,13 @@ def names_of(subjects: Iterable[str]) -> dict[str, str]:
 
 
 def beside_published(
-    published: Mapping[tuple[str, str], float],
-    spread: pd.DataFrame,
-    subjects: Sequence[str],
-    names: Sequence[str],
+    report: Report, spread: pd.DataFrame, subjects: Sequence[str], names: Sequence[str]
 ) -> pd.DataFrame:
     """As `wildlab.studies.monte_carlo.beside_published`, in words for tracks."""
-    table = monte_carlo.beside_published(published, spread, names_of(subjects), names)
-    return table.replace({"quantity": QUANTITIES})
+    table = monte_carlo.beside_published(report, spread, names_of(subjects), names)
+    for before, words in QUANTITIES.items():
+        table["quantity"] = table["quantity"].str.replace(rf"^{before}\b", words, regex=True)
+    return table
 
 
 def list_numbers(values: Sequence[float], decimals: int = 1) -> str:

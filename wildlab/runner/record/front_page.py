@@ -9,6 +9,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.reporting.cases import load_cases
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.notebook_file import read_notebook
@@ -26,7 +27,8 @@ def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     path = reports / "index.html"
     reports.mkdir(parents=True, exist_ok=True)
     learn = [*tutorial_links(reports), *_reference_link(reports)]
-    write_atomic(path, ledger_page(statuses, _other_reports(reports, studies), learn=learn, code=code))
+    others = _other_reports(reports, studies)
+    write_atomic(path, ledger_page(statuses, others, learn=learn, code=code, cases=load_cases()))
     return path
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.reporting.metrics import read_metrics
-from wildlab.reporting.published import FOLDER, load_claims, load_published
-from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, look_words, verdict_on
+from wildlab.reporting.published import FOLDER, load_claims, published_rows
+from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus, look_words
+from wildlab.reporting.verdicts import judge, recorded_for
 from wildlab.runner.catalogue import StudyEntry
 
 
@@ -86,28 +87,38 @@ def _status(folder: Path) -> dict[str, Any]:
 
 def _numbers(study: StudyEntry, metrics: dict[str, Any] | None, state: str, published: Path) -> list[Number]:
     ours = {(entry["name"], entry["subject"]): entry for entry in metrics["metrics"]} if metrics else {}
+    rows = published_rows(study.name, published)
+    printed = {(row["name"], row["subject"]): float(row["value"]) for row in rows}
     numbers = []
-    for row in load_published(study.name, published).to_dict(orient="records"):
-        found = ours.get((row["name"], row["subject"]), {})
-        within = None if math.isnan(row["within"]) else float(row["within"])
-        number = {
-            "name": row["name"],
-            "subject": row["subject"],
-            "unit": row["unit"],
-            "source": row["source"],
-            "published": float(row["value"]),
-            "digits": int(row["digits"]),
-            "here": found.get("value"),
-            "low": found.get("low"),
-            "high": found.get("high"),
-            "within": within,
-            "over": _over(metrics, found),
-        }
-        verdict = verdict_on(number["here"], number["published"], within, number["low"], number["high"])
-        if state == FIRST_LOOK and verdict != MISSING:
-            verdict = FIRST_LOOK
-        reason = _reason(study, row["name"], row["subject"], state) if verdict == MISSING else ""
-        numbers.append(Number(**number, verdict=verdict, reason=reason))
+    for row in rows:
+        found, compared = recorded_for(row, ours), judge(row, ours, printed)
+        if compared is None:
+            verdict, reason = MISSING, _reason(study, row["name"], row["subject"], state)
+        else:
+            verdict, reason = compared.verdict, compared.reason
+        numbers.append(
+            Number(
+                name=row["name"],
+                subject=row["subject"],
+                unit=row["unit"],
+                source=row["source"],
+                published=abs(float(row["value"])) if row["by_size"] else float(row["value"]),
+                digits=int(row["digits"]),
+                here=found.get("value"),
+                low=found.get("low"),
+                high=found.get("high"),
+                within=None if math.isnan(row["within"]) else float(row["within"]),
+                verdict=FIRST_LOOK if state == FIRST_LOOK and verdict != MISSING else verdict,
+                reason=reason,
+                kind=row["kind"],
+                ratio=None if compared is None else compared.ratio,
+                below=found.get("below"),
+                spread=None if compared is None else compared.spread,
+                by_size=bool(row["by_size"]),
+                again=bool(row["again"]),
+                over=_over(metrics, dict(found)),
+            )
+        )
     return numbers
 
 
@@ -141,6 +152,11 @@ def _claims(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publi
                 verdict=FIRST_LOOK if ours and state == FIRST_LOOK else ours.get("verdict", "not tested yet"),
                 fraction=ours.get("fraction"),
                 seeds=ours.get("seeds"),
+                low=ours.get("low"),
+                high=ours.get("high"),
+                met=ours.get("met"),
+                premise=theirs.get("premise", ""),
+                own=bool(theirs.get("own", False)),
             )
         )
     return claims

@@ -1,0 +1,91 @@
+"""What a share of flights allows to be said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom, ttest_rel
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation import share_interval
+from wildlab.evaluation import shares as s
+
+
+@pytest.mark.parametrize(
+    ("count", "flights", "verdict"),
+    [
+        (200, 200, s.HOLDS),
+        (189, 200, s.HOLDS),
+        (188, 200, s.MOSTLY),
+        (115, 200, s.MOSTLY),
+        (113, 200, s.UNDECIDED),
+        (100, 200, s.UNDECIDED),
+        (87, 200, s.UNDECIDED),
+        (85, 200, s.MOSTLY_NOT),
+        (12, 200, s.MOSTLY_NOT),
+        (11, 200, s.FAILS),
+        (0, 200, s.FAILS),
+        (3, 3, s.UNDECIDED),
+        (5, 5, s.MOSTLY),
+        (20, 20, s.MOSTLY),
+        (35, 35, s.HOLDS),
+        (0, 1, s.UNDECIDED),
+    ],
+)
+def test_the_interval_decides(count: int, flights: int, verdict: str) -> None:
+    assert s.share_verdict(share_interval(count, flights)) == verdict
+    assert s.decide(np.arange(flights) < count).verdict == verdict
+
+
+def test_a_denial_is_judged_as_the_mirror_of_its_claim() -> None:
+    mirror = dict(zip(s.SHARE_VERDICTS, reversed(s.SHARE_VERDICTS), strict=True))
+    for n in (7, 40, 200):
+        for k in range(n + 1):
+            there, back = (s.share_verdict(share_interval(one, n)) for one in (k, n - k))
+            assert mirror[there] == back
+
+
+def test_only_flights_that_meet_the_premise_are_asked() -> None:
+    true, met = np.arange(100) < 50, np.arange(100) < 60
+    found = s.decide(true, met)
+    assert (found.true, found.met, found.flights) == (50, 60, 100)
+    assert found.share == share_interval(50, 60)
+    none = s.decide(true, np.arange(100) < 49)
+    assert (none.verdict, none.share, none.met) == (s.NO_PREMISE, None, 49)
+
+
+def test_what_cannot_be_decided_is_refused() -> None:
+    for true, premise in (([], None), ([True, False], [True])):
+        with pytest.raises(WildlabError, match="one premise for each"):
+            s.decide(true, premise)
+
+
+def test_a_measure_is_held_against_the_threshold() -> None:
+    measured = np.array([0.1, 0.2, 0.3, np.nan])
+    assert s.Check(measured=measured).holds(0.25).tolist() == [True, True, False, False]
+    assert s.Check(measured=measured, above=True).holds(0.25).tolist() == [False, False, True, False]
+    both = s.Check(measured=measured, true=np.array([False, True, True, True]))
+    assert both.holds(0.25).tolist() == [False, True, False, False]
+    assert len(both) == 4 and s.Check.of(both) is both
+    assert s.Check.of([1, 0]).holds().tolist() == [True, False]
+    for check in (s.Check(measured=measured), s.Check()):
+        with pytest.raises(WildlabError, match="State the threshold"):
+            check.holds()
+
+
+def test_a_paired_difference_has_students_interval() -> None:
+    rng = np.random.default_rng(1)
+    first, second = rng.normal(5, 2, 30), rng.normal(4, 2, 30)
+    known = ttest_rel(first, second).confidence_interval(0.95)
+    found = s.paired_difference([*first, np.nan], [*second, 1.0])
+    assert found == pytest.approx(((first - second).mean(), known.low, known.high))
+    assert s.paired_difference([1.0, np.nan], [1.0, 1.0]) is None
+
+
+@pytest.mark.parametrize("flights", [35, 40, 50, 60, 80, 100, 150, 200, 300])
+def test_how_often_chance_makes_a_verdict_wrong(flights: int) -> None:
+    counts = np.arange(flights + 1)
+    verdicts = np.array([s.share_verdict(share_interval(int(k), flights)) for k in counts])
+    for border, wrong in ((0.9, [s.HOLDS]), (0.5, [s.HOLDS, s.MOSTLY]), (0.1, [s.FAILS])):
+        assert binom.pmf(counts[np.isin(verdicts, wrong)], flights, border).sum() <= s.WRONG
+    assert s.expected_wrong(100) == 100 * s.WRONG

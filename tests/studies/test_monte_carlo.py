@@ -1,0 +1,108 @@
+"""Published numbers beside ours, and the verdicts on claims, on made-up flights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation import share_interval
+from wildlab.evaluation.shares import Check
+from wildlab.reporting.report import Report, open_report
+from wildlab.studies import monte_carlo
+from wildlab.studies.protocol import Metric, Study
+
+STUDY = Study("x", ("ekf",), metric_of=lambda subject, name: Metric(name, subject, "m"))
+#: Published there: mean error 9.4, mean north -4.1, of a sign that is not defined.
+PUBLISHED = "schmidt-fast-vessel"
+
+
+@pytest.fixture
+def report() -> Report:
+    return open_report(study=PUBLISHED, kind="twin")
+
+
+def recorded(report: Report, **columns: Any) -> pd.DataFrame:
+    spread = pd.DataFrame({("ekf", name): np.asarray(values, float) for name, values in columns.items()})
+    monte_carlo.record_spread(report, STUDY, spread, {})
+    return spread
+
+
+def test_published_beside_flights(report: Report) -> None:
+    north = np.r_[1.0, np.linspace(-5, 5, 100)]
+    spread = recorded(report, mae=np.r_[20.0, np.linspace(8, 12, 100)], mean_north=north)
+    table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae", "mean_north"])
+    error, mean = (table.iloc[i] for i in (0, 1))
+    assert (error["published"], error["drawn"], error["verdict"]) == (9.4, 20.0, "agrees")
+    assert error["here"] == spread["ekf", "mae"].median() and error["ratio"] == error["here"] / 9.4
+    assert error["below"] == "35 %"
+    # By size: 4.1 beside the median of sizes, which is not the size of the median.
+    assert (mean["published"], mean["here"], mean["drawn"]) == (4.1, np.median(np.abs(north)), 1.0)
+    assert mean["quantity"] == "mean north, by size" and mean["verdict"] == "agrees"
+    with pytest.raises(WildlabError, match="Speed of ekf is not published"):
+        monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["speed"])
+
+
+def test_what_is_recorded_is_what_is_judged(report: Report) -> None:
+    recorded(report, mae=np.linspace(8, 12, 101), mean_north=np.linspace(-5, 5, 101))
+    entries = report.recorded
+    assert entries["mean_north", "ekf"]["value"] == pytest.approx(0)
+    size = entries["size_of_mean_north", "ekf"]
+    assert (size["value"], size["low"], size["high"]) == pytest.approx((2.5, 0.25, 4.75), abs=0.06)
+    assert entries["mae", "ekf"]["below"] == pytest.approx(0.35, abs=0.01)
+
+
+def claims_of(monkeypatch: pytest.MonkeyPatch, *ids: str, **more: Any) -> None:
+    claims = [{"id": i, "text": f"Claim {i}.", "source": "H 1", **more} for i in ids]
+    monkeypatch.setattr(monte_carlo, "load_claims", lambda study: claims)
+
+
+def test_claims_are_decided_by_the_interval_of_their_share(
+    report: Report, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claims_of(monkeypatch, "always", "never", "half")
+    flights = np.arange(50)
+    checks = {"always": flights >= 0, "never": flights < 0, "half": flights < 30}
+    table = monte_carlo.decide_claims(report, "made-up", checks)
+    assert table["verdict"].tolist() == ["holds", "does not hold", "undecided"]
+    assert table["share"].tolist()[2] == "30 of 50 (46 to 72 %)"
+    assert [c["fraction"] for c in report.claims] == [1.0, 0.0, 0.6]
+    assert (report.claims[2]["low"], report.claims[2]["high"]) == share_interval(30, 50)[1:]
+    assert monte_carlo.holding(report, "always") and not monte_carlo.holding(report, "always", "half")
+
+
+def test_three_flights_decide_nothing(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+    claims_of(monkeypatch, "a")
+    assert monte_carlo.decide_claims(report, "x", {"a": [True] * 3})["verdict"].tolist() == ["undecided"]
+
+
+def test_a_threshold_is_shown_at_half_and_at_twice(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+    claims_of(monkeypatch, "a", threshold=2, reason="as far as one sees")
+    measured = np.r_[np.full(50, 1.5), np.full(50, 3.0)]
+    (row,) = monte_carlo.decide_claims(report, "x", {"a": Check(measured=measured)}).to_dict("records")
+    assert row["verdict"] == "undecided"
+    assert row["threshold"] == "at 1 does not hold, at 4 holds; taken: 2 (as far as one sees)"
+    assert (report.claims[0]["half"], report.claims[0]["twice"]) == ("does not hold", "holds")
+
+
+def test_a_premise_and_a_difference_are_said(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+    claims_of(monkeypatch, "a", premise="Errors grow in turns", own=True)
+    met, true = np.arange(100) < 80, np.arange(100) < 40
+    first, second = np.arange(100.0) % 7, np.zeros(100)
+    check = Check(true=true, premise=met, first=first, second=second, unit="m")
+    (row,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+    assert row["share"].startswith("40 of 80 (") and row["share"].endswith("of 100 flights in all")
+    assert row["premise"] == "Errors grow in turns: 80 of 100 flights" and "Ours" in row["claim"]
+    assert row["difference"].startswith(f"{first.mean():.2f} (") and row["difference"].endswith("m")
+    check = Check(true=true, premise=~met)
+    (row,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+    assert (row["verdict"], row["share"]) == ("premise not met", "20 of 100 flights meet the premise")
+
+
+def test_a_claim_without_a_check_is_named(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
+    claims_of(monkeypatch, "a")
+    with pytest.raises(WildlabError, match="computed for the claim 'a'"):
+        monte_carlo.decide_claims(report, "x", {})

@@ -1,0 +1,223 @@
+"""Is a sentence true of flights? What a share of simulated flights, and its interval, allows to be said.
+
+A sentence that is true of some flights and not of others has a share, which so many simulated flights give
+with a 95 % interval (Wilson's, `wildlab.evaluation.runs.share_interval`). The verdict is by the interval, so
+that few flights decide little: of twenty, even all of them leave open whether it is nine in ten.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+
+Array = NDArray[np.float64]
+
+HOLDS, MOSTLY, UNDECIDED = "holds", "holds on most flights", "undecided"
+MOSTLY_NOT, FAILS = "fails on most flights", "does not hold"
+#: The twin lacks what the sentence is about.
+NO_PREMISE = "premise not met"
+#: No flight here could decide it.
+UNDECIDABLE = "cannot be decided"
+#: From the most to the least true.
+SHARE_VERDICTS = (HOLDS, MOSTLY, UNDECIDED, MOSTLY_NOT, FAILS)
+#: Shares of all flights between the verdicts.
+ALMOST_ALL, HALF, ALMOST_NONE = 0.9, 0.5, 0.1
+#: Largest probability of a wrong verdict, worked out for 35 flights and more.
+WRONG = 0.035
+
+
+@dataclass(frozen=True)
+class Check:
+    """What simulated flights give for a sentence; `Check.of` takes plain bools.
+
+    Attributes
+    ----------
+    true
+        (N,) bool: of which flights it is true. None where a threshold decides, which the sentence's author
+        has to name: then ``measured`` is held against it.
+    measured
+        (N,), what the threshold is for, in its unit; NaN counts as not true.
+    above
+        Whether the sentence is true above the threshold; else it is below.
+    premise
+        (N,) bool: which flights have what the sentence is about; None means all.
+    first, second
+        (N,), what a comparison compares, in ``unit``: the paired difference is shown.
+    """
+
+    true: NDArray[np.bool_] | None = None
+    measured: Array | None = None
+    above: bool = False
+    premise: NDArray[np.bool_] | None = None
+    first: Array | None = None
+    second: Array | None = None
+    unit: str = ""
+
+    @classmethod
+    def of(cls, given: Check | ArrayLike) -> Check:
+        """A check of what may be one already, or (N,) bools."""
+        return given if isinstance(given, cls) else cls(true=np.asarray(given, bool))
+
+    def holds(self, threshold: float | None = None) -> NDArray[np.bool_]:
+        """(N,) bool: of which flights the sentence is true, with that threshold.
+
+        Raises
+        ------
+        WildlabError
+            If it needs a threshold and there is none, or has no use for one.
+        """
+        if self.true is not None and self.measured is None:
+            return self.true
+        if self.measured is None or threshold is None:
+            raise WildlabError(
+                "a claim has a measure and no threshold, or neither",
+                "state the threshold with the claim, or give the flights of which it is true",
+            )
+        with np.errstate(invalid="ignore"):
+            beyond = self.measured > threshold if self.above else self.measured < threshold
+        return beyond if self.true is None else beyond & self.true
+
+    def __len__(self) -> int:
+        return len(self.true if self.true is not None else np.asarray(self.measured))
+
+
+class Decision(NamedTuple):
+    """What the flights say of a sentence.
+
+    Attributes
+    ----------
+    verdict
+        One of `SHARE_VERDICTS`, or `NO_PREMISE`.
+    share
+        Of the flights that meet the premise, with its interval; None where too few do.
+    true, met, flights
+        Of how many it is true, how many meet the premise, how many there are.
+    """
+
+    verdict: str
+    share: Interval | None
+    true: int
+    met: int
+    flights: int
+
+
+def share_verdict(share: Interval) -> str:
+    """The verdict on a sentence by the interval of its share.
+
+    Parameters
+    ----------
+    share
+        From `wildlab.evaluation.runs.share_interval`.
+
+    Returns
+    -------
+    str
+        One of `SHARE_VERDICTS`.
+
+    Examples
+    --------
+    >>> share_verdict(share_interval(196, 200)), share_verdict(share_interval(20, 20))
+    ('holds', 'holds on most flights')
+    """
+    if share.low >= ALMOST_ALL:
+        return HOLDS
+    if share.low > HALF:
+        return MOSTLY
+    if share.high <= ALMOST_NONE:
+        return FAILS
+    if share.high < HALF:
+        return MOSTLY_NOT
+    return UNDECIDED
+
+
+def decide(true: ArrayLike, premise: ArrayLike | None = None) -> Decision:
+    """Decide a sentence on simulated flights.
+
+    Parameters
+    ----------
+    true
+        (N,) bool: of which flights it is true.
+    premise
+        (N,) bool: which flights have what the sentence is about; all where it is None. The share is that of
+        these flights. Where not even half of the flights have it, the sentence is not judged.
+
+    Returns
+    -------
+    Decision
+
+    Raises
+    ------
+    WildlabError
+        Where there is no flight, or not one premise for each.
+
+    Examples
+    --------
+    >>> decide([True] * 95 + [False] * 5).verdict
+    'holds on most flights'
+    """
+    yes = np.asarray(true, bool)
+    met = np.ones(len(yes), bool) if premise is None else np.asarray(premise, bool)
+    if not len(yes) or met.shape != yes.shape:
+        raise WildlabError(
+            f"{len(yes)} flights and premises of the shape {met.shape}",
+            "give one or more flights, and one premise for each",
+        )
+    count, of = int((yes & met).sum()), int(met.sum())
+    if 2 * of < len(yes):
+        return Decision(NO_PREMISE, None, count, of, len(yes))
+    share = share_interval(count, of)
+    return Decision(share_verdict(share), share, count, of, len(yes))
+
+
+def paired_difference(first: ArrayLike, second: ArrayLike) -> Interval | None:
+    """Mean of ``first - second`` over flights that have both, with Student's interval.
+
+    Parameters
+    ----------
+    first, second
+        (N,), one number of each flight; NaN where a flight has none.
+
+    Returns
+    -------
+    Interval or None
+        None where fewer than two flights have both.
+
+    Examples
+    --------
+    >>> round(paired_difference([3.0, 4.0, 5.0], [2.0, 2.0, 2.0]).estimate, 1)
+    2.0
+    """
+    apart = np.asarray(first, float) - np.asarray(second, float)
+    return mean_interval(apart) if np.isfinite(apart).sum() > 1 else None
+
+
+def expected_wrong(tested: int) -> float:
+    """How many verdicts chance makes wrong, at most and on average.
+
+    A verdict is wrong where the share of all such flights lies on the other side of the border that the
+    verdict says it does not cross. Wilson's interval crosses a border wrongly with a probability of no more
+    than `WRONG`, which is reached where the share of all flights is the border itself.
+
+    Parameters
+    ----------
+    tested
+        How many sentences were decided on simulated flights.
+
+    Returns
+    -------
+    float
+        An upper bound of the mean: sentences that are clearly true or false hardly count. Those of one study
+        share their flights, so wrong ones come together.
+
+    Examples
+    --------
+    >>> expected_wrong(100)
+    3.5
+    """
+    return WRONG * tested
