@@ -6,6 +6,7 @@ the same detections, and a comparison of sources is a comparison of sightings.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import NamedTuple
 
@@ -14,9 +15,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
+from wildlab.evaluation.consistency import average, chi_square_interval, position_nees, share_inside
 from wildlab.evaluation.track_errors import summarise_track, track_errors
-from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
@@ -314,6 +315,11 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
     The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
     error counts as the filter's.
 
+    Besides means over the track there are ``error_at_end`` (m) and ``nees_at_end``, of the last frame at
+    which the target's place is known; ``p95_measured`` (m), below which the distance is at 95 % of the frames
+    with a detection; and ``nees_band_low``, ``nees_band_high``: the 95 % band of the mean NEES of a
+    consistent filter, for as many independent values as this one's are worth.
+
     Parameters
     ----------
     seen
@@ -344,14 +350,33 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
         "fraction_nees_inside": share_inside(values, bounds),
         "fraction_nis_inside": share_inside(track.nis, bounds),
     }
+    distance = np.hypot(*(seen.truth - state)[:, :2].T)
+    known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.seen
+    band = average(values, 2, _worth(values[known]))
+    numbers |= {
+        "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
+        "nees_at_end": float(values[known[-1]]) if len(known) else math.nan,
+        "p95_measured": float(np.quantile(distance[measured], 0.95)) if measured.any() else math.nan,
+        "nees_band_low": band.low,
+        "nees_band_high": band.high,
+    }
     innovation = track.innovation[np.isfinite(track.innovation).all(axis=1)]
     for i, axis in enumerate(axes):
         numbers[f"lag1_autocorrelation_{axis}"] = float(autocorrelation(innovation[:, i], 1)[1])
     return Scored(values, track.nis, numbers)
 
 
+def _worth(values: Array) -> float:
+    """How many independent values a NEES over time is worth; one where that cannot be told."""
+    if len(values) < 3 or np.ptp(values) == 0:
+        return 1.0
+    return max(1.0, effective_sample_size(values, len(values) - 1))
+
+
 def evaluate_measurements(seen: Sighting) -> dict[str, float]:
     """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m.
+
+    Also the autocorrelation of their errors from one detection to the next.
 
     Parameters
     ----------
@@ -368,4 +393,8 @@ def evaluate_measurements(seen: Sighting) -> dict[str, float]:
         "mean_north": float(np.nanmean(e[:, 0])),
         "mean_east": float(np.nanmean(e[:, 1])),
         "mae_georeferenced": float(np.nanmean(np.hypot(*e.T))),
+        **{
+            f"lag1_autocorrelation_{axis}": float(autocorrelation(column[np.isfinite(column)], 1)[1])
+            for axis, column in zip(("north", "east"), e.T, strict=True)
+        },
     }

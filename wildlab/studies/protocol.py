@@ -40,6 +40,7 @@ from numpy.typing import ArrayLike
 
 from wildlab import studies
 from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
 
 #: Numbers of one flight by (subject, name).
 Numbers = Mapping[tuple[str, str], float]
@@ -70,7 +71,7 @@ class Study:
         What is computed for a seed; None where the case does not go over simulated flights one by one.
     check_claims
         Trials, one row for each flight and columns (subject, name), and whatever else the notebook has to say
-        -> on which flights each claim is true, by the claim's id.
+        -> what the flights give for each claim, by the claim's id: a `Check`, or (flights,) bools.
     metric_of
         Subject and name of a number of the trial -> its metric; None where it is recorded as none.
     """
@@ -78,7 +79,7 @@ class Study:
     case: str
     subjects: tuple[str, ...]
     trial: Callable[..., Numbers] | None = None
-    check_claims: Callable[..., Mapping[str, ArrayLike]] | None = None
+    check_claims: Callable[..., Mapping[str, Check] | Mapping[str, ArrayLike]] | None = None
     metric_of: Callable[[str, str], Metric | None] | None = None
 
     @property
