@@ -41,7 +41,10 @@ from numpy.typing import ArrayLike
 from wildlab import studies
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
+from wildlab.simulation.variation import varied
 
+#: The parameter of `run_trial` that moves the twins.
+VARIED = "varied"
 #: Numbers of one flight by (subject, name).
 Numbers = Mapping[tuple[str, str], float]
 #: The same by "subject/name", as they are kept.
@@ -117,6 +120,9 @@ def find_case(case: str) -> Study:
 def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
     """What the trial of a case gives for a seed, by "subject/name".
 
+    Besides the trial's own there may be the parameter `VARIED`: factors for parameters of its twins, as
+    `wildlab.simulation.variation.varied` takes them.
+
     Raises
     ------
     WildlabError
@@ -126,7 +132,9 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
     trial = find_case(case).trial
     if trial is None:
         raise WildlabError(f"the case {case!r} has no trial for each seed", "give it one, or leave seeds out")
-    found = trial(seed, **parameters)
+    given = dict(parameters)
+    with varied(given.pop(VARIED, {})):
+        found = trial(seed, **given)
     values = {f"{subject}/{name}": float(value) for (subject, name), value in found.items()}
     wrong = next((key for key in values if key.count("/") != 1), None)
     if not values or wrong is not None:
