@@ -60,7 +60,7 @@ def test_a_flight_is_flown_with_what_was_moved():
     with varied(dict.fromkeys(paths, 2.0)):
         moved = simulate_twin("fast-vessel", 1, ("imu", "gnss"))
     assert plain.nav["truth"].equals(moved.nav["truth"])
-    assert not plain.table("targets").equals(moved.table("targets"))
+    assert not plain.table("truth").equals(moved.table("truth"))
 
 
 def test_what_may_not_be_moved_is_refused():
