@@ -68,9 +68,11 @@ def one_run(values: Mapping[str, ArrayLike], bounds: tuple[float, float], second
     above = {name: int((np.asarray(one) > high).sum()) for name, one in values.items()}
     below = {name: int((np.asarray(one) < low).sum()) for name, one in values.items()}
     steps = len(np.asarray(values["honest"]))
-    title = f"One run: above the limit {above['overconfident']} times if overconfident, {above['honest']} if honest"
+    over, fair = above["overconfident"], above["honest"]
+    title = f"One run: above the limit {over} times if overconfident, {fair} if honest"
     alt = (
-        f"NEES of one run over {seconds:.0f} seconds, {steps} steps, with limits of {low:.2f} and {high:.2f}. "
+        f"NEES of one run over {seconds:.0f} seconds, {steps} steps, with limits of {low:.2f} and "
+        f"{high:.2f}. "
         + " ".join(
             f"The {name} filter is above them at {above[name]} steps and below them at {below[name]}."
             for name in values
