@@ -13,8 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, field_validator, model_validator
 
 from wildlab.flight.files import Strict
-
-STANDARD_GRAVITY = 9.80665  # m/s^2: what data sheets mean by g
+from wildlab.geometry.gravity import STANDARD_GRAVITY
 
 #: Units a twin may use, and what one of each is in SI and radians.
 UNITS = {

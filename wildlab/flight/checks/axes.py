@@ -13,8 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import Array, Inertial, Moves, attitudes_near, turns
 from wildlab.flight.store import Flight
-
-GRAVITY = 9.81  # m/s^2; anywhere on Earth to a few per mille
+from wildlab.geometry.gravity import USUAL_GRAVITY as GRAVITY
 
 #: Half of all samples lie above and half below: this one does not mind manoeuvres.
 PLAUSIBLE = (5.0, 20.0)  # m/s^2
