@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import USUAL_GRAVITY as GRAVITY
+from wildlab.geometry.gravity import USUAL_GRAVITY
 from wildlab.simulation import kernels
 from wildlab.simulation.disturbances import AttitudeDisturbance
 
@@ -99,7 +99,7 @@ def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Arr
     return rates
 
 
-def specific_forces(motion: Motion, gravity: float = GRAVITY) -> Array:
+def specific_forces(motion: Motion, gravity: float = USUAL_GRAVITY) -> Array:
     """What ideal accelerometers feel: the acceleration less gravity.
 
     Parameters
