@@ -30,8 +30,8 @@ def flights(**values):
 def test_the_summary_says_from_where_and_how_far_off():
     images, receiver, track = text.summary(flights())
     assert images == (
-        "From 240 metres on average a single thermal image places a drifting vessel about 9 metres from where "
-        "its own receiver says it is."
+        "From 240 metres on average a single thermal image places a drifting vessel about 9 metres from "
+        "where its own receiver says it is."
     )
     assert "the images are 8.8 metres off; the receiver is 1.8 metres off itself" in receiver
     assert track.endswith("less than the images it is made of.")
