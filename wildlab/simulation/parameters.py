@@ -23,6 +23,7 @@ from wildlab.simulation.sensor_parameters import (
     Assumed,
     Autopilot,
     Boresight,
+    CameraSway,
     Gimbal,
     Gnss,
     Imu,
@@ -67,6 +68,7 @@ class TwinParameters(Strict):
     onboard_clock: OnboardClock | None = None
     autopilot: Autopilot
     boresight: Boresight | None = None
+    camera_sway: CameraSway | None = None
     imu: Imu | None = None
     gnss: Gnss | None = None
     truth: TruePose
@@ -281,7 +283,8 @@ def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
     -------
     pandas.DataFrame
         One row per parameter. Columns, all of them text: ``parameter``, ``value``, ``unit``, ``status``
-        (published or chosen) and ``because`` (the source, and the reason where there is one).
+        (published, chosen or fitted) and ``because`` (the source, what it was fitted to, and the reason,
+        where there are any).
 
     Raises
     ------
@@ -296,9 +299,53 @@ def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
                 "value": p.value if isinstance(p.value, str) else f"{p.value:.10g}",
                 "unit": "" if p.unit == "1" else p.unit,
                 "status": p.status,
-                "because": "; ".join(part for part in (p.source, p.reason) if part),
+                "because": p.because,
             }
             for group, name, p in each_parameter(parameters)
         ],
         columns=["parameter", "value", "unit", "status", "because"],
     )
+
+
+def status_words(table: pd.DataFrame) -> str:
+    """What of a twin's parameters was published, chosen and fitted, in words.
+
+    Parameters
+    ----------
+    table
+        As :func:`parameters_table` gives it.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> status_words(pd.DataFrame({"status": ["chosen", "published", "chosen"]}))
+    '3 parameters: 1 published, 2 chosen'
+    """
+    counts = table["status"].value_counts()
+    said = [f"{counts[status]} {status}" for status in ("published", "chosen", "fitted") if status in counts]
+    return f"{len(table)} parameters: {', '.join(said)}"
+
+
+def fitted_to(twin: TwinParameters | str | Path) -> tuple[str, ...]:
+    """The published tables that any parameter of a twin was fitted to, sorted: they do not test the twin.
+
+    Parameters
+    ----------
+    twin
+        Its parameters, or its name or file as for :func:`load_twin`.
+
+    Returns
+    -------
+    tuple of str
+        As published numbers name their sources: ``"H table 5.4"``.
+
+    Raises
+    ------
+    WildlabError
+        As :func:`load_twin`, where it is given a name or a file.
+    """
+    parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
+    return tuple(sorted({table for *_, p in each_parameter(parameters) for table in p.fitted_to}))

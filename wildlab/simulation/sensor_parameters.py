@@ -149,6 +149,25 @@ class Boresight(Strict):
         return self
 
 
+class CameraSway(Strict):
+    """How the camera turns against the airframe after the bank has changed.
+
+    Its standard deviation per axis is the ``share`` of what the bank has changed over the last ``memory`` or
+    so: see `wildlab.simulation.camera_sway`.
+    """
+
+    share: Annotated[Parameter, quantity("1", 0, 1)]
+    memory: Duration
+    shortest_period: Duration
+    longest_period: Duration
+
+    @model_validator(mode="after")
+    def _band(self) -> CameraSway:
+        if self.shortest_period.number > self.longest_period.number:
+            raise ValueError("shortest_period is longer than longest_period; exchange the two")
+        return self
+
+
 class Imu(Strict):
     """An inertial measurement unit as its data sheet describes it; random walks as noise densities."""
 

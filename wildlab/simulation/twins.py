@@ -17,6 +17,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.animal_motion import animals_truth
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
+from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.gimbal import gimbal_table
 from wildlab.simulation.manifest import twin_manifest
@@ -114,7 +115,9 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
         nav[UNCALIBRATED] = uncalibrated
     known = trajectory(sample_times(twin.truth.rate.si, duration))
     nav[TRUTH] = nav_table(known)
-    frames, detections = frames_and_detections(twin, trajectory(exposure_times(twin)), seed)
+    frames, detections = frames_and_detections(
+        twin, camera_motion(twin, trajectory, exposure_times(twin), seed), seed
+    )
     if twin.animals is not None:
         truth = animals_truth(twin, twin.animals, seed)
     else:
