@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.files import read_toml
 from wildlab.geometry.gravity import Earth
+from wildlab.simulation import kernels
 from wildlab.simulation.imu import (
     TriadDataSheet,
     ideal_imu,
@@ -196,6 +197,17 @@ def test_both_triads_have_the_angles_of_the_data_sheet(name):
     for sheet in triad_data_sheets(imu):
         assert sheet.axis_misalignment == imu.axis_misalignment.si > 0
         assert sheet.package_misalignment == imu.package_misalignment.si
+
+
+def test_each_axis_reads_along_its_own_direction():
+    """Of a unit whose x axis leans towards y alone, only x reads a vector along y."""
+    axes = np.array([[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    reading = np.zeros((1, 3))
+    no_limits = np.array([np.inf, 0.0])
+    kernels.read_triad(
+        np.array([[0.0, 2.0, 0.0]]), axes, np.zeros(3), np.zeros((1, 3)), reading, 0.0, no_limits
+    )
+    assert reading[0] == pytest.approx([0.2, 2.0, 0.0])
 
 
 def test_range_and_resolution_bound_the_reading():
