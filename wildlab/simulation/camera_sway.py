@@ -95,7 +95,7 @@ def camera_sway(twin: TwinParameters, trajectory: Trajectory, seed: int) -> Sign
 
     def angles(times: Array) -> Array:
         t = np.asarray(times, float)
-        return np.interp(t, grid, size)[:, None] * np.stack([axis(t) for axis in axes], axis=-1)
+        return np.asarray(np.interp(t, grid, size)[:, None] * np.stack([axis(t) for axis in axes], axis=-1))
 
     return angles
 
