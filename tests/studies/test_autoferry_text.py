@@ -131,8 +131,8 @@ def test_the_headline_turns_with_what_is_gained_and_spoilt() -> None:
     few = words.headline(FEW, "schmidt", "2 scenarios that nothing is tuned on")
     assert few == (
         "On 2 scenarios that nothing is tuned on, one filter throughout (Schmidt) neither clearly helps nor "
-        "clearly harms: compared with white noise, 1 of 4 tracks by lidar and radar turned honest about their "
-        "error, 2 turned dishonest, and 1 got lost."
+        "clearly harms: compared with white noise, 1 of 4 tracks by lidar and radar turned honest about "
+        "their error, 2 turned dishonest, and 1 got lost."
     )
     none = words.headline(FEW.iloc[:0], "schmidt", "x")
     assert "no sensor alone keeps more than half of its tracks" in none

@@ -98,8 +98,9 @@ def headline(found: pd.DataFrame, fixed: str, where: str) -> str:
     else:
         said = "neither clearly helps nor clearly harms"
     return (
-        f"On {where}, one filter throughout ({FILTER_WORDS[fixed]}) {said}: compared with white noise, {gained} "
-        f"of {n} tracks by {by} turned honest about their error, {spoilt} turned dishonest, and {lost} got lost."
+        f"On {where}, one filter throughout ({FILTER_WORDS[fixed]}) {said}: compared with white noise, "
+        f"{gained} of {n} tracks by {by} turned honest about their error, {spoilt} turned dishonest, and "
+        f"{lost} got lost."
     )
 
 
