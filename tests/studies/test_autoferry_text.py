@@ -134,6 +134,8 @@ def test_the_headline_turns_with_what_is_gained_and_spoilt() -> None:
         "clearly harms: compared with white noise, 1 of 4 tracks by lidar and radar turned honest about "
         "their error, 2 turned dishonest, and 1 got lost."
     )
+    lead = judged(made("lidar", ["gained", "gained", "spoilt"]))
+    assert "neither clearly helps nor clearly harms" in words.headline(lead, "schmidt", "x")
     none = words.headline(FEW.iloc[:0], "schmidt", "x")
     assert "no sensor alone keeps more than half of its tracks" in none
     assert (
@@ -376,6 +378,8 @@ def test_mean_nees_of_all_tracks(tracks: pd.DataFrame) -> None:
     )
     assert "4 of 7 are of lost tracks. Tracks of 1 that stay" in alt and "4 of 7 hollow" in caption
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["lidar", "colour\ncamera"]
+    lost = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
+    assert sum(len(line.get_xdata()) for line in lost) == 4
     kept = tracks.assign(share_with_target=1.0, nees_low=0.0, nees_high=1000.0)
     other = charts.mean_nees_shown(kept, outcomes(kept, words.KEYS, "coloured"), "coloured")
     assert other[0].axes[0].get_title(loc="left").endswith("2 with differenced, 2 with white noise")
