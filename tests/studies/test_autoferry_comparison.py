@@ -152,6 +152,11 @@ def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough() -> Non
     assert (
         choose_filter(table(coloured=(0.5, 9.0), schmidt=(3.0, 9.0), thinned=(9.0, 9.0)), KEYS) == "schmidt"
     )
+    # Nor do bearings, whatever a filter makes of them.
+    bearing = {"sensor": "eo", "kind": "bearing"}
+    camera = [row("a", "ekf", 9.0, **bearing), row("a", "thinned", 2.0, **bearing)]  # type: ignore[arg-type]
+    positions = table(coloured=(3.0, 2.0), schmidt=(2.5, 2.0), thinned=(5.0, 2.0))
+    assert choose_filter(pd.concat([positions, pd.DataFrame(4 * camera)]), KEYS) == "schmidt"
     # What follows something else decides nothing.
     lost = table(coloured=(2.0, 2.0), schmidt=(9.0, 2.0)).assign(share_with_target=0.1)
     assert choose_filter(lost, KEYS) == "coloured"

@@ -42,7 +42,7 @@ def stays(table: pd.DataFrame, mostly: float = MOSTLY) -> NDArray[np.bool_]:
 
     One that never began, or whose boat the sensor never saw, does not.
     """
-    return np.asarray(np.isfinite(table["rmse"]) & (table["share_with_target"] >= mostly), bool)
+    return np.asarray(table["share_with_target"] >= mostly, bool)
 
 
 def consistent(table: pd.DataFrame) -> NDArray[np.bool_]:
