@@ -27,6 +27,7 @@ from wildlab.simulation.sensor_parameters import (
     Gnss,
     Imu,
     OnboardClock,
+    Tolerance,
     TruePose,
     TwinCamera,
     TwinMount,
@@ -67,6 +68,7 @@ class TwinParameters(Strict):
     camera_sway: CameraSway | None = None
     imu: Imu | None = None
     gnss: Gnss | None = None
+    tolerance: Tolerance | None = None
     truth: TruePose
     assumed: Assumed
 
