@@ -13,6 +13,7 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
+from wildlab.studies.printed_numbers.items import all_items
 
 pytestmark = pytest.mark.slow
 
@@ -63,6 +64,17 @@ def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> Non
     folder = run("consistency-bounds", reports)
     printed = [m for m in values(folder).values() if m["published"] is not None]
     assert len(printed) == 6
+    assert faults(folder / "report.html") == []
+
+
+def test_printed_numbers_stand_beside_each_other(reports: Path, faults: Faults) -> None:
+    folder = run("printed-numbers", reports)
+    found = values(folder)
+    assert {name for name, _ in found} == {"ratio"}
+    assert {subject: m["value"] for (_, subject), m in found.items()} == pytest.approx(
+        {item.key: item.ratio for item in all_items()}
+    )
+    assert json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["kind"] == "computed"
     assert faults(folder / "report.html") == []
 
 

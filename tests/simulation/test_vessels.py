@@ -41,10 +41,11 @@ def detection_times(flight):
 
 
 def unspoiled(twin):
-    """The twin whose camera and detector do not err, nor does the camera turn against the airframe."""
+    """The twin whose camera and detector do not err, is as stated, and does not turn against the airframe."""
     camera = twin.camera
     exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
-    return twin.model_copy(update={"camera": camera.model_copy(update=exact), "camera_sway": None})
+    as_stated = {"camera_sway": None, "tolerance": None}
+    return twin.model_copy(update={"camera": camera.model_copy(update=exact), **as_stated})
 
 
 @pytest.mark.parametrize(("name", "count", "segments", "period", "fix"), FLIGHTS)

@@ -15,6 +15,7 @@ from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_
 from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
 from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.sensor_parameters import Gnss
 from wildlab.simulation.trajectory import Motion, Trajectory, angular_rates, attitude_along
 
 
@@ -93,11 +94,17 @@ def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFr
     return pd.DataFrame(columns)
 
 
-def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
-    """Fixes of the two receivers over the whole flight, and the velocity that the first one gives."""
+def gnss_table(
+    twin: TwinParameters, payload: Trajectory, seed: int, stated: Gnss | None = None
+) -> pd.DataFrame:
+    """Fixes of the two receivers over the whole flight, and the velocity that the first one gives.
+
+    What the columns say of its accuracy is that of the receivers as ``stated``; left out, as they are.
+    """
     g = twin.gnss
     if g is None:
         raise ValueError("this twin carries no receivers")
+    sheet = g if stated is None else stated
     times = sample_times(g.rate.si, twin.flight.duration.si)
     motion, rate = payload(times), angular_rates(attitude_along(payload), times)
     arms = {
@@ -120,10 +127,12 @@ def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataF
             columns |= {
                 f"v_{axis}_m_s": (velocity + slip)[:, i] for i, axis in enumerate(("north", "east", "down"))
             }
-    for i, axis in enumerate(("horizontal", "vertical")):
-        sd = math.hypot(errors.noise_sd[i], errors.correlated_sd[i])
-        columns[f"sd_{axis}_m"] = np.full(len(times), sd)
-    columns["sd_velocity_m_s"] = np.full(len(times), g.velocity_noise.si)
+    for axis, noise, correlated in (
+        ("horizontal", sheet.horizontal_noise.si, sheet.horizontal_correlated_sd.si),
+        ("vertical", sheet.vertical_noise.si, sheet.vertical_correlated_sd.si),
+    ):
+        columns[f"sd_{axis}_m"] = np.full(len(times), math.hypot(noise, correlated))
+    columns["sd_velocity_m_s"] = np.full(len(times), sheet.velocity_noise.si)
     for which, arm in arms.items():
         columns |= {f"{which}lever_{axis}_m": np.full(len(times), arm[i]) for i, axis in enumerate("xyz")}
     return pd.DataFrame(columns)

@@ -28,6 +28,7 @@ from wildlab.simulation.sensor_parameters import (
     Gnss,
     Imu,
     OnboardClock,
+    Tolerance,
     TruePose,
     TwinCamera,
     TwinMount,
@@ -71,6 +72,7 @@ class TwinParameters(Strict):
     camera_sway: CameraSway | None = None
     imu: Imu | None = None
     gnss: Gnss | None = None
+    tolerance: Tolerance | None = None
     truth: TruePose
     assumed: Assumed
 

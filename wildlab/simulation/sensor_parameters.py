@@ -112,6 +112,20 @@ class Autopilot(Strict):
         return self
 
 
+class Tolerance(Strict):
+    """How far what is stated of the sensors may be from what they are (see `wildlab.simulation.as_flown`).
+
+    ``noise`` and ``bias`` are limits, as shares of noise densities and of standard deviations of biases;
+    ``focal_length`` (a share), ``principal_point`` and ``mount`` are standard deviations, per axis.
+    """
+
+    noise: Annotated[Parameter, quantity("1", 0, 0.9)]
+    bias: Annotated[Parameter, quantity("1", 0, 0.9)]
+    focal_length: Annotated[Parameter, quantity("1", 0, 0.2)]
+    principal_point: Pixels
+    mount: AngleSpread
+
+
 class TruePose(Strict):
     """The pose that no sensor knows, written down for figures."""
 
