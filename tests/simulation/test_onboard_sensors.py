@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.files import read_toml
 from wildlab.geometry.gravity import EARTH_RATE, normal_gravity
 from wildlab.simulation.imu import TriadDataSheet, triad_data_sheets
-from wildlab.simulation.onboard_sensors import imu_table, payload_boresight
+from wildlab.simulation.onboard_sensors import as_mounted, imu_table, mounted_imu, payload_boresight
 from wildlab.simulation.parameters import PARTS, TwinParameters, load_twin
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import angular_rates, attitude_along, turned
+from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, turned
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import simulate
 
@@ -96,6 +97,49 @@ def test_a_flight_has_the_readings_of_the_unit_on_the_payload(exact):
     assert truth["time_s"].iloc[[0, -1]].to_numpy() == pytest.approx([t[0], t[-1]])
     assert (carried.inv() * last).magnitude() < 2e-5
     assert np.linalg.norm(spin * 20) > 1e-3, "the Earth's turning shows"
+
+
+def test_the_unit_feels_and_errs_in_its_own_axes_and_is_then_calibrated(exact):
+    """Steps of a coarse resolution lie along the axes of the unit, as it is mounted, and not along b."""
+    airframe = twin_trajectory(exact, np.random.default_rng(0))
+    coarse = with_imu(exact, accelerometer_resolution=50.0, gyro_resolution=0.5)
+    fine, rough = imu_table(exact, airframe, 4), imu_table(coarse, airframe, 4)
+    R_bi, unit = mounted_imu(exact), coarse.imu
+    assert R_bi is not None and unit is not None
+    expected = Rotation.from_euler("ZYX", [0.25, -5.7, 1.1], degrees=True).as_matrix()
+    assert R_bi == pytest.approx(expected, abs=1e-12)
+    own = as_mounted(rough, R_bi)
+    sizes = unit.accelerometer_resolution.si, unit.gyro_resolution.si
+    for columns, step in zip((FORCE, RATE), sizes, strict=True):
+        steps = own[columns].to_numpy() / step
+        assert steps == pytest.approx(np.round(steps), abs=1e-8)
+        calibrated = rough[columns].to_numpy()
+        assert calibrated == pytest.approx(fine[columns].to_numpy(), abs=step)
+        assert np.abs(calibrated / step - np.round(calibrated / step)).max() > 0.1
+        # What the unit gives is the vector of b in its own axes.
+        assert as_mounted(fine, R_bi)[columns].to_numpy() == pytest.approx(
+            fine[columns].to_numpy() @ expected
+        )
+    pd.testing.assert_series_equal(own["time_s"], rough["time_s"])
+
+
+def test_a_level_unit_at_rest_reads_the_angles_that_the_thesis_prints(exact):
+    """How they were found (H 5.6.1): roll and pitch that gravity shows while the airframe is level."""
+
+    def still(times):
+        zeros = np.zeros((len(times), 3))
+        return Motion(times, zeros, zeros, zeros, np.tile(np.eye(3), (len(times), 1, 1)))
+
+    table, R_bi = imu_table(exact, still, 1), mounted_imu(exact)
+    assert R_bi is not None
+    x, y, z = as_mounted(table, R_bi)[FORCE].to_numpy()[0]
+    assert np.degrees([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))]) == pytest.approx([1.1, -5.7])
+    assert table[FORCE].to_numpy()[0, :2] == pytest.approx([0, 0], abs=1e-12), "calibrated, b is level"
+
+
+def test_without_known_angles_the_axes_are_those_of_the_airframe(exact):
+    autopilot = exact.autopilot.model_copy(update={"imu_yaw": None})
+    assert mounted_imu(exact.model_copy(update={"autopilot": autopilot})) is None
 
 
 @pytest.mark.parametrize("figure", sorted(Imu.model_fields))
