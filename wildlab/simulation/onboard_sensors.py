@@ -102,8 +102,8 @@ def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFr
     R_bi = mounted_imu(twin)
     if R_bi is None:
         R_bi = np.eye(3)
-    felt = (vectors @ R_bi for vectors in true)
-    read = read_imu(*felt, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
+    force, rate = (vectors @ R_bi for vectors in true)
+    read = read_imu(force, rate, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
     force, rate = (vectors @ R_bi.T for vectors in read)
     columns = {"time_s": times}
     columns |= {f"f_{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}

@@ -32,7 +32,7 @@ def pixels_on_ground(pixels: ArrayLike, height: ArrayLike, focal_length: ArrayLi
     >>> float(pixels_on_ground(20.0, 350.0, 1000.0))
     7.0
     """
-    return np.asarray(np.asarray(pixels, float) * height / focal_length)
+    return np.asarray(np.asarray(pixels, float) * np.asarray(height, float) / np.asarray(focal_length, float))
 
 
 def images_in(duration: ArrayLike, rate: ArrayLike) -> Array:

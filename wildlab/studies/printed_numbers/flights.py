@@ -40,7 +40,9 @@ def mean_within_two_metres(printed: Printed) -> Item:
     """H 8.1.1 against table 5.6."""
     numbers = printed["slow-vessel"]
     north, east = (numbers["observer", f"mean_{axis}"] for axis in ("north", "east"))
-    other = np.hypot(*(numbers["pixhawk-autopilot", f"mean_{axis}"] for axis in ("north", "east")))
+    other = float(
+        np.linalg.norm([numbers["pixhawk-autopilot", f"mean_{axis}"] for axis in ("north", "east")])
+    )
     off = float(np.hypot(north, east))
     return Item(
         "mean-within-two-metres",
