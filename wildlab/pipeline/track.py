@@ -273,25 +273,44 @@ def follow_schmidt(
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
 
 
+def follow_schmidt_each(seen: Sighting, tuning: CvTuning, covariances: ArrayLike) -> list[Track]:
+    """`follow_schmidt` with each of several covariances of the poses, (B, N, 6, 6), in one run of the filter.
+
+    Parameters
+    ----------
+    seen, tuning
+        As for `follow_schmidt`.
+    covariances
+        One for each run, in place of that which the source states; m and rad.
+
+    Returns
+    -------
+    list of Track
+        B of them.
+    """
+    pose = PoseUncertainty(np.asarray(covariances, float))
+    z = np.broadcast_to(seen.uv, (len(pose.covariance), *seen.uv.shape))
+    R = np.eye(2) * tuning.pixel**2
+    return _compiled_runs(seen, z, R, tuning, View(seen.poses, seen.plane_down), pose)
+
+
 def _compiled(
     seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
 ) -> Track:
     """One run of the compiled filters, which a test holds against the readable ones."""
-    found = run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
-    n = len(seen.times)
-    S = np.full((n, 2, 2), np.nan)  # the compiled filters give the NIS in its place
-    chosen = np.where(np.isfinite(found.nis[0]), 0, -1).astype(np.int64)
-    return Track(
-        seen.times,
-        found.x[0],
-        found.P[0],
-        found.innovation[0],
-        S,
-        found.nis[0],
-        found.used[0],
-        chosen,
-        found.limited[0],
-    )
+    return _compiled_runs(seen, z[None], R, tuning, view, pose)[0]
+
+
+def _compiled_runs(
+    seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
+) -> list[Track]:
+    found = run_batch(seen.times, z, R, tuning.motion, start(seen, tuning), view=view, pose=pose)
+    S = np.full((len(seen.times), 2, 2), np.nan)  # the compiled filters give the NIS in its place
+    chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
+    return [
+        Track(seen.times, x, P, innovation, S, nis, used, which, limited)
+        for x, P, innovation, nis, used, which, limited in zip(*found[1:6], chosen, found.limited, strict=True)
+    ]
 
 
 class Scored(NamedTuple):

@@ -123,8 +123,7 @@ def run_batch(
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
-        each = [schmidt.transitions_of_pose(one.reshape(N, 6, 6), pose.change) for one in P_poses]
-        phis = np.array(each).reshape(len(P_poses), N, 36)
+        phis = _transitions(P_poses, pose.change)
         unknown = ~np.isfinite(P_poses).all(axis=2)
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -206,6 +205,33 @@ def _run_alike(
     x_first, v_first = np.moveaxis(estimates, -1, 0), np.moveaxis(innovation, -1, 0)
     shared = np.broadcast_to(covariances, (B, len(kept), 4, 4))
     return BatchTracks(times[kept], x_first, shared, v_first, nis.T, used.T, np.zeros((B, N), bool))
+
+
+def _transitions(covariances: Array, change: schmidt.Change) -> Array:
+    """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 36), as (B, N, 36).
+
+    They do not depend on the scale: runs whose covariances are multiples of those of another share its own,
+    which take most of the time of a run.
+    """
+    phis = np.empty(covariances.shape)
+    known: list[int] = []
+    for run, own in enumerate(covariances):
+        like = next((other for other in known if _multiples(covariances[other], own)), None)
+        if like is None:
+            known.append(run)
+            phis[run] = schmidt.transitions_of_pose(own.reshape(-1, 6, 6), change).reshape(-1, 36)
+        else:
+            phis[run] = phis[like]
+    return phis
+
+
+def _multiples(one: Array, other: Array) -> bool:
+    """Whether ``other`` is ``one`` times a number above zero, but for rounding; NaN where that has it."""
+    largest = np.nanargmax(np.abs(one)) if np.isfinite(one).any() else 0
+    if not (one.flat[largest] > 0 and other.flat[largest] > 0):
+        return False
+    factor = other.flat[largest] / one.flat[largest]
+    return bool(np.allclose(other, factor * one, rtol=1e-12, atol=0, equal_nan=True))
 
 
 def _singular(row: int) -> WildlabError:
