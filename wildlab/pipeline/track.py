@@ -309,7 +309,9 @@ def _compiled_runs(
     chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
     return [
         Track(seen.times, x, P, innovation, S, nis, used, which, limited)
-        for x, P, innovation, nis, used, which, limited in zip(*found[1:6], chosen, found.limited, strict=True)
+        for x, P, innovation, nis, used, which, limited in zip(
+            *found[1:6], chosen, found.limited, strict=True
+        )
     ]
 
 

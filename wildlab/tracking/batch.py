@@ -123,7 +123,7 @@ def run_batch(
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
-        phis = _transitions(P_poses, pose.change)
+        phis = _transitions(P_poses, pose)
         unknown = ~np.isfinite(P_poses).all(axis=2)
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -207,19 +207,21 @@ def _run_alike(
     return BatchTracks(times[kept], x_first, shared, v_first, nis.T, used.T, np.zeros((B, N), bool))
 
 
-def _transitions(covariances: Array, change: schmidt.Change) -> Array:
+def _transitions(covariances: Array, pose: PoseUncertainty) -> Array:
     """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 36), as (B, N, 36).
 
-    They do not depend on the scale: runs whose covariances are multiples of those of another share its own,
-    which take most of the time of a run.
+    They take most of the time of a run. They do not depend on the scale: runs whose covariances are multiples
+    of those of another share its own. And where nothing is left of ``C`` they do not matter.
     """
-    phis = np.empty(covariances.shape)
+    phis = np.tile(np.eye(6).ravel(), (*covariances.shape[:2], 1))
+    if pose.correlation_time == 0:
+        return phis
     known: list[int] = []
     for run, own in enumerate(covariances):
         like = next((other for other in known if _multiples(covariances[other], own)), None)
         if like is None:
             known.append(run)
-            phis[run] = schmidt.transitions_of_pose(own.reshape(-1, 6, 6), change).reshape(-1, 36)
+            phis[run] = schmidt.transitions_of_pose(own.reshape(-1, 6, 6), pose.change).reshape(-1, 36)
         else:
             phis[run] = phis[like]
     return phis
