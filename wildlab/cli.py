@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from wildlab import __version__
+from wildlab.commands import studies
+from wildlab.commands.shared import FILE, FOLDER
 from wildlab.errors import WildlabError
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-FOLDER = click.Path(path_type=Path, file_okay=False)
-FILE = click.Path(path_type=Path, dir_okay=False)
+    pass
 
 
 class Commands(click.Group):
@@ -59,170 +58,11 @@ def wildlab() -> None:
     """
 
 
-@wildlab.command("list")
-@click.option("--out", type=FOLDER, help="Where the reports are.  [default: reports]")
-@click.option("--json", "as_json", is_flag=True, help="As JSON, with every published number and ours.")
-def list_(out: Path | None, as_json: bool) -> None:
-    """The studies, and where each stands: published numbers, and how many agree.
-
-    \b
-    Example:
-      wildlab list
-    """
-    from wildlab.evaluation.printed import AGREES
-    from wildlab.evaluation.shares import HOLDS, MOSTLY
-    from wildlab.flight.catalog import is_fetched
-    from wildlab.runner.catalogue import load_studies
-    from wildlab.runner.record.status import as_plain, study_status
-
-    statuses = [study_status(study, _reports(out)) for study in load_studies().values()]
-    if as_json:
-        print_json([as_plain(one) for one in statuses])
-        return
-    rows = []
-    for one in statuses:
-        done, data = one.state == "done", one.study.dataset
-        holding = sum(claim.verdict in (HOLDS, MOSTLY) for claim in one.claims)
-        # What has not been run has neither come out nor failed to.
-        count = len(one.counted)
-        numbers = f"{one.count(AGREES)} of {count}" if done else f"{count} printed"
-        claims = f"{holding} of {len(one.claims)}" if done else f"{len(one.claims)} printed"
-        first = f"; first: wildlab fetch {data}" if data and not done and not is_fetched(data) else ""
-        state = f"{one.state}{first}"
-        rows.append(
-            [
-                one.study.name,
-                one.study.kind,
-                state,
-                numbers if one.numbers else "-",
-                claims if one.claims else "-",
-                one.study.title,
-            ]
-        )
-    print_table(["study", "kind", "state", "numbers agree", "claims hold", "question"], rows)
+for _command in (studies.list_, studies.run, studies.vary, studies.evaluate):
+    wildlab.add_command(_command)
 
 
-@wildlab.command()
-@click.argument("studies", nargs=-1, metavar="STUDY...")
-@click.option(
-    "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
-)
-@click.option("--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")
-@click.option(
-    "--seeds",
-    type=click.IntRange(1, 1_000_000),
-    help="Over how many simulated flights, in place of the study's own.",
-)
-@click.option("--flight", type=FOLDER, help="A flight folder in place of the study's own (one study only).")
-@click.option(
-    "--jobs",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="How many processes at a time, for notebooks and seeds together.",
-)
-@click.option(
-    "--scheduler",
-    metavar="tcp://HOST:PORT",
-    help="Compute the seeds on a dask.distributed cluster; notebooks run here.",
-)
-@click.option(
-    "--timeout",
-    type=click.FloatRange(0, min_open=True),
-    help="Minutes a notebook may take, and each seed.  [default: 30]",
-)
-@click.option("--out", type=FOLDER, help="Where reports go.  [default: reports]")
-def run(
-    studies: tuple[str, ...],
-    everything: bool,
-    first_look: bool,
-    seed: int | None,
-    seeds: int | None,
-    flight: Path | None,
-    jobs: int,
-    scheduler: str | None,
-    timeout: float | None,
-    out: Path | None,
-) -> None:
-    """Run studies; each leaves a report, and the ledger shows them all.
-
-    --all goes over them twice: first every report from few flights, then the full numbers in their place.
-    A study that is named runs once, in full; the name of a case (schmidt) stands for all its studies.
-    --seeds N is one pass over N flights.
-
-    What was computed for a seed is kept: a run that was broken off goes on where it stopped, and more
-    seeds cost only those that are new. The numbers are the same for any --jobs.
-
-    \b
-    Examples:
-      wildlab run sensitivity consistency-bounds
-      wildlab run schmidt --jobs 2
-      wildlab run --all --jobs 4
-      wildlab run --all --first-look
-      wildlab run static-point --seeds 200 --jobs 4
-      wildlab run static-point --scheduler tcp://127.0.0.1:8786
-    """
-    from wildlab.runner.run import run_studies
-
-    if everything and studies:
-        raise click.UsageError("Name studies or say --all, not both.")
-    if first_look and seeds is not None:
-        raise click.UsageError("--first-look has its own number of flights: leave it or --seeds out.")
-    outcomes = run_studies(
-        studies,
-        everything=everything,
-        first_look=first_look,
-        seed=seed,
-        seeds=seeds,
-        flight=flight,
-        reports=_reports(out),
-        parallel=jobs,
-        scheduler=scheduler,
-        timeout_s=None if timeout is None else timeout * 60,
-        console=_console(),
-    )
-    click.echo(shown(_reports(out) / "index.html"))
-    failed = [outcome.name for outcome in outcomes if outcome.state == "failed"]
-    if failed:
-        click.echo(f"{len(failed)} of {len(outcomes)} failed: {', '.join(failed)}.", err=True)
-        sys.exit(1)
-
-
-@wildlab.command()
-@click.argument("flight", type=FOLDER)
-@click.option("--source", help="Which poses to judge, where the flight has several (its nav/NAME.parquet).")
-@click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
-@click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes it may take.  [default: 30]"
-)
-def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float | None) -> None:
-    """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
-
-    One report on the accuracy of its georeferencing, and one on its navigation, as far as the data go.
-
-    \b
-    Examples:
-      wildlab evaluate flights/tuesday
-      wildlab evaluate flights/antenna --source autopilot
-    """
-    from wildlab.runner.evaluate import evaluate_flight
-
-    outcomes = evaluate_flight(
-        flight,
-        source=source,
-        reports=_reports(out),
-        timeout_s=None if timeout is None else timeout * 60,
-        console=_console(),
-    )
-    for outcome in outcomes:
-        if outcome.folder is not None:
-            click.echo(shown(outcome.folder / "report.html"))
-    if any(outcome.state == "failed" for outcome in outcomes):
-        sys.exit(1)
-
-
-@wildlab.command()
+@wildlab.command(short_help="Is a flight usable, and for what?")
 @click.argument("flight", type=FOLDER)
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def check(flight: Path, as_json: bool) -> None:
@@ -278,7 +118,7 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
     click.echo(f'Next: wildlab check "{shown(into)}"', err=True)
 
 
-@wildlab.command()
+@wildlab.command(short_help="Get a public data set, or list what there is.")
 @click.argument("dataset", required=False)
 @click.option("--json", "as_json", is_flag=True, help="Without DATASET: the list as JSON.")
 def fetch(dataset: str | None, as_json: bool) -> None:
@@ -367,19 +207,6 @@ def _datasets(catalog: Any) -> list[dict[str, Any]]:
 
 def _tell_download(file: str, done: int, count: int) -> None:
     click.echo(f"getting {file} ({done + 1} of {count})", err=True)
-
-
-def _reports(out: Path | None) -> Path:
-    from wildlab.paths import REPORTS
-
-    return REPORTS if out is None else out
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    # Progress goes to standard error: standard output is the path of the result.
-    return Console(stderr=True)
 
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:

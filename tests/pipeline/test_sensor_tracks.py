@@ -14,13 +14,14 @@ from wildlab.pipeline.sensor_tracks import (
     FILTERS,
     GATE,
     PATIENCE_S,
+    WITH_ITS_TARGET_M,
     SensorTrack,
     follow_flight,
     start_near,
     table,
 )
 from wildlab.pipeline.sensor_tuning import REACH, SensorTuning, errors_near, tune
-from wildlab.studies.autoferry.comparison import beside_white, check_claims, gains, off_ideal, pooled
+from wildlab.studies.autoferry.comparison import off_ideal
 
 KEYS = ["sensor", "target"]
 
@@ -290,67 +291,38 @@ def test_a_track_does_not_start_on_another_target():
     assert rows["rmse"].isna().all()
 
 
-# --- comparing ----------------------------------------------------------------------------------------------
+def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
+    n = 40
+    estimate, near = np.zeros((n, 4)), np.arange(n) < 30
+    error = np.zeros((n, 4))
+    error[10:, 0] = WITH_ITS_TARGET_M + 1.0  # it strays
+    error[20:] = np.nan  # and ends, while the target is still seen
+    nan, known = np.full(n, np.nan), np.ones(n, bool)
+    one = SensorTrack(
+        "lidar",
+        "one",
+        "kf",
+        np.arange(n) / 2,
+        estimate,
+        error,
+        nan,
+        np.full((n, 2), np.nan),
+        nan,
+        known,
+        near,
+    )
+    (row,) = table([one]).to_dict(orient="records")
+    assert (row["seen"], row["share_with_target"]) == (30, pytest.approx(1 / 3))
+    unseen = table([one._replace(near=np.zeros(n, bool))]).iloc[0]
+    assert unseen["seen"] == 0 and np.isnan(unseen["share_with_target"])
 
 
-def cases() -> pd.DataFrame:
-    nan = float("nan")
-    columns = [
-        "sensor",
-        "target",
-        "filter",
-        "rmse",
-        "anees",
-        "nees_high",
-        "anis",
-        "north",
-        "east",
-        "compared",
-    ]
-    rows = [
-        ("lidar", "a", "kf", 4.0, 8.0, 3.0, 0.5, 0.6, 0.1, 10),
-        ("lidar", "a", "coloured", 4.2, 1.0, 3.0, 1.0, -0.2, 0.3, 10),
-        ("lidar", "a", "schmidt", 5.0, 2.0, 3.0, 1.0, 0.2, 0.3, 10),
-        ("lidar", "b", "kf", 2.0, 2.0, 3.0, 9.0, 0.1, 0.1, 30),
-        ("lidar", "b", "coloured", 1.9, 0.5, 3.0, 1.0, -0.2, 0.3, 30),
-        ("lidar", "c", "kf", nan, nan, nan, nan, nan, nan, 0),
-        ("lidar", "c", "coloured", nan, nan, nan, nan, nan, nan, 0),
-    ]
-    found = pd.DataFrame(rows, columns=columns)
-    found["lag1_autocorrelation"], found["kind"] = nan, "position"
-    return found.rename(columns={axis: f"lag1_autocorrelation_{axis}" for axis in ("north", "east")})
-
-
-def test_a_factor_too_small_is_as_wrong_as_one_too_large():
-    np.testing.assert_allclose(off_ideal([2.0, 4.0, 1.0, 20.0]), [0, np.log(2), np.log(2), np.log(10)])
-
-
-def test_gain_is_consistency_at_a_bounded_price():
-    both = beside_white(cases(), KEYS)
-    assert list(both["filter"]) == ["coloured", "schmidt", "coloured"]
-    assert list(both["nearer"]) == [True, True, False]
-    found = gains(cases(), KEYS).set_index("target")
-    # Schmidt's NEES is ideal, but its error is a quarter larger.
-    assert found.loc["a", "filter"] == "coloured"
-    assert bool(found.loc["a", "gained"])
-    assert found.loc["a", "rmse_ratio"] == pytest.approx(1.05)
-    assert not found.loc["b", "gained"]
-    assert "c" not in found.index
-
-
-def test_pooled_cases_weigh_by_what_was_compared():
-    found = pooled(cases(), ["sensor"]).set_index("filter")
-    assert found.loc["kf", "rmse"] == pytest.approx(np.sqrt((10 * 16 + 30 * 4) / 40))
-    assert found.loc["kf", "anees"] == pytest.approx((10 * 8 + 30 * 2) / 40)
-    assert found.loc["schmidt", "compared"] == 10
-
-
-def test_claims_are_decided_case_by_case():
-    checks = check_claims(cases(), KEYS)
-    assert checks["white-noise-overconfident"].tolist() == [True, False]
-    assert checks["white-noise-nis-within"].tolist() == [True, False]
-    assert checks["differencing-whitens"].tolist() == [True, False]
-    assert checks["differencing-nearer-ideal"].tolist() == [True, False]
-    assert checks["differencing-costs-accuracy"].tolist() == [True, False]
-    assert checks["schmidt-nearer-ideal"].tolist() == [True]
-    assert checks["schmidt-as-accurate"].tolist() == [False]
+def test_what_is_near_a_target_is_what_the_sensor_saw_of_it():
+    followed = follow_flight(make(4, sd=0.5, sees=("two",)), {"lidar": quiet(sd=0.5)})
+    shares = table(followed).set_index(["target", "filter"])["share_with_target"]
+    assert shares["two", "kf"] > 0.95
+    seen = {one.target: one.near for one in followed}
+    assert seen["two"].sum() == pytest.approx(
+        6 / 7 * len(seen["two"]), abs=2
+    )  # every seventh look sees nothing
+    assert seen["one"].mean() < 0.2  # only where the other passes by

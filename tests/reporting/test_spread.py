@@ -9,7 +9,6 @@ import pytest
 from wildlab.reporting.report import open_report
 from wildlab.reporting.spread import bounds_of, range_clause, range_words, spread_words
 from wildlab.studies import monte_carlo, single_target
-from wildlab.studies.gating import text as gating
 from wildlab.studies.protocol import Metric, Study
 
 FLIGHTS = pd.Series(np.random.default_rng(1).permutation(np.arange(200.0)))
@@ -77,11 +76,6 @@ def test_tables_follow_the_number_of_flights(n: int, heading: str | None) -> Non
         assert columns.get("range") == heading and ("below" in columns) == (n > 1)
         assert ("median" in columns["here"]) == (n > 1)
     assert table.loc[0, "range"] == range_words(FLIGHTS[:n])
-
-
-def test_runs_of_gating_follow_their_number() -> None:
-    assert gating.rates_columns(10_000)["range"] == "90 % of runs"
-    assert gating.rates_columns(29)["range"] == "lowest to highest of 29 runs"
 
 
 @pytest.mark.parametrize(("n", "bounds"), [(1, (None, None)), (2, "range"), (29, "range"), (30, "quantiles")])

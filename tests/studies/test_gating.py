@@ -2,33 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.gating import kernels
 from wildlab.studies.gating import monte_carlo as gating
 from wildlab.studies.gating.monte_carlo import (
+    GATES,
     IMAGES,
     Choices,
+    Outcome,
     Overflight,
     draw_scene,
     gate,
+    outcomes,
     overflight,
     streams,
 )
+from wildlab.studies.gating.readings import READINGS
 from wildlab.studies.gating.variations import (
     chosen_parts,
     claim_margins,
+    seconds_in_view,
     standard_error,
     variations,
     vary,
     verdict,
 )
+from wildlab.tracking.measurement import predict_azimuth_elevation, predict_pixel
+
+FEEDS = ("own", "assigned", "nothing")
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +73,10 @@ def warmed_up(scene: gating.Scene, run: int) -> KalmanFilter:
     return kf
 
 
-def test_positions_as_another_filter_gates_them(over: Overflight) -> None:
+@pytest.mark.parametrize("feed", FEEDS)
+def test_positions_as_another_filter_gates_them(over: Overflight, feed: str) -> None:
     runs = streams(7, 4)
-    scene, gated = draw_scene(over, runs), gate(over, Choices(), runs)
+    scene, gated = draw_scene(over, runs), gate(over, Choices(updated_with=feed), runs)  # type: ignore[arg-type]
     for run in range(4):
         kf = warmed_up(scene, run)
         for t in range(IMAGES):
@@ -71,7 +85,8 @@ def test_positions_as_another_filter_gates_them(over: Overflight) -> None:
             nis = [v @ np.linalg.inv(S) @ v for v in gated.measured[run, t] - kf.x[:2]]
             np.testing.assert_allclose(gated.nis[0, run, t], nis, rtol=1e-8)
             assert gated.right[0, run, t] == (nis[0] < nis[1])
-            kf.update(gated.measured[run, t, int(np.argmin(nis))])
+            if feed != "nothing":
+                kf.update(gated.measured[run, t, int(np.argmin(nis)) if feed == "assigned" else 0])
             np.testing.assert_allclose(gated.estimate[0, run, t], kf.x[:2], atol=1e-7)
 
 
@@ -80,11 +95,23 @@ def seen_angles(p_c: Array) -> Array:
     return np.array([np.arctan2(y, x), np.arctan(z / np.hypot(x, y))])
 
 
-@pytest.mark.parametrize("form", ["pixels", "angles"])
-def test_pixels_and_angles_as_written_out(over: Overflight, form: str) -> None:
+@pytest.mark.parametrize(
+    ("form", "feed", "angles_update"),
+    [
+        ("pixels", "own", "pixels"),
+        ("pixels", "assigned", "pixels"),
+        ("angles", "own", "pixels"),
+        ("angles", "assigned", "pixels"),
+        ("angles", "own", "angles"),
+        ("both", "own", "pixels"),
+        ("both", "assigned", "pixels"),
+    ],
+)
+def test_pixels_and_angles_as_written_out(over: Overflight, form: str, feed: str, angles_update: str) -> None:
     """The extended filter of H (6.4)-(6.11) for single runs, its derivatives by differences."""
     runs = streams(11, 2)
-    scene, gated = draw_scene(over, runs), gate(over, Choices(), runs)
+    choices = Choices(updated_with=feed, angles_update=angles_update)  # type: ignore[arg-type]
+    scene, gated = draw_scene(over, runs), gate(over, choices, runs)
     f = over.poses.camera.fx
     middle = np.array([over.poses.camera.cx, over.poses.camera.cy])
     R_uv, R_angles = np.diag([360.0, 160.0]), np.diag(np.radians([6.0, 3.0]) ** 2)
@@ -112,20 +139,65 @@ def test_pixels_and_angles_as_written_out(over: Overflight, form: str) -> None:
 
             x, P = kf.F @ x, kf.F @ P @ kf.F.T + kf.Q
             uv = scene.pixels[run, t]
-            H = slope(pixel, x[:2])
-            if form == "pixels":
-                gaps, S = uv - pixel(x[:2]), H @ P @ H.T + R_uv
-            else:
-                measured = np.array([seen_angles(np.append((z - middle) / f, 1.0)) for z in uv])
-                gaps = measured - angles(x[:2])
-                gaps[:, 0] = np.angle(np.exp(1j * gaps[:, 0]))
-                H_angles = slope(angles, x[:2])
-                S = H_angles @ P @ H_angles.T + R_angles
-            nis = [v @ np.linalg.inv(S) @ v for v in gaps]
-            np.testing.assert_allclose(gated.nis[gating.FORMS.index(form), run, t], nis, rtol=1e-4)
-            K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_uv)
-            x = x + K @ (uv[int(np.argmin(nis))] - pixel(x[:2]))
+            measured = np.array([seen_angles(np.append((z - middle) / f, 1.0)) for z in uv])
+            H, H_angles = slope(pixel, x[:2]), slope(angles, x[:2])
+            gaps, turns = uv - pixel(x[:2]), measured - angles(x[:2])
+            turns[:, 0] = np.angle(np.exp(1j * turns[:, 0]))
+            S, S_angles = H @ P @ H.T + R_uv, H_angles @ P @ H_angles.T + R_angles
+            by_pixels = np.array([v @ np.linalg.inv(S) @ v for v in gaps])
+            by_angles = np.array([v @ np.linalg.inv(S_angles) @ v for v in turns])
+            nis = {"pixels": by_pixels, "angles": by_angles, "both": by_pixels + by_angles}[form]
+            row = GATES.index(form)
+            np.testing.assert_allclose(gated.nis[row, run, t], nis, rtol=1e-4)
+            assert gated.right[row, run, t] == (nis[0] < nis[1])
+            used = int(np.argmin(nis)) if feed == "assigned" else 0
+            if angles_update == "angles":
+                H, S, gaps = H_angles, S_angles, turns
+            K = P @ H.T @ np.linalg.inv(S)
+            x = x + K @ gaps[used]
             P = P - K @ H @ P
+
+
+def test_what_is_expected_is_what_tracking_expects() -> None:
+    """Measurements and derivatives of any camera, against the room that filters use."""
+    rng = np.random.default_rng(3)
+    camera = Camera(640, 512, 700.0, 690.0, 310.0, 260.0, skew=3.0)
+    A = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+    for _ in range(20):
+        R = euler_to_matrix(*rng.normal(0, 0.4, 3))
+        p, at = np.append(rng.normal(0, 30, 2), -100.0), rng.normal(0, 30, 2)
+        poses = CameraPoses.at_lens(camera, p, R, np.eye(3))
+        for form, predict in ((kernels.PIXELS, predict_pixel), (kernels.ANGLES, predict_azimuth_elevation)):
+            want = predict(at, poses, 0.0)
+            found = kernels.expected(form, False, *at, p, R, A)
+            np.testing.assert_allclose(found[:2], want.z, rtol=1e-10)
+            np.testing.assert_allclose(found[2:], want.H_position.ravel(), rtol=1e-9)
+        azimuth = kernels.expected(kernels.ANGLES, True, *at, p, R, A)[0]
+        one = np.arctan(np.tan(predict_azimuth_elevation(at, poses, 0.0).z[0]))
+        assert azimuth == pytest.approx(one, nan_ok=True)
+
+
+def test_what_is_behind_the_lens_or_on_its_axis_is_not_expected() -> None:
+    A, down, p = np.array([700.0, 700.0, 320.0, 256.0, 0.0]), np.eye(3), np.array([0.0, 0.0, -100.0])
+    up = np.diag([1.0, -1.0, -1.0])
+    for form in (kernels.PIXELS, kernels.ANGLES):
+        assert np.isnan(kernels.expected(form, False, 5.0, 5.0, p, up, A)).all()
+    assert np.isnan(kernels.expected(kernels.ANGLES, False, 0.0, 0.0, p, down, A)).all()
+    assert np.isfinite(kernels.expected(kernels.PIXELS, False, 0.0, 0.0, p, down, A)).all()
+    nan = np.nan
+    assert [kernels.nearest(np.array(d)) for d in ((1.0, 2.0), (2.0, 1.0), (nan, 9.0), (nan, nan))] == [
+        0,
+        1,
+        1,
+        -1,
+    ]
+
+
+def test_a_camera_that_distorts_is_refused(over: Overflight) -> None:
+    camera = replace(over.poses.camera, distortion=(0.1, 0.0, 0.0, 0.0, 0.0))
+    bent = replace(over, poses=replace(over.poses, camera=camera))
+    with pytest.raises(WildlabError, match=r"the camera distorts.*Use a twin whose camera has no distortion"):
+        gate(bent, Choices(), streams(1, 2))
 
 
 def test_without_noise_and_far_apart_nothing_goes_wrong(
@@ -151,9 +223,33 @@ def test_two_targets_in_one_place_are_a_toss_up(over: Overflight, monkeypatch: p
 
 def test_a_run_does_not_depend_on_the_others(over: Overflight) -> None:
     many = gating.success_rates(over, Choices(), 7, 3, chunk=3)
-    assert many.shape == (3, 7)
+    assert many.shape == (len(GATES), 7)
     np.testing.assert_array_equal(many[:, :4], gating.success_rates(over, Choices(), 4, 3))
     assert (gating.success_rates(over, Choices(), 4, 4) != many[:, :4]).any()
+
+
+def test_readings_are_judged_on_the_same_draws(over: Overflight) -> None:
+    found = outcomes(over, {name: one.choices for name, one in READINGS.items()}, 6, 3, chunk=4)
+    for name, one in READINGS.items():
+        np.testing.assert_array_equal(found[name].rate, gating.success_rates(over, one.choices, 6, 3))
+    # Angles in the update change the track that angles gate, and no other.
+    same = np.isclose(found["own"].rate, found["angles"].rate).all(axis=1)
+    assert same.tolist() == [True, True, False, True]
+
+
+def test_mistakes_are_counted_apart_and_together(over: Overflight) -> None:
+    gated = gate(over, Choices(), streams(5, 30))
+    found = outcomes(over, {"": Choices()}, 30, 5)[""]
+    pixels, angles = ~gated.right[1], ~gated.right[2]
+    np.testing.assert_allclose(found.mistakes[0] + found.mistakes[2], 100 * pixels.mean(axis=1))
+    np.testing.assert_allclose(found.mistakes[1] + found.mistakes[2], 100 * angles.mean(axis=1))
+    np.testing.assert_allclose(found.mistakes[2], 100 * (pixels & angles).mean(axis=1))
+    assert found.same_images.tolist() == [bool((p == a).all()) for p, a in zip(pixels, angles, strict=True)]
+    # Both gates on the same track: their distances added, and the smaller sum taken.
+    np.testing.assert_allclose(gated.nis[3], gated.nis[1] + gated.nis[2])
+    np.testing.assert_array_equal(gated.right[3], gated.nis[3][..., 0] < gated.nis[3][..., 1])
+    agree = gated.right[1] == gated.right[2]
+    np.testing.assert_array_equal(gated.right[3][agree], gated.right[1][agree])
 
 
 def test_the_noise_is_that_of_the_tables(over: Overflight) -> None:
@@ -206,10 +302,11 @@ def test_what_is_printed_of_the_angles(over: Overflight) -> None:
 
 def test_what_feeds_the_track(over: Overflight) -> None:
     runs = streams(1, 60)
-    fed = {name: gate(over, Choices(updated_with=name), runs) for name in ("assigned", "own", "nothing")}  # type: ignore[arg-type]
+    fed = {name: gate(over, Choices(updated_with=name), runs) for name in FEEDS}  # type: ignore[arg-type]
     own, nothing = fed["own"], fed["nothing"]
     # Gated by angles and updated by pixels, the track fed with its own is that of the pixels.
     np.testing.assert_allclose(own.estimate[2], own.estimate[1])
+    np.testing.assert_allclose(own.estimate[3], own.estimate[1])
     # Without updates the track goes straight on, whatever the form.
     np.testing.assert_allclose(np.diff(nothing.estimate, 2, axis=2), 0, atol=1e-8)
     np.testing.assert_allclose(nothing.estimate[0], nothing.estimate[2])
@@ -244,7 +341,7 @@ def test_variations_change_one_thing_each(flight: Flight, over: Overflight) -> N
 
 
 def test_a_table_of_variations(flight: Flight) -> None:
-    table = vary(flight, "own", 12, 1)
+    table = vary(flight, Choices(), 12, 1)
     assert list(table["variation"]) == list(variations(flight, Choices()))
     first = table.iloc[0]
     assert first[[f"{form}_change" for form in gating.FORMS]].abs().max() == 0
@@ -269,21 +366,49 @@ def test_a_flight_without_truth_or_too_short(flight: Flight) -> None:
         overflight(Flight(flight.manifest, {"truth": far}, flight.tables))
 
 
+def outcome(rates: Array, mistakes: tuple[float, float, float] = (1, 2, 1), same: float = 0.0) -> Outcome:
+    """Runs whose mistakes are the same, a share of them in the same images."""
+    n = rates.shape[1]
+    return Outcome(rates, np.tile(np.array(mistakes, float)[:, None], n), np.arange(n) < same * n)
+
+
 def test_claims_are_decided_run_by_run() -> None:
     wobble = np.tile([-5.0, 5.0], 500)
-    level = np.array([[96.6], [96.8], [96.0]]) + wobble  # what the runs share does not blur the differences
-    margins = claim_margins(level)
+    level = np.array([[96.6], [96.8], [96.0], [96.9]]) + wobble  # what the runs share blurs no difference
+    margins = claim_margins(outcome(level, same=0.1))
     assert {name: verdict(margin) for name, margin in margins.items()} == {
         "forms-agree": "holds",
         "angles-least-accurate": "holds",
+        "mistakes-on-different-images": "holds",
     }
-    np.testing.assert_allclose(margins["forms-agree"], 0.2)
-    apart = claim_margins(level[[2, 1, 0]] * [[0.9], [1], [1]])
+    np.testing.assert_allclose(margins["forms-agree"].mean(axis=1), [1.2, 0.8, 0.4, 1.6, 0.2, 1.8])
+    np.testing.assert_allclose(margins["angles-least-accurate"].mean(axis=1), [0.6, 0.8])
+    apart = claim_margins(outcome(level[[2, 1, 0, 3]] * [[0.9], [1], [1], [1]], same=0.9))
     assert {verdict(margin) for margin in apart.values()} == {"does not hold"}
-    assert verdict(np.array([-1.0, 1.0, 0.5])) == "cannot be decided"
 
 
-def test_every_choice_has_its_reason(over: Overflight) -> None:
-    table = chosen_parts(over, 0.93)
+def test_a_claim_wants_every_margin_and_chance_decides_none() -> None:
+    sure, unsure, against = [1.0, 1.1, 0.9], [-1.0, 1.0, 0.5], [-1.0, -1.1, -0.9]
+    assert verdict(np.array([sure, sure])) == "holds"
+    assert verdict(np.array([sure, unsure])) == "cannot be decided"
+    assert verdict(np.array([unsure, against])) == "does not hold"
+    assert verdict(np.full((1, 4), np.nan)) == "cannot be decided"
+    # One form that leads surely does not make up for one whose lead is chance.
+    rates = np.array([[97.0, 97.0, 97.0], [96.0, 98.0, 94.5], [96.0, 96.1, 95.9], [97.0, 97.0, 97.0]])
+    assert verdict(claim_margins(outcome(rates))["angles-least-accurate"]) == "cannot be decided"
+
+
+def test_a_run_without_mistakes_says_nothing_of_where_they_fall() -> None:
+    margin = claim_margins(outcome(np.full((4, 6), 100.0), mistakes=(0, 0, 0), same=1.0))
+    assert np.isnan(margin["mistakes-on-different-images"]).all()
+
+
+def test_every_choice_has_its_reason(over: Overflight, flight: Flight) -> None:
+    at_rest = seconds_in_view(overflight(flight, gimbal="down"))
+    assert 0 < at_rest < seconds_in_view(over) == IMAGES / 10
+    table = chosen_parts(over, 0.93, at_rest)
     assert (table.map(len) > 0).all(axis=None) and table["part"].is_unique
-    assert "93 %" in table.set_index("part").loc["beyond the edge", "chosen"]
+    by_part = table.set_index("part")
+    assert "93 %" in by_part.loc["beyond the edge", "chosen"]
+    assert f"{at_rest:.1f} s of these 14.1 s" in by_part.loc["gimbal", "reason"]
+    assert READINGS["own"].short in by_part.loc["track updated with", "chosen"]

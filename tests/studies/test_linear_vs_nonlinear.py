@@ -1,6 +1,7 @@
 """Claims of H 6.4.2, 7.5.1 and 7.5.2 flight by flight, and filters over detections against every frame."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,71 +9,174 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.pipeline.track import follow_positions, start
+from wildlab.reporting.published import load_claims
+from wildlab.studies.coloured_noise import text as coloured_noise_text
 from wildlab.studies.coloured_noise import trial as coloured_noise
+from wildlab.studies.linear_vs_nonlinear import text as linear_vs_nonlinear_text
 from wildlab.studies.linear_vs_nonlinear import trial as linear_vs_nonlinear
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import singer
 from wildlab.tracking.run import run_filter
 
 
-def test_claims_on_the_two_forms_are_decided_flight_by_flight() -> None:
-    """Three flights: every claim is true on the first and false on the second; the third differs by one."""
-    lags = {
-        ("kf", "lag1_autocorrelation_north"): 0.3,
-        ("kf", "lag1_autocorrelation_east"): -0.3,
-        ("ekf", "lag1_autocorrelation_u"): 0.3,
-        ("ekf", "lag1_autocorrelation_v"): 0.3,
-    }
+def flights(*changes: dict[tuple[str, str], float]) -> pd.DataFrame:
+    """Flights on which every claim of H 6.4.2 is true, each with its changes."""
     good = {
         ("kf", "mae"): 10.0,
         ("ekf", "mae"): 10.9,
-        ("kf", "nees"): 8.0,
-        ("ekf", "nees"): 9.0,
-        ("kf", "nis"): 0.5,
-        ("ekf", "nis"): 0.6,
+        ("ukf", "mae"): 10.8,
         ("measurements", "detections"): 101.0,
-        **lags,
+        ("beside", "lag1"): 0.25,
     }
-    bad = {
-        **good,
-        ("kf", "mae"): 12.0,
-        ("kf", "nees"): 7.0,
-        ("kf", "nis"): 2.1,
-        ("ekf", "lag1_autocorrelation_v"): 0.1,
+    for who, nees, nis in (("kf", 8.0, 0.5), ("ekf", 9.0, 0.6)):
+        good |= {
+            (who, "nees"): nees,
+            (who, "nis"): nis,
+            (who, "nees_band_high"): 4.0,
+            (who, "p95_measured"): 9.0,
+        }
+    good |= {
+        ("kf", f"lag1_autocorrelation_{axis}"): value for axis, value in (("north", 0.3), ("east", -0.3))
     }
-    checks = linear_vs_nonlinear.check_claims(pd.DataFrame([good, bad, {**good, ("ekf", "mae"): 11.1}]))
-    assert len(checks) == 6
-    assert list(checks.pop("kf-ekf-similar")) == [True, False, False]
-    assert all(list(true) == [True, False, True] for true in checks.values())
+    good |= {("ekf", f"lag1_autocorrelation_{axis}"): value for axis, value in (("u", 0.3), ("v", 0.4))}
+    good |= {("measurements", f"lag1_autocorrelation_{axis}"): 0.9 for axis in ("north", "east")}
+    return pd.DataFrame([{**good, **change} for change in changes])
 
 
-def test_claims_on_correlated_noise_are_decided_flight_by_flight() -> None:
+#: What makes each claim of H 6.4.2 untrue.
+OPPOSED = {
+    "kf-ekf-similar": {("ekf", "mae"): 11.1},
+    "kf-more-accurate": {("kf", "mae"): 12.0},
+    "too-optimistic": {("kf", "nees"): 3.9},
+    "nis-below-mean": {("kf", "nis"): 2.1},
+    "ekf-nis-larger": {("ekf", "nis"): 0.4},
+    "innovations-coloured": {("kf", "lag1_autocorrelation_east"): -0.1},
+    "ten-metres-while-measured": {("ekf", "p95_measured"): 10.1},
+    "vertical-pixel-more-correlated": {("kf", "lag1_autocorrelation_north"): 0.5},
+    "slow-flight-more-correlated": {("beside", "lag1"): 0.9},
+}
+THRESHOLDS = {
+    claim["id"]: float(claim["threshold"])
+    for study in ("linear-vs-nonlinear-fast", "coloured-noise-fast", "coloured-noise-drifting")
+    for claim in load_claims(study)
+    if "threshold" in claim
+}
+
+
+@pytest.mark.parametrize("claim", OPPOSED)
+def test_claims_on_tracks_are_decided_flight_by_flight(claim: str) -> None:
+    checks = linear_vs_nonlinear.check_claims(flights({}, OPPOSED[claim]))
+    assert set(checks) == set(OPPOSED)
+    assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
+
+
+def test_flights_without_what_a_claim_is_about_are_not_asked() -> None:
+    white = {("measurements", "lag1_autocorrelation_east"): 0.1}
+    checks = linear_vs_nonlinear.check_claims(flights({}, white, {("ekf", "mae"): 150.0}))
+    for claim in ("too-optimistic", "innovations-coloured"):
+        assert np.asarray(checks[claim].premise).tolist() == [True, False, True]
+    assert np.asarray(checks["kf-more-accurate"].premise).tolist() == [True, True, False]
+    alone = flights({}).drop(columns=[("beside", "lag1")])
+    assert np.asarray(
+        linear_vs_nonlinear.check_claims(alone)["slow-flight-more-correlated"].premise
+    ).tolist() == [False]
+
+
+def noisy(*changes: dict[tuple[str, str], float]) -> pd.DataFrame:
+    """Flights on which every claim of H 7.5.1 and 7.5.2 is true, each with its changes."""
     good: dict[tuple[str, str], float] = {("measurements", "detections"): 101.0}
     for who, mae, nees, nis, lag in (
         ("cv", 10.0, 12.0, 0.5, 0.4),
         ("singer", 9.6, 11.0, 0.5, 0.4),
-        ("coloured", 12.0, 1.5, 0.2, -0.1),
+        ("coloured", 12.0, 1.5, 0.3, -0.1),
+        ("coloured-less-noise", 11.0, 2.5, 0.5, -0.1),
+        ("cv-more-acceleration", 11.0, 9.0, 0.5, 0.3),
     ):
-        good |= {(who, "mae"): mae, (who, "nees"): nees, (who, "nis"): nis}
+        good |= {(who, "mae"): mae, (who, "nees"): nees, (who, "nis"): nis, (who, "error_at_end"): 4.0}
+        good |= {(who, "nees_band_low"): 0.5, (who, "nees_band_high"): 4.0}
+        good |= {(who, "fraction_nees_inside"): 0.95, (who, "rmse_speed_beginning"): mae / 10}
         good |= {(who, f"lag1_autocorrelation_{axis}"): lag for axis in ("north", "east")}
-    bad = {
-        **good,
-        ("cv", "mae"): 13.0,
-        ("singer", "nees"): 7.0,
-        ("coloured", "nees"): 7.5,
-        ("cv", "nis"): 2.1,
-        ("singer", "lag1_autocorrelation_east"): 0.1,
-        ("coloured", "lag1_autocorrelation_north"): -0.5,
+    good |= {("measurements", f"lag1_autocorrelation_{axis}"): 0.9 for axis in ("north", "east")}
+    return pd.DataFrame([{**good, **change} for change in changes])
+
+
+NOISY_OPPOSED = {
+    "neglected-too-optimistic": {("singer", "nees"): 3.9},
+    "differencing-inside": {("coloured", "fraction_nees_inside"): 0.85},
+    "differencing-consistent": {("coloured", "nees"): 4.1},
+    "neglected-coloured": {("singer", "lag1_autocorrelation_east"): 0.1},
+    "differencing-less-coloured": {("coloured", "lag1_autocorrelation_north"): -0.5},
+    "differencing-white": {("coloured", "lag1_autocorrelation_north"): -0.5},
+    "differencing-costs": {("cv", "mae"): 13.0},
+    "singer-gains-nothing": {("singer", "mae"): 9.4},
+    "nis-below-mean": {("cv", "nis"): 2.1},
+    "nis-similar": {("coloured", "nis"): 0.1},
+    "nis-smaller-with-differencing": {("coloured", "nis"): 0.6},
+    "five-metres-at-end": {("coloured", "error_at_end"): 5.1},
+    "differencing-converges-slower": {("cv", "rmse_speed_beginning"): 1.3},
+    "less-noise-helps-differencing": {("coloured-less-noise", "mae"): 12.1},
+    "more-acceleration-trades": {("cv-more-acceleration", "mae"): 9.9},
+}
+
+
+@pytest.mark.parametrize("claim", NOISY_OPPOSED)
+def test_claims_on_correlated_noise_are_decided_flight_by_flight(claim: str) -> None:
+    checks = coloured_noise.check_claims(noisy({}, NOISY_OPPOSED[claim]))
+    assert set(checks) == set(NOISY_OPPOSED)
+    assert checks[claim].holds(THRESHOLDS.get(claim)).tolist() == [True, False]
+
+
+def said(verdict: str, share: float | None) -> dict[str, Any]:
+    return {"verdict": verdict, "fraction": share}
+
+
+def test_words_turn_with_their_numbers() -> None:
+    claims = {"kf-ekf-similar": said("holds", 1.0)}
+    one = " ".join(linear_vs_nonlinear_text.summary(flights(*[{}] * 40), claims, "fast"))
+    assert "The linear filter is nearer to the truth on 40 of 40 flights, by 0.9 m" in one
+    assert "on nearly all of 40 flights (100 %)" in one and "times as large as it states" in one
+    assert "single detections do not show it" in one
+    turned = {
+        ("kf", "mae"): 14.0,
+        ("kf", "nees"): 1.0,
+        ("kf", "nis"): 9.0,
+        ("ekf", "nees"): 2.0,
+        ("ekf", "nis"): 2.0,
     }
-    checks = coloured_noise.check_claims(pd.DataFrame([good, bad]))
-    assert len(checks) == 8
-    for claim, true in checks.items():
-        assert list(true) == [True, False], claim
+    claims = {"kf-ekf-similar": said("does not hold", 0.02)}
+    other = " ".join(linear_vs_nonlinear_text.summary(flights(*[turned] * 40), claims, "slow"))
+    assert "The extended filter is nearer to the truth on 40 of 40 flights, by 3.1 m" in other
+    assert "on hardly any of 40 flights (2 %)" in other and "0.71 of what it states" in other
+    assert "would suggest larger ones" in other and "detections agree" in other
+    alone = " ".join(
+        linear_vs_nonlinear_text.summary(flights({}), {"kf-ekf-similar": said("undecided", 1.0)}, "fast")
+    )
+    assert "on one flight" in alone and "on 1 of 1 flights, which decides nothing" in alone
+    assert "−0.10 m in the middle" in linear_vs_nonlinear_text.unscented_words(flights({}, {}))
+
+
+def test_words_on_correlated_noise_turn_with_their_numbers() -> None:
+    claims = {"differencing-consistent": said("holds", 1.0)}
+    one = " ".join(coloured_noise_text.summary(noisy(*[{}] * 40), claims))
+    assert "The benchmark is nearer to the truth on 40 of 40 flights, by 2.0 m" in one
+    assert "Singer's model is nearer to the truth on 40" in one and "on nearly all of 40" in one
+    turned = {("coloured", "mae"): 8.0, ("singer", "mae"): 12.0, ("coloured", "nees"): 50.0}
+    claims = {"differencing-consistent": said("premise not met", None)}
+    other = " ".join(coloured_noise_text.summary(noisy(*[turned] * 40), claims))
+    assert "Differencing is nearer" in other and "The benchmark is nearer to the truth on 40" in other
+    assert "5.0 times as large as it states" in other and "not tested" in other
+    assert "4.0 times less" in coloured_noise_text.correlation_words({"cv": 0.4, "coloured": 0.1})
+    assert "no less" in coloured_noise_text.correlation_words({"cv": 0.1, "coloured": 0.4})
+    middling = [{("cv", "mae"): value} for value in (10.0, 9.0, 11.0, 8.0, 12.0)]
+    assert "is typical" in coloured_noise_text.drawn_words(noisy(*middling))
+    assert "is not typical: 0 of the 4" in coloured_noise_text.drawn_words(
+        noisy({("cv", "mae"): 1.0}, *middling[1:])
+    )
 
 
 def test_another_twin_is_refused() -> None:
     with pytest.raises(WildlabError, match=r"none of the flights of H 6\.4\.2"):
-        linear_vs_nonlinear.trial(1, twin="static-antenna")
+        linear_vs_nonlinear.trial(1, twin="static-antenna", beside="")
     with pytest.raises(WildlabError, match=r"none of the flights of H 7.5.1 and 7.5.2"):
         coloured_noise.trial(1, twin="static-antenna")
 
@@ -106,7 +210,7 @@ def test_over_detections_alone_is_over_every_frame() -> None:
 
 @pytest.mark.slow
 def test_on_three_flights_neglected_noise_makes_filters_too_sure() -> None:
-    flights = [coloured_noise.trial(seed, twin="fast-vessel") for seed in (1, 2, 3)]
-    checks = coloured_noise.check_claims(pd.DataFrame(flights))
-    assert checks["nis-below-mean"].all()
-    assert all(one["coloured", "nees"] < one["cv", "nees"] for one in flights)
+    found = [coloured_noise.trial(seed, twin="fast-vessel") for seed in (1, 2, 3)]
+    checks = coloured_noise.check_claims(pd.DataFrame(found))
+    assert checks["nis-below-mean"].holds().all()
+    assert all(one["coloured", "nees"] < one["cv", "nees"] for one in found)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
 from wildlab.pipeline.navigation_errors import TUNINGS
 from wildlab.reporting.published import load_claims, load_published
@@ -74,9 +75,14 @@ def test_a_trial_gives_what_metrics_and_claims_ask_for(case: str) -> None:
     named = [study.metric_of(*key) for key in keys]
     assert len({m[:2] for m in named if m is not None}) == sum(m is not None for m in named), "named twice"
     spread = pd.DataFrame([dict(zip(keys, values.values(), strict=True))] * 3)
-    checks = study.check_claims(spread, **TOLD.get(case, {}))
+    given_checks = study.check_claims(spread, **TOLD.get(case, {}))
+    checks = {claim: Check.of(check) for claim, check in given_checks.items()}
     assert {claim["id"] for claim in load_claims(entry.name)} <= set(checks)
-    for claim, true in checks.items():
-        array = np.asarray(true)
+    thresholds = {claim["id"]: claim.get("threshold") for claim in load_claims(entry.name)}
+    for claim, check in checks.items():
+        threshold = thresholds.get(claim, 1.0 if check.measured is not None else None)
+        array = np.asarray(check.holds(None if threshold is None else float(threshold)))
         assert array.shape == (3,) and array.dtype == bool, claim
+        for more in (check.premise, check.first, check.second):
+            assert more is None or np.shape(more) == (3,), claim
         assert len(set(array.tolist())) == 1, "the same flight, the same verdict"

@@ -8,9 +8,9 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
-from wildlab.pipeline.navigation_errors import errors_against
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.pipeline.pose_noise import covariance_of
+from wildlab.pipeline.sighting_errors import pauses
 from wildlab.pipeline.track import Sighting, follow_schmidt
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.schmidt.trial import (
@@ -35,9 +35,7 @@ from wildlab.studies.schmidt.trial import (
     evaluate_nees,
     first_part,
     navigated_sighting,
-    numbers_of_poses,
     only,
-    pauses,
     scaled,
     sheet_sighting,
     sheet_tuning,
@@ -178,28 +176,6 @@ def test_a_flight_without_pauses_has_no_numbers_of_them(seen: Sighting) -> None:
         *("nees_predicted", "mae_predicted", "mae_first_pause", "fraction_above_predicted"),
         *("pauses_above", "nis_top_after_pauses", "rmse_speed_start", "rmse_course_start"),
     }
-
-
-def test_numbers_of_poses_are_those_of_their_errors(flight: Flight, seen: Sighting) -> None:
-    sheet_sighting(flight)
-    found = numbers_of_poses(flight, seen)
-    off = errors_against(flight.nav["truth"], flight.nav[SOURCE], seen.times)
-    assert found[SOURCE, "rms_roll"] == pytest.approx(np.degrees(np.sqrt(np.nanmean(off.error[:, 6] ** 2))))
-    assert found[SOURCE, "mean_sd_north"] == pytest.approx(np.nanmean(off.sd[:, 0]))
-    # Straight down, an angle moves the target by that angle times the focal length.
-    level = np.hypot(found[SOURCE, "rms_roll"], found[SOURCE, "rms_pitch"]) / np.sqrt(2)
-    assert found[SOURCE, "shift_px"] == pytest.approx(np.radians(level) * 1160, rel=0.4)
-    whole = found[SOURCE, "difference_roll"]
-    parts = sorted([found[SOURCE, "difference_turning"], found[SOURCE, "difference_straight"]])
-    assert parts[0] <= whole <= parts[1]
-
-
-def test_poses_that_are_off_by_nothing_move_nothing(flight: Flight, seen: Sighting) -> None:
-    sheet_sighting(flight)
-    right = Flight(flight.manifest, flight.nav | {"truth": flight.nav[SOURCE]}, flight.tables)
-    found = numbers_of_poses(right, seen)
-    assert found[SOURCE, "shift_px"] == pytest.approx(0, abs=1e-6)
-    assert found[SOURCE, "rms_yaw"] == pytest.approx(0, abs=1e-6)
 
 
 def test_calibration_flights_are_none_of_the_flights() -> None:

@@ -82,9 +82,9 @@ def test_the_thesis_yardstick_counts_averages_within_the_bounds_of_single_values
 
 
 def test_who_is_nearer_follows_the_errors() -> None:
-    for times, word, share in ((0.5, "smaller", "100 %"), (2.0, "larger", "0 %")):
+    for times, who in ((0.5, "Schmidt"), (2.0, "extended")):
         (first, *_) = text.variant_points(flights(schmidt__mae=times))
-        assert word in first and share in first
+        assert first.startswith(f"The {who} filter is nearer to the truth on {SIZE} of {SIZE} flights")
         last = headline.summary_words(flights(schmidt__mae=times))[-1]
         assert last.startswith(f"Positions are {times:.1f} m")
 
@@ -148,17 +148,19 @@ def test_one_to_two_degrees_are_judged_by_both_yardsticks() -> None:
 
 
 def test_a_drawn_flight_is_typical_or_not() -> None:
-    among = flights(ekf__mae=lambda i, _: 30.0 if i == 0 else float(i))
-    beside = flights(ekf__mae=lambda i, _: 99.0 if i == 0 else float(i))
-    typical = text.typical_table(among)
-    assert typical["typical"].tolist() == ["yes"] * len(text.DRAWN)
-    assert text.typical_words(typical, SIZE).startswith("It is typical in all that its figures show")
-    odd = text.typical_table(beside)
-    assert odd["typical"].tolist() == ["no"] + ["yes"] * (len(text.DRAWN) - 1)
-    words = text.typical_words(odd, SIZE)
-    assert "in 7 of 8 things" in words and "mean error, extended, larger than on 99 %" in words
-    assert "too few to say" in text.typical_words(text.typical_table(among[:3]), 3)
-    assert "in nothing that" in text.typical_words(odd.assign(typical="no"), SIZE)
+    def like(first: float) -> pd.DataFrame:
+        """All that is shown as in the middle, but for one mean error."""
+        changed = {f"{who}__{name}": lambda i, _: float(i or 30) for _, who, name, *_ in text.DRAWN}
+        return flights(**changed | {"ekf__mae": lambda i, _: float(i or first)})
+
+    typical = text.typical_table(like(30.5))
+    assert text.typical_sentence(typical) == "It is typical in all that its figures show."
+    odd = text.typical_table(like(99.0))
+    assert odd["typical"][0] == "not typical: 59 of the 59 others have a smaller one"
+    assert "in 7 of 8 things" in text.typical_sentence(odd)
+    assert text.typical_sentence(odd).endswith("It is not in: mean error, extended.")
+    assert "in nothing" in text.typical_sentence(odd.assign(typical=odd["typical"][0]))
+    assert "no other flight" in text.typical_sentence(text.typical_table(like(1.0)[:1]))
 
 
 def test_figures_of_the_drawn_flight_say_its_numbers() -> None:

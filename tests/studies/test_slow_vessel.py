@@ -63,21 +63,62 @@ def test_long_steps_state_more_and_are_the_same_without_pauses():
     assert np.all(long >= short) and np.all(long[even > 3] > short[even > 3])
 
 
-def test_claims_are_decided_flight_by_flight():
-    """Two flights, one on which every claim is true and one on which none is."""
-    good = {(subject, name): 1.0 for subject in SUBJECTS for name in ("mean_north", "mean_east")}
-    good |= {("observer", "mae"): 10.0, ("pixhawk-autopilot", "mae"): 9.0, ("observer-subset", "mae"): 7.0,
-             ("pixhawk-autopilot-subset", "mae"): 7.1, ("first-case", "mae"): 6.0,
-             ("observer-exact", "mae"): 5.9, ("observer", "largest"): 39.0, ("observer", "below_20"): 0.6,
-             ("observer", "5_to_10"): 0.6, ("filter", "beginning"): 9.0, ("filter-subset", "beginning"): 8.0,
-             ("filter", "at_end"): 4.0}  # fmt: skip
-    bad = {**good, ("observer", "mae"): 5.0, ("pixhawk-autopilot-subset", "mae"): 5.0,
-           ("observer", "mean_north"): -3.0, ("observer", "largest"): 41.0, ("observer", "below_20"): 0.4,
-           ("observer", "5_to_10"): 0.4, ("filter", "beginning"): 7.0, ("filter", "at_end"): 6.0}  # fmt: skip
-    checks = check_claims(pd.DataFrame([good, bad]))
-    assert all(list(true) == [True, False] for true in checks.values())
-    assert set(checks) == {claim["id"] for claim in load_claims("slow-vessel")}
-    assert set(good) <= set(METRICS)
+#: A flight on which every claim of H 5.6.2 is true, and what makes each untrue.
+GOOD = {(subject, name): 1.0 for subject in SUBJECTS for name in ("mean_north", "mean_east")}
+GOOD |= {
+    (subject, name): 7.0 for subject in ("observer", "pixhawk-autopilot") for name in ("sd_north", "sd_east")
+}
+GOOD |= {
+    ("observer", "mae"): 10.0,
+    ("pixhawk-autopilot", "mae"): 9.0,
+    ("observer-subset", "mae"): 7.0,
+    ("pixhawk-autopilot-subset", "mae"): 7.1,
+    ("first-case", "mae"): 6.0,
+    ("observer-exact", "mae"): 5.9,
+    ("observer", "largest"): 39.0,
+    ("observer", "below_20"): 0.6,
+    ("observer", "5_to_10"): 0.6,
+    ("observer", "last_tenth"): 11.0,
+    ("vessel", "speed_beginning"): 2.0,
+    ("vessel", "speed_beginning_subset"): 0.5,
+    ("filter", "beginning"): 9.0,
+    ("filter-subset", "beginning"): 8.0,
+    ("filter", "at_end"): 4.0,
+}
+OPPOSED = {
+    "observer-autopilot-comparable": {("pixhawk-autopilot", "mae"): 8.0},
+    "sds-comparable": {("observer", "sd_east"): 9.0},
+    "subset-comparable": {("pixhawk-autopilot-subset", "mae"): 9.0},
+    "observer-best-on-subset": {("pixhawk-autopilot-subset", "mae"): 6.9},
+    "mean-about-two-metres": {("observer", "mean_north"): -3.0},
+    "larger-than-first-case": {("first-case", "mae"): 10.1},
+    "reference-explains": {("observer-exact", "mae"): 6.1},
+    "largest-almost-forty": {("observer", "largest"): 41.0},
+    "majority-below-twenty": {("observer", "below_20"): 0.4},
+    "better-part-five-to-ten": {("observer", "5_to_10"): 0.4},
+    "grows-at-end": {("observer", "last_tenth"): 9.0},
+    "beginning-larger-on-whole-flight": {("filter", "beginning"): 7.0},
+    "few-metres-at-end": {("filter", "at_end"): 6.0},
+}
+
+
+@pytest.mark.parametrize("claim", OPPOSED)
+def test_claims_are_decided_flight_by_flight(claim):
+    checks = check_claims(pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]))
+    typed = {entry["id"]: entry for entry in load_claims("slow-vessel")}
+    assert set(checks) == set(OPPOSED) == set(typed)
+    threshold = float(typed[claim]["threshold"]) if "threshold" in typed[claim] else None
+    assert checks[claim].holds(threshold).tolist() == [True, False]
+    assert set(GOOD) <= set(METRICS)
+
+
+def test_flights_without_what_a_claim_is_about_are_not_asked():
+    calm = {("vessel", "speed_beginning"): 0.4}
+    checks = check_claims(
+        pd.DataFrame([GOOD, {**GOOD, **calm}, {**GOOD, **OPPOSED["larger-than-first-case"]}])
+    )
+    assert list(checks["beginning-larger-on-whole-flight"].premise) == [True, False, True]
+    assert list(checks["reference-explains"].premise) == [True, True, False]
 
 
 def test_every_published_number_has_a_metric():

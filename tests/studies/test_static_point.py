@@ -8,7 +8,9 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
 from wildlab.geometry.frames import euler_to_matrix
+from wildlab.reporting.published import load_claims
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.static_point import text
 from wildlab.studies.static_point.trial import (
     COLUMNS,
     METRICS,
@@ -91,18 +93,72 @@ def test_a_simulated_flight_has_every_column_and_the_misalignment_costs_most():
     assert found["without-misalignment-calibration", "mae"] == max(found[column, "mae"] for column in COLUMNS)
 
 
-def test_claims_are_decided_flight_by_flight():
-    """Two flights, one on which every claim is true and one on which none is."""
-    good = {("observer", "mae"): 5.0, ("pixhawk-autopilot", "mae"): 4.01, ("observer", "mean_north"): 1.0,
-            ("observer", "mean_east"): 1.0, ("without-time-synchronization", "mae"): 6.0,
-            ("without-misalignment-calibration", "mae"): 16.0, ("filter", "lag1_north"): 0.5,
-            ("filter", "lag1_east"): 0.5, ("filter", "after_first_batch"): 0.9,
-            ("filter", "at_end"): 0.4}  # fmt: skip
-    bad = {**good, ("observer", "mean_north"): 3.0, ("pixhawk-autopilot", "mae"): 3.99,
-           ("without-time-synchronization", "mae"): 4.0, ("without-misalignment-calibration", "mae"): 14.0,
-           ("filter", "lag1_east"): 0.05, ("filter", "after_first_batch"): 1.1,
-           ("filter", "at_end"): 0.6}  # fmt: skip
-    checks = check_claims(pd.DataFrame([good, bad]), bound=0.1)
-    assert len(checks) == 7
-    assert all(list(true) == [True, False] for true in checks.values())
-    assert set(good) <= set(METRICS)
+#: A flight on which every claim of H 5.6.1 is true, and what makes each untrue.
+GOOD = {
+    ("observer", "mae"): 5.0,
+    ("pixhawk-autopilot", "mae"): 4.01,
+    ("without-time-synchronization", "mae"): 6.0,
+    ("without-misalignment-calibration", "mae"): 16.0,
+    ("observer", "mean_north"): 1.0,
+    ("observer", "mean_east"): 1.0,
+    ("observer", "largest"): 31.0,
+    ("observer", "smallest"): 0.2,
+    ("filter", "lag1_north"): 0.5,
+    ("filter", "lag1_east"): 0.5,
+    ("filter", "after_first_batch"): 0.9,
+    ("filter", "at_end"): 0.4,
+    ("filter", "nees_at_end"): 3.0,
+}
+OPPOSED = {
+    "observer-autopilot-comparable": {("pixhawk-autopilot", "mae"): 3.99},
+    "synchronisation-matters": {("without-time-synchronization", "mae"): 4.0},
+    "misalignment-matters-most": {("without-misalignment-calibration", "mae"): 5.5},
+    "calibration-before-sensors": {("pixhawk-autopilot", "mae"): 3.9},
+    "innovations-coloured": {("filter", "lag1_east"): 0.05},
+    "metre-after-first-batch": {("filter", "after_first_batch"): 1.1},
+    "half-metre-at-end": {("filter", "at_end"): 0.6},
+    "mean-within-two-metres": {("observer", "mean_north"): 3.0},
+    "single-errors-above-thirty": {("observer", "largest"): 29.0},
+    "best-below-thirty-centimetres": {("observer", "smallest"): 0.31},
+}
+
+
+@pytest.mark.parametrize("claim", OPPOSED)
+def test_claims_are_decided_flight_by_flight(claim):
+    checks = check_claims(pd.DataFrame([GOOD, {**GOOD, **OPPOSED[claim]}]), bound=0.1)
+    typed = {entry["id"]: entry for entry in load_claims("static-point")}
+    assert set(checks) == set(OPPOSED) == set(typed)
+    threshold = float(typed[claim]["threshold"]) if "threshold" in typed[claim] else None
+    assert checks[claim].holds(threshold).tolist() == [True, False]
+    assert set(GOOD) <= set(METRICS)
+
+
+def test_words_turn_with_their_numbers():
+    published = {
+        (OBSERVER, name): value for name, value in (("mean_north", 0.2), ("mean_east", 0.1), ("mae", 6.4))
+    }
+    published["pixhawk-autopilot", "mae"] = 7.7
+    coverage = {("filter", "coverage"): 0.95}
+    far = pd.DataFrame([{**GOOD, **coverage}] * 4)
+    one, other = (text.partings(far, published, 500, bound) for bound in (0.1, 0.9))
+    assert "average out slowly" in one[0] and "average out slowly" not in other[0]
+    assert "0 of 4 flights come that near" in one[0] and "met by 4 of 4 flights" in one[1]
+    near = far.assign(**{}).copy()
+    near[("observer", "mean_north")] = near[("observer", "mean_east")] = 0.0
+    assert "average out slowly" not in text.partings(near, published, 500, 0.1)[0]
+    assert text.sureness(far) == "surer than it may be on 0 of 4 flights"
+    assert text.sureness(pd.DataFrame([{**GOOD, ("filter", "nees_at_end"): 9.0}])).endswith(
+        "on 1 of 1 flight"
+    )
+    ends = pd.DataFrame([{**GOOD, ("filter", "at_end"): value} for value in (0.7, 2.2, 2.0, 2.4, 3.0)])
+    assert (
+        "at the end it is not typical: 0 of the 4 others have a smaller one, where the median is 2.2 m"
+        in text.drawn_words(ends)
+    )
+    assert "costs another 1.0" in text.summary(far, 0.1)[1] and "helps less" in text.summary(far, 0.1)[2]
+    cheap = pd.DataFrame(
+        [{**GOOD, **OPPOSED["synchronisation-matters"], **OPPOSED["innovations-coloured"]}] * 2
+    )
+    assert (
+        "costs nothing more" in text.summary(cheap, 0.1)[1] and "not all wrong" in text.summary(cheap, 0.1)[2]
+    )

@@ -67,6 +67,7 @@ class SensorTrack(NamedTuple):
     Row by row of the scans: ``estimate`` (N, 4) north, east, velocities, NaN without a track; ``error``
     (N, 4) truth minus estimate and ``nees`` (N,) of the position, NaN without truth too; ``innovation``
     (N, m) and ``nis`` (N,) of the detections used, NaN elsewhere. ``known`` (N,): where there is truth.
+    ``near`` (N,): where the sensor saw something within `REACH` of the target's true place.
     """
 
     sensor: str
@@ -79,6 +80,7 @@ class SensorTrack(NamedTuple):
     innovation: Array
     nis: Array
     known: NDArray[np.bool_]
+    near: NDArray[np.bool_]
 
 
 def follow_flight(flight: Flight, tunings: Mapping[str, SensorTuning]) -> list[SensorTrack]:
@@ -218,19 +220,25 @@ def _score(
     error = np.where(np.isfinite(x), where - x, np.nan)
     nees = position_nees(error[:, :2], track.P[:, :2, :2], truth.covariance)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    return SensorTrack(scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known)
+    near = errors_near(scans, truth)[1] >= 0
+    return SensorTrack(
+        scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known, near
+    )
 
 
 def _nothing(scans: Scans, truth: Truth, name: str) -> SensorTrack:
     n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    nan = np.full(n, np.nan)
+    nan, near = np.full(n, np.nan), errors_near(scans, truth)[1] >= 0
+    unused = np.full((n, m), np.nan)
     return SensorTrack(
-        scans.sensor, truth.target, name, scans.times, empty, empty, nan, np.full((n, m), np.nan), nan, known
+        scans.sensor, truth.target, name, scans.times, empty, empty, nan, unused, nan, known, near
     )
 
 
+#: A track whose error (m) is below this is with its target: about the length of the ferry's smaller boats.
+WITH_ITS_TARGET_M = 15.0
 #: Numbers of a row of `table`, with their units.
 COLUMNS = {
     "rmse": "m",
@@ -242,6 +250,7 @@ COLUMNS = {
     "lag1_autocorrelation": "1",
     "fraction_nees_inside": "1",
     "share_followed": "1",
+    "share_with_target": "1",
 }
 
 
@@ -252,7 +261,9 @@ def table(followed: list[SensorTrack]) -> pd.DataFrame:
     truth; ``nees_low`` and ``nees_high``, the 95 % interval of the mean NEES of a consistent filter, for as
     many values as the correlated ones are worth; ``nis_low`` and ``nis_high`` likewise. ``anees`` is of the
     position, 2 is right; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
-    a measurement. ``share_followed``: of the scans with truth, those that have a track.
+    a measurement. ``share_followed``: of the scans with truth, those that have a track. ``seen``: scans in
+    which the sensor saw something near the target's true place, and ``share_with_target``: in how many of
+    them a track is within `WITH_ITS_TARGET_M` of it.
     """
     return pd.DataFrame([_row(one) for one in followed])
 
@@ -264,6 +275,7 @@ def _row(one: SensorTrack) -> dict[str, object]:
     lag1 = [_lag1(column) for column in used.T]
     nees, nis = average(one.nees, 2, _worth(one.nees)), average(one.nis, m, _worth(one.nis))
     on = np.isfinite(one.error[:, 0])
+    there = np.hypot(*one.error[:, :2].T) < WITH_ITS_TARGET_M  # NaN, where there is no track, is not there
     return {
         "sensor": one.sensor,
         "kind": "position" if m == 2 else "bearing",
@@ -284,6 +296,8 @@ def _row(one: SensorTrack) -> dict[str, object]:
         "lag1_autocorrelation": lag1[0] if m == 1 else np.nan,
         "fraction_nees_inside": share_inside(one.nees, chi_square_interval(2)),
         "share_followed": float(on.sum() / one.known.sum()) if one.known.any() else np.nan,
+        "seen": int(one.near.sum()),
+        "share_with_target": float(there[one.near].mean()) if one.near.any() else np.nan,
     }
 
 

@@ -6,6 +6,7 @@ the same detections, and a comparison of sources is a comparison of sightings.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import NamedTuple
 
@@ -14,15 +15,15 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
+from wildlab.evaluation.consistency import average, chi_square_interval, position_nees, share_inside
 from wildlab.evaluation.track_errors import summarise_track, track_errors
-from wildlab.evaluation.whiteness import autocorrelation
+from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
-from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.batch import View, as_tracks, run_batch
 from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.run import Start, Track, start_from_first
@@ -273,46 +274,13 @@ def follow_schmidt(
     return _compiled(seen, seen.uv, np.eye(2) * tuning.pixel**2, tuning, view, pose)
 
 
-def follow_schmidt_each(seen: Sighting, tuning: CvTuning, covariances: ArrayLike) -> list[Track]:
-    """`follow_schmidt` with each of several covariances of the poses, (B, N, 6, 6), in one run of the filter.
-
-    Parameters
-    ----------
-    seen, tuning
-        As for `follow_schmidt`.
-    covariances
-        One for each run, in place of that which the source states; m and rad.
-
-    Returns
-    -------
-    list of Track
-        B of them.
-    """
-    pose = PoseUncertainty(np.asarray(covariances, float))
-    z = np.broadcast_to(seen.uv, (len(pose.covariance), *seen.uv.shape))
-    R = np.eye(2) * tuning.pixel**2
-    return _compiled_runs(seen, z, R, tuning, View(seen.poses, seen.plane_down), pose)
-
-
 def _compiled(
     seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
 ) -> Track:
     """One run of the compiled filters, which a test holds against the readable ones."""
-    return _compiled_runs(seen, z[None], R, tuning, view, pose)[0]
-
-
-def _compiled_runs(
-    seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
-) -> list[Track]:
-    found = run_batch(seen.times, z, R, tuning.motion, start(seen, tuning), view=view, pose=pose)
-    S = np.full((len(seen.times), 2, 2), np.nan)  # the compiled filters give the NIS in its place
-    chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
-    return [
-        Track(seen.times, x, P, innovation, S, nis, used, which, limited)
-        for x, P, innovation, nis, used, which, limited in zip(
-            *found[1:6], chosen, found.limited, strict=True
-        )
-    ]
+    return as_tracks(
+        run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
+    )[0]
 
 
 class Scored(NamedTuple):
@@ -334,6 +302,11 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
 
     The truth is taken for exact, as in H 7.5; where it comes from a receiver of its own, that receiver's
     error counts as the filter's.
+
+    Besides means over the track there are ``error_at_end`` (m) and ``nees_at_end``, of the last frame at
+    which the target's place is known; ``p95_measured`` (m), below which the distance is at 95 % of the frames
+    with a detection; and ``nees_band_low``, ``nees_band_high``: the 95 % band of the mean NEES of a
+    consistent filter, for as many independent values as this one's are worth.
 
     Parameters
     ----------
@@ -365,14 +338,33 @@ def evaluate_track(seen: Sighting, track: Track, axes: tuple[str, str] = ("north
         "fraction_nees_inside": share_inside(values, bounds),
         "fraction_nis_inside": share_inside(track.nis, bounds),
     }
+    distance = np.hypot(*(seen.truth - state)[:, :2].T)
+    known, measured = np.flatnonzero(np.isfinite(values)), np.isfinite(distance) & seen.seen
+    band = average(values, 2, _worth(values[known]))
+    numbers |= {
+        "error_at_end": float(distance[known[-1]]) if len(known) else math.nan,
+        "nees_at_end": float(values[known[-1]]) if len(known) else math.nan,
+        "p95_measured": float(np.quantile(distance[measured], 0.95)) if measured.any() else math.nan,
+        "nees_band_low": band.low,
+        "nees_band_high": band.high,
+    }
     innovation = track.innovation[np.isfinite(track.innovation).all(axis=1)]
     for i, axis in enumerate(axes):
         numbers[f"lag1_autocorrelation_{axis}"] = float(autocorrelation(innovation[:, i], 1)[1])
     return Scored(values, track.nis, numbers)
 
 
+def _worth(values: Array) -> float:
+    """How many independent values a NEES over time is worth; one where that cannot be told."""
+    if len(values) < 3 or np.ptp(values) == 0:
+        return 1.0
+    return max(1.0, effective_sample_size(values, len(values) - 1))
+
+
 def evaluate_measurements(seen: Sighting) -> dict[str, float]:
     """The georeferenced detections themselves: mean error (truth minus measurement) and mean distance, m.
+
+    Also the autocorrelation of their errors from one detection to the next.
 
     Parameters
     ----------
@@ -389,4 +381,8 @@ def evaluate_measurements(seen: Sighting) -> dict[str, float]:
         "mean_north": float(np.nanmean(e[:, 0])),
         "mean_east": float(np.nanmean(e[:, 1])),
         "mae_georeferenced": float(np.nanmean(np.hypot(*e.T))),
+        **{
+            f"lag1_autocorrelation_{axis}": float(autocorrelation(column[np.isfinite(column)], 1)[1])
+            for axis, column in zip(("north", "east"), e.T, strict=True)
+        },
     }

@@ -6,7 +6,8 @@ the twin (``parts = ["cruiser-mini"]``); what the twin itself says goes before w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,9 @@ from wildlab.simulation.target_parameters import Animals, Enclosure, Pair, Segme
 
 TWINS = DATA / "twins"
 PARTS = TWINS / "parts"
+
+#: What happens to every twin that is loaded: `wildlab.simulation.variation.varied` moves some parameters.
+CHANGE: ContextVar[Callable[[TwinParameters], TwinParameters] | None] = ContextVar("change", default=None)
 
 
 class TwinParameters(Strict):
@@ -208,7 +212,9 @@ def load_twin(name_or_path: str | Path) -> TwinParameters:
         path = TWINS / f"{text}.toml"
     else:
         path = Path(name_or_path)
-    return check_model(TwinParameters, _with_parts(read_toml(path, "the parameters of a twin"), path), path)
+    twin = check_model(TwinParameters, _with_parts(read_toml(path, "the parameters of a twin"), path), path)
+    change = CHANGE.get()
+    return twin if change is None else change(twin)
 
 
 def part_names() -> list[str]:

@@ -40,7 +40,11 @@ from numpy.typing import ArrayLike
 
 from wildlab import studies
 from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.simulation.variation import varied
 
+#: The parameter of `run_trial` that moves the twins.
+VARIED = "varied"
 #: Numbers of one flight by (subject, name).
 Numbers = Mapping[tuple[str, str], float]
 #: The same by "subject/name", as they are kept.
@@ -70,7 +74,7 @@ class Study:
         What is computed for a seed; None where the case does not go over simulated flights one by one.
     check_claims
         Trials, one row for each flight and columns (subject, name), and whatever else the notebook has to say
-        -> on which flights each claim is true, by the claim's id.
+        -> what the flights give for each claim, by the claim's id: a `Check`, or (flights,) bools.
     metric_of
         Subject and name of a number of the trial -> its metric; None where it is recorded as none.
     """
@@ -78,7 +82,7 @@ class Study:
     case: str
     subjects: tuple[str, ...]
     trial: Callable[..., Numbers] | None = None
-    check_claims: Callable[..., Mapping[str, ArrayLike]] | None = None
+    check_claims: Callable[..., Mapping[str, Check] | Mapping[str, ArrayLike]] | None = None
     metric_of: Callable[[str, str], Metric | None] | None = None
 
     @property
@@ -116,6 +120,9 @@ def find_case(case: str) -> Study:
 def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
     """What the trial of a case gives for a seed, by "subject/name".
 
+    Besides the trial's own there may be the parameter `VARIED`: factors for parameters of its twins, as
+    `wildlab.simulation.variation.varied` takes them.
+
     Raises
     ------
     WildlabError
@@ -125,7 +132,9 @@ def run_trial(case: str, seed: int, parameters: Mapping[str, Any]) -> Values:
     trial = find_case(case).trial
     if trial is None:
         raise WildlabError(f"the case {case!r} has no trial for each seed", "give it one, or leave seeds out")
-    found = trial(seed, **parameters)
+    given = dict(parameters)
+    with varied(given.pop(VARIED, {})):
+        found = trial(seed, **given)
     values = {f"{subject}/{name}": float(value) for (subject, name), value in found.items()}
     wrong = next((key for key in values if key.count("/") != 1), None)
     if not values or wrong is not None:

@@ -76,9 +76,8 @@ def beside_published(
 ) -> pd.DataFrame:
     """As `wildlab.studies.monte_carlo.beside_published`, in words for tracks."""
     table = monte_carlo.beside_published(report, spread, names_of(subjects), names)
-    for before, words in QUANTITIES.items():
-        table["quantity"] = table["quantity"].str.replace(rf"^{before}\b", words, regex=True)
-    return table
+    name, comma, size = (table["quantity"].str.partition(",")[column] for column in range(3))
+    return table.assign(quantity=name.replace(QUANTITIES) + comma + size)
 
 
 def list_numbers(values: Sequence[float], decimals: int = 1) -> str:

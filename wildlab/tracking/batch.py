@@ -19,7 +19,7 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, check_rows, check_start, checked
+from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
 
 
@@ -162,6 +162,28 @@ def run_batch(
             out[1][slots[start.row]] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
         out[4][start.row] = True
     return BatchTracks(given.times[kept], *(np.moveaxis(a, -1, 0) for a in out))
+
+
+def as_tracks(found: BatchTracks) -> list[Track]:
+    """Each run as the readable filters give it, where estimates were kept after all rows.
+
+    Parameters
+    ----------
+    found
+        From `run_batch`, B runs of N measurements.
+
+    Returns
+    -------
+    list of Track
+        B of them; ``S`` is NaN, for the compiled filters give the NIS in its place.
+    """
+    S = np.full((len(found.times), 2, 2), np.nan)
+    chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
+    each = zip(*found[1:6], chosen, found.limited, strict=True)
+    return [
+        Track(found.times, x, P, v, S, nis, used, which, limited)
+        for x, P, v, nis, used, which, limited in each
+    ]
 
 
 def _run_alike(

@@ -156,7 +156,7 @@ def _claims(study: StudyEntry, metrics: dict[str, Any] | None, state: str, publi
                 high=ours.get("high"),
                 met=ours.get("met"),
                 premise=theirs.get("premise", ""),
-                own=bool(theirs.get("own", False)),
+                own=bool(theirs.get("own", not theirs)),
             )
         )
     return claims

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import SensorTrack
+from wildlab.pipeline.sensor_tracks import FILTERS, SensorTrack
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -24,35 +24,41 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
-from wildlab.studies.autoferry.comparison import IDEAL, WHITES
-from wildlab.studies.autoferry.text import FILTER_WORDS, SENSOR_WORDS, WITH_ITS_BOAT_M, signed
+from wildlab.studies.autoferry.comparison import IDEAL, stays
+from wildlab.studies.autoferry.text import FILTER_WORDS, SENSOR_WORDS, map_counts, nees_title, signed
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
 
 SENSOR_COLOURS = {"lidar": BLUE, "radar": VERMILLION, "ir": PURPLE, "eo": GREEN}
-#: Drawn on the maps: for positions the filter of H 7.2.2, for bearings the only one of the thesis' own.
-ON_MAPS = {"coloured", "ekf"}
 #: Metres beyond the targets' ways that a map shows.
 MARGIN_M = 40.0
 #: Lags of the innovations shown, detections.
 LAGS = 20
 
 
-def map_shown(case: str, flight: Flight, followed: Sequence[SensorTrack], tracks: pd.DataFrame) -> Shown:
+def on_maps(fixed: str) -> dict[str, str]:
+    """The filter that a map shows of each kind of detection: the fixed one, or white where it has none."""
+    return {kind: fixed if fixed in names else names[0] for kind, names in FILTERS.items()}
+
+
+def map_shown(
+    case: str, flight: Flight, followed: Sequence[SensorTrack], tracks: pd.DataFrame, fixed: str
+) -> Shown:
     """The map of a flight, with how many of its tracks stay with their boat."""
-    rows = tracks[(tracks["case"] == case) & tracks["filter"].isin(ON_MAPS) & tracks["rmse"].notna()]
-    stay = {
-        kind: rows.loc[rows["kind"] == kind, "rmse"] < WITH_ITS_BOAT_M for kind in ("position", "bearing")
-    }
-    counts = ", ".join(f"{int(true.sum())} of {len(true)} by {kind}" for kind, true in stay.items())
+    drawn = on_maps(fixed)
+    counts = map_counts(case, tracks, drawn)
     words = case.replace("-", " ").capitalize()
+    filters = "; ".join(f"{kind}s: {FILTER_WORDS[name]}" for kind, name in drawn.items())
+    mine = [one for one in followed if one.filter in drawn.values()]
+    lines = counts.split(", ")
+    split = ",\n".join(", ".join(lines[i : i + 2]) for i in range(0, len(lines), 2))
     return (
-        track_map(flight, followed, f"{words}: tracks that stay with their boat\n{counts}"),
+        track_map(flight, mine, f"{words}: tracks that stay\n{split}"),
         f"map-{case}",
         f"Map of {case}: the ways of the boats and the platform, and the track of each boat by each sensor. "
         f"Tracks that stay with their boat: {counts}.",
-        "Positions: differenced; bearings: extended filter. Tracks that leave the surroundings are cut off.",
+        f"Shown of {filters}. Tracks that leave the surroundings are cut off.",
     )
 
 
@@ -62,11 +68,18 @@ def nees_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.DataFram
     ``tracks`` are the rows of that boat and sensor.
     """
     share = tracks.set_index("filter")["fraction_nees_inside"]
-    inside = ", ".join(f"{FILTER_WORDS[one.filter]} {100 * share[one.filter]:.0f} %" for one in followed)
+    n = tracks.set_index("filter")["compared"]
+    inside = ", ".join(
+        f"{FILTER_WORDS[one.filter]} {100 * share[one.filter]:.0f} % of {n[one.filter]} scans"
+        for one in followed
+    )
     words = SENSOR_WORDS.get(sensor, sensor)
     best = " and ".join(FILTER_WORDS[str(name)] for name in share.index[share == share.max()])
+    said = f"most often inside is {best}" if best else "no track"
+    if best and not stays(tracks).any():
+        said = f"no track stays;\nmost often inside is {best}"
     return (
-        nees_chart(followed, f"{words.capitalize()}: most often inside is {best}"),
+        nees_chart(followed, f"{words.capitalize()}: {said}"),
         f"nees-{sensor}",
         f"NEES over time by {words} on a logarithmic axis. Time inside the 95 percent band: {inside}.",
         f"Inside the band: {inside}. Counterpart of H figures 7.6 and 7.21.",
@@ -91,8 +104,11 @@ def innovations_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.D
     )
 
 
-def mean_nees_shown(tracks: pd.DataFrame) -> Shown:
-    """The mean NEES of every track by sensor and filter, with what is ideal."""
+def mean_nees_shown(tracks: pd.DataFrame, found: pd.DataFrame, fixed: str) -> Shown:
+    """The mean NEES of every track by sensor and filter, with what is ideal; lost tracks are hollow.
+
+    ``found`` are the outcomes of the filter held fixed, of the sensors that are of use.
+    """
     fig, ax = new_figure(5.8, 3.8)
     known = tracks[np.isfinite(tracks["anees"])]
     ends, place = [], 0
@@ -100,8 +116,9 @@ def mean_nees_shown(tracks: pd.DataFrame) -> Shown:
         left = place
         for name, rows in group.groupby("filter", sort=False):
             spread = np.linspace(-0.22, 0.22, len(rows)) if len(rows) > 1 else np.zeros(1)
-            ax.plot(place + spread, rows["anees"], ".", color=colour(str(name)), ms=7)
-            ax.plot([place - 0.3, place + 0.3], [rows["anees"].median()] * 2, color=colour(str(name)), lw=2)
+            kept, tint = stays(rows), colour(str(name))
+            ax.plot((place + spread)[kept], rows["anees"][kept], "o", color=tint, ms=4)
+            ax.plot((place + spread)[~kept], rows["anees"][~kept], "o", mec=tint, mfc="white", ms=4)
             place += 1
         ends.append(((left + place - 1) / 2, SENSOR_WORDS.get(str(sensor), str(sensor)).replace(" ", "\n")))
         place += 1
@@ -122,18 +139,19 @@ def mean_nees_shown(tracks: pd.DataFrame) -> Shown:
     ax.set_ylabel("mean NEES of a track")
     for words in dict.fromkeys(FILTER_WORDS.values()):
         name = next(key for key, value in FILTER_WORDS.items() if value == words)
-        ax.plot([], [], ".", color=colour(name), ms=9, label=words)
-    fig.legend(loc="outside lower center", ncols=4)
-    white = known[known["filter"].isin(WHITES)]
-    over = int((white["anees"] > white["nees_high"]).sum())
-    ax.set_title(f"With white noise, {over} of {len(white)} tracks are overconfident")
+        ax.plot([], [], "o", color=colour(name), ms=5, label=words)
+    ax.plot([], [], "o", mec=GREY, mfc="white", ms=5, label="lost")
+    fig.legend(loc="outside lower center", ncols=5)
+    title = nees_title(found, fixed)
+    ax.set_title(title)
+    lost = int((~stays(known)).sum())
     return (
         fig,
         "mean-nees",
-        "Mean NEES of every track on a logarithmic axis by sensor and filter, beside the ideal of two; with "
-        f"white noise assumed {over} of {len(white)} lie above their 95 percent interval.",
-        "One dot for each boat and scenario, a bar for their median. White noise: blue for positions, "
-        "vermillion for bearings.",
+        "Mean NEES of every track on a logarithmic axis by sensor and filter, beside the ideal of two; "
+        f"{lost} of {len(known)} are of lost tracks. {title.replace(chr(10), ' ')}.",
+        f"One dot for each boat and scenario; {lost} of {len(known)} hollow: lost. White noise: blue for "
+        "positions, vermillion for bearings.",
     )
 
 
@@ -149,17 +167,16 @@ def track_map(flight: Flight, followed: Sequence[SensorTrack], title: str) -> Fi
     ends.append((float(nav["east_m"].iloc[-1]), float(nav["north_m"].iloc[-1]), "own ship"))
     labelled = set()
     for one in followed:
-        if one.filter in ON_MAPS:
-            label = SENSOR_WORDS.get(one.sensor, one.sensor)
-            ax.plot(
-                one.estimate[:, 1],
-                one.estimate[:, 0],
-                color=SENSOR_COLOURS.get(one.sensor, GREY),
-                lw=1.3,
-                zorder=3,
-                label=None if label in labelled else label,
-            )
-            labelled.add(label)
+        label = SENSOR_WORDS.get(one.sensor, one.sensor)
+        ax.plot(
+            one.estimate[:, 1],
+            one.estimate[:, 0],
+            color=SENSOR_COLOURS.get(one.sensor, GREY),
+            lw=1.3,
+            zorder=3,
+            label=None if label in labelled else label,
+        )
+        labelled.add(label)
     for east, north, name in ends:
         own = name == "own ship"
         ax.plot(east, north, "o", color=GREY if own else "black", ms=5, zorder=4)

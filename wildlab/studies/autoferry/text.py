@@ -1,17 +1,24 @@
-"""What the report on boats followed by several sensors of a ferry says: words, tables and metrics."""
+"""What the report on boats followed by a ferry's sensors says: every sentence follows from the numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import ACCELERATION_DENSITY, COLUMNS, PATIENCE_S
-from wildlab.pipeline.sensor_tuning import REACH, SensorTuning
-from wildlab.reporting.report import Report
-from wildlab.studies.autoferry.comparison import PRICE, WHITES, beside_white, check_claims
+from wildlab.pipeline.sensor_tracks import ACCELERATION_DENSITY, PATIENCE_S, WITH_ITS_TARGET_M
+from wildlab.pipeline.sensor_tuning import REACH
+from wildlab.studies.autoferry.comparison import (
+    IDEAL,
+    MOSTLY,
+    PRICE,
+    WHITES,
+    share_interval,
+    stays,
+)
 
 #: What names one track: sensor, target and flight.
 KEYS = ["sensor", "target", "case"]
@@ -23,45 +30,13 @@ FILTER_WORDS = {
     "schmidt": "Schmidt",
     "thinned": "thinned",
 }
-#: A track whose error (RMSE, m) is below this stays with its boat: about the length of the smaller boats and
-#: half of the ship's.
-WITH_ITS_BOAT_M = 15.0
-
-TUNING_COLUMNS = {
-    "sensor": "sensor",
-    "offset": "add to stamps (s)",
-    "sd": "error, SD",
-    "share": "lasting share",
-    "time": "lasts (s)",
-    "causes": "the lasting part is put down to",
-    "thinned": "thinned to one in (s)",
-}
-TUNING_DIGITS = {"share": 2, "time": 1, "thinned": 1}
-TRACK_COLUMNS = {
-    "target": "boat",
-    "scenario": "scenario",
-    "words": "filter",
-    "detections": "detections",
-    "followed": "followed (%)",
-    "rmse": "RMSE (m)",
-    "anees": "mean NEES",
-    "bound": "its 95 % band",
-    "inside": "NEES in band (%)",
-    "anis": "mean NIS",
-    "lag1": "lag-one correlation",
-}
-TRACK_DIGITS = {"followed": 0, "rmse": 1, "anees": 2, "inside": 0, "anis": 2, "lag1": 2}
-GAIN_COLUMNS = {
-    "sensor": "sensor",
-    "scenario": "scenario",
-    "anees_white": "NEES, white noise",
-    "rmse_white": "RMSE (m)",
-    "words": "best of the others",
-    "anees": "its NEES",
-    "rmse_ratio": "its RMSE, ratio",
-    "gained": "more consistent",
-}
-GAIN_DIGITS = {"anees_white": 1, "rmse_white": 1, "anees": 1, "rmse_ratio": 2}
+#: Elements of a measurement, by kind: what its mean NIS should be.
+ELEMENTS = {"position": 2, "bearing": 1}
+RULE = (
+    f"A track stays with its boat where it is within {WITH_ITS_TARGET_M:g} m of it in at least "
+    f"{100 * MOSTLY:.0f} % of the "
+    "scans in which the sensor saw something near the boat's true place; else it is lost."
+)
 
 
 def case_of(flight: Flight) -> str:
@@ -69,210 +44,254 @@ def case_of(flight: Flight) -> str:
     return flight.name.replace("autoferry-", "scenario-").lower()
 
 
-def record_tracks(report: Report, table: pd.DataFrame) -> None:
-    """Record every number of every track, under ``sensor/target/case/filter``."""
-    for _, row in table.iterrows():
-        subject = "/".join([*(str(row[key]) for key in KEYS), str(row["filter"])])
-        of_other_kind = {
-            "position": {"lag1_autocorrelation"},
-            "bearing": {"lag1_autocorrelation_north", "lag1_autocorrelation_east"},
-        }[row["kind"]]
-        for name, unit in COLUMNS.items():
-            if name not in of_other_kind:
-                of = "detections" if name.startswith(("anis", "lag1")) else "compared"
-                report.metric(name, subject, row[name], unit, n=int(row[of]))
-        report.metric("detections_used", subject, int(row["detections"]), "1")
+def named(sensors: Sequence[Any]) -> str:
+    """Sensors in words: "lidar, radar and thermal camera"."""
+    words = [SENSOR_WORDS.get(str(one), str(one)) for one in sensors]
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else "".join(words)
 
 
-def record_tunings(report: Report, tunings: Mapping[str, SensorTuning]) -> pd.DataFrame:
-    """Record what was fitted of each sensor, and return it as a table."""
-    rows = []
-    for sensor, one in tunings.items():
-        angle = one.kind == "bearing"
-        scale, unit = (180 / np.pi, "deg") if angle else (1.0, "m")
-        report.metric(
-            "clock_offset", sensor, one.offset_s, "s", n=one.n, low=one.offset_low_s, high=one.offset_high_s
-        )
-        report.metric("error_sd", sensor, scale * one.sd, unit, n=one.n)
-        report.metric("error_correlation_time", sensor, one.correlation_time_s, "s", n=one.n)
-        low, high = (signed(end, 1) for end in (one.offset_low_s, one.offset_high_s))
-        causes = {
-            f"position {one.position_sd_m:.1f} m": one.position_sd_m > 0.05,
-            f"clock {one.clock_sd_s:.1f} s": one.clock_sd_s > 0.05,
-            f"heading {np.degrees(one.yaw_sd_rad):.1f}°": np.degrees(one.yaw_sd_rad) > 0.05,
-        }
-        rows.append(
-            {
-                "sensor": SENSOR_WORDS.get(sensor, sensor),
-                "offset": f"{signed(one.offset_s)} ({low} to {high})",
-                "sd": f"{scale * one.sd:.1f}{'°' if angle else ' m'}",
-                "share": one.share,
-                "time": one.correlation_time_s,
-                "causes": ", ".join(words for words, there in causes.items() if there),
-                "thinned": max(one.thinning_s, one.interval_s),
-            }
-        )
-    return pd.DataFrame(rows)
+def of_all(k: int, n: int) -> str:
+    """A count with its denominator and, as a share, its 95 % interval (Wilson): "3 of 16 (7 to 43 %)"."""
+    low, high = share_interval(k, n)
+    return f"{k} of {n} ({100 * low:.0f} to {100 * high:.0f} %)" if n else "0 of 0"
 
 
-def tracks_table(table: pd.DataFrame, sensor: str) -> pd.DataFrame:
-    """The tracks of one sensor, as a reader wants them."""
-    rows = table[table["sensor"] == sensor]
-    lag1 = rows[[name for name in COLUMNS if name.startswith("lag1")]]
-    return rows.assign(
-        scenario=rows["case"].str.removeprefix("scenario-"),
-        words=rows["filter"].map(FILTER_WORDS),
-        followed=100 * rows["share_followed"],
-        inside=100 * rows["fraction_nees_inside"],
-        bound=[
-            f"{low:.1f} to {high:.1f}" for low, high in zip(rows["nees_low"], rows["nees_high"], strict=True)
-        ],
-        # The axis on which they are more correlated.
-        lag1=[
-            float(one[np.argmax(np.abs(one))]) if len(one) else np.nan
-            for one in (values[np.isfinite(values)] for values in lag1.to_numpy(float))
-        ],
+def judged_on(cases: Sequence[str], first: str) -> str:
+    """Which scenarios the numbers are of; ``first`` is the one that everything is tuned on."""
+    others = [case for case in cases if case != first]
+    if not others:
+        return f"{first.replace('-', ' ')}, which everything is tuned on: nothing is held out"
+    return f"{len(others)} scenario{'s' if len(others) > 1 else ''} that nothing is tuned on"
+
+
+# --- the headline
+
+
+def counts_of(found: pd.DataFrame) -> dict[str, int]:
+    """How many tracks there are, and how many have each outcome; see `comparison.outcomes`."""
+    counts = found["outcome"].value_counts()
+    return {"tracks": len(found)} | {str(name): int(k) for name, k in counts.items()}
+
+
+def headline(found: pd.DataFrame, fixed: str, where: str) -> str:
+    """What one filter, held fixed, gains and spoils, and what is lost; a sentence."""
+    if found.empty:
+        alone = "no sensor alone keeps more than half of its tracks with their boats"
+        return f"On {where}, {alone}: nothing can be gained."
+    counts = counts_of(found)
+    n, gained, spoilt, lost = (counts.get(name, 0) for name in ("tracks", "gained", "spoilt", "lost"))
+    by = named(list(dict.fromkeys(found["sensor"])))
+    low, high = share_interval(gained, gained + spoilt)
+    if low > 0.5:
+        said = "helps more often than it harms"
+    elif high < 0.5:
+        said = "harms more often than it helps"
+    else:
+        said = "neither clearly helps nor clearly harms"
+    return (
+        f"On {where}, one filter throughout ({FILTER_WORDS[fixed]}) {said}: of {n} tracks by {by} it makes "
+        f"{gained} honest about the error that white noise left dishonest, and spoils {spoilt} that were "
+        f"honest; "
+        f"{lost} of {n} are lost."
     )
 
 
-def overview(table: pd.DataFrame) -> pd.DataFrame:
-    """One row for each sensor and filter: medians over the tracks, and against the white filter."""
-    both = beside_white(table, KEYS)
-    rows = []
-    for (sensor, name), group in table.groupby(["sensor", "filter"], sort=False):
-        against = both[(both["sensor"] == sensor) & (both["filter"] == name)]
-        tracks = group[np.isfinite(group["rmse"])]
-        rows.append(
-            {
-                "sensor": SENSOR_WORDS.get(str(sensor), str(sensor)),
-                "filter": FILTER_WORDS.get(str(name), str(name)),
-                "tracks": len(tracks),
-                "rmse": tracks["rmse"].median(),
-                "anees": tracks["anees"].median(),
-                "inside": 100 * tracks["fraction_nees_inside"].median(),
-                "anis": tracks["anis"].median(),
-                "nearer": f"{int(against['nearer'].sum())} of {len(against)}" if len(against) else "",
-            }
-        )
-    return pd.DataFrame(rows)
+def error_words(found: pd.DataFrame) -> str:
+    """How far off the tracks that stay typically are, by sensor; a sentence, empty where none stays."""
+    parts = []
+    for sensor, rows in found.groupby("sensor", sort=False):
+        kept = rows[rows["stays"]]
+        if len(kept):
+            parts.append(
+                f"{kept['rmse'].median():.0f} metres with the {named([sensor])} "
+                f"({len(kept)} of {len(rows)} tracks stay)"
+            )
+    return f"A track that stays with its boat is typically off by {' and '.join(parts)}." if parts else ""
 
 
-OVERVIEW_COLUMNS = {
-    "sensor": "sensor",
-    "filter": "filter",
-    "tracks": "tracks",
-    "rmse": "RMSE (m)",
-    "anees": "mean NEES",
-    "inside": "NEES in band (%)",
-    "anis": "mean NIS",
-    "nearer": "NEES nearer 2",
-}
-OVERVIEW_DIGITS = {"rmse": 1, "anees": 1, "inside": 0, "anis": 2}
+def use_words(use: pd.DataFrame) -> str:
+    """Which sensors alone are of no use for locating boats, and which are, with their counts; a sentence."""
+    useless = use[~use["of_use"]]
+    if useless.empty:
+        return "Each sensor alone keeps more than half of its tracks with their boats."
+    counts = ", ".join(
+        f"the {named([row['sensor']])} keeps {row['kept']} of {row['tracks']} tracks with their boats"
+        + (f" ({row['rmse']:.0f} metres off in the median)" if np.isfinite(row["rmse"]) else "")
+        for _, row in useless.iterrows()
+    )
+    alone = "alone is" if len(useless) == 1 else "are each alone"
+    who = named(useless["sensor"].tolist())
+    return f"The {who} {alone} of no use for locating boats: with its best filter, {counts}."
 
 
-def gains_table(found: pd.DataFrame) -> pd.DataFrame:
-    """What `wildlab.studies.autoferry.comparison.gains` gives, in words, sensor by sensor."""
-    found = found.sort_values("sensor", key=lambda names: names.map(list(SENSOR_WORDS).index), kind="stable")
-    return found.assign(
-        sensor=found["sensor"].map(SENSOR_WORDS),
-        scenario=found["case"].str.removeprefix("scenario-"),
-        words=[FILTER_WORDS.get(name, "none at that price") for name in found["filter"]],
+def level_of(found: pd.DataFrame) -> str:
+    """``good`` where more than half of the tracks stay and have their mean NEES in its band, or ``warn``."""
+    return "good" if 2 * int(found["inside"].sum()) > len(found) else "warn"
+
+
+def tiles(found: pd.DataFrame) -> list[tuple[str, str]]:
+    """The numbers to remember."""
+    if found.empty:
+        return [("0", "tracks that a filter could be judged on")]
+    n = len(found)
+    shown = []
+    for sensor, rows in found.groupby("sensor", sort=False):
+        kept = rows.loc[rows["stays"], "rmse"]
+        about = f"median error of the {len(kept)} of {len(rows)} tracks by {named([sensor])} that stay"
+        shown.append((f"{kept.median():.0f} m" if len(kept) else "—", about))
+    gained, lost = (int((found["outcome"] == name).sum()) for name in ("gained", "lost"))
+    low, high = share_interval(gained, n)
+    shown.append((f"{gained} of {n}", f"tracks gain ({100 * low:.0f} to {100 * high:.0f} %)"))
+    return [*shown, (f"{lost} of {n}", "tracks are lost, which is no gain whatever the filter says")]
+
+
+def nees_title(found: pd.DataFrame, fixed: str) -> str:
+    """In how many tracks the mean NEES is in its band, with the fixed filter and with white noise."""
+    inside, white = int(found["inside"].sum()), int(found["inside_white"].sum())
+    said = f"{inside} with {FILTER_WORDS[fixed]}, {white} with white noise"
+    return f"Tracks of {len(found)} that stay and know their error:\n{said}"
+
+
+def chosen_words(fixed: str, first: str) -> str:
+    """How the filter was chosen that is held fixed."""
+    return (
+        f"The filter is chosen on {first.replace('-', ' ')} alone, as all tuning is: of differenced, Schmidt "
+        f"and thinned the one whose mean NEES lies nearest {IDEAL:g} there, at most {100 * (PRICE - 1):.0f} "
+        f"% less accurate. That is: {FILTER_WORDS[fixed]}."
     )
 
 
-def claims_by_sensor(table: pd.DataFrame, texts: Mapping[str, str]) -> pd.DataFrame:
-    """In how many cases of each sensor each claim is true, as text: ``4 of 10``."""
-    rows = []
-    for claim, text in texts.items():
-        row = {"claim": text}
-        for sensor, words in SENSOR_WORDS.items():
-            true = check_claims(table[table["sensor"] == sensor], KEYS)[claim]
-            row[words] = f"{int(true.sum())} of {len(true)}" if len(true) else "—"
-        rows.append(row)
-    return pd.DataFrame(rows)
+def hindsight_words(hind: pd.DataFrame, fixed: pd.DataFrame) -> str:
+    """What choosing the filter for each track afterwards would gain, said to be hindsight; a sentence."""
+    gained, n = int(hind["gained"].sum()), len(hind)
+    counts = {name: sum(name in some for some in hind["filters"]) for name in FILTER_WORDS}
+    by = ", ".join(f"{FILTER_WORDS[name]} {k}" for name, k in counts.items() if k)
+    several = int((hind["filters"].map(len) > 1).sum())
+    by += f"; {several} with more than one" if several else ""
+    held = int((fixed["outcome"] == "gained").sum())
+    return (
+        f"With hindsight: had the best of the others been known for each track, {gained} of {n} would gain"
+        + (f" ({by})" if by else "")
+        + f", where the one filter has {held} of {len(fixed)}. "
+        "Nobody can choose so before the truth is known."
+    )
 
 
-def summary_sentences(
-    tracks: pd.DataFrame, gained: Mapping[str, pd.Series], kinds: Mapping[str, str]
-) -> list[str]:
-    """What a ranger needs to know. ``gained`` by sensor; ``kinds`` of detections by sensor."""
-    white = tracks[tracks["filter"].isin(WHITES) & tracks["rmse"].notna()]
-    error = white.groupby("sensor")["rmse"].median()
-    over = int((white["anees"] > white["nees_high"]).sum())
-    ranging = [sensor for sensor in error.index if kinds[sensor] == "position"]
-    looking = [sensor for sensor in error.index if kinds[sensor] == "bearing"]
-    sentences = []
-    if ranging:
-        places = " and ".join(f"{error[one]:.0f} metres with the {SENSOR_WORDS[one]}" for one in ranging)
-        sentences.append(f"Typically, a boat's track is off by {places}.")
-    if looking:
-        places = " and ".join(f"{error[one]:.0f} metres with the {SENSOR_WORDS[one]}" for one in looking)
-        sentences.append(
-            f"Cameras tell directions only, and from a ship as slow as this one that means {places}."
+# --- what did not stay, and what stands behind the verdicts
+
+
+def strays(found: pd.DataFrame) -> str:
+    """How many tracks do not stay with their boat, which, and what another threshold would say."""
+    lost = found[found["outcome"] == "lost"]
+    named_ones = []
+    for _, row in lost.iterrows():
+        share = row["share_with_target"]
+        near = "never seen"
+        if np.isfinite(share):
+            near = f"near it in {100 * share:.0f} % of {row['seen']} scans"
+        white = "" if not row["stays_white"] else ", but kept with white noise"
+        named_ones.append(
+            f"{row['target']} by {named([row['sensor']])} in "
+            f"{str(row['case']).replace('-', ' ')} ({near}{white})"
         )
-    last = f"In {over} of {len(white)} tracks the simple filter was surer of itself than it should have been"
-    if ranging:
-        where = " and ".join(
-            f"{int(gained[one].sum())} of {len(gained[one])} scenarios with the {SENSOR_WORDS[one]}"
-            for one in ranging
-        )
-        last += f"; one of the others was more honest, and at most a tenth less accurate, in {where}"
-    return [*sentences, f"{last}."]
+    n = len(found)
+    other = {share: n - int(stays(found, share).sum()) for share in (0.5, 0.95)}
+    threshold = ", ".join(f"{k} at {100 * share:.0f} %" for share, k in other.items())
+    behind = f" Were other shares of the scans asked for, {threshold} would be lost."
+    if not named_ones:
+        return f"none of {n} tracks is lost.{behind}"
+    are = "is" if len(lost) == 1 else "are"
+    return f"{len(lost)} of {n} tracks {are} lost: {'; '.join(named_ones)}.{behind}"
 
 
-def alone_words(both: pd.DataFrame, sensors: Iterable[str]) -> str:
-    """In how many cases each filter, were it the only choice, is more consistent at the price allowed.
-
-    ``both`` is what `wildlab.studies.autoferry.comparison.beside_white` gives.
-    """
-    words = []
-    for sensor in sensors:
-        rows = both[both["sensor"] == sensor]
-        better = rows["nearer"] & (rows["rmse_ratio"] <= PRICE)
-        counts = better.groupby(rows["filter"], sort=False).agg(["sum", "count"])
-        parts = [
-            f"{FILTER_WORDS[str(name)]} {row['sum']} of {row['count']}" for name, row in counts.iterrows()
-        ]
-        words.append(f"{SENSOR_WORDS[sensor]}: {', '.join(parts)}")
-    return "; ".join(words)
-
-
-def strays(tracks: pd.DataFrame) -> str:
-    """The tracks by position that do not stay with their boat, in a sentence; empty where all do."""
-    white = tracks[tracks["filter"].isin(WHITES) & (tracks["kind"] == "position")]
-    lost = white[white["rmse"] > WITH_ITS_BOAT_M]
-    named = [
-        f"{row['target']} by {SENSOR_WORDS[row['sensor']]} in {str(row['case']).replace('-', ' ')} "
-        f"({row['rmse']:.0f} m, {100 * row['share_followed']:.0f} % of the time)"
-        for _, row in lost.iterrows()
-    ]
-    return f"Tracks by position, white noise assumed, that do not stay: {'; '.join(named)}." if named else ""
+def drawn_words(found: pd.DataFrame, case: str, boat: str) -> str:
+    """What became of the boat that is drawn, and how many tracks fared alike: whether it is typical."""
+    mine = found[(found["case"] == case) & (found["target"] == boat)]
+    parts = []
+    for sensor, rows in mine.groupby("sensor", sort=False):
+        outcome, same = str(rows["outcome"].iloc[0]), found[found["sensor"] == sensor]
+        alike = int((same["outcome"] == outcome).sum())
+        parts.append(f"{named([sensor])}: {outcome} ({alike} of {len(same)} tracks)")
+    return (
+        f"With the filter held fixed, {'; '.join(parts)}." if parts else "It was tuned on, and is not judged."
+    )
 
 
 def remarks(tracks: pd.DataFrame) -> list[str]:
-    """What stands behind the verdicts, with the numbers that say so."""
+    """What stands behind the verdicts, with the numbers that say so; ``tracks`` are those of kept cases."""
     white = tracks[tracks["filter"].isin(WHITES)]
+    said = []
+    for kind, rows in white.groupby("kind", sort=False):
+        right, middle = ELEMENTS[str(kind)], float(rows["anis"].median())
+        below, above = (rows["anis"] < rows["nis_low"]).sum(), (rows["anis"] > rows["nis_high"]).sum()
+        said.append(
+            f"With white noise assumed, the mean NIS of a {kind} is {middle:.2f} in the median, where "
+            f"{right} is right; in {below} of {len(rows)} tracks it is below its band (the noise assumed is "
+            f"larger than what changes from one detection to the next) and in {above} above (it is smaller)."
+        )
     differenced = tracks[(tracks["filter"] == "coloured") & tracks["rmse"].notna()]
-    lag1 = differenced[["lag1_autocorrelation_north", "lag1_autocorrelation_east"]]
-    negative = (lag1.min(axis=1) < -1.96 / np.sqrt(differenced["detections"])).sum()
-    nis = {str(kind): rows["anis"].median() for kind, rows in white.groupby("kind", sort=False)}
-    expected = {"position": 2, "bearing": 1}
+    if len(differenced):
+        lag1 = differenced[["lag1_autocorrelation_north", "lag1_autocorrelation_east"]]
+        bound = 1.96 / np.sqrt(differenced["detections"])
+        negative, positive = (lag1.min(axis=1) < -bound).sum(), (lag1.max(axis=1) > bound).sum()
+        said.append(
+            f"Of {len(differenced)} differenced tracks, neighbouring innovations are correlated negatively "
+            f"in {negative} "
+            f"(more was differenced than lasts) and positively in {positive} (less was)."
+        )
     thinned = tracks[(tracks["filter"] == "thinned") & tracks["rmse"].notna()].merge(
         white, on=KEYS, suffixes=("", "_white")
     )
-    poorer = (thinned["rmse"] > thinned["rmse_white"]).sum()
-    return [
-        "With white noise assumed, the median of the mean NIS is "
-        + " and ".join(
-            f"{value:.2f} for a {kind}, where {expected[kind]} is right" for kind, value in nis.items()
+    if len(thinned):
+        poorer = (thinned["rmse"] > thinned["rmse_white"]).sum()
+        said.append(
+            f"Thinned tracks are less accurate than those of all detections in {poorer} of {len(thinned)} "
+            "cases."
         )
-        + ": the noise that covers the errors is larger than what changes from one detection to the next.",
-        f"In {int(negative)} of {len(differenced)} differenced tracks neighbouring innovations are "
-        "correlated negatively, as they are where part of an error is new at every detection and is "
-        "differenced too.",
-        f"Thinned tracks are less accurate than those of all detections in {int(poorer)} of {len(thinned)} "
-        "cases.",
+    return said
+
+
+def claims_caption(tracks: pd.DataFrame, kept: pd.DataFrame) -> str:
+    """Which tracks the claims are decided on, with their number."""
+    all_cases, kept_ones = (len(some.drop_duplicates(KEYS)) for some in (tracks, kept))
+    return (
+        f"Decided on the {kept_ones} of {all_cases} cases whose track stays with its boat with white noise; "
+        "what follows something else says nothing of how a filter takes its errors. Differencing is for "
+        "positions."
+    )
+
+
+def offsets_caption(again: pd.DataFrame, first: str) -> str:
+    """How far the clock offsets that scenarios ask for lie apart, by sensor; ``first`` is the one used."""
+    spread = again.set_index("sensor").apply(np.ptp, axis=1)
+    parts = "; ".join(f"{sensor}: within {value:.1f} s of each other" for sensor, value in spread.items())
+    what = "The clock offset (s) that each scenario alone would ask for"
+    return f"{what}; only that of {first.replace('-', ' ')} is used. {parts}."
+
+
+def limits(use: pd.DataFrame) -> list[str]:
+    """What the report does not tell."""
+    said = [
+        "No detection says what it is of. Tracks start on the first detection near a boat's true place; "
+        "what they follow later may be another boat, the wake or the shore.",
+        "The ferry's own heading and its error are not published, nor how good the boats' receivers are: "
+        "one metre was assumed.",
+        "A detection is of the side of the hull that is seen, the truth is of an antenna. On a straight "
+        "course that cannot "
+        "be told from a late clock.",
+        "Clutter is not followed, and tracks are not taken up again once they are lost.",
     ]
+    useless = use.loc[~use["of_use"], "sensor"].tolist()
+    if useless:
+        said.append(f"What the {named(useless)} would add to the others: each sensor is alone here.")
+    return said
+
+
+def map_counts(case: str, tracks: pd.DataFrame, drawn: Mapping[str, str]) -> str:
+    """How many tracks of a flight stay with their boat, by sensor; ``drawn`` is the filter of each kind."""
+    rows = tracks[(tracks["case"] == case) & (tracks["filter"] == tracks["kind"].map(drawn))]
+    kept = pd.Series(stays(rows), rows.index).groupby(rows["sensor"], sort=False).agg(["sum", "size"])
+    return ", ".join(f"{named([sensor])} {row['sum']} of {row['size']}" for sensor, row in kept.iterrows())
 
 
 def signed(value: float, decimals: int = 2) -> str:
@@ -289,7 +308,7 @@ nearest detection in a 99 % gate, a track dropped after {PATIENCE_S:g} s without
 linear filter, bearings through the extended one, started at the mean distance that {first} shows. All filters
 of a track get the same detections, those that the filter with white noise let in.
 
-SensorTuning, on {first} alone: the detection nearest to a boat within {REACH["position"]:g} m or
+Tuning, on {first} alone: the detection nearest to a boat within {REACH["position"]:g} m or
 {np.degrees(REACH["bearing"]):g}° is taken for its own. The clock offset is the one with the least sum of
 squared errors. $\sigma$ is their root mean square, standing part included; their autocorrelation is fitted by
 $c\, e^{{-t/\tau}}$. Differencing takes $F_c = e^{{-T/\tau}}$ and the variance that $e_2 - F_c e_1$ then has
@@ -299,6 +318,9 @@ fading with $\tau$; the rest is white. Thinning keeps detections so far apart th
 by less than $1/e$.
 
 NEES is of the position, truth minus estimate; the truth's own variance is added to the filter's. A mean NEES
-is overconfident where it lies above the 95 % interval for as many independent values as the correlated ones
-are worth. It counts as nearer 2 where its ratio to 2 is smaller, whichever way.
+is honest where it lies in the 95 % interval of the mean of as many independent chi-square values as the
+correlated ones are worth, overconfident above it. {RULE} A filter gains on a track that stays where its mean
+NEES is in that interval, that of white noise is not, and its error is at most {100 * (PRICE - 1):.0f} %
+larger. Behind a count stands the 95 % interval of its share (Wilson), as if tracks were independent of each
+other.
 """

@@ -2,12 +2,14 @@
 
 Two targets at rest are seen in every image of a short flight, from poses that are known with white errors.
 One of them, the main object, is tracked, and the detection with the smaller normalised innovation squared is
-given to it. That distance is computed from georeferenced positions (H 6.2.3), from pixels (6.8), or from
-azimuth and elevation (6.11). All runs go through the flight together, image by image.
+taken for its own. That distance is computed from georeferenced positions (H 6.2.3), from pixels (6.8), from
+azimuth and elevation (6.11), or from pixels and angles together, as H 6.4.3 proposes at its end: there the
+two distances are added, so that where they disagree the surer one decides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -18,23 +20,19 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera, in_image
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel, pixel_to_plane
 from wildlab.geometry.mount import Mount
-from wildlab.tracking.association import distances, nearest_within
+from wildlab.studies.gating import kernels
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import (
-    Prediction,
-    azimuth_elevation_of_pixel,
-    difference,
-    on_state,
-    predict_azimuth_elevation,
-    predict_pixel,
-)
+from wildlab.tracking.measurement import azimuth_elevation_of_pixel, on_state
 from wildlab.tracking.motion import constant_velocity
 
 #: The three forms of H table 6.6, in its order.
 FORMS = ("position", "pixels", "angles")
+#: What a detection is associated by: a form, or pixels and angles together.
+GATES = (*FORMS, "both")
 
 #: H 6.4.3: 141 images at 10 Hz; the second target 10 m north and 15 m east of the main one, each displaced
 #: by 10 m per axis; 50 iterations of the filter before, on the true position with 10 m of noise per axis.
@@ -50,7 +48,6 @@ R_FORM = {
     "pixels": np.diag([360.0, 160.0]),
     "angles": np.diag(np.radians([6.0, 3.0]) ** 2),
 }
-IS_ANGLE = {"position": (False, False), "pixels": (False, False), "angles": (True, False)}
 
 #: Normal draws of a run: targets, start, warm-up, poses and pixels.
 _DRAWS = (4, 2, 2 * WARM_UP, 8 * IMAGES, 4 * IMAGES)
@@ -87,10 +84,10 @@ class Choices:
     sd_acceleration
         Process noise of H (6.1), m/s^2: that of the slow vessel of H 6.4.2, the same 10 m of noise beside it.
     updated_with
-        The measurement that was assigned to the track ("assigned to the main target"), the main object's
-        ``own`` whatever was assigned, or nothing.
+        The main object's ``own`` measurement whatever was assigned, the one that was ``assigned``, or
+        nothing: see `wildlab.studies.gating.readings`.
     angles_update
-        H 6.3.2: pixels are used in the update and angles for gating.
+        What updates the track that angles gate. H 6.3.2: pixels are used in the update and angles for gating.
     azimuth
         ``atan2``: two-argument arctangents. ``arctan``: an azimuth that cannot tell a target from the one
         opposite. ``printed``: H (6.10) to the letter, where moreover the measured elevation is negative for
@@ -102,7 +99,7 @@ class Choices:
     """
 
     sd_acceleration: float = 0.01
-    updated_with: Literal["assigned", "own", "nothing"] = "assigned"
+    updated_with: Literal["own", "assigned", "nothing"] = "own"
     angles_update: Literal["pixels", "angles"] = "pixels"
     azimuth: Literal["atan2", "arctan", "printed"] = "atan2"
     warm_up_step: float = 1 / RATE_HZ
@@ -110,12 +107,12 @@ class Choices:
 
 
 class Gated(NamedTuple):
-    """What happened in N runs of T images; forms in the order of `FORMS`, the main object first."""
+    """What happened in N runs of T images; gates in the order of `GATES`, the main object first."""
 
-    right: NDArray[np.bool_]  # (3, N, T)
+    right: NDArray[np.bool_]  # (4, N, T)
     counted: NDArray[np.bool_]  # (N, T)
-    nis: Array  # (3, N, T, 2)
-    estimate: Array  # (3, N, T, 2) north, east after the update
+    nis: Array  # (4, N, T, 2)
+    estimate: Array  # (4, N, T, 2) north, east after the update
     measured: Array  # (N, T, 2, 2) georeferenced detections
     pixels: Array  # (N, T, 2, 2) detections
     targets: Array  # (N, 2, 2) true positions
@@ -235,36 +232,76 @@ def draw_scene(over: Overflight, runs: list[np.random.SeedSequence]) -> Scene:
 
 
 def gate(over: Overflight, choices: Choices, runs: list[np.random.SeedSequence]) -> Gated:
-    """Every image of every run, associated in the three forms. Keeps everything: for some 1000 runs."""
-    scene = draw_scene(over, runs)
-    camera, p_nc, R_nc = scene.poses.camera, scene.poses.p_nc, scene.poses.R_nc
-    ground = pixel_to_plane(camera, scene.pixels, p_nc[:, :, None], R_nc[:, :, None], 0.0)[..., :2]
-    detections = {
-        "position": ground,
-        "pixels": scene.pixels,
-        "angles": _measured_angles(camera, scene.pixels, choices),
+    """Every image of every run, associated by each of `GATES`. Keeps everything: for some 1000 runs.
+
+    Raises
+    ------
+    WildlabError
+        If the camera distorts.
+    """
+    return _gate(draw_scene(over, runs), choices)
+
+
+class Outcome(NamedTuple):
+    """What became of each of N runs, per cent of its images; NaN where no image of a run counts."""
+
+    rate: Array  # (4, N) associated rightly, gates in the order of `GATES`
+    mistakes: Array  # (3, N) wrong by pixels alone, by angles alone, by both
+    same_images: NDArray[np.bool_]  # (N,) whether pixels and angles are wrong in exactly the same images
+
+
+def outcomes(
+    over: Overflight, readings: Mapping[str, Choices], runs: int, seed: int, chunk: int = 500
+) -> dict[str, Outcome]:
+    """What became of each run by each of some choices, on the same draws.
+
+    Parameters
+    ----------
+    over
+        The flight, from `overflight`.
+    readings
+        Choices by name.
+    runs, seed
+        How many, and of their streams; see `streams`.
+    chunk
+        Runs held in memory at a time; the numbers do not depend on it.
+
+    Returns
+    -------
+    dict
+        By the names of ``readings``.
+
+    Raises
+    ------
+    WildlabError
+        If the camera distorts.
+    """
+    sources = streams(seed, runs)
+    parts: dict[str, list[Outcome]] = {name: [] for name in readings}
+    for first in range(0, runs, chunk):
+        scene = draw_scene(over, sources[first : first + chunk])
+        for name, choices in readings.items():
+            parts[name].append(_outcome(_gate(scene, choices)))
+    return {
+        name: Outcome(*(np.concatenate(values, axis=-1) for values in zip(*some, strict=True)))
+        for name, some in parts.items()
     }
-    inside = np.asarray(in_image(camera, scene.pixels).all(axis=-1), bool)
-    counted = inside if choices.in_image_only else np.ones_like(inside)
-    start = _warm_up(scene, choices)
-    steps = [_associate(form, scene, choices, detections, counted, start) for form in FORMS]
-    chosen, nis, estimate = (np.stack(parts) for parts in zip(*steps, strict=True))
-    return Gated((chosen == 0) & counted, counted, nis, estimate, ground, scene.pixels, scene.targets)
 
 
 def success_rates(over: Overflight, choices: Choices, runs: int, seed: int, chunk: int = 500) -> Array:
-    """Share of right associations in each run, (3, runs) in per cent; forms in the order of `FORMS`.
+    """Share of right associations in each run, (4, runs) in per cent; gates in the order of `GATES`.
 
-    ``chunk`` runs are held in memory at a time; the numbers do not depend on it. A run without an image that
-    counts is NaN.
+    The arguments are those of `outcomes`. A run without an image that counts is NaN.
     """
-    sources = streams(seed, runs)
-    parts = []
-    for first in range(0, runs, chunk):
-        done = gate(over, choices, sources[first : first + chunk])
-        n = done.counted.sum(axis=-1)
-        parts.append(100 * done.right.sum(axis=-1) / np.where(n > 0, n, np.nan))
-    return np.concatenate(parts, axis=1)
+    return outcomes(over, {"": choices}, runs, seed, chunk)[""].rate
+
+
+def _outcome(done: Gated) -> Outcome:
+    n = done.counted.sum(axis=-1)
+    of = np.where(n > 0, n, np.nan)
+    pixels, angles = (~done.right[GATES.index(form)] & done.counted for form in ("pixels", "angles"))
+    apart = np.stack([pixels & ~angles, angles & ~pixels, pixels & angles]).sum(axis=-1)
+    return Outcome(100 * done.right.sum(axis=-1) / of, 100 * apart / of, (pixels == angles).all(axis=-1))
 
 
 def share_in_image(over: Overflight, runs: int, seed: int) -> float:
@@ -286,61 +323,38 @@ def _warm_up(scene: Scene, choices: Choices) -> tuple[Array, Array]:
     return x, P
 
 
-def _associate(
-    form: str,
-    scene: Scene,
-    choices: Choices,
-    detections: dict[str, Array],
-    counted: NDArray[np.bool_],
-    start: tuple[Array, Array],
-) -> tuple[NDArray[np.int64], Array, Array]:
-    """Index of the detection taken (N, T), NIS of both (N, T, 2), estimate (N, T, 2)."""
-    x, P = start
-    if form != "position":  # an extended filter's covariance differs from run to run
-        P = np.broadcast_to(P, (len(x), 4, 4))
-    by = choices.angles_update if form == "angles" else form
+def _gate(scene: Scene, choices: Choices) -> Gated:
+    camera, p_nc, R_nc = scene.poses.camera, scene.poses.p_nc, scene.poses.R_nc
+    if camera.distorts:
+        raise WildlabError(
+            "the camera distorts, and the simulation of H 6.4.3 knows the pinhole alone",
+            "use a twin whose camera has no distortion",
+            field="camera",
+        )
+    ground = pixel_to_plane(camera, scene.pixels, p_nc[:, :, None], R_nc[:, :, None], 0.0)[..., :2]
+    p_nc, R_nc = np.ascontiguousarray(p_nc), np.ascontiguousarray(R_nc)
+    measured = np.stack([ground, scene.pixels, _measured_angles(camera, scene.pixels, choices)])
+    inside = np.asarray(in_image(camera, scene.pixels).all(axis=-1), bool)
+    counted = inside if choices.in_image_only else np.ones_like(inside)
+    x, P = _warm_up(scene, choices)
     F, Q = constant_velocity(1 / RATE_HZ, choices.sd_acceleration)
+    A = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+    noise = np.stack([R_FORM[form] for form in FORMS])
+    feed = {"nothing": kernels.NOTHING, "own": kernels.OWN, "assigned": kernels.ASSIGNED}[
+        choices.updated_with
+    ]
     N, T = counted.shape
-    taken, nis, estimate = np.empty((N, T), np.int64), np.empty((N, T, 2)), np.empty((N, T, 2))
-    every = np.arange(N)
-    for t in range(T):
-        x, P = predict(x, P, F, Q)
-        poses = scene.poses.take((slice(None), t))
-        seen = _expected(form, x[:, :2], poses)
-        compared = _printed(seen, choices) if form == "angles" else seen
-        angles = IS_ANGLE[form] if choices.azimuth == "atan2" else (False, False)
-        nis[:, t] = distances(compared, angles, P, detections[form][:, t], R_FORM[form])
-        taken[:, t] = nearest_within(nis[:, t], 1.0, 2)
-        if choices.updated_with != "nothing":
-            used = taken[:, t] if choices.updated_with == "assigned" else np.zeros(N, np.int64)
-            if by != form:
-                seen = _expected(by, x[:, :2], poses)
-            gap = difference(detections[by][every, t, used], seen.z, IS_ANGLE[by])
-            step = correct(x, P, gap, on_state(seen.H_position, 4), R_FORM[by])
-            fine = counted[:, t] & (used >= 0) & np.isfinite(gap).all(axis=-1)
-            if fine.all():
-                x, P = step.x, step.P
-            else:
-                x = np.where(fine[:, None], step.x, x)
-                P = np.where(fine[:, None, None], step.P, P)
-        estimate[:, t] = x[:, :2]
-    return taken, nis, estimate
-
-
-def _expected(form: str, position: Array, poses: CameraPoses) -> Prediction:
-    if form == "position":
-        return Prediction(position, np.eye(2), np.zeros((2, 6)))
-    if form == "pixels":
-        return predict_pixel(position, poses, 0.0)
-    return predict_azimuth_elevation(position, poses, 0.0)
-
-
-def _printed(expected: Prediction, choices: Choices) -> Prediction:
-    """H (6.9) with the arctangent of one argument, unless `atan2`; its derivatives are the same."""
-    if choices.azimuth == "atan2":
-        return expected
-    azimuth, elevation = np.moveaxis(expected.z, -1, 0)
-    return expected._replace(z=np.stack([np.arctan(np.tan(azimuth)), elevation], axis=-1))
+    taken = np.empty((len(GATES), N, T), np.int64)
+    nis, estimate = np.empty((len(GATES), N, T, 2)), np.empty((len(GATES), N, T, 2))
+    with announced("the loop of the study of gating"):
+        for by in range(len(GATES)):
+            angles = by == kernels.ANGLES and choices.angles_update == "angles"
+            update = kernels.ANGLES if angles else min(by, kernels.PIXELS)
+            kernels.associate_runs(
+                by, update, feed, choices.azimuth != "atan2", A, p_nc, R_nc, measured, counted, F, Q, noise,
+                x, P, taken[by], nis[by], estimate[by],
+            )  # fmt: skip
+    return Gated((taken == 0) & counted, counted, nis, estimate, ground, scene.pixels, scene.targets)
 
 
 def _measured_angles(camera: Camera, pixels: Array, choices: Choices) -> Array:

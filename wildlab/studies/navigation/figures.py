@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -282,4 +282,23 @@ def show_nees(report: Report, studied: Studied, begin: float) -> None:
         alt="NEES of position, velocity and attitude over time on log axes, with 95 % bands.",
         caption=f"NEES, three degrees of freedom each. {CONVENTION} An error that stays for the whole flight "
         "keeps it on one side.",
+    )
+
+
+def sheet_words(published: Mapping[tuple[str, str], float], spread: pd.DataFrame) -> str:
+    """How the deviations of the filter that has the data sheets' noise compare with the printed ones.
+
+    Parameters
+    ----------
+    published
+        By (subject, name).
+    spread
+        What the trial gives, one row for each flight.
+    """
+    names = [f"mean_sd_{name}" for name in (*PLACES, *AXES)]
+    ratios = [float(spread["mekf", name].median() / published["mekf", name]) for name in names]
+    low, high = min(ratios), max(ratios)
+    return (
+        "With the noise that the data sheets state they come out "
+        f"{low:.2f} to {high:.2f} times as large here."
     )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from wildlab.pipeline.navigation_errors import AXES, SETTLING_S, numbers_of, study_navigation
+from wildlab.evaluation.shares import Check
+from wildlab.pipeline.navigation_errors import SETTLING_S, numbers_of, study_navigation
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -23,10 +21,8 @@ def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     return numbers_of(study_navigation(simulate_twin(twin, seed)), SETTLING_S)
 
 
-def check_claims(spread: pd.DataFrame, tuned: str) -> dict[str, NDArray[np.bool_]]:
-    """On which flights each claim of H 7.5.3 and 7.5.4 on its figures is true, by the claim's id.
-
-    Mainly, mostly and the majority are read as more than half of the time, few as less than a tenth.
+def check_claims(spread: pd.DataFrame, tuned: str) -> dict[str, Check]:
+    """What the flights give for each claim of H 7.5.3 and 7.5.4 on its figures, by the claim's id.
 
     Parameters
     ----------
@@ -35,11 +31,14 @@ def check_claims(spread: pd.DataFrame, tuned: str) -> dict[str, NDArray[np.bool_
     tuned
         Subject of the filter that was tuned like the printed one of that flight.
     """
-    inside: dict[str, Any] = {name: spread[tuned, f"inside_{name}"] for name in (*AXES, "velocity")}
-    checks = {
-        "roll-pitch-within-bounds": (inside["roll"] > 0.5) & (inside["pitch"] > 0.5),
-        "roll-within-bounds": inside["roll"] > 0.5,
-        "velocity-within-bounds": inside["velocity"] > 0.5,
-        "velocity-mostly-within-bounds": inside["velocity"] > 0.9,
+
+    def outside(*names: str) -> Check:
+        share = np.column_stack([spread[tuned, f"inside_{name}"].to_numpy(float) for name in names])
+        return Check(measured=1 - share.min(axis=1))
+
+    return {
+        "roll-pitch-within-bounds": outside("roll", "pitch"),
+        "roll-within-bounds": outside("roll"),
+        "velocity-within-bounds": outside("velocity"),
+        "velocity-mostly-within-bounds": outside("velocity"),
     }
-    return {claim: np.asarray(true, bool) for claim, true in checks.items()}

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from wildlab.reporting.spread import share_below
 from wildlab.studies.schmidt.claims import within
-from wildlab.studies.schmidt.trial import BOUNDS
+from wildlab.studies.schmidt.trial import BOUNDS, PUBLISHED
+from wildlab.studies.track_text import accuracy_words, typical_words
 
 WORDS = {
     "ekf": "Extended",
@@ -46,8 +46,7 @@ TYPICAL_COLUMNS = {
     "shown": "what",
     "here": "this flight",
     "median": "median of the flights",
-    "below": "flights below (%)",
-    "typical": "typical",
+    "typical": "is it typical?",
 }
 
 METHOD = r"""Both filters have the constant-velocity model of H (6.1) and (6.2) with $\sigma_v = 0.05\
@@ -96,12 +95,12 @@ def medians_table(spread: pd.DataFrame) -> pd.DataFrame:
 
 def variant_points(spread: pd.DataFrame) -> list[str]:
     """What the variants come to, a sentence each."""
-    closer = spread["ekf", "mae"] - spread["schmidt", "mae"]
     share = {who: 100 * within(spread[who, "nees"]).mean() for who in WORDS}
+    mae = pd.DataFrame({who: spread[who, "mae"] for who in PUBLISHED})
+    both = {who: f"the {WORDS[who]} filter" for who in PUBLISHED}
+    nearer = accuracy_words(both | {"ekf": "the extended filter"}, mae)
     return [
-        f"On average the Schmidt filter's mean error is {abs(closer.mean()):.1f} m "
-        f"{'smaller' if closer.mean() > 0 else 'larger'} than the extended filter's; it is smaller on "
-        f"{100 * (closer > 0).mean():.0f} % of the flights.",
+        f"{nearer[0].upper()}{nearer[1:]}.",
         f"With the uncertainty in attitude alone {share['schmidt-attitude-only']:.0f} % of the flights pass "
         "the thesis's yardstick, with that in position alone "
         f"{share['schmidt-position-only']:.0f} %.",
@@ -128,38 +127,31 @@ DRAWN = (
 
 
 def typical_table(spread: pd.DataFrame) -> pd.DataFrame:
-    """The drawn flight, in the first row, among the others: ``shown``, ``here``, ``median``, ``below`` (%, of
-    the flights that have less) and ``typical``, whether it is in the middle half."""
-    rows = []
-    for words, who, name, digits, unit in DRAWN:
-        values = spread[who, name]
-        below = share_below(values, float(values.iloc[0]))
-        rows.append(
+    """The drawn flight, in the first row, among the others: ``shown``, ``here``, ``median``, and ``typical``,
+    in words."""
+    return pd.DataFrame(
+        [
             {
                 "shown": words,
-                "here": f"{values.iloc[0]:.{digits}f} {unit}".rstrip(),
-                "median": f"{values.median():.{digits}f} {unit}".rstrip(),
-                "below": 100 * below,
-                "typical": "yes" if 0.25 <= below <= 0.75 else "no",
+                "here": f"{spread[who, name].iloc[0]:.{digits}f} {unit}".rstrip(),
+                "median": f"{spread[who, name].median():.{digits}f} {unit}".rstrip(),
+                "typical": typical_words(spread[who, name]),
             }
-        )
-    return pd.DataFrame(rows)
+            for words, who, name, digits, unit in DRAWN
+        ]
+    )
 
 
-def typical_words(table: pd.DataFrame, flights: int) -> str:
-    """Whether the drawn flight is typical in what its figures show."""
-    if flights < 4:
-        return f"Of {flights} simulated flights; too few to say whether it is typical."
-    odd = table[table["typical"] == "no"]
-    if odd.empty:
-        return f"It is typical in all that its figures show: in the middle half of {flights} flights."
-    listed = "; ".join(
-        f"{row['shown']}, larger than on {row['below']:.0f} %" for row in odd.to_dict("records")
-    )
-    whole = "in nothing" if len(odd) == len(table) else f"in {len(table) - len(odd)} of {len(table)} things"
-    return (
-        f"It is typical {whole} that its figures show (middle half of {flights} flights). Not in: {listed}."
-    )
+def typical_sentence(table: pd.DataFrame) -> str:
+    """Whether the drawn flight is typical in what its figures show; from `typical_table`."""
+    odd = table["typical"].str.startswith("not typical")
+    if not (odd | table["typical"].str.startswith("typical")).all():
+        return "There is no other flight to say whether it is typical."
+    if not odd.any():
+        return "It is typical in all that its figures show."
+    listed = ", ".join(table["shown"][odd])
+    whole = "nothing" if odd.all() else f"{(~odd).sum()} of {len(table)} things"
+    return f"It is typical in {whole} that its figures show. It is not in: {listed}."
 
 
 def limits_of(spread: pd.DataFrame, frames: int) -> list[str]:

@@ -17,16 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, position_nees, share_inside
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.evaluation.track_errors import SLOWEST_M_S, summarise_track, track_errors
-from wildlab.flight.clocks import frame_times, poses_at
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import matrix_to_euler, wrap
-from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.pipeline.consistency import worth
 from wildlab.pipeline.navigate import PUBLISHED_LIKE, MekfTuning, navigate_mekf
-from wildlab.pipeline.navigation_errors import AXES, PLACES, errors_against
-from wildlab.pipeline.navigation_inputs import VELOCITY, imu_noise
+from wildlab.pipeline.navigation_errors import errors_against
+from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.pipeline.pose_noise import covariance_of, estimate_from_sighting
+from wildlab.pipeline.sighting_errors import NAMES as POSE_NAMES
+from wildlab.pipeline.sighting_errors import (
+    flight_numbers,
+    mean,
+    pauses,
+    pose_numbers,
+    premise_numbers,
+    shown,
+)
 from wildlab.pipeline.track import (
     CvTuning,
     Scored,
@@ -34,11 +41,13 @@ from wildlab.pipeline.track import (
     evaluate_track,
     follow_pixels,
     follow_schmidt,
-    follow_schmidt_each,
     sighting,
+    start,
 )
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.batch import View, as_tracks, run_batch
 from wildlab.tracking.run import Track
+from wildlab.tracking.schmidt import PoseUncertainty
 
 Array = NDArray[np.float64]
 Numbers = dict[tuple[str, str], float]
@@ -65,10 +74,6 @@ METRES = (2.5, 5.0)
 CALIBRATION = 1_000_000
 #: How long its camera watches the known target, s: ten minutes, many times what the poses' errors last.
 CALIBRATION_S = 600.0
-#: A time without detections that is longer is a pause, s.
-PAUSE_S = 2.0
-#: From this bank on an airframe turns, rad.
-TURNING = np.radians(20.0)
 
 
 def scaled(factor: float) -> str:
@@ -198,8 +203,7 @@ def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, T
     fixed |= {constant(DEGREES[1], metres): constant_covariance(DEGREES[1], metres) for metres in METRES}
     fixed["schmidt-estimated"] = covariance_of(noise)
     told |= {who: np.tile(one, (len(P), 1, 1)) for who, one in fixed.items()}
-    each = follow_schmidt_each(seen, TUNING, np.stack(list(told.values())))
-    tracks = dict(zip(told, each, strict=True)) | {
+    tracks = dict(zip(told, _follow_each(seen, list(told.values())), strict=True)) | {
         "ekf": follow_pixels(seen, TUNING),
         "ekf-60-pixels": follow_pixels(seen, MORE_NOISE),
         "schmidt-data-sheet": follow_schmidt(by_sheet, TUNING),
@@ -207,6 +211,21 @@ def compare(seen: Sighting, by_sheet: Sighting, noise: PoseNoise) -> dict[str, T
         "inflation": follow_schmidt(seen, TUNING, correlation_time=0.0),
     }
     return {who: tracks[who] for who in SUBJECTS}
+
+
+def _follow_each(seen: Sighting, covariances: list[Array]) -> list[Track]:
+    """`follow_schmidt` with each of several covariances (N, 6, 6), in one run of the compiled filter."""
+    z = np.broadcast_to(seen.uv, (len(covariances), *seen.uv.shape))
+    found = run_batch(
+        seen.times,
+        z,
+        np.eye(2) * TUNING.pixel**2,
+        TUNING.motion,
+        start(seen, TUNING),
+        view=View(seen.poses, seen.plane_down),
+        pose=PoseUncertainty(np.stack(covariances)),
+    )
+    return as_tracks(found)
 
 
 def compare_flight(flight: Flight, seed: int) -> Compared:
@@ -235,17 +254,15 @@ def compare_flight(flight: Flight, seed: int) -> Compared:
         who: evaluate(seen, track, moment) if who in FILTERS else evaluate_nees(seen, track, moment)
         for who, track in tracks.items()
     }
-    beside = numbers_of_poses(flight, seen) | numbers_of_flight(flight, seen)
-    named = zip((*PLACES, *AXES), np.sqrt(np.diag(covariance_of(noise))), strict=True)
-    beside |= {(ESTIMATED, f"mean_sd_{name}"): _shown(name, float(sd)) for name, sd in named}
+    beside: Numbers = {("flight", name): value for name, value in flight_numbers(flight, seen).items()}
+    for source in (SOURCE, SHEET):
+        own = errors_against(flight.nav["truth"], flight.nav[source], seen.times)
+        found = pose_numbers(own)
+        found |= premise_numbers(flight, seen, source, own) if source == SOURCE else {}
+        beside |= {(source, name): value for name, value in found.items()}
+    estimated = zip(POSE_NAMES, np.sqrt(np.diag(covariance_of(noise))), strict=True)
+    beside |= {(ESTIMATED, f"mean_sd_{name}"): shown(name, float(sd)) for name, sd in estimated}
     return Compared(seen, tracks, scored, beside)
-
-
-def pauses(seen: Sighting) -> list[NDArray[np.intp]]:
-    """Rows of the frames of each pause, from the first to the last without a detection."""
-    rows = np.flatnonzero(seen.seen)
-    long = np.flatnonzero(np.diff(seen.times[rows]) > PAUSE_S)
-    return [np.arange(rows[i] + 1, rows[i + 1]) for i in long]
 
 
 def evaluate_nees(seen: Sighting, track: Track, moment: float) -> Scored:
@@ -253,7 +270,7 @@ def evaluate_nees(seen: Sighting, track: Track, moment: float) -> Scored:
     values = position_nees(seen.truth - track.x[:, :4], track.P[:, :4, :4])
     known = np.flatnonzero(np.isfinite(values))
     numbers = {
-        "nees": _mean(values),
+        "nees": mean(values),
         "nees_drawn": float(values[known[int(moment * len(known))]]),
         "nees_worth": worth(values),
         "fraction_nees_inside": share_inside(values, BOUNDS),
@@ -285,80 +302,19 @@ def evaluate(seen: Sighting, track: Track, moment: float = 0.0) -> Scored:
     started = summarise_track(track_errors(seen.truth[begin], track.x[begin, :4]))
     found.numbers.update(
         nis_worth=worth(nis),
-        nees_predicted=_mean(nees[unseen]),
-        mae_predicted=_mean(distance[unseen]),
+        nees_predicted=mean(nees[unseen]),
+        mae_predicted=mean(distance[unseen]),
         fraction_above_predicted=_share_above(nees[unseen]),
         pauses_above=_share_above([np.nanmedian(nees[rows]) for rows in empty]),
-        mae_first_pause=_mean(distance[empty[0]]) if empty else float("nan"),
-        nis_top_after_pauses=_mean(np.isin(largest, first).astype(float)),
+        mae_first_pause=mean(distance[empty[0]]) if empty else float("nan"),
+        nis_top_after_pauses=mean(np.isin(largest, first).astype(float)),
         fraction_nis_above=_share_above(nis),
         oscillation=float(np.sqrt(np.nanvar(error, axis=0).sum())),
-        mean_speed=_mean(np.hypot(*track.x[:, 2:4].T)),
+        mean_speed=mean(np.hypot(*track.x[:, 2:4].T)),
         rmse_speed_start=started.rmse_speed,
         rmse_course_start=started.rmse_course,
     )
     return found
-
-
-def numbers_of_poses(flight: Flight, seen: Sighting) -> Numbers:
-    """What is stated and true of the poses at the frames, by (source, name); m and degrees.
-
-    ``mean_sd_...`` is what a source states of itself, ``rms_...`` how far it is from the camera's airframe.
-    Of `SOURCE` also: ``sd_spread``, the range that nine of ten of a deviation lie in over its median, of the
-    coordinate or angle that changes most; ``difference_...``, RMS against the autopilot, and
-    ``outside_...``, the share beyond two deviations; ``..._turning`` and ``..._straight``, roll's while the
-    airframe turns and not; ``shift_px``, RMS over detections and both axes of what the pose's error moves
-    the target by in the image.
-    """
-    numbers: Numbers = {}
-    for source in (SOURCE, SHEET):
-        found = errors_against(flight.nav["truth"], flight.nav[source], seen.times)
-        for i, name in zip((0, 1, 2, 6, 7, 8), (*PLACES, *AXES), strict=True):
-            numbers[source, f"mean_sd_{name}"] = _shown(name, _mean(found.sd[:, i]))
-            numbers[source, f"rms_{name}"] = _shown(name, _rms(found.error[:, i]))
-        if source == SOURCE:
-            own = found
-    sd = own.sd[np.isfinite(own.sd[:, 0])][:, [0, 1, 2, 6, 7, 8]]
-    low, middle, high = np.quantile(sd, (0.05, 0.5, 0.95), axis=0)
-    numbers[SOURCE, "sd_spread"] = float(((high - low) / middle).max())
-    turns = np.abs(matrix_to_euler(seen.poses.R_nb)[:, 0]) > TURNING
-    beside = errors_against(flight.nav["autopilot"], flight.nav[SOURCE], seen.times)
-    for i, name in enumerate(AXES, 6):
-        off = beside.error[:, i]
-        beyond = np.where(np.isfinite(off), np.abs(off) > 2 * beside.sd[:, i], np.nan)
-        numbers[SOURCE, f"difference_{name}"] = _shown(name, _rms(off))
-        numbers[SOURCE, f"outside_{name}"] = _mean(beyond)
-    for word, rows in (("turning", turns), ("straight", ~turns)):
-        numbers[SOURCE, f"difference_{word}"] = float(np.degrees(_rms(beside.error[rows, 6])))
-        numbers[SOURCE, f"rms_{word}"] = float(np.degrees(_rms(own.error[rows, 6])))
-    rows = np.flatnonzero(seen.seen)
-    J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
-    off = own.error[rows][:, [0, 1, 2, 6, 7, 8]]
-    shift = np.linalg.solve(J.pixel, J.pose @ off[:, :, None])
-    return numbers | {(SOURCE, "shift_px"): _rms(shift.ravel())}
-
-
-def numbers_of_flight(flight: Flight, seen: Sighting) -> Numbers:
-    """What premises ask of the flight itself, as subject ``flight``.
-
-    ``detections``, ``pauses``; shares of the frames in which the airframe is ``turning`` and the vessel
-    ``moving`` faster than `SLOWEST_M_S`; ``crab`` (deg), RMS of heading minus course on straight legs;
-    ``settled``, for how long (s) navigation has run when the vessel is first seen.
-    """
-    nav = flight.nav["truth"]
-    p, R, _ = poses_at(nav, seen.times)
-    roll, _, yaw = matrix_to_euler(R).T
-    v = [np.interp(seen.times, nav["time_s"], nav[name]) for name in VELOCITY[:2]]
-    turns = np.abs(roll) > TURNING
-    crab = wrap(yaw - np.arctan2(v[1], v[0]))[~turns & np.isfinite(p[:, 0])]
-    return {
-        ("flight", "detections"): float(seen.seen.sum()),
-        ("flight", "pauses"): float(len(pauses(seen))),
-        ("flight", "turning"): float(turns.mean()),
-        ("flight", "moving"): _mean(np.hypot(*seen.truth[:, 2:].T) > SLOWEST_M_S),
-        ("flight", "crab"): float(np.degrees(_rms(crab))),
-        ("flight", "settled"): float(seen.times[0] - flight.table("imu")["time_s"].iloc[0]),
-    }
 
 
 def summarise(compared: Compared) -> Numbers:
@@ -382,22 +338,7 @@ def trial(seed: int, *, twin: str) -> Mapping[tuple[str, str], float]:
     return summarise(compare_flight(simulate_twin(twin, seed), seed))
 
 
-def _shown(name: str, value: float) -> float:
-    """Angles in degrees, for a reader; coordinates as they are."""
-    return float(np.degrees(value)) if name in AXES else value
-
-
-def _mean(values: ArrayLike) -> float:
-    array = np.asarray(values, float)
-    known = array[np.isfinite(array)]
-    return float(known.mean()) if len(known) else float("nan")
-
-
 def _share_above(values: ArrayLike) -> float:
     """Of the known values, those above `BOUNDS`."""
     array = np.asarray(values, float)
-    return _mean(array[np.isfinite(array)] > BOUNDS[1])
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(_mean(values**2)))
+    return mean(array[np.isfinite(array)] > BOUNDS[1])

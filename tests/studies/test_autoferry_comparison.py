@@ -1,0 +1,227 @@
+"""What counts as a gain on a track: every outcome by hand, and no track left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.studies.autoferry.comparison import (
+    MOSTLY,
+    OUTCOMES,
+    PRICE,
+    beside_white,
+    check_claims,
+    choose_filter,
+    kept_cases,
+    of_use,
+    off_ideal,
+    outcomes,
+    share_interval,
+    stays,
+    with_hindsight,
+)
+
+KEYS = ["sensor", "target", "case"]
+NAN = float("nan")
+WHITE = {"position": "kf", "bearing": "ekf"}
+
+
+def row(
+    target: str,
+    name: str,
+    anees: float,
+    *,
+    rmse: float = 2.0,
+    share: float = 1.0,
+    sensor: str = "lidar",
+    kind: str = "position",
+    anis: float = 2.0,
+    lag1: float = 0.5,
+    case: str = "scenario-3",
+) -> dict[str, object]:
+    """A track whose mean NEES should lie between 1 and 3."""
+    return {
+        "sensor": sensor, "target": target, "case": case, "kind": kind, "filter": name, "rmse": rmse,
+        "anees": anees, "nees_low": 1.0, "nees_high": 3.0, "anis": anis, "nis_low": 1.5, "nis_high": 2.5,
+        "share_with_target": share, "seen": 50, "compared": 60, "detections": 40,
+        "lag1_autocorrelation_north": lag1 if kind == "position" else NAN,
+        "lag1_autocorrelation_east": 0.0 if kind == "position" else NAN,
+        "lag1_autocorrelation": lag1 if kind == "bearing" else NAN,
+    }  # fmt: skip
+
+
+#: Outcome -> mean NEES with white noise and with the other filter; the other's RMSE (white: 2 m) and share of
+#: the scans near the boat.
+CASES = {
+    "gained": (9.0, 2.0, 2.0 * PRICE, 1.0),
+    "too dear": (9.0, 2.0, 2.01 * PRICE, 1.0),
+    "both inside": (1.0, 3.0, 9.0, 1.0),
+    "neither inside": (9.0, 3.01, 1.0, MOSTLY),
+    "spoilt": (2.0, 0.99, 1.0, 1.0),
+    "lost": (9.0, 2.0, 2.0, MOSTLY - 0.01),
+}
+
+
+def cases(name: str = "schmidt") -> pd.DataFrame:
+    rows = []
+    for target, (white, other, rmse, share) in CASES.items():
+        rows += [row(target, "kf", white), row(target, name, other, rmse=rmse, share=share)]
+    return pd.DataFrame(rows)
+
+
+def test_every_track_has_exactly_one_outcome() -> None:
+    found = outcomes(cases(), KEYS, "schmidt").set_index("target")
+    assert found["outcome"].to_dict() == {name: name for name in CASES}
+    assert set(CASES) == set(OUTCOMES)
+    assert found.index[found["inside"]].tolist() == ["gained", "too dear", "both inside"]
+    assert found.index[found["inside_white"]].tolist() == ["both inside", "spoilt"]
+    assert found.index[~found["stays"]].tolist() == ["lost"] and found["stays_white"].all()
+
+
+def test_nearer_its_ideal_is_no_gain_outside_the_band() -> None:
+    """From 90 to 3.1 is much nearer 2, and still not honest."""
+    table = pd.DataFrame([row("a", "kf", 90.0), row("a", "schmidt", 3.1)])
+    assert beside_white(table, KEYS)["nearer"].all()
+    assert outcomes(table, KEYS, "schmidt")["outcome"].tolist() == ["neither inside"]
+
+
+def test_a_track_that_never_began_is_lost_and_counted() -> None:
+    table = pd.DataFrame(
+        [
+            row("a", "kf", NAN, rmse=NAN, share=0.0),
+            row("a", "schmidt", NAN, rmse=NAN, share=0.0),
+            row("b", "kf", NAN, rmse=NAN, share=NAN),  # never seen
+            row("b", "schmidt", NAN, rmse=NAN, share=NAN),
+        ]
+    )
+    found = outcomes(table, KEYS, "schmidt")
+    assert found["outcome"].tolist() == ["lost", "lost"] and not found["stays_white"].any()
+    assert not stays(table).any() and not with_hindsight(table, KEYS)["gained"].any()
+    assert beside_white(table, KEYS).empty
+
+
+def test_a_track_that_only_white_noise_keeps_is_lost_with_the_other() -> None:
+    table = pd.DataFrame([row("a", "kf", 2.0), row("a", "schmidt", 2.0, share=0.3)])
+    found = outcomes(table, KEYS, "schmidt").iloc[0]
+    assert (found["outcome"], found["stays_white"], found["inside_white"]) == ("lost", True, True)
+
+
+def test_a_filter_that_is_not_for_bearings_is_judged_on_positions() -> None:
+    camera = [
+        row("a", "ekf", 9.0, sensor="eo", kind="bearing"),
+        row("a", "schmidt", 2.0, sensor="eo", kind="bearing"),
+    ]
+    table = pd.concat([cases("coloured"), pd.DataFrame(camera)], ignore_index=True)
+    assert len(outcomes(table, KEYS, "coloured")) == len(CASES)
+    assert outcomes(table, KEYS, "schmidt")["sensor"].tolist() == ["eo"]
+
+
+def test_hindsight_takes_whatever_gains() -> None:
+    table = pd.concat(
+        [
+            cases("schmidt"),
+            pd.DataFrame([row(name, "coloured", 2.0) for name in CASES]),
+            pd.DataFrame([row(name, "thinned", 0.1) for name in CASES]),
+        ]
+    )
+    found = with_hindsight(table, KEYS).set_index("target")
+    assert found.index[found["gained"]].tolist() == ["gained", "too dear", "neither inside", "lost"]
+    assert found.loc["gained", "filters"] == ["coloured", "schmidt"]
+    assert found.loc["spoilt", "filters"] == []
+    assert found["gained"].sum() >= (outcomes(table, KEYS, "schmidt")["outcome"] == "gained").sum()
+
+
+def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough() -> None:
+    def table(**anees_rmse: tuple[float, float]) -> pd.DataFrame:
+        rows = [row("a", "kf", 9.0)]
+        return pd.DataFrame(
+            rows + [row("a", name, nees, rmse=rmse) for name, (nees, rmse) in anees_rmse.items()]
+        )
+
+    assert (
+        choose_filter(table(coloured=(3.0, 2.0), schmidt=(2.5, 2.0), thinned=(5.0, 2.0)), KEYS) == "schmidt"
+    )
+    assert (
+        choose_filter(table(coloured=(3.0, 2.0), schmidt=(2.5, 2.3), thinned=(5.0, 2.0)), KEYS) == "coloured"
+    )
+    # As far below as above: a factor too small is as wrong as one too large.
+    assert (
+        choose_filter(table(coloured=(0.5, 2.0), schmidt=(6.0, 2.0), thinned=(9.0, 2.0)), KEYS) == "schmidt"
+    )
+    assert (
+        choose_filter(table(coloured=(0.5, 9.0), schmidt=(3.0, 9.0), thinned=(9.0, 9.0)), KEYS) == "schmidt"
+    )
+    # What follows something else decides nothing.
+    lost = table(coloured=(2.0, 2.0), schmidt=(9.0, 2.0)).assign(share_with_target=0.1)
+    assert choose_filter(lost, KEYS) == "coloured"
+    kept = table(coloured=(9.0, 2.0), schmidt=(2.0, 2.0)).assign(target="b")
+    assert choose_filter(pd.concat([lost, kept]), KEYS) == "schmidt"
+
+
+def test_a_sensor_is_of_use_where_a_filter_keeps_most_of_its_tracks() -> None:
+    def camera(kept: int, of: int) -> pd.DataFrame:
+        shares = [1.0 if k < kept else 0.0 for k in range(of)]
+        white = [
+            row(str(k), "ekf", 2.0, sensor="eo", kind="bearing", share=0.0, rmse=80.0) for k in range(of)
+        ]
+        other = [
+            row(str(k), "schmidt", 2.0, sensor="eo", kind="bearing", share=share, rmse=50.0)
+            for k, share in enumerate(shares)
+        ]
+        return pd.DataFrame(white + other)
+
+    for kept, use in ((0, False), (4, False), (5, True)):
+        (found,) = of_use(camera(kept, 8)).to_dict(orient="records")
+        assert (found["kept"], found["tracks"], found["of_use"]) == (kept, 8, use)
+        assert (found["filter"], found["rmse"]) == (("schmidt", 50.0) if kept else ("ekf", 80.0))
+
+
+def test_a_factor_too_small_is_as_wrong_as_one_too_large() -> None:
+    np.testing.assert_allclose(off_ideal([2.0, 4.0, 1.0, 20.0]), [0, np.log(2), np.log(2), np.log(10)])
+
+
+def test_the_interval_of_a_share() -> None:
+    low, high = share_interval(4, 20)
+    z, p, n = 1.959964, 0.2, 20
+    middle, half = p + z**2 / (2 * n), z * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    assert (low, high) == pytest.approx(((middle - half) / (1 + z**2 / n), (middle + half) / (1 + z**2 / n)))
+    assert share_interval(0, 5)[0] == 0 and share_interval(5, 5)[1] == 1
+    assert np.isnan(share_interval(0, 0)).all()
+
+
+def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean() -> None:
+    table = pd.DataFrame(
+        [
+            row("a", "kf", 8.0, rmse=4.0, anis=2.4, lag1=0.6),
+            row("a", "coloured", 1.0, rmse=4.2, lag1=-0.3),
+            row("a", "schmidt", 2.0, rmse=5.0),
+            # Inside the band of single values (0.05 to 7.4), and outside that of a mean.
+            row("b", "kf", 2.0, anis=0.5, lag1=0.1),
+            row("b", "coloured", 0.5, rmse=1.9, lag1=-0.3),
+            row("b", "schmidt", 2.5, rmse=2.0),
+            row("c", "kf", NAN, rmse=NAN, anis=NAN),
+            row("c", "coloured", NAN, rmse=NAN),
+        ]
+    )
+    checks = check_claims(table, KEYS)
+    assert checks["white-noise-overconfident"].tolist() == [True, False]
+    assert checks["white-noise-nis-within"].tolist() == [True, False]
+    assert checks["differencing-whitens"].tolist() == [True, False]
+    assert checks["differencing-nearer-ideal"].tolist() == [True, False]
+    assert checks["differencing-costs-accuracy"].tolist() == [True, False]
+    assert checks["schmidt-nearer-ideal"].tolist() == [True, False]
+    assert checks["schmidt-as-accurate"].tolist() == [False, True]
+
+
+def test_only_cases_that_white_noise_keeps_decide() -> None:
+    table = pd.DataFrame(
+        [
+            row("a", "kf", 2.0), row("a", "schmidt", 2.0, share=0.1),
+            row("b", "kf", 2.0, share=0.1), row("b", "schmidt", 2.0),
+        ]
+    )  # fmt: skip
+    assert kept_cases(table, KEYS)[["target", "filter"]].to_numpy().tolist() == [
+        ["a", "kf"],
+        ["a", "schmidt"],
+    ]

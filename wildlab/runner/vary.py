@@ -1,0 +1,265 @@
+"""`wildlab vary`: which verdicts of a study turn when the parameters that were chosen for its twin are moved.
+
+Each group of chosen or fitted parameters (`wildlab.simulation.variation.groups_of`) is multiplied by each
+factor, the filters' tuning stays what it is, and the study's trial is computed on the same seeds. Verdicts of
+these flights stand beside those of as many flights of the twin as it is.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.files import write_json
+from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.reporting.published import published_rows
+from wildlab.reporting.report import open_report
+from wildlab.reporting.text import slug
+from wildlab.reporting.verdicts import judge
+from wildlab.runner.catalogue import StudyEntry, find_study, load_studies
+from wildlab.runner.processes.worker_pool import WorkerPool
+from wildlab.runner.seeds.fingerprint import trial_key
+from wildlab.runner.seeds.kept import SeedWork, failed_seeds, make_work, missing_seeds, read_seed, sweep_seeds
+from wildlab.runner.trials import split_keys
+from wildlab.simulation import load_twin
+from wildlab.simulation.variation import groups_of
+from wildlab.studies.monte_carlo import decide_claims, record_spread
+from wildlab.studies.protocol import VARIED, Study
+
+#: Where tables are kept among the reports.
+STORE = ".vary"
+#: By what parameters are multiplied, and over how many flights, where nothing else is asked for.
+FACTORS, SEEDS = (0.5, 0.8, 1.25, 2.0), 20
+#: The move that moves nothing, which the others are compared with.
+AS_IT_IS = "as it is"
+
+
+class Moved(NamedTuple):
+    """One group moved: by which factor, the verdicts by what they are on, and why there are none."""
+
+    group: str
+    factor: float
+    verdicts: dict[str, str]
+    reason: str = ""
+
+
+def vary_study(
+    name: str,
+    *,
+    factors: Sequence[float] = FACTORS,
+    seeds: int = SEEDS,
+    told: dict[str, Any] | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    parallel: int = 1,
+    tell: Callable[[str], None] = lambda line: None,
+) -> pd.DataFrame:
+    """Move each group of a study's twin, and see which verdicts turn.
+
+    What is computed is kept, so that a run that is broken off goes on where it stopped.
+
+    Parameters
+    ----------
+    name
+        Of the study.
+    factors
+        By which the parameters are multiplied.
+    seeds
+        Over how many flights, the same for all.
+    told
+        What the study's claims are told besides the flights.
+    parallel
+        How many processes.
+    tell
+        Called with a line on how it goes.
+
+    Returns
+    -------
+    DataFrame
+        `turned_table`; it is also kept for the study's report, see `kept_table`.
+
+    Raises
+    ------
+    WildlabError
+        If the study is unknown or has no trial on simulated flights, a factor is not above zero, or its twin
+        cannot be computed as it is.
+    """
+    study = find_study(name, load_studies(notebooks / "studies.toml"))
+    case = study.shown_case()
+    if case is None or study.twin is None:
+        raise WildlabError(
+            f"{name!r} is not computed over simulated flights, so there is nothing to move",
+            "see which are: wildlab list (kind twin, and a number of flights)",
+        )
+    if not factors or any(not np.isfinite(one) or one <= 0 or one == 1 for one in factors):
+        raise WildlabError(
+            f"factors {', '.join(f'{one:g}' for one in factors)}",
+            "give numbers above zero other than one: --by 0.5,2",
+        )
+    moves: dict[tuple[str, float], dict[str, float]] = {(AS_IT_IS, 1.0): {}}
+    for group, parameters in groups_of(load_twin(study.twin)).items():
+        moves |= {(group, float(one)): dict.fromkeys(parameters, float(one)) for one in factors}
+    works = {move: _work(study, case, seeds, move, given, reports) for move, given in moves.items()}
+    failures = _compute(list(works.values()), parallel, tell)
+    moved = []
+    for (group, factor), work in works.items():
+        reason = failures.get(work.study, "")
+        if reason and group == AS_IT_IS:
+            raise RunFailed(reason, "mend that first")
+        verdicts = {} if reason else _verdicts(study, case, work, told or {})
+        moved.append(Moved(group, factor, verdicts, reason))
+    table = turned_table(moved)
+    rows = [
+        {**row, "turned": None if np.isnan(row["turned"]) else row["turned"]}
+        for row in table.to_dict(orient="records")
+    ]
+    content = {"study": name, "seeds": seeds, "rows": rows}
+    path = reports / STORE / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_json(path, content)
+    return table
+
+
+def turned_table(moved: Sequence[Moved]) -> pd.DataFrame:
+    """Which verdicts are others than on the twin as it is, the first of ``moved``.
+
+    Returns
+    -------
+    DataFrame
+        Columns ``group``, ``factor``, ``turned`` (how many), ``of`` and ``which``, a line for each that
+        turned; where nothing could be computed ``which`` says why, and ``turned`` is NaN.
+    """
+    (base, *others) = moved
+    rows = []
+    for one in others:
+        turned = [
+            f"{key}: {base.verdicts[key]} → {verdict}"
+            for key, verdict in one.verdicts.items()
+            if base.verdicts.get(key, verdict) != verdict
+        ]
+        rows.append(
+            {
+                "group": one.group,
+                "factor": one.factor,
+                "turned": float("nan") if one.reason else float(len(turned)),
+                "of": len(base.verdicts),
+                "which": one.reason or "; ".join(turned),
+            }
+        )
+    return pd.DataFrame(rows, columns=["group", "factor", "turned", "of", "which"])
+
+
+def kept_table(study: str, out: str = "") -> tuple[pd.DataFrame, int] | None:
+    """The table that `vary_study` has left for a study's report, and of how many flights; None without one.
+
+    Parameters
+    ----------
+    out
+        The notebook's parameter: the report's folder.
+    """
+    reports = Path(out).parent if out else REPORTS
+    try:
+        content = json.loads((reports / STORE / f"{study}.json").read_text(encoding="utf-8"))
+        table = pd.DataFrame(content["rows"], columns=["group", "factor", "turned", "of", "which"])
+        table = table.astype({"factor": float, "turned": float})
+        return table, int(content["seeds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+#: Headings of the table in a report.
+COLUMNS = {"group": "chosen parameters", "factor": "times", "turned": "verdicts turned", "which": "which"}
+
+
+def turned_words(kept: tuple[pd.DataFrame, int] | None, study: str) -> str:
+    """What a report says over the table, or how to get one."""
+    if kept is None:
+        return (
+            "How much hangs on what was chosen for the simulated flight has not been computed here: "
+            f"`wildlab vary {study}` moves each group of chosen parameters and shows which verdicts turn."
+        )
+    table, seeds = kept
+    done = table[table["turned"].notna()]
+    fragile = done[done["turned"] > 0]
+    lost = len(table) - len(done)
+    words = (
+        f"Groups of chosen parameters were multiplied, the filters' tuning left alone, each over {seeds} "
+        f"flights: {len(fragile)} of {len(done)} moves turn a verdict"
+    )
+    if len(fragile):
+        worst = fragile.sort_values("turned", ascending=False).iloc[0]
+        words += (
+            f", most of all {worst['group']} times {worst['factor']:g} ({worst['turned']:.0f} of "
+            f"{worst['of']:.0f})"
+        )
+    return words + (f"; {lost} cannot be flown" if lost else "") + "."
+
+
+def _work(
+    study: StudyEntry,
+    case: Study,
+    seeds: int,
+    move: tuple[str, float],
+    factors: dict[str, float],
+    reports: Path,
+) -> SeedWork:
+    given = {**study.parameters, "twin": study.twin}
+    group, factor = move
+    # No flight is drawn here: all seeds from one upwards.
+    work = make_work(reports, f"{study.name}.vary.{slug(group)}-{factor:g}", case.case, 0, seeds + 1, given)
+    parameters = work.parameters | ({VARIED: factors} if factors else {})
+    return replace(work, parameters=parameters, key=trial_key(case.case, parameters, work.code))
+
+
+def _compute(works: Sequence[SeedWork], parallel: int, tell: Callable[[str], None]) -> dict[str, str]:
+    """Compute what is missing; by the work's name why nothing came of those that failed."""
+    by_name = {work.study: work for work in works}
+    waiting = [(work, seed) for work in works for seed in missing_seeds(work)]
+    total, done = len(waiting), 0
+    failures: dict[str, str] = {}
+    there = sum(len(work.seeds) for work in works) - total
+    tell(f"{len(works) - 1} moves and the twin as it is: {total} flights to compute, {there} are there")
+    with WorkerPool() as pool:
+        while waiting or pool.pipes:
+            while waiting and pool.places(parallel - pool.size) > 0:
+                work, seed = waiting.pop(0)
+                if work.study in failures:
+                    done += 1  # one flight that cannot be flown is enough
+                    continue
+                pool.submit(work, seed)
+            for result in pool.collect(wait_s=0.25):
+                done += 1
+                if result.failure is not None:
+                    failures.setdefault(result.study, failed_seeds([(result.seed, result.failure.reason)]))
+                if done % 20 == 0:
+                    tell(f"{done} of {total} flights")
+    for name, work in by_name.items():
+        if name not in failures:
+            sweep_seeds(work)
+    return failures
+
+
+def _verdicts(study: StudyEntry, case: Study, work: SeedWork, told: dict[str, Any]) -> dict[str, str]:
+    """The verdicts on a study's claims and published numbers, by what they are on."""
+    rows = [values for seed in work.seeds if (values := read_seed(work, seed)) is not None]
+    if len(rows) < len(work.seeds):
+        raise RunFailed(f"numbers of {work.study} have gone while they were read", "run it again")
+    spread = pd.DataFrame([split_keys(values) for values in rows])
+    report = open_report(study=study.name, kind="twin", seeds=len(rows))
+    record_spread(report, case, spread, {})
+    found: dict[str, str] = {}
+    if case.check_claims is not None:
+        decide_claims(report, study.name, case.check_claims(spread, **told))
+        found = {claim["id"]: claim["verdict"] for claim in report.claims}
+    for row in published_rows(study.name):
+        compared = judge(row, report.recorded, report.published)
+        if compared is not None:
+            found[f"{row['name']} of {row['subject']}"] = compared.verdict
+    return found
