@@ -14,8 +14,6 @@ from wildlab.pipeline.navigation_errors import AXES, PLACES, Errors, errors_agai
 from wildlab.pipeline.navigation_inputs import VELOCITY
 from wildlab.pipeline.track import Sighting
 
-Array = NDArray[np.float64]
-
 #: A time without detections that is longer is a pause, s.
 PAUSE_S = 2.0
 #: From this bank on an airframe turns, rad.
@@ -150,6 +148,6 @@ def mean(values: ArrayLike) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def rms(values: Array) -> float:
+def rms(values: ArrayLike) -> float:
     """Root mean square of the known values; NaN where there is none."""
-    return float(np.sqrt(mean(values**2)))
+    return float(np.sqrt(mean(np.square(np.asarray(values, float)))))
