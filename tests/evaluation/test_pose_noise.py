@@ -71,3 +71,20 @@ def test_euler_errors_as_rotation_vectors_against_finite_differences():
         axis=-1,
     )
     assert np.allclose(euler_errors_to_body(roll, pitch), numeric, atol=1e-5)
+
+
+def test_images_with_different_numbers_of_points_in_any_order():
+    """Points of an image belong together wherever they stand; and each size of image has its say."""
+    true = (1.0, 2.0, np.radians(1.5), np.radians(2.0), 5.0)
+    given = simulate(4, true, 150, 5)
+    rng = np.random.default_rng(4)
+    some = rng.random(len(given[-1])) < 0.6
+    sizes = np.unique(given[-1][some], return_counts=True)[1]
+    assert len(set(sizes)) == 5
+    rows = np.flatnonzero(some)
+    in_order = estimate_pose_noise(*(part[rows] for part in given), ASSUMED)
+    rng.shuffle(rows)
+    shuffled = estimate_pose_noise(*(part[rows] for part in given), ASSUMED)
+    for kind, put_in in zip(in_order.sd, true, strict=True):
+        assert shuffled.sd[kind] == pytest.approx(in_order.sd[kind], rel=1e-3)
+        assert abs(np.log(in_order.sd[kind] / put_in)) < 3 * np.log(in_order.factor[kind]), kind

@@ -197,3 +197,39 @@ def test_bad_input_is_named():
             times, np.zeros((3, N, 2)), R, lambda dt: (np.eye(4), -99 * np.eye(4)), start,
             gate_probability=0.99,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize("change", ["bias", "navigated"])
+def test_covariances_of_poses_that_differ_by_a_factor(change, monkeypatch):
+    """Share their transitions, and give what each gives alone; one that differs otherwise has its own."""
+    times, uv, poses, _ = overflight(N)
+    rng = np.random.default_rng(1)
+    P = np.array([random_pose_covariance(rng, 0.3) for _ in range(N)])
+    bent = P.copy()
+    bent[7:, 3, 3] *= 1.1
+    told = np.array([P, 0.01 * P, bent, 9 * P])
+    view, start = View(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
+    z = np.tile(uv, (4, 1, 1))
+    computed = []
+    whole = schmidt.transitions_of_pose
+    monkeypatch.setattr(schmidt, "transitions_of_pose", lambda *a: computed.append(1) or whole(*a))
+    pose = PoseUncertainty(told, change=change)
+    together = run_batch(times, z, 4 * np.eye(2), CV, start, view=view, pose=pose)
+    assert len(computed) == 2
+    for run in range(4):
+        own = pose._replace(covariance=told[run])
+        alone = run_batch(times, z[:1], 4 * np.eye(2), CV, start, view=view, pose=own)
+        assert np.allclose(together.x[run], alone.x[0], rtol=1e-9, equal_nan=True)
+        assert np.allclose(together.P[run], alone.P[0], rtol=1e-9, equal_nan=True)
+    assert not np.allclose(together.P[0, -1], together.P[3, -1])
+
+
+def test_a_correlation_that_is_forgotten_needs_no_transitions(monkeypatch):
+    times, uv, poses, _ = overflight(N)
+    rng = np.random.default_rng(1)
+    P = np.array([random_pose_covariance(rng, 0.3) for _ in range(N)])
+    view, start = View(poses, 0.0), Start(times[0], np.zeros(4), np.diag([50.0, 50, 9, 9]))
+    monkeypatch.setattr(schmidt, "transitions_of_pose", None)
+    pose = PoseUncertainty(P, correlation_time=0.0)
+    batch = run_batch(times, uv[None], 4 * np.eye(2), CV, start, view=view, pose=pose)
+    assert np.isfinite(batch.P[0, -1]).all()

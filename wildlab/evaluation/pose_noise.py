@@ -9,11 +9,10 @@ are most likely, with a broad prior about the ones assumed, so that what the dat
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
@@ -81,13 +80,8 @@ def estimate_pose_noise(
     keep = np.isfinite(e).all(axis=1) & np.isfinite(J).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2))
     labels = np.asarray(image)[keep]
     e, J, R, own_pixel = e[keep], J[keep], R[keep], (Ju @ np.swapaxes(Ju, 1, 2))[keep]
-    blocks = []
-    for label in np.unique(labels):
-        rows = labels == label
-        blocks.append(
-            (e[rows].ravel(), J[rows].reshape(-1, 6), block_diag(*R[rows]), block_diag(*own_pixel[rows]))
-        )
-    if len(blocks) < 3:
+    blocks = _by_points(labels, e, J, R, own_pixel)
+    if sum(len(residual) for residual, *_ in blocks) < 3:
         raise ValueError("fewer than three images with known points: their noise cannot be estimated")
     start = np.log([assumed[kind] for kind in KINDS])
 
@@ -98,9 +92,10 @@ def estimate_pose_noise(
         pixel = np.exp(2 * log_sd[-1])
         total = 0.5 * np.sum(((log_sd - start) / PRIOR) ** 2)
         for residual, derivative, own, of_pixel in blocks:
-            L = np.linalg.cholesky(own + pixel * of_pixel + derivative * variance @ derivative.T)
-            z = np.linalg.solve(L, residual)
-            total += 0.5 * z @ z + np.log(np.diag(L)).sum()
+            spread = derivative * variance @ np.swapaxes(derivative, 1, 2)
+            L = np.linalg.cholesky(own + pixel * of_pixel + spread)
+            z = np.linalg.solve(L, residual[..., None])
+            total += 0.5 * np.sum(z**2) + np.log(np.diagonal(L, axis1=1, axis2=2)).sum()
         return float(total)
 
     # Bounded, for the first step along a steep slope would otherwise leap to where no prior brings it back.
@@ -112,6 +107,25 @@ def estimate_pose_noise(
         sd=dict(zip(KINDS, map(float, np.exp(found.x)), strict=True)),
         factor=dict(zip(KINDS, map(float, factor), strict=True)),
     )
+
+
+def _by_points(
+    labels: NDArray[Any], e: Array, J: Array, R: Array, own_pixel: Array
+) -> list[tuple[Array, Array, Array, Array]]:
+    """Residuals (K, 2m), derivatives (K, 2m, 6) and both covariances (K, 2m, 2m) of the K images that have m
+    points each, for every m: images of one size are worked on together."""
+    _, which, points = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(which, kind="stable")
+    blocks = []
+    for m in np.unique(points):
+        rows = order[points[which[order]] == m].reshape(-1, m)
+        k = len(rows)
+        each = np.zeros((2, k, m, 2, m, 2))
+        for i in range(m):
+            each[0, :, i, :, i], each[1, :, i, :, i] = R[rows[:, i]], own_pixel[rows[:, i]]
+        own, of_pixel = each.reshape(2, k, 2 * m, 2 * m)
+        blocks.append((e[rows].reshape(k, 2 * m), J[rows].reshape(k, 2 * m, 6), own, of_pixel))
+    return blocks
 
 
 def _second_derivatives(function: Callable[[Array], float], x: Array, h: float = 1e-3) -> Array:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import split_images
@@ -12,6 +14,12 @@ from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
 from wildlab.pipeline.evaluate import draws_of, errors_of, known_points, score_points
 from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
+from wildlab.pipeline.track import Sighting
+
+Array = NDArray[np.float64]
+
+#: Images nearer in time than this say the same of a pose whose error wanders over tens of seconds, s.
+APART_S = 1.0
 
 
 def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFrame) -> PoseNoise:
@@ -33,6 +41,62 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
     }
     images = o.table["frame_id"].to_numpy()
     return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed)
+
+
+def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
+    """Standard deviations of the poses of a camera that followed a target whose positions are known.
+
+    As `estimate_noise`, but the attitude's errors are counted in b, as in H (7.39), and the prior lies about
+    what the poses state of themselves. The known positions are taken for exact. Images nearer than `APART_S`
+    to the last one are left out.
+
+    Parameters
+    ----------
+    flight
+        What it states of the pixel and of the ground's height is assumed.
+    seen
+        From `wildlab.pipeline.track.sighting`, with truth.
+
+    Returns
+    -------
+    PoseNoise
+
+    Raises
+    ------
+    WildlabError
+        Where the poses have no covariance, or fewer than three images have a known target.
+    """
+    if seen.poses.covariance is None:
+        raise WildlabError(
+            "the poses have no covariance to begin with", "use those of the MEKF: navigate_mekf(flight)"
+        )
+    rows = np.flatnonzero(seen.seen & np.isfinite(seen.truth[:, :2]).all(axis=1))
+    slots = np.floor((seen.times[rows] - seen.times[0]) / APART_S)
+    rows = rows[np.unique(slots, return_index=True)[1]]
+    if len(rows) < 3:
+        raise WildlabError(
+            f"the target's position is known in {len(rows)} images", "give a flight with three or more"
+        )
+    J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
+    stated = np.sqrt(np.nanmean(np.diagonal(seen.poses.covariance, axis1=1, axis2=2), axis=0))
+    usual = assumed_deviations(flight)
+    assumed = {
+        "position_horizontal": float(stated[:2].mean()),
+        "position_vertical": float(stated[2]),
+        "roll_pitch": float(stated[3:5].mean()),
+        "yaw": float(stated[5]),
+        "pixel": usual["pixel_px"],
+    }
+    plane = usual["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
+    errors = seen.positions[rows] - seen.truth[rows, :2]
+    return estimate_pose_noise(errors, J.pose, J.pixel, plane, rows, assumed)
+
+
+def covariance_of(noise: PoseNoise) -> Array:
+    """The covariance (6, 6) of a pose with estimated deviations, H (7.39): position in n, attitude in b."""
+    level, angle = noise.sd["position_horizontal"], noise.sd["roll_pitch"]
+    sd = [level, level, noise.sd["position_vertical"], angle, angle, noise.sd["yaw"]]
+    return np.diag(np.square(sd))
 
 
 def as_deviations(noise: PoseNoise) -> dict[str, float]:

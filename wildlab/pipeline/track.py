@@ -23,7 +23,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.georeference import observe
-from wildlab.tracking.batch import View, run_batch
+from wildlab.tracking.batch import View, as_tracks, run_batch
 from wildlab.tracking.measurement import Sensor, pixels
 from wildlab.tracking.motion import Motion, constant_velocity
 from wildlab.tracking.run import Start, Track, start_from_first
@@ -278,21 +278,9 @@ def _compiled(
     seen: Sighting, z: Array, R: Array, tuning: CvTuning, view: View | None, pose: PoseUncertainty | None
 ) -> Track:
     """One run of the compiled filters, which a test holds against the readable ones."""
-    found = run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
-    n = len(seen.times)
-    S = np.full((n, 2, 2), np.nan)  # the compiled filters give the NIS in its place
-    chosen = np.where(np.isfinite(found.nis[0]), 0, -1).astype(np.int64)
-    return Track(
-        seen.times,
-        found.x[0],
-        found.P[0],
-        found.innovation[0],
-        S,
-        found.nis[0],
-        found.used[0],
-        chosen,
-        found.limited[0],
-    )
+    return as_tracks(
+        run_batch(seen.times, z[None], R, tuning.motion, start(seen, tuning), view=view, pose=pose)
+    )[0]
 
 
 class Scored(NamedTuple):

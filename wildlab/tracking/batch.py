@@ -19,7 +19,7 @@ from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, check_rows, check_start, checked
+from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
 from wildlab.tracking.schmidt import PoseUncertainty
 
 
@@ -123,8 +123,7 @@ def run_batch(
     if pose is not None:
         check_rows(np.shape(pose.covariance)[-3], N, "pose.covariance")
         P_poses = _per_run(pose.covariance, 2, N)
-        each = [schmidt.transitions_of_pose(one.reshape(N, 6, 6), pose.change) for one in P_poses]
-        phis = np.array(each).reshape(len(P_poses), N, 36)
+        phis = _transitions(P_poses, pose)
         unknown = ~np.isfinite(P_poses).all(axis=2)
         z[np.broadcast_to(unknown, (B, N))] = np.nan
         P_poses[unknown] = 0.0
@@ -163,6 +162,28 @@ def run_batch(
             out[1][slots[start.row]] = np.moveaxis(P0, 0, -1) if P0.ndim == 3 else P0[..., None]
         out[4][start.row] = True
     return BatchTracks(given.times[kept], *(np.moveaxis(a, -1, 0) for a in out))
+
+
+def as_tracks(found: BatchTracks) -> list[Track]:
+    """Each run as the readable filters give it, where estimates were kept after all rows.
+
+    Parameters
+    ----------
+    found
+        From `run_batch`, B runs of N measurements.
+
+    Returns
+    -------
+    list of Track
+        B of them; ``S`` is NaN, for the compiled filters give the NIS in its place.
+    """
+    S = np.full((len(found.times), 2, 2), np.nan)
+    chosen = np.where(np.isfinite(found.nis), 0, -1).astype(np.int64)
+    each = zip(*found[1:6], chosen, found.limited, strict=True)
+    return [
+        Track(found.times, x, P, v, S, nis, used, which, limited)
+        for x, P, v, nis, used, which, limited in each
+    ]
 
 
 def _run_alike(
@@ -206,6 +227,35 @@ def _run_alike(
     x_first, v_first = np.moveaxis(estimates, -1, 0), np.moveaxis(innovation, -1, 0)
     shared = np.broadcast_to(covariances, (B, len(kept), 4, 4))
     return BatchTracks(times[kept], x_first, shared, v_first, nis.T, used.T, np.zeros((B, N), bool))
+
+
+def _transitions(covariances: Array, pose: PoseUncertainty) -> Array:
+    """What `schmidt.transitions_of_pose` gives for each run's covariances (B, N, 36), as (B, N, 36).
+
+    They take most of the time of a run. They do not depend on the scale: runs whose covariances are multiples
+    of those of another share its own. And where nothing is left of ``C`` they do not matter.
+    """
+    phis = np.tile(np.eye(6).ravel(), (*covariances.shape[:2], 1))
+    if pose.correlation_time == 0:
+        return phis
+    known: list[int] = []
+    for run, own in enumerate(covariances):
+        like = next((other for other in known if _multiples(covariances[other], own)), None)
+        if like is None:
+            known.append(run)
+            phis[run] = schmidt.transitions_of_pose(own.reshape(-1, 6, 6), pose.change).reshape(-1, 36)
+        else:
+            phis[run] = phis[like]
+    return phis
+
+
+def _multiples(one: Array, other: Array) -> bool:
+    """Whether ``other`` is ``one`` times a number above zero, but for rounding; NaN where that has it."""
+    largest = np.nanargmax(np.abs(one)) if np.isfinite(one).any() else 0
+    if not (one.flat[largest] > 0 and other.flat[largest] > 0):
+        return False
+    factor = other.flat[largest] / one.flat[largest]
+    return bool(np.allclose(other, factor * one, rtol=1e-12, atol=0, equal_nan=True))
 
 
 def _singular(row: int) -> WildlabError:
