@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
@@ -75,6 +75,24 @@ class TwinParameters(Strict):
     tolerance: Tolerance | None = None
     truth: TruePose
     assumed: Assumed
+    _moved_from: TwinParameters | None = PrivateAttr(default=None)
+
+    @property
+    def moved_from(self) -> TwinParameters | None:
+        """The twin as its file has it, where this one was moved from it in memory: see `as_moved_from`."""
+        return self._moved_from
+
+    def as_moved_from(self, written: TwinParameters) -> TwinParameters:
+        """The same parameters, known to be those of another twin with some of them moved.
+
+        A course is laid, and recording begins, so that what is printed of the detections comes out with the
+        other parameters as they are written. Of a flight with others that cannot be asked: it is where it was
+        on its lap when recording begins, and shows its target in as many images as it does, at most in as
+        many as are printed.
+        """
+        moved = self.model_copy()
+        moved._moved_from = written.moved_from or written
+        return moved
 
     @field_validator("enclosures")
     @classmethod
