@@ -212,6 +212,7 @@ def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean() -> No
     checks = check_claims(table, KEYS)
     assert checks["white-noise-overconfident"].tolist() == [True, False]
     assert checks["white-noise-nis-within"].tolist() == [True, False]
+    assert checks["white-noise-nis-low"].tolist() == [False, True]
     assert checks["differencing-whitens"].tolist() == [True, False]
     assert checks["differencing-nearer-ideal"].tolist() == [True, False]
     assert checks["differencing-costs-accuracy"].tolist() == [True, False]
