@@ -113,7 +113,8 @@ def test_the_whole_flight_is_reproducible_and_free_of_problems(name, tmp_path):
     assert len(files) == 10
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
-    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 60e6
+    # Readings are turned from the axes that the unit is mounted in: they lie on no grid, and compress less.
+    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 80e6
     assert [f.sentence for f in check_flight(load_flight(tmp_path / "a")) if f.level == "problem"] == []
     rate = np.degrees(flight.imu[[f"w_{axis}_rad_s" for axis in "xyz"]].abs().max())
     assert (rate < 100).all()  # the range of the ADIS16490 is not reached
