@@ -93,17 +93,17 @@ def words(spread: pd.DataFrame, base: str) -> str:
     called = {"": "the filter of the table", **NAMES}[best]
     kept, seen = middle[subjects[THINNED], "detections"], middle["measurements", "detections"]
     mae = pd.DataFrame({who: spread[who, "mae"] for who in (base, subjects[NOISES[-1]], subjects[THINNED])})
-    first = {base: "The filter of the table"}
-    accuracy = [
-        accuracy_words(first | {subjects[name]: text}, mae[[base, subjects[name]]])
-        for name, text in (
-            (NOISES[-1], "The one with noise by height, tilt and place"),
-            (THINNED, "The one with fewer detections"),
+    accuracy = " ".join(
+        f"Compared with {NAMES[name].replace('by height, tilt', 'noise by height, tilt')}, "
+        + accuracy_words(
+            {base: "the filter of the table", subjects[name]: "the variation"}, mae[[base, subjects[name]]]
         )
-    ]
+        + "."
+        for name in (NOISES[-1], THINNED)
+    )
     return (
         f"Errors of the filter of the table are {stated_words(own)}; with noise by height, tilt and place "
         f"in the image they are {stated_words(nees[NOISES[-1]])}, with {kept:.0f} of {seen:.0f} detections "
         f"{stated_words(nees[THINNED])}. Nearest to a mean NEES of 2 comes {called} ({every[best]:.1f}). "
-        f"Tilt and place make the mean NEES {change} the height alone does. {accuracy[0]}. {accuracy[1]}."
+        f"Tilt and place make the mean NEES {change} the height alone does. {accuracy}"
     )
