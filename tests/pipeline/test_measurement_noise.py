@@ -96,6 +96,8 @@ def test_thinning_finds_how_long_errors_last():
     both = [passes(errors) for errors in (lasting, white)]
     intervals = [interval_of_news(seen, follow_positions(seen, quiet)) for seen in both]
     assert intervals[0] == pytest.approx(1.0, rel=0.35) and intervals[1] < 0.15
+    mixed = passes(np.column_stack([white[:, 0], lasting[:, 1]]))
+    assert interval_of_news(mixed, follow_positions(mixed, quiet)) > 0.5, "the element that lasts counts"
     few = thinned(both[0], intervals[0])
     times = few.times[few.seen]
     assert np.diff(times).min() >= intervals[0] - 0.1 and few.seen[0]
