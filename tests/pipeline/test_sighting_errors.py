@@ -75,7 +75,9 @@ def test_errors_of_the_pose_move_the_target_in_the_image(flight: Flight, seen: S
         for poses in (true, seen.poses.take(rows))
     ]
     expected = np.sqrt(np.mean((uv[0] - uv[1]) ** 2))
-    assert premise_numbers(flight, seen, "mekf", own)["shift_px"] == pytest.approx(expected, rel=0.05)
+    found = premise_numbers(flight, seen, "mekf", own)
+    assert found["shift_px"] == pytest.approx(expected, rel=0.05)
+    assert found["largest_shift_px"] == pytest.approx(np.hypot(*(uv[0] - uv[1]).T).max(), rel=0.05)
 
 
 def test_an_autopilot_that_agrees_has_no_differences(flight: Flight, seen: Sighting, own: Errors) -> None:
