@@ -122,6 +122,32 @@ def test_flatness_against_the_depression_of_sampled_rays(uv):
         assert ray_flatness(pose, [uv], e)[0] == pytest.approx(sampled, rel=0.01), source
 
 
+def test_flatness_is_the_slope_of_the_depression_by_finite_differences():
+    """Exact, and on its own: the depression of a ray is turned by each source's small steps."""
+    R_nb, mount = euler_to_matrix(0.2, -0.5, 0.7), Mount("forward", 0.9, -0.3, (0.1, -0.05, 0.02))
+    R_bm = mount_rotation(mount)
+    R_mc, uv, h = R_bm.T @ camera_rotation(mount), np.array([600.0, 480.0]), 1e-6
+
+    def depression(pixel=ZERO[:2], attitude=ZERO, wobble=ZERO):
+        R = R_nb @ rotation_vector_to_matrix(attitude) @ R_bm @ rotation_vector_to_matrix(wobble) @ R_mc
+        north, east, down = R @ [*normalise(BENT, uv + pixel), 1.0]
+        return np.arctan2(down, np.hypot(north, east))
+
+    def slope(name: str, size: int):
+        return np.array(
+            [(depression(**{name: h * e}) - depression(**{name: -h * e})) / (2 * h) for e in np.eye(size)]
+        )
+
+    pose, none = CameraPoses(BENT, mount, ZERO, R_nb), errors(0.0, pixel=0.0)
+    for field, name, size in (("pixel", "pixel", 2), ("pose", "attitude", 3), ("mount", "wobble", 3)):
+        A = np.random.default_rng(size).normal(size=(size, size))
+        spread = 1e-4 * A @ A.T
+        given = np.kron(np.diag([0.0, 1.0]), spread) if field == "pose" else spread
+        expected = np.sqrt(slope(name, size) @ spread @ slope(name, size)) / np.tan(depression())
+        found = ray_flatness(pose, [uv], none._replace(**{field: given}))[0]
+        assert found == pytest.approx(expected, rel=1e-6), field
+
+
 def test_samples_scatter_about_the_point_as_the_derivatives_say():
     """Turned mount with a lever arm, bent lens, errors that are small and differ from axis to axis."""
     rng = np.random.default_rng(6)

@@ -26,7 +26,8 @@ from wildlab.pipeline.navigation_errors import (
     unit_of,
 )
 from wildlab.pipeline.navigation_inputs import VELOCITY
-from wildlab.simulation.twins import simulate_twin
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.twins import simulate
 
 
 def table(times: np.ndarray, attitude: Rotation, p: np.ndarray, v: np.ndarray) -> pd.DataFrame:
@@ -92,8 +93,8 @@ def test_times_without_a_pose_or_between_rows_state_nothing(pair):
 
 @pytest.fixture(scope="module")
 def early() -> Flight:
-    """Two minutes of a twin."""
-    whole = simulate_twin("fast-vessel", 4)
+    """Two minutes of a twin whose sensors are what is said of them."""
+    whole = simulate(load_twin("fast-vessel").model_copy(update={"tolerance": None}), 4)
     tables = {
         name: t[t["time_s"] < 120.0].reset_index(drop=True)
         for name, t in whole.tables.items()

@@ -29,7 +29,6 @@ from wildlab.runner.seeds.kept import (
     SeedWork,
     failed_seeds,
     make_work,
-    missing_seeds,
     other_seeds,
     read_seed,
     sweep_seeds,
@@ -53,17 +52,6 @@ def test_every_float_is_read_back_as_it_was(tmp_path_factory: pytest.TempPathFac
     assert read is not None and list(read) == ["a/b", "a/nan"] and math.isnan(read["a/nan"])
     assert read["a/b"].hex() == value.hex()
     json.loads((one.folder / "1.json").read_text(), parse_constant=lambda word: pytest.fail(word))
-
-
-@pytest.mark.parametrize(
-    "text", ["", '{"seed": 1', "[]", '{"case": "static-point", "seed": 3, "values": {}}']
-)
-def test_a_file_that_says_something_else_is_no_seed(tmp_path: Path, text: str) -> None:
-    one = work(tmp_path)
-    write_seed(one, 1, {"a/b": 1.0})
-    assert missing_seeds(one) == [3, 4]
-    (one.folder / "1.json").write_text(text)
-    assert missing_seeds(one) == [1, 3, 4]
 
 
 @given(drawn=st.integers(0, 40), count=st.integers(1, 40))

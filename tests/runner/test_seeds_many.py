@@ -158,6 +158,25 @@ def test_more_seeds_cost_only_the_new_ones_and_other_parameters_all(tmp_path: Pa
     assert len(after) == 1 and after != before, "what the old parameters left is swept"
 
 
+def test_damaged_numbers_are_computed_again_and_the_run_says_so(tmp_path: Path) -> None:
+    folder = make(tmp_path)
+    run(folder, "walks")
+    before, whole = numbers(folder, "reports"), kept(folder, "reports")
+    store = folder / "reports" / ".seeds" / "walks" / next(iter(whole)).partition("/")[0]
+    content = bytearray((store / "5.json").read_bytes())
+    content[content.index(b'"walk/end": ') + 12] ^= 1
+    (store / "5.json").write_bytes(bytes(content))
+    text = run(folder, "walks", "--jobs", "2")
+    assert "seeds walks: kept numbers are damaged and are computed again: 1 seed (5)" in text, text
+    assert "1 to compute, 6 are there" in text and [seed for seed, _ in flown(folder)[7:]] == [5]
+    assert numbers(folder, "reports") == before and kept(folder, "reports") == whole
+    origin = json.loads((folder / "reports" / "walks" / "provenance.json").read_text())["seeds"]
+    assert origin["damaged"] == {"count": 1, "seeds": [5]}
+    assert origin["digests"]["5"] == json.loads(whole[f"{store.name}/5"])["digest"]
+    page = (folder / "reports" / "walks" / "report.html").read_text()
+    assert "of which 1 had been damaged and computed again" in page
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_run_that_is_broken_off_goes_on_where_it_stopped(tmp_path: Path, number: signal.Signals) -> None:
     folder = make(tmp_path, seconds=0.4, seeds=12)

@@ -13,6 +13,7 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.paths import DATA
 from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.run import run_studies
+from wildlab.studies.printed_numbers.items import all_items
 
 pytestmark = pytest.mark.slow
 
@@ -66,6 +67,17 @@ def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> Non
     assert faults(folder / "report.html") == []
 
 
+def test_printed_numbers_stand_beside_each_other(reports: Path, faults: Faults) -> None:
+    folder = run("printed-numbers", reports)
+    found = values(folder)
+    assert {name for name, _ in found} == {"ratio"}
+    assert {subject: m["value"] for (_, subject), m in found.items()} == pytest.approx(
+        {item.key: item.ratio for item in all_items()}
+    )
+    assert json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["kind"] == "computed"
+    assert faults(folder / "report.html") == []
+
+
 def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
     folder = run("static-point", reports, seeds=4, parallel=2)
     found = values(folder)
@@ -80,7 +92,7 @@ def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
             assert metric["low"] <= metric["value"] <= metric["high"]
             assert metric["published"] is not None
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 7)
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 4, 10)
     assert json.loads((folder / "provenance.json").read_text())["seeds"]["seeds"] == [1, 2, 3]
     for figure in ("02", "03a", "03b", "04a", "04b", "05a", "05b", "06", "07"):
         assert (folder / "figures" / f"fig-5-{figure}.pdf").is_file()
@@ -240,5 +252,5 @@ def test_slow_vessel_over_a_few_flights(reports: Path, faults: Faults) -> None:
 
 def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
     page = reports / "index.html"
-    assert "42 of 42 within 0.15 m" in page.read_text(encoding="utf-8")
+    assert "42 published numbers: 42 agree" in page.read_text(encoding="utf-8")
     assert faults(page) == []

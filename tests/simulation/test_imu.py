@@ -7,10 +7,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.files import read_toml
-from wildlab.simulation.imu import TriadDataSheet, ideal_imu, misaligned_triad, read_imu, read_triad
+from wildlab.geometry.gravity import Earth
+from wildlab.simulation import kernels
+from wildlab.simulation.imu import (
+    TriadDataSheet,
+    ideal_imu,
+    misaligned_triad,
+    read_imu,
+    read_triad,
+    triad_data_sheets,
+)
 from wildlab.simulation.parameters import PARTS
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import angular_rates, attitude_along, specific_forces
+from wildlab.simulation.trajectory import Motion, angular_rates, attitude_along, specific_forces
 
 #: A triad that does not err; each test switches one error on.
 IDEAL = TriadDataSheet(
@@ -45,6 +54,32 @@ def test_ideal_readings_are_those_of_the_motion_whatever_the_chunk(restless_loit
         assert np.abs(force[some] - specific_forces(trajectory(t[some]))).max() < 1e-9
         # Two differences of different steps: each errs by some 1e-7 of a tenth of a radian per second.
         assert np.abs(rate[some] - angular_rates(attitude_along(trajectory), t[some])).max() < 1e-7
+
+
+def test_a_body_that_nothing_pulls_feels_what_gravity_has_of_the_turning_earth():
+    """Free in inertial space, seen from an n that turns: no rate, and of the force only the centrifugal part.
+
+    An accelerometer in free fall feels nothing. What a plumb line calls gravity holds the centrifugal
+    acceleration of n already; where n turns and nothing pulls, that part stays over, and the Coriolis part
+    must cancel with the acceleration that n sees.
+    """
+    spin = np.array([0.02, -0.03, 0.05])  # rad/s, so much that every term shows
+    start, drift = np.array([300.0, -200.0, -350.0]), np.array([15.0, 8.0, -4.0])
+    body = Rotation.from_rotvec([0.3, -0.8, 1.1])
+
+    def trajectory(times):
+        to_n = Rotation.from_rotvec(np.outer(times, -spin))
+        p = to_n.apply(start + np.outer(times, drift))
+        v = to_n.apply(np.tile(drift, (len(times), 1))) - np.cross(spin, p)
+        a = -2 * np.cross(spin, v) - np.cross(spin, np.cross(spin, p))
+        return Motion(times, p, v, a, (to_n * body).as_matrix())
+
+    force, rate = ideal_imu(trajectory, 250.0, 2000, Earth(0.0, 0.0, 0.0, tuple(spin)))
+    motion = trajectory(np.arange(2000) / 250)
+    centrifugal = -np.cross(spin, np.cross(spin, motion.position))
+    assert np.linalg.norm(2 * np.cross(spin, motion.velocity), axis=1).min() > 1  # m/s^2
+    assert np.abs(rate).max() < 1e-9
+    assert np.abs(force - np.einsum("nji,nj->ni", motion.R_nb, centrifugal)).max() < 1e-9
 
 
 def test_ideal_readings_carry_a_strapdown_round_the_loiter(restless_loiter):
@@ -111,6 +146,8 @@ def test_the_turn_on_bias_is_drawn_once_per_flight():
     assert np.ptp(runs, axis=1).max() == 0
     assert runs[:, 0].std(axis=0) == pytest.approx([0.3] * 3, rel=5 / np.sqrt(2 * 2000))
     assert runs[:, 0].mean(axis=0) == pytest.approx([0] * 3, abs=5 * 0.3 / np.sqrt(2000))
+    # Each axis has a bias of its own.
+    assert np.corrcoef(runs[:, 0].T)[np.triu_indices(3, 1)] == pytest.approx([0] * 3, abs=5 / np.sqrt(2000))
 
 
 def test_misaligned_axes_stay_within_the_stated_angles():
@@ -128,6 +165,49 @@ def test_misaligned_axes_stay_within_the_stated_angles():
         assert 0.99 * limit < np.abs(angles).max() < 1.0001 * limit
         # Even draws have the SD limit / sqrt(3).
         assert angles.std() == pytest.approx(limit / np.sqrt(3), rel=0.03)
+
+
+def test_a_misaligned_unit_reads_another_direction():
+    """Gravity seen by a turned package keeps its length; axes that lean read a share of their neighbours."""
+    g, limit, runs = 9.81, np.radians(0.25), 3000
+    plumb = np.array([[0.0, 0.0, g]])
+    turned, leaning = (
+        np.array(
+            [
+                read_triad(plumb, 250.0, IDEAL._replace(**{what: limit}), np.random.default_rng(k))[0]
+                for k in range(runs)
+            ]
+        )
+        for what in ("package_misalignment", "axis_misalignment")
+    )
+    assert np.linalg.norm(turned, axis=1) == pytest.approx(g, abs=1e-12)
+    # x and y each read g times an angle drawn evenly from -limit to limit, of its own.
+    for reading in (turned, leaning):
+        assert np.std(reading[:, :2], axis=0) == pytest.approx(g * limit / np.sqrt(3), rel=0.05)
+        assert abs(np.corrcoef(reading[:, :2].T)[0, 1]) < 5 / np.sqrt(runs)
+        assert 0.98 * g * limit < np.abs(reading[:, :2]).max() < 1.001 * g * limit
+    # An axis that leans loses length along its own direction alone, and so less than the whole package.
+    assert np.ptp(leaning[:, 2]) < g * limit**2
+
+
+@pytest.mark.parametrize("name", ["adis16490", "stim300"])
+def test_both_triads_have_the_angles_of_the_data_sheet(name):
+    imu = data_sheet(name)
+    assert imu.axis_misalignment.si < imu.package_misalignment.si
+    for sheet in triad_data_sheets(imu):
+        assert sheet.axis_misalignment == imu.axis_misalignment.si > 0
+        assert sheet.package_misalignment == imu.package_misalignment.si
+
+
+def test_each_axis_reads_along_its_own_direction():
+    """Of a unit whose x axis leans towards y alone, only x reads a vector along y."""
+    axes = np.array([[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    reading = np.zeros((1, 3))
+    no_limits = np.array([np.inf, 0.0])
+    kernels.read_triad(
+        np.array([[0.0, 2.0, 0.0]]), axes, np.zeros(3), np.zeros((1, 3)), reading, 0.0, no_limits
+    )
+    assert reading[0] == pytest.approx([0.2, 2.0, 0.0])
 
 
 def test_range_and_resolution_bound_the_reading():

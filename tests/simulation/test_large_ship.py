@@ -7,6 +7,7 @@ import pytest
 
 from tests.simulation.test_twins import with_values
 from wildlab.errors import WildlabError
+from wildlab.simulation.as_flown import as_flown
 from wildlab.simulation.camera_detections import exposure_times
 from wildlab.simulation.camera_view import Exposures
 from wildlab.simulation.error_models import stream
@@ -57,7 +58,7 @@ def test_blobs_are_of_the_ship_seen_through_the_true_mount(twin):
     exact = simulate(with_values(twin, camera__marking_sd=0.0), 4).detections
     trajectory = twin_trajectory(twin, stream(4, "trajectory"))
     true = trajectory(exposure_times(twin))
-    view = Exposures(twin, true)
+    view = Exposures(as_flown(twin, 4), true)
     image = exact["frame_id"].str[1:].astype(int).to_numpy() - 1
     corners = target_outline(twin.target, 4)(true.times)
     polygon = np.stack([view.pixels(corners[:, i]) for i in range(4)], axis=1)[image]

@@ -13,9 +13,11 @@ from wildlab.simulation.parameters import (
     PARTS,
     TWINS,
     each_parameter,
+    fitted_to,
     load_twin,
     parameters_table,
     part_names,
+    status_words,
     twin_names,
 )
 
@@ -55,6 +57,7 @@ def test_every_parameter_of_every_twin_is_accounted_for():
                 assert re.search(r"\b[HF] (\d|table|fig|\()", parameter.source), where
             else:
                 assert len(parameter.reason) > 8, where
+            assert bool(parameter.fitted_to) == (parameter.status == "fitted"), where
 
 
 def test_published_numbers_are_those_of_the_thesis():
@@ -68,7 +71,6 @@ def test_published_numbers_are_those_of_the_thesis():
         "flight.duration": 25 * 60,
         "flight.altitude": 350,
         "target.height": 2,
-        "target.sd": 0.01,
         "target.observations": 552,
         "camera.width": 640,
         "camera.height": 512,
@@ -90,16 +92,18 @@ def test_published_numbers_are_those_of_the_thesis():
         "imu.axis_misalignment": 0.05,
         "imu.package_misalignment": 0.25,
         "gnss.rate": 10,
-        "gnss.latency": 0,
         "autopilot.rate": 10,
         "autopilot.imu_roll": 1.1,
         "autopilot.imu_pitch": -5.7,
         "autopilot.imu_yaw": 0.25,
-        "assumed.plane_height": 0.01,
-        "assumed.roll": round((1.35 + 1.22 + 1.73) / 3, 1),
-        "assumed.pitch": round((1.30 + 1.24 + 1.78) / 3, 1),
-        "assumed.yaw": round((2.65 + 2.63 + 2.48) / 3, 1),
     }
+
+
+def test_what_is_assumed_of_the_pose_is_the_mean_of_what_is_printed():
+    assumed = load_twin("static-antenna").assumed
+    assert assumed.roll.number == round((1.35 + 1.22 + 1.73) / 3, 1)
+    assert assumed.pitch.number == round((1.30 + 1.24 + 1.78) / 3, 1)
+    assert assumed.yaw.number == round((2.65 + 2.63 + 2.48) / 3, 1)
 
 
 def exchanged_imu(tmp_path, part: str):
@@ -249,6 +253,59 @@ def test_a_choice_without_a_reason_is_refused(altered):
         WildlabError, match=r"target\.identifier: the value is called chosen but gives no reason"
     ):
         altered(old, old.replace("only a name", " "))
+
+
+FITTED = '[loiter.radius]\nvalue = 160.0\nunit = "m"\nstatus = "fitted"\nfitted_to = ["H table 5.4"]'
+
+
+def test_a_fitted_value_names_its_tables_and_the_page_shows_them(altered):
+    twin = altered(RADIUS, FITTED)
+    assert twin.loiter.radius.fitted_to == ("H table 5.4",)
+    row = parameters_table(twin).set_index("parameter").loc["loiter: radius"]
+    assert row["status"] == "fitted"
+    assert row["because"].startswith("fitted to H table 5.4; a round one with which")
+    assert "H table 5.4" in fitted_to(twin)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "found"),
+    [
+        (
+            'fitted_to = ["H table 5.4"]',
+            "",
+            r"loiter\.radius: the value is called fitted but not to what\. Add fitted_to",
+        ),
+        (
+            'fitted_to = ["H table 5.4"]',
+            'fitted_to = ["table 5.4"]',
+            r"loiter\.radius: 'table 5\.4' names no table\. Write it as 'H table 5\.4'",
+        ),
+        (
+            '"fitted"',
+            '"chosen"',
+            r"loiter\.radius: the value is called chosen and has fitted_to\. Take that out",
+        ),
+    ],
+)
+def test_a_fitted_value_that_does_not_say_to_what_is_refused(altered, old, new, found):
+    with pytest.raises(WildlabError, match=found):
+        altered(RADIUS, FITTED.replace(old, new))
+
+
+def test_a_fitted_value_without_a_reason_is_refused(altered):
+    old = '[target.identifier]\nvalue = "antenna"\nunit = ""\nstatus = "chosen"\nreason = "only a name"'
+    with pytest.raises(WildlabError, match=r"the value is called fitted but gives no reason\. Add a reason"):
+        altered(old, old.replace("chosen", "fitted").replace("only a name", ""))
+
+
+def test_how_many_were_published_chosen_and_fitted_is_counted(altered):
+    table = parameters_table(altered(RADIUS, FITTED))
+    counts = table["status"].value_counts()
+    assert status_words(table) == (
+        f"{len(table)} parameters: {counts['published']} published, {counts['chosen']} chosen, "
+        f"{counts['fitted']} fitted"
+    )
+    assert status_words(table[table["status"] == "chosen"]).endswith(f" {counts['chosen']} chosen")
 
 
 LOITER = """

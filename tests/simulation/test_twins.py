@@ -125,7 +125,8 @@ def test_the_first_images_that_show_the_target_are_the_ones_marked(twin):
 
 
 def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
-    flight = quick(with_values(twin, camera__marking_sd=0.0, camera__latency=0.0), 5)
+    exact = with_values(twin, camera__marking_sd=0.0, camera__latency=0.0, camera_sway__share=0.0)
+    flight = quick(exact.model_copy(update={"tolerance": None}), 5)
     m = flight.manifest
     at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
     p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
@@ -142,7 +143,8 @@ def test_the_true_pose_puts_unspoiled_marks_on_the_antenna(twin):
 
 
 def test_marks_scatter_about_the_true_pixels_as_stated(twin):
-    exact, marked = (quick(with_values(twin, camera__marking_sd=sd), 6).detections for sd in (0.0, 2.0))
+    known = twin.model_copy(update={"tolerance": None})
+    exact, marked = (quick(with_values(known, camera__marking_sd=sd), 6).detections for sd in (0.0, 2.0))
     off = (marked[["u_px", "v_px"]] - exact[["u_px", "v_px"]]).to_numpy()
     assert off.mean(axis=0) == pytest.approx([0, 0], abs=5 * 2 / np.sqrt(552))
     assert off.std(axis=0) == pytest.approx([2, 2], rel=5 / np.sqrt(2 * 552))
@@ -241,9 +243,10 @@ def test_the_payload_turns_against_the_airframe_slowly_by_about_a_degree(twin):
     ]
     turn = np.array(turns)
     # Sixteen sines, the slowest of 600 s: the mean square of a flight is theirs to some 10 %.
-    assert np.sqrt((turn**2).mean(axis=(0, 1))) == pytest.approx([0.8] * 3, rel=0.06)
+    sd = twin.boresight.roll_sd.number
+    assert np.sqrt((turn**2).mean(axis=(0, 1))) == pytest.approx([sd] * 3, rel=0.06)
     # deg/s, were all sines in step
-    fastest = 0.8 * np.sqrt(2 / 16) * 16 * 2 * np.pi * (1 / 20 - 1 / 600) / np.log(600 / 20)
+    fastest = sd * np.sqrt(2 / 16) * 16 * 2 * np.pi * (1 / 20 - 1 / 600) / np.log(600 / 20)
     assert np.abs(np.diff(turn, axis=1)).max() < fastest
 
 

@@ -14,7 +14,8 @@ from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.target_motion import target_path, truth_table
+from wildlab.simulation.target_motion import target_path, truth_table, way_along
+from wildlab.simulation.target_parameters import TargetMotion
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate, simulate_twin
 
 #: Twin, detections, segments (None: not printed), tracking period in s, seconds per fix of the truth.
@@ -40,10 +41,11 @@ def detection_times(flight):
 
 
 def unspoiled(twin):
-    """The twin whose camera and detector do not err."""
+    """The twin whose camera and detector do not err, is as stated, and does not turn against the airframe."""
     camera = twin.camera
     exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
-    return twin.model_copy(update={"camera": camera.model_copy(update=exact)})
+    as_stated = {"camera_sway": None, "tolerance": None}
+    return twin.model_copy(update={"camera": camera.model_copy(update=exact), **as_stated})
 
 
 @pytest.mark.parametrize(("name", "count", "segments", "period", "fix"), FLIGHTS)
@@ -111,7 +113,8 @@ def test_the_whole_flight_is_reproducible_and_free_of_problems(name, tmp_path):
     assert len(files) == 10
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
-    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 60e6
+    # Readings are turned from the axes that the unit is mounted in: they lie on no grid, and compress less.
+    assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 80e6
     assert [f.sentence for f in check_flight(load_flight(tmp_path / "a")) if f.level == "problem"] == []
     rate = np.degrees(flight.imu[[f"w_{axis}_rad_s" for axis in "xyz"]].abs().max())
     assert (rate < 100).all()  # the range of the ADIS16490 is not reached
@@ -122,13 +125,13 @@ def test_speeds_and_altitudes_are_those_printed(named):
     truth = flight.nav["truth"]
     t, height = truth["time_s"].to_numpy(), -truth["down_m"].to_numpy()
     printed = {
-        "slow-vessel": (200, 200),
+        "slow-vessel": (200, 300),
         "fast-vessel": (350, 350),
         "drifting-vessel": (200, 300),
         "drifting-vessel-eight": (200, 300),
         "slow-vessel-eight": (300, 300),
     }[name]
-    early, late = height[t < 700], height[t > 0.75 * t[-1]]
+    early, late = height[t < 700], height[t > 0.78 * t[-1]]
     assert early.mean() == pytest.approx(printed[0], abs=3)
     assert late.mean() == pytest.approx(printed[1], abs=3)
     assert height.std() < 4 or printed[0] != printed[1]
@@ -246,3 +249,37 @@ def test_a_target_at_rest_has_one_row_of_truth():
     assert len(log) == 1
     assert np.isnan(log["time_s"].iloc[0])
     assert log[POSITION].to_numpy().tolist() == [[0.0, 0.0, -2.0]]
+
+
+def test_a_vessel_that_was_faster_comes_up_from_behind_and_drifts_on():
+    motion = load_twin("slow-vessel").target.motion
+    early, slow, slowing = motion.early_speed.si, motion.speed.si, motion.slowing_time.si
+    t = np.arange(0.0, 1500.0, 0.01)
+    speed = np.gradient(way_along(motion, t), t)
+    assert speed[1] == pytest.approx(early, rel=1e-3)
+    at = np.searchsorted(t, slowing)
+    assert speed[at] == pytest.approx(slow + (early - slow) / np.e, rel=1e-3)
+    assert speed[-1] == pytest.approx(slow)
+    assert way_along(motion, [1500.0]) == pytest.approx([slow * 1500.0])
+    steady = motion.model_copy(update={"early_speed": None, "slowing_time": None})
+    assert way_along(steady, t) == pytest.approx(slow * t)
+
+
+def test_an_early_speed_without_its_time_is_refused():
+    motion = load_twin("slow-vessel").target.motion.model_dump()
+    with pytest.raises(ValueError, match="early_speed and slowing_time belong together; give both or none"):
+        TargetMotion.model_validate({**motion, "slowing_time": None})
+
+
+def test_the_slow_vessel_is_seen_while_it_is_still_faster_and_from_two_heights():
+    flight = simulate_twin("slow-vessel", 4, without=OPTIONAL_TABLES)
+    at = detection_times(flight)
+    motion = load_twin("slow-vessel").target.motion
+    first = np.diff(way_along(motion, [at[0], at[0] + 1]))[0]
+    assert first > 2 * motion.speed.si
+    nav = flight.nav["truth"]
+    height = -np.interp(at, nav["time_s"], nav["down_m"])
+    # H 5.6.2: approximately 200 m; H 7.5.4, flight 2: 200 m to 300 m, lower in the first half.
+    assert np.median(height[at < 2200]) == pytest.approx(200, abs=5)
+    assert np.median(height[at > 2320]) == pytest.approx(300, abs=5)
+    assert (height < 210).mean() > 0.5

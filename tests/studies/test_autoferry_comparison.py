@@ -152,6 +152,11 @@ def test_the_fixed_filter_is_the_nearest_its_ideal_that_is_cheap_enough() -> Non
     assert (
         choose_filter(table(coloured=(0.5, 9.0), schmidt=(3.0, 9.0), thinned=(9.0, 9.0)), KEYS) == "schmidt"
     )
+    # Nor do bearings, whatever a filter makes of them.
+    bearing = {"sensor": "eo", "kind": "bearing"}
+    camera = [row("a", "ekf", 9.0, **bearing), row("a", "thinned", 2.0, **bearing)]  # type: ignore[arg-type]
+    positions = table(coloured=(3.0, 2.0), schmidt=(2.5, 2.0), thinned=(5.0, 2.0))
+    assert choose_filter(pd.concat([positions, pd.DataFrame(4 * camera)]), KEYS) == "schmidt"
     # What follows something else decides nothing.
     lost = table(coloured=(2.0, 2.0), schmidt=(9.0, 2.0)).assign(share_with_target=0.1)
     assert choose_filter(lost, KEYS) == "coloured"
@@ -207,6 +212,7 @@ def test_claims_are_decided_case_by_case_and_means_by_the_band_of_a_mean() -> No
     checks = check_claims(table, KEYS)
     assert checks["white-noise-overconfident"].tolist() == [True, False]
     assert checks["white-noise-nis-within"].tolist() == [True, False]
+    assert checks["white-noise-nis-low"].tolist() == [False, True]
     assert checks["differencing-whitens"].tolist() == [True, False]
     assert checks["differencing-nearer-ideal"].tolist() == [True, False]
     assert checks["differencing-costs-accuracy"].tolist() == [True, False]

@@ -219,7 +219,8 @@ def test_claims_are_decided_by_the_default_reading() -> None:
     def verdicts(of: dict[str, Outcome]) -> list[tuple[str, str]]:
         table = tables.claims_table(of, claims)
         assert table["id"].tolist() == [claim["id"] for claim in claims]
-        return list(zip(table["verdict"], table["stress"], strict=True))
+        assert set(tables.claim_columns()) <= set(table)
+        return list(zip(table["verdict"], table[STRESS], strict=True))
 
     assert verdicts(LIKE_PRINT) == [("holds", "does not hold"), ("holds", "holds"), ("holds", "holds")]
     turned = found(outcome(70, 60, 80, 55, same=1.0), outcome(96.64, 96.83, 95.99, 97.5))
@@ -255,8 +256,9 @@ def test_every_mean_is_recorded_with_its_standard_error() -> None:
 
 
 def test_every_reading_has_something_that_speaks_for_it() -> None:
-    table = tables.readings_table()
-    assert len(table) == 3 and (table.map(len) > 0).all(axis=None)
+    assert len(words.readings_points()) == len(READINGS) == 3
+    for said, one in zip(words.readings_points(), READINGS.values(), strict=True):
+        assert one.short in said and one.speaks_for and one.speaks_against and one.role in said
     rates = tables.readings_rates(LIKE_PRINT, PUBLISHED)
     assert rates["track updated with"].tolist() == ["published", *(one.short for one in READINGS.values())]
     assert rates["position"][0] == "96.64" and rates["position"][2].startswith("76.39 ±")

@@ -3,11 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
-from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.frames import matrix_to_euler
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.static_point import text
@@ -21,7 +20,6 @@ from wildlab.studies.static_point.trial import (
     filter_errors,
     navigate_observers,
     summarise_at_rest,
-    turned,
 )
 from wildlab.tracking.kalman import filter_at_rest
 
@@ -60,32 +58,26 @@ def test_only_a_twin_tells_how_the_imu_was_turned(make_flight):
         navigate_observers(make_flight())
 
 
-def test_what_is_turned_on_a_level_airframe_has_these_angles(make_flight):
-    """And on any airframe it has them against it; nothing but the attitude is touched."""
-    angles = np.radians([1.1, -5.7, 0.25])
-    nav = make_flight().nav["logged"]
-    got = turned(nav, euler_to_matrix(*angles))
-    names = ["q_w", "q_x", "q_y", "q_z"]
-    was, now = (Rotation.from_quat(table[names], scalar_first=True) for table in (nav, got))
-    assert np.allclose((was.inv() * now).as_euler("ZYX")[:, ::-1], angles)
-    pd.testing.assert_frame_equal(nav.drop(columns=names), got.drop(columns=names))
-
-
 @pytest.mark.slow
 def test_a_simulated_flight_has_every_column_and_the_misalignment_costs_most():
     flight = simulate_twin("static-antenna", 2)
+    sources = set(flight.nav)
+    imu = flight.table("imu").copy()
     navigate_observers(flight)
-    ours, left_in = (
-        poses_at(flight.nav[name], flight.nav["autopilot"]["time_s"])[1] for name in (OBSERVER, UNCALIBRATED)
+    pd.testing.assert_frame_equal(flight.table("imu"), imu)
+    assert set(flight.nav) == sources | {OBSERVER, UNCALIBRATED}
+    times = flight.nav["autopilot"]["time_s"].to_numpy()
+    (ours_at, ours, _), (theirs_at, theirs, _) = (
+        poses_at(flight.nav[name], times) for name in (OBSERVER, UNCALIBRATED)
     )
-    theirs, theirs_left_in = (
-        poses_at(flight.nav[name], flight.nav["autopilot"]["time_s"])[1]
-        for name in ("autopilot", "autopilot-uncalibrated")
-    )
-    known = np.isfinite(ours).all(axis=(1, 2))
-    between = (np.swapaxes(a, 1, 2) @ b for a, b in ((ours, left_in), (theirs, theirs_left_in)))
-    of_observer, of_autopilot = between
-    assert np.allclose(of_observer[known], of_autopilot[known], atol=1e-6)
+    settled = np.isfinite(ours).all(axis=(1, 2)) & (times > 350)
+    apart = np.degrees(matrix_to_euler(np.swapaxes(ours, 1, 2) @ theirs)[settled])
+    # Gravity shows an observer roll and pitch of the axes that it believes in. The heading comes from two
+    # antennas, whose baseline it knows in the axes of the airframe: that part of the misalignment is lost.
+    assert apart.mean(axis=0)[:2] == pytest.approx([1.1, -5.7], abs=0.1)
+    assert abs(apart.mean(axis=0)[2]) < 0.1
+    assert apart.std(axis=0).min() > 1e-4, "it is found, not put behind"
+    assert np.abs(ours_at - theirs_at)[settled].max() > 1e-3
     scored = evaluate_columns(flight, np.random.default_rng(2))
     assert list(scored) == list(COLUMNS)
     found = summarise_at_rest(scored)

@@ -160,7 +160,8 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
     """Which verdicts of a STUDY hang on what was chosen for its twin?
 
     Each group of chosen parameters is multiplied, the filters' tuning left alone; the table names the
-    verdicts that turn. What is computed is kept; the study's report shows the table from its next run on.
+    verdicts that turn. A moved flight shows its target in as many images as it does, at most in as many as
+    are printed. What is computed is kept; the study's report shows the table from its next run on.
 
     \b
     Examples:

@@ -217,7 +217,7 @@ def expected_wrong(tested: int) -> float:
 
     Examples
     --------
-    >>> expected_wrong(100)
+    >>> round(expected_wrong(100), 1)
     3.5
     """
     return WRONG * tested

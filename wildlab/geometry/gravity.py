@@ -12,6 +12,8 @@ from wildlab.geometry.frames import Array
 
 #: Of the Earth, rad/s (WGS84).
 EARTH_RATE = 7.292115e-5
+#: What data sheets mean by g, m/s^2, and what gravity is taken to be where nothing better is known.
+STANDARD_GRAVITY, USUAL_GRAVITY = 9.80665, 9.81
 
 # WGS84: semi-major axis (m), first eccentricity squared, flattening, gravity at the equator (m/s^2),
 # Somigliana's constant, and the ratio of centrifugal force to gravity at the equator.
@@ -97,7 +99,7 @@ def local_earth(latitude: float, height: float = 0.0) -> Earth:
     return Earth(float(normal_gravity(latitude, height)), gradient, 1 / 6371e3, rate)
 
 
-def flat_earth(gravity: float = 9.81) -> Earth:
+def flat_earth(gravity: float = USUAL_GRAVITY) -> Earth:
     """Frame n as an inertial one with the same gravity everywhere, as in H 7.3.2.
 
     Parameters

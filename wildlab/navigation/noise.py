@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.geometry.frames import Array
+from wildlab.geometry.gravity import USUAL_GRAVITY
 
 
 class ImuNoise(NamedTuple):
@@ -132,11 +133,11 @@ def from_data_sheet(
 
 #: H table A.5; the time is chosen: the minute or so at which Allan deviations of such sensors are lowest.
 ADIS16490 = from_data_sheet(
-    velocity_random_walk=0.008, angle_random_walk_deg=0.09, accelerometer_bias=3.6e-6 * 9.81,
+    velocity_random_walk=0.008, angle_random_walk_deg=0.09, accelerometer_bias=3.6e-6 * USUAL_GRAVITY,
     gyro_bias_deg=1.8, bias_time=100.0,
 )  # fmt: skip
 #: H table A.6; the time as above.
 STIM300 = from_data_sheet(
-    velocity_random_walk=0.07, angle_random_walk_deg=0.15, accelerometer_bias=0.05e-3 * 9.81,
+    velocity_random_walk=0.07, angle_random_walk_deg=0.15, accelerometer_bias=0.05e-3 * USUAL_GRAVITY,
     gyro_bias_deg=0.3, bias_time=100.0,
 )  # fmt: skip

@@ -188,7 +188,7 @@ def start(seen: Sighting, tuning: CvTuning, n: int = 4, **more: float) -> Start:
     return start_from_first(seen.times, seen.positions, tuning.position_0, tuning.velocity_0, n, **more)
 
 
-def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
+def follow_positions(seen: Sighting, tuning: CvTuning, R: ArrayLike | None = None) -> Track:
     """The Kalman filter on georeferenced detections, H 6.2.
 
     Parameters
@@ -197,6 +197,8 @@ def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
         From `sighting`.
     tuning
         Its ``pixel`` is not used.
+    R
+        (N, 2, 2) m^2, noise of each detection in place of the tuning's ``measurement``.
 
     Returns
     -------
@@ -211,8 +213,8 @@ def follow_positions(seen: Sighting, tuning: CvTuning) -> Track:
     >>> track.x.shape == (len(seen.times), 4)
     True
     """
-    R = np.eye(2) * tuning.measurement**2
-    return _compiled(seen, seen.positions, R, tuning, None, None)
+    noise = np.eye(2) * tuning.measurement**2 if R is None else np.asarray(R, float)
+    return _compiled(seen, seen.positions, noise, tuning, None, None)
 
 
 def follow_pixels(seen: Sighting, tuning: CvTuning) -> Track:

@@ -11,7 +11,16 @@ import pandas as pd
 from wildlab.errors import RunFailed
 from wildlab.paths import REPORTS
 from wildlab.runner.processes.worker_pool import WorkerPool
-from wildlab.runner.seeds.kept import SeedWork, failed_seeds, make_work, missing_seeds, read_seed
+from wildlab.runner.seeds.kept import (
+    SeedWork,
+    again_words,
+    failed_seeds,
+    faults,
+    make_work,
+    read_seed,
+    set_aside,
+    take_stock,
+)
 
 
 def trials_table(
@@ -27,7 +36,8 @@ def trials_table(
     """The numbers of all flights: columns (subject, name), one row for each seed, the flight drawn first.
 
     `wildlab run` has computed them before the notebook starts. In a notebook opened by hand, those that are
-    not there yet are computed now, in a process beside the kernel, and kept.
+    not there yet, and those whose kept numbers are damaged, are computed now, in a process beside the kernel,
+    and kept.
 
     Parameters
     ----------
@@ -45,13 +55,20 @@ def trials_table(
     Raises
     ------
     WildlabError
-        If a parameter is missing, or a seed fails; it names the seed.
+        If a parameter is missing, a seed fails, or its numbers have other names than those of the other seeds
+        even when they are computed again; it names the seed.
     """
     reports = Path(out).parent if out else REPORTS
     work = make_work(reports, study, case, seed, seeds, parameters)
-    missing = missing_seeds(work)
-    if missing:
+    stock, fresh = take_stock(work), set[int]()
+    set_aside(work, stock.damaged)
+    for words in again_words(stock):
+        print(f"{study}: {words}")
+    while missing := [one for one in take_stock(work, fresh).missing if one not in fresh]:
         _compute(work, missing)
+        fresh |= set(missing)
+    if wrong := faults(work, fresh):
+        raise RunFailed(failed_seeds(wrong), "mend that; the other seeds are kept")
     rows = {one: read_seed(work, one) for one in work.seeds}
     unread = [one for one, values in rows.items() if values is None]
     if unread:

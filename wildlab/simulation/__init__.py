@@ -13,7 +13,8 @@ Where a change belongs:
   `target_parameters`, whose values are `parameter_quantities`;
 - motion: `trajectory`, from `loiter`, `waypoint_courses`, `survey_courses`, `attitudes` and `disturbances`;
   what a twin flies is in `twin_trajectory`, what it looks for in `target_motion` and `animal_motion`;
-- sensors: `imu`, `gnss`, `gimbal`, and the `error_models` that they share;
+- sensors: `imu`, `gnss`, `gimbal`, and the `error_models` that they share; what they are rather than what is
+  said of them: `as_flown`; how the camera turns against the airframe: `camera_sway`;
 - speed: `kernels`, compiled, each with its twin in readable numpy in `plain`;
 - tables: `onboard_sensors`; `camera_detections` with `camera_view`, `animal_detections`,
   `extended_target_detections` and `clipped_outlines`; `manifest`;

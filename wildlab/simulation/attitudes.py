@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.gravity import USUAL_GRAVITY
 from wildlab.simulation import kernels
 from wildlab.simulation.disturbances import AttitudeDisturbance
-from wildlab.simulation.trajectory import GRAVITY, FlightPath, Motion, Signal, Trajectory, turned
+from wildlab.simulation.trajectory import FlightPath, Motion, Signal, Trajectory, turned
 
 
 def coordinated_attitude(
@@ -17,7 +18,7 @@ def coordinated_attitude(
     *,
     wind: ArrayLike = (0.0, 0.0, 0.0),
     trim_pitch: float = 0.0,
-    gravity: float = GRAVITY,
+    gravity: float = USUAL_GRAVITY,
 ) -> Array:
     """The attitude in which a fixed wing flies a path: nose into the oncoming air, banked into the turn.
 
@@ -50,7 +51,7 @@ def fixed_wing_trajectory(
     *,
     wind: ArrayLike = (0.0, 0.0, 0.0),
     trim_pitch: float = 0.0,
-    gravity: float = GRAVITY,
+    gravity: float = USUAL_GRAVITY,
     gusts: AttitudeDisturbance | None = None,
 ) -> Trajectory:
     """Motion along a path in coordinated flight, and gusts about it.
@@ -85,7 +86,7 @@ def thrust_aligned_trajectory(
     heading: Signal,
     *,
     trim_pitch: float = 0.0,
-    gravity: float = GRAVITY,
+    gravity: float = USUAL_GRAVITY,
     gusts: AttitudeDisturbance | None = None,
 ) -> Trajectory:
     """Motion of what leans no more than its own acceleration asks for, whichever way its nose points.

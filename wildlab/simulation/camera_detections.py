@@ -94,6 +94,14 @@ def with_subset(twin: TwinParameters, frames: pd.DataFrame, detections: pd.DataF
     first = int(twin.subset.first.number) - 1
     last = first + int(twin.subset.observations.number) - 1
     ends = detections["frame_id"].to_numpy()
+    if twin.moved_from is not None:  # with fewer detections it ends with the last of them
+        last = min(last, len(ends) - 1)
+    if first > last:
+        raise WildlabError(
+            f"the subset begins with detection {first + 1}, and there are {len(ends)}",
+            "lower subset.first, or raise target.observations",
+            field="subset.first",
+        )
     inside = frames["frame_id"].between(ends[first], ends[last])
     return frames.assign(group=np.where(inside, SUBSET, "").astype(object))
 
@@ -102,7 +110,7 @@ def _in_view(twin: TwinParameters, view: Exposures, target: Target, uv: Array) -
     """Numbers of the images that show the target, (K,)."""
     seen = np.flatnonzero(in_image(view.poses.camera, uv, target.border.si))
     wanted = int(target.observations.number)
-    if len(seen) < wanted:
+    if len(seen) < wanted and (twin.moved_from is None or not len(seen)):
         group = "target" if target is twin.target else "second_target"
         nearer = "loiter.radius" if twin.loiter is not None else "route.length"
         raise WildlabError(
@@ -115,19 +123,27 @@ def _in_view(twin: TwinParameters, view: Exposures, target: Target, uv: Array) -
 
 def _chosen(twin: TwinParameters, views: list[Numbers], seed: int) -> list[Numbers]:
     """Those of the images that show a target in which it is marked, per target."""
-    wanted = [int(target.observations.number) for target in twin.targets]
+    # Where a twin was moved there may be fewer.
+    wanted = [
+        min(int(target.observations.number), len(images))
+        for target, images in zip(twin.targets, views, strict=True)
+    ]
     if twin.pair is not None:
-        return _pair_chosen(views, wanted, int(twin.pair.both.number), stream(seed, "misses"))
+        both, rng = int(twin.pair.both.number), stream(seed, "misses")
+        return _pair_chosen(views, wanted, both, rng, fewer=twin.moved_from is not None)
     if twin.targets[0].choice.text == "first":
         return [views[0][: wanted[0]]]
     return [np.sort(stream(seed, "misses").choice(views[0], wanted[0], replace=False))]
 
 
 def _pair_chosen(
-    views: list[Numbers], wanted: list[int], both: int, rng: np.random.Generator
+    views: list[Numbers], wanted: list[int], both: int, rng: np.random.Generator, *, fewer: bool
 ) -> list[Numbers]:
-    """Images for each of two targets, of which just ``both`` are common."""
+    """Images for each of two targets, of which just ``both`` are common; ``fewer`` where there are not so
+    many, if that is allowed."""
     in_common = np.intersect1d(views[0], views[1])
+    if fewer:
+        both = min(both, len(in_common), *wanted)
     if len(in_common) < both:
         raise WildlabError(
             f"both targets are in view in {len(in_common)} images only, not in {both}",
@@ -138,6 +154,8 @@ def _pair_chosen(
     # The second target first: where it is marked alone, the first one has been missed if it is in view.
     second = rng.choice(np.setdiff1d(views[1], together), wanted[1] - both, replace=False)
     left = np.setdiff1d(views[0], np.concatenate([together, second]))
+    if fewer:
+        wanted = [min(wanted[0], both + len(left)), wanted[1]]
     if len(left) < wanted[0] - both:
         raise WildlabError(
             f"the first target is left with {both + len(left)} images, not {wanted[0]}, where the second is "

@@ -32,7 +32,7 @@ def extended_target_frames_and_detections(
     if twin.segments is None:
         raise ValueError("a target with an outline needs segments")
     blobs = _visible(view, target, seed)
-    images, segment = _kept(twin.segments, view, blobs)
+    images, segment = _kept(twin.segments, view, blobs, fewer=twin.moved_from is not None)
     areas = np.array([blobs[image].area for image in images])
     wanted = int(target.observations.number)
     found = np.sort(np.argsort(-areas, kind="stable")[:wanted])
@@ -63,11 +63,14 @@ def _visible(view: Exposures, target: Target, seed: int) -> list[Blob]:
     return blobs
 
 
-def _kept(segments: Segments, view: Exposures, blobs: list[Blob]) -> tuple[Numbers, Numbers]:
-    """Numbers of the images that are kept, the first ones that show the target, and of their segments."""
+def _kept(segments: Segments, view: Exposures, blobs: list[Blob], *, fewer: bool) -> tuple[Numbers, Numbers]:
+    """Numbers of the images that are kept, the first ones that show the target, and of their segments.
+
+    ``fewer`` says that there may be fewer images than asked for, in another number of segments.
+    """
     seen = np.flatnonzero([blob.area > 0 for blob in blobs])
     wanted, count = int(segments.images.number), int(segments.count.number)
-    if len(seen) < wanted:
+    if len(seen) < wanted and not (fewer and len(seen)):
         raise WildlabError(
             f"the target is in view in {len(seen)} images only, not in {wanted}",
             "lower segments.images, or raise camera.images and flight.duration",
@@ -75,7 +78,7 @@ def _kept(segments: Segments, view: Exposures, blobs: list[Blob]) -> tuple[Numbe
         )
     seen = seen[:wanted]
     segment = np.concatenate([[0], np.cumsum(np.diff(view.times[seen]) > _APART)])
-    if segment[-1] + 1 != count:
+    if segment[-1] + 1 != count and not fewer:
         raise WildlabError(
             f"the first {wanted} images that show the target are {segment[-1] + 1} segments, not {count}",
             "change segments.count, or how fast the target is passed",

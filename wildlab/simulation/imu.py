@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array
-from wildlab.geometry.gravity import Earth, flat_earth
+from wildlab.geometry.gravity import USUAL_GRAVITY, Earth, flat_earth
 from wildlab.simulation import kernels
 from wildlab.simulation.error_models import gauss_markov
 from wildlab.simulation.sensor_parameters import Imu
-from wildlab.simulation.trajectory import GRAVITY, Trajectory
+from wildlab.simulation.trajectory import Trajectory
 
 #: The n of a trajectory, by itself.
-INERTIAL = flat_earth(GRAVITY)
+INERTIAL = flat_earth(USUAL_GRAVITY)
 
 _CHUNK = 16_384  # samples at a time: their motion then fits into the processor's cache
 _ASIDE = 4  # samples on either side of a difference of fourth order with a step of two samples

@@ -13,7 +13,11 @@ from wildlab.simulation.sensor_parameters import Gnss, Imu, TwinMount
 
 
 def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
-    """What `flight.toml` of the twin says; its uncertainties are what one would assume, not the truth."""
+    """What `flight.toml` of the twin says: its sensors' sheets and what one would assume, not the truth.
+
+    The truth of a flight is drawn about it (`wildlab.simulation.as_flown`). Of a twin as flown, camera and
+    mount are the real ones.
+    """
     c, m, assumed = twin.camera, twin.mount, twin.assumed
     calibrated = m.calibrated is None or m.calibrated.text == "yes"
     misalignment = _misalignment(m) if calibrated else (0.0, 0.0, 0.0)

@@ -15,6 +15,7 @@ from wildlab.simulation.error_models import gauss_markov, rounded, stream, with_
 from wildlab.simulation.gnss import PositionErrors, antenna_motion, position_fixes
 from wildlab.simulation.imu import ideal_imu, read_imu
 from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.sensor_parameters import Gnss
 from wildlab.simulation.trajectory import Motion, Trajectory, angular_rates, attitude_along
 
 
@@ -58,12 +59,20 @@ def autopilot_tables(
         true.acceleration,
         with_attitude_error(true.R_nb, turn),
     )
-    if a.imu_roll is None or a.imu_pitch is None or a.imu_yaw is None:
+    imu = mounted_imu(twin)
+    if imu is None:
         return nav_table(logged), None
-    # Of a level airframe the IMU reads these angles, so they are its attitude against the airframe.
-    imu = euler_to_matrix(a.imu_roll.si, a.imu_pitch.si, a.imu_yaw.si)
     left_in = Motion(logged.times, logged.position, logged.velocity, logged.acceleration, logged.R_nb @ imu)
     return nav_table(logged), nav_table(left_in)
+
+
+def mounted_imu(twin: TwinParameters) -> Array | None:
+    """How the IMU is turned against the airframe: ``R_bi`` (3, 3), from its axes to b; None if not known."""
+    a = twin.autopilot
+    if a.imu_roll is None or a.imu_pitch is None or a.imu_yaw is None:
+        return None
+    # Of a level airframe the IMU reads these angles, so they are its attitude against the airframe.
+    return euler_to_matrix(a.imu_roll.si, a.imu_pitch.si, a.imu_yaw.si)
 
 
 def payload_boresight(twin: TwinParameters, seed: int) -> AttitudeDisturbance:
@@ -79,25 +88,64 @@ def payload_boresight(twin: TwinParameters, seed: int) -> AttitudeDisturbance:
 
 
 def imu_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
-    """Readings of the inertial unit over the whole flight."""
+    """Readings of the inertial unit over the whole flight, calibrated: turned from its axes to those of b.
+
+    It feels the motion in its own axes, as it is mounted, and errs in these. `as_mounted` gives its readings
+    as they were before the calibration.
+    """
     if twin.imu is None:
         raise ValueError("this twin carries no inertial unit")
     times = sample_times(twin.imu.rate.si, twin.flight.duration.si)
     # The airframe flies as if n were inertial; its sensors feel the Earth turn, and where on it they are.
     earth = local_earth(twin.place.latitude.si, twin.place.height.si)
     true = ideal_imu(payload, twin.imu.rate.si, len(times), earth)
-    force, rate = read_imu(*true, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
+    R_bi = mounted_imu(twin)
+    if R_bi is None:
+        R_bi = np.eye(3)
+    force, rate = (vectors @ R_bi for vectors in true)
+    read = read_imu(force, rate, twin.imu, lambda triad: stream(seed, f"imu {triad}"))
+    force, rate = (vectors @ R_bi.T for vectors in read)
     columns = {"time_s": times}
     columns |= {f"f_{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}
     columns |= {f"w_{axis}_rad_s": rate[:, i] for i, axis in enumerate("xyz")}
     return pd.DataFrame(columns)
 
 
-def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataFrame:
-    """Fixes of the two receivers over the whole flight, and the velocity that the first one gives."""
+def as_mounted(readings: pd.DataFrame, R_bi: Array) -> pd.DataFrame:
+    """Calibrated readings of an inertial unit as it gave them, in its own axes.
+
+    Parameters
+    ----------
+    readings
+        A table ``imu``, in the axes of b.
+    R_bi
+        (3, 3), from the unit's axes to b: see `mounted_imu`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The same table in the axes of the unit, as if nobody had calibrated how it is mounted.
+    """
+    triads = ([f"f_{axis}_m_s2" for axis in "xyz"], [f"w_{axis}_rad_s" for axis in "xyz"])
+    own = {
+        name: column
+        for triad in triads
+        for name, column in zip(triad, (readings[triad].to_numpy(float) @ R_bi).T, strict=True)
+    }
+    return readings.assign(**own)
+
+
+def gnss_table(
+    twin: TwinParameters, payload: Trajectory, seed: int, stated: Gnss | None = None
+) -> pd.DataFrame:
+    """Fixes of the two receivers over the whole flight, and the velocity that the first one gives.
+
+    What the columns say of its accuracy is that of the receivers as ``stated``; left out, as they are.
+    """
     g = twin.gnss
     if g is None:
         raise ValueError("this twin carries no receivers")
+    sheet = g if stated is None else stated
     times = sample_times(g.rate.si, twin.flight.duration.si)
     motion, rate = payload(times), angular_rates(attitude_along(payload), times)
     arms = {
@@ -120,10 +168,12 @@ def gnss_table(twin: TwinParameters, payload: Trajectory, seed: int) -> pd.DataF
             columns |= {
                 f"v_{axis}_m_s": (velocity + slip)[:, i] for i, axis in enumerate(("north", "east", "down"))
             }
-    for i, axis in enumerate(("horizontal", "vertical")):
-        sd = math.hypot(errors.noise_sd[i], errors.correlated_sd[i])
-        columns[f"sd_{axis}_m"] = np.full(len(times), sd)
-    columns["sd_velocity_m_s"] = np.full(len(times), g.velocity_noise.si)
+    for axis, noise, correlated in (
+        ("horizontal", sheet.horizontal_noise.si, sheet.horizontal_correlated_sd.si),
+        ("vertical", sheet.vertical_noise.si, sheet.vertical_correlated_sd.si),
+    ):
+        columns[f"sd_{axis}_m"] = np.full(len(times), math.hypot(noise, correlated))
+    columns["sd_velocity_m_s"] = np.full(len(times), sheet.velocity_noise.si)
     for which, arm in arms.items():
         columns |= {f"{which}lever_{axis}_m": np.full(len(times), arm[i]) for i, axis in enumerate("xyz")}
     return pd.DataFrame(columns)

@@ -1,20 +1,21 @@
 """Numbers that say where they come from: a value, its unit, and on whose word.
 
-A parameter is a table with a value, a unit, a status (``published`` with its source, or ``chosen`` with the
-reason). The unit is part of the check: a length in feet is an error, not a surprise.
+A parameter is a table with a value, a unit and a status: ``published`` with its source, ``chosen`` with the
+reason, or ``fitted`` with the reason and the published tables that it was fitted to. What those tables say
+is then no test of the twin. The unit is part of the check: a length in feet is an error, not a surprise.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, field_validator, model_validator
 
 from wildlab.flight.files import Strict
-
-STANDARD_GRAVITY = 9.80665  # m/s^2: what data sheets mean by g
+from wildlab.geometry.gravity import STANDARD_GRAVITY
 
 #: Units a twin may use, and what one of each is in SI and radians.
 UNITS = {
@@ -40,14 +41,22 @@ UNITS = {
 }
 
 
+_TABLE = re.compile(r"[HF] table [A-Z\d]+\.\d+")
+
+
 class Parameter(Strict):
-    """One parameter of a twin: its value, and on whose word."""
+    """One parameter of a twin: its value, and on whose word.
+
+    ``fitted_to`` names tables as the published numbers name theirs (``H table 5.4``), so that the two can be
+    held against each other.
+    """
 
     value: float | str
     unit: str
-    status: Literal["published", "chosen"]
+    status: Literal["published", "chosen", "fitted"]
     source: str = ""
     reason: str = ""
+    fitted_to: tuple[str, ...] = ()
 
     @field_validator("value", mode="before")
     @classmethod
@@ -62,9 +71,23 @@ class Parameter(Strict):
     def _accounted_for(self) -> Parameter:
         if self.status == "published" and not self.source.strip():
             raise ValueError("the value is called published but names no source; add the section or table")
-        if self.status == "chosen" and not self.reason.strip():
-            raise ValueError("the value is called chosen but gives no reason; add a reason")
+        if self.status != "published" and not self.reason.strip():
+            raise ValueError(f"the value is called {self.status} but gives no reason; add a reason")
+        if self.status == "fitted" and not self.fitted_to:
+            raise ValueError('the value is called fitted but not to what; add fitted_to = ["H table 5.4"]')
+        if self.status != "fitted" and self.fitted_to:
+            raise ValueError(
+                f"the value is called {self.status} and has fitted_to; take that out, or call it fitted"
+            )
+        if wrong := [name for name in self.fitted_to if not _TABLE.fullmatch(name)]:
+            raise ValueError(f"{wrong[0]!r:.80} names no table; write it as 'H table 5.4'")
         return self
+
+    @property
+    def because(self) -> str:
+        """Where the value comes from, in words: source, what it was fitted to, reason."""
+        fitted = f"fitted to {', '.join(self.fitted_to)}" if self.fitted_to else ""
+        return "; ".join(part for part in (self.source, fitted, self.reason) if part)
 
     @property
     def number(self) -> float:

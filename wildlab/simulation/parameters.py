@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
@@ -23,10 +23,12 @@ from wildlab.simulation.sensor_parameters import (
     Assumed,
     Autopilot,
     Boresight,
+    CameraSway,
     Gimbal,
     Gnss,
     Imu,
     OnboardClock,
+    Tolerance,
     TruePose,
     TwinCamera,
     TwinMount,
@@ -67,10 +69,30 @@ class TwinParameters(Strict):
     onboard_clock: OnboardClock | None = None
     autopilot: Autopilot
     boresight: Boresight | None = None
+    camera_sway: CameraSway | None = None
     imu: Imu | None = None
     gnss: Gnss | None = None
+    tolerance: Tolerance | None = None
     truth: TruePose
     assumed: Assumed
+    _moved_from: TwinParameters | None = PrivateAttr(default=None)
+
+    @property
+    def moved_from(self) -> TwinParameters | None:
+        """The twin as its file has it, where this one was moved from it in memory: see `as_moved_from`."""
+        return self._moved_from
+
+    def as_moved_from(self, written: TwinParameters) -> TwinParameters:
+        """The same parameters, known to be those of another twin with some of them moved.
+
+        A course is laid, and recording begins, so that what is printed of the detections comes out with the
+        other parameters as they are written. Of a flight with others that cannot be asked: it is where it was
+        on its lap when recording begins, and shows its target in as many images as it does, at most in as
+        many as are printed.
+        """
+        moved = self.model_copy()
+        moved._moved_from = written.moved_from or written
+        return moved
 
     @field_validator("enclosures")
     @classmethod
@@ -281,7 +303,8 @@ def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
     -------
     pandas.DataFrame
         One row per parameter. Columns, all of them text: ``parameter``, ``value``, ``unit``, ``status``
-        (published or chosen) and ``because`` (the source, and the reason where there is one).
+        (published, chosen or fitted) and ``because`` (the source, what it was fitted to, and the reason,
+        where there are any).
 
     Raises
     ------
@@ -296,9 +319,53 @@ def parameters_table(twin: TwinParameters | str | Path) -> pd.DataFrame:
                 "value": p.value if isinstance(p.value, str) else f"{p.value:.10g}",
                 "unit": "" if p.unit == "1" else p.unit,
                 "status": p.status,
-                "because": "; ".join(part for part in (p.source, p.reason) if part),
+                "because": p.because,
             }
             for group, name, p in each_parameter(parameters)
         ],
         columns=["parameter", "value", "unit", "status", "because"],
     )
+
+
+def status_words(table: pd.DataFrame) -> str:
+    """What of a twin's parameters was published, chosen and fitted, in words.
+
+    Parameters
+    ----------
+    table
+        As :func:`parameters_table` gives it.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> status_words(pd.DataFrame({"status": ["chosen", "published", "chosen"]}))
+    '3 parameters: 1 published, 2 chosen'
+    """
+    counts = table["status"].value_counts()
+    said = [f"{counts[status]} {status}" for status in ("published", "chosen", "fitted") if status in counts]
+    return f"{len(table)} parameters: {', '.join(said)}"
+
+
+def fitted_to(twin: TwinParameters | str | Path) -> tuple[str, ...]:
+    """The published tables that any parameter of a twin was fitted to, sorted: they do not test the twin.
+
+    Parameters
+    ----------
+    twin
+        Its parameters, or its name or file as for :func:`load_twin`.
+
+    Returns
+    -------
+    tuple of str
+        As published numbers name their sources: ``"H table 5.4"``.
+
+    Raises
+    ------
+    WildlabError
+        As :func:`load_twin`, where it is given a name or a file.
+    """
+    parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
+    return tuple(sorted({table for *_, p in each_parameter(parameters) for table in p.fitted_to}))

@@ -112,6 +112,20 @@ class Autopilot(Strict):
         return self
 
 
+class Tolerance(Strict):
+    """How far what is stated of the sensors may be from what they are (see `wildlab.simulation.as_flown`).
+
+    ``noise`` and ``bias`` are limits, as shares of noise densities and of standard deviations of biases;
+    ``focal_length`` (a share), ``principal_point`` and ``mount`` are standard deviations, per axis.
+    """
+
+    noise: Annotated[Parameter, quantity("1", 0, 0.9)]
+    bias: Annotated[Parameter, quantity("1", 0, 0.9)]
+    focal_length: Annotated[Parameter, quantity("1", 0, 0.2)]
+    principal_point: Pixels
+    mount: AngleSpread
+
+
 class TruePose(Strict):
     """The pose that no sensor knows, written down for figures."""
 
@@ -144,6 +158,25 @@ class Boresight(Strict):
 
     @model_validator(mode="after")
     def _band(self) -> Boresight:
+        if self.shortest_period.number > self.longest_period.number:
+            raise ValueError("shortest_period is longer than longest_period; exchange the two")
+        return self
+
+
+class CameraSway(Strict):
+    """How the camera turns against the airframe after the bank has changed.
+
+    Its standard deviation per axis is the ``share`` of what the bank has changed over the last ``memory`` or
+    so: see `wildlab.simulation.camera_sway`.
+    """
+
+    share: Annotated[Parameter, quantity("1", 0, 1)]
+    memory: Duration
+    shortest_period: Duration
+    longest_period: Duration
+
+    @model_validator(mode="after")
+    def _band(self) -> CameraSway:
         if self.shortest_period.number > self.longest_period.number:
             raise ValueError("shortest_period is longer than longest_period; exchange the two")
         return self

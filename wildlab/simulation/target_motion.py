@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
 from wildlab.simulation.disturbances import band_limited_disturbance
 from wildlab.simulation.error_models import rounded, stream
 from wildlab.simulation.gnss import PositionErrors, position_fixes
-from wildlab.simulation.target_parameters import Target
+from wildlab.simulation.target_parameters import Target, TargetMotion
 from wildlab.simulation.trajectory import Signal
 
 
@@ -39,17 +40,43 @@ def target_path(target: Target, seed: int) -> Signal:
     band = (motion.deviation_shortest_period.si, motion.deviation_longest_period.si)
     north, east = (band_limited_disturbance(motion.deviation_sd.si, *band, rng) for _ in range(2))
     start, course = (motion.north.si, motion.east.si), motion.course.si
-    velocity = motion.speed.si * np.array([np.cos(course), np.sin(course)])
+    ahead = np.array([np.cos(course), np.sin(course)])
 
     def path(times: Array) -> Array:
         t = np.asarray(times, float)
         p = np.empty((len(t), 3))
-        p[:, 0] = start[0] + velocity[0] * t + north(t)
-        p[:, 1] = start[1] + velocity[1] * t + east(t)
+        along = way_along(motion, t)
+        p[:, 0] = start[0] + ahead[0] * along + north(t)
+        p[:, 1] = start[1] + ahead[1] * along + east(t)
         p[:, 2] = down
         return p
 
     return path
+
+
+def way_along(motion: TargetMotion, times: ArrayLike) -> Array:
+    """How far a target has come along its course, without its deviations.
+
+    Where it is faster in the beginning it starts from behind, so that later it is where a target with the
+    steady speed alone would be.
+
+    Parameters
+    ----------
+    motion
+        Its parameters.
+    times
+        (N,) s, from 0.
+
+    Returns
+    -------
+    (N,) m from the place that the parameters give for time 0; below zero behind it.
+    """
+    t = np.asarray(times, float)
+    steady = motion.speed.si * t
+    if motion.early_speed is None or motion.slowing_time is None:
+        return np.asarray(steady)
+    slowing = motion.slowing_time.si
+    return np.asarray(steady - (motion.early_speed.si - motion.speed.si) * slowing * np.exp(-t / slowing))
 
 
 def target_outline(target: Target, seed: int) -> Signal:

@@ -29,7 +29,11 @@ Arm = Annotated[Parameter, quantity("m", -1e3, 1e3)]
 
 
 class TargetMotion(Strict):
-    """A steady course from where the target is at time 0, and how it deviates from it."""
+    """A steady course, where on it the target would have been at time 0, and how it deviates from it.
+
+    With an ``early_speed`` it comes up along that course from behind: that fast at time 0, and slower by what
+    is left of the difference after each ``slowing_time``, to 1/e.
+    """
 
     north: Place
     east: Place
@@ -38,6 +42,14 @@ class TargetMotion(Strict):
     deviation_sd: LengthSpread
     deviation_shortest_period: Duration
     deviation_longest_period: Duration
+    early_speed: Speed | None = None
+    slowing_time: Duration | None = None
+
+    @model_validator(mode="after")
+    def _slowed(self) -> TargetMotion:
+        if (self.early_speed is None) != (self.slowing_time is None):
+            raise ValueError("early_speed and slowing_time belong together; give both or none")
+        return self
 
     @model_validator(mode="after")
     def _band(self) -> TargetMotion:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
+from wildlab.geometry.gravity import USUAL_GRAVITY
 from wildlab.simulation import kernels
 from wildlab.simulation.disturbances import AttitudeDisturbance
 
@@ -22,8 +23,6 @@ from wildlab.simulation.disturbances import AttitudeDisturbance
 FlightPath = Callable[[Array], tuple[Array, Array, Array]]
 #: Times (N,) in s -> something of shape (N, ...).
 Signal = Callable[[Array], Array]
-
-GRAVITY = 9.81  # m/s^2, where nothing better is known
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def angular_rates(attitude: Signal, times: ArrayLike, step: float = 0.01) -> Arr
     return rates
 
 
-def specific_forces(motion: Motion, gravity: float = GRAVITY) -> Array:
+def specific_forces(motion: Motion, gravity: float = USUAL_GRAVITY) -> Array:
     """What ideal accelerometers feel: the acceleration less gravity.
 
     Parameters

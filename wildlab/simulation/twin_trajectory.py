@@ -108,11 +108,27 @@ def _laps(twin: TwinParameters) -> Laps:
     ValueError
         As :func:`_closed_course`.
     """
+    laps = _laps_as_written(twin)
+    written = twin.moved_from
+    if written is None:
+        return laps
+    # Whoever flies it begins to record where on the lap it suits, however long the lap takes in that wind.
+    begins = twin.camera.recording_start.si
+    ahead = begins / _lap_time(_laps_as_written(written)) - begins / _lap_time(laps)
+    return laps._replace(start=laps.start + ahead)
+
+
+def _laps_as_written(twin: TwinParameters) -> Laps:
     f = twin.flight
     start, roll_time = _timing(twin)
     return Laps(
         _closed_course(twin), f.airspeed.si, f.duration.si, _wind(twin)[:2], _drift(twin), start, roll_time
     )
+
+
+def _lap_time(laps: Laps) -> float:
+    """How long a lap takes, s."""
+    return float(lap_times(laps.course, laps.airspeed, np.subtract(laps.wind, laps.drift))[-1])
 
 
 def _timing(twin: TwinParameters) -> tuple[float, float]:
@@ -134,8 +150,7 @@ def _altitudes(twin: TwinParameters, laps: Laps) -> Array:
     """Times and altitudes, (K, 2) s and m."""
     f = twin.flight
     if twin.cable is not None:
-        lap = float(lap_times(laps.course, laps.airspeed, np.subtract(laps.wind, laps.drift))[-1])
-        return cable_heights(twin.cable, lap, f.duration.si)
+        return cable_heights(twin.cable, _lap_time(laps), f.duration.si)
     if twin.climb is not None:
         begins, takes = twin.climb.start.si, twin.climb.duration.si
         return np.array([[begins, f.altitude.si], [begins + takes, twin.climb.altitude.si]])

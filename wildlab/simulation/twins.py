@@ -16,7 +16,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.animal_motion import animals_truth
+from wildlab.simulation.as_flown import as_flown
 from wildlab.simulation.camera_detections import exposure_times, frames_and_detections
+from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.gimbal import gimbal_table
 from wildlab.simulation.manifest import twin_manifest
@@ -104,6 +106,7 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
             field="without",
         )
     seed = int(seed)
+    flown = as_flown(twin, seed)  # what the sensors are; the manifest states what is said of them
     trajectory = twin_trajectory(twin, stream(seed, "trajectory"))
     duration = twin.flight.duration.si
     calibrated, uncalibrated = autopilot_tables(
@@ -114,7 +117,9 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
         nav[UNCALIBRATED] = uncalibrated
     known = trajectory(sample_times(twin.truth.rate.si, duration))
     nav[TRUTH] = nav_table(known)
-    frames, detections = frames_and_detections(twin, trajectory(exposure_times(twin)), seed)
+    frames, detections = frames_and_detections(
+        flown, camera_motion(twin, trajectory, exposure_times(twin), seed), seed
+    )
     if twin.animals is not None:
         truth = animals_truth(twin, twin.animals, seed)
     else:
@@ -131,7 +136,7 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
             return turned(trajectory(times), boresight)
 
         if twin.imu is not None and "imu" not in without:
-            tables["imu"] = imu_table(twin, payload, seed)
+            tables["imu"] = imu_table(flown, payload, seed)
         if twin.gnss is not None and "gnss" not in without:
-            tables["gnss"] = gnss_table(twin, payload, seed)
+            tables["gnss"] = gnss_table(flown, payload, seed, twin.gnss)
     return Flight(twin_manifest(twin, seed), nav, tables)

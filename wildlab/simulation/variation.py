@@ -2,6 +2,8 @@
 
 `varied` holds for every twin that is loaded within it: a trial that asks for its twin by name gets it moved,
 wherever it asks. Nothing that filters are told (the group ``assumed``, tunings in the code) is moved.
+
+A moved twin need not show its target as often as is printed: see `TwinParameters.as_moved_from`.
 """
 
 from __future__ import annotations
@@ -95,24 +97,48 @@ def apply(twin: TwinParameters, factors: Mapping[str, float]) -> TwinParameters:
     WildlabError
         As `varied`, or where the twin is not possible any more.
     """
-    content = twin.model_dump(exclude_unset=True)
     movable = {name for names in groups_of(twin).values() for name in names}
     there = {f"{part}.{name}" for part, name, _ in each_parameter(twin)}
-    for path, factor in factors.items():
-        if path not in there:
-            continue
-        if path not in movable:
+    for path in factors:
+        if path in there and path not in movable:
             raise WildlabError(
                 f"the parameter {path!r} of the twin {twin.name!r} is published, or cannot be scaled",
                 f"move one of: {', '.join(sorted(movable))}",
             )
+    return scaled(twin, {path: factor for path, factor in factors.items() if path in there})
+
+
+def scaled(twin: TwinParameters, factors: Mapping[str, float]) -> TwinParameters:
+    """A twin with some of its numbers multiplied, published ones as well: to see what its flight stands.
+
+    Parameters
+    ----------
+    factors
+        As for `varied`; every parameter must be there.
+
+    Returns
+    -------
+    TwinParameters
+        Checked anew, and known to be moved: see `TwinParameters.as_moved_from`.
+
+    Raises
+    ------
+    WildlabError
+        Where the twin is not possible any more.
+    KeyError
+        Where it has no such parameter.
+    """
+    if not factors:
+        return twin
+    content = twin.model_dump(exclude_unset=True)
+    for path, factor in factors.items():
         part = content
         *parts, name = path.split(".")
         for one in parts:
             part = part[one]
         part[name]["value"] *= factor
     try:
-        return type(twin).model_validate(content)
+        return type(twin).model_validate(content).as_moved_from(twin)
     except ValueError as error:
         raise WildlabError(
             f"with {', '.join(f'{path} x {factor:g}' for path, factor in factors.items())} the twin "

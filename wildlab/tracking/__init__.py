@@ -36,7 +36,7 @@ from wildlab.tracking.motion import (
     rest,
     singer,
 )
-from wildlab.tracking.noise import constant_noise, noise_by_altitude
+from wildlab.tracking.noise import constant_noise, noise_by_altitude, noise_by_direction
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first
 from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.unscented import run_unscented
@@ -60,6 +60,7 @@ __all__ = [
     "in_steps",
     "nearest_within",
     "noise_by_altitude",
+    "noise_by_direction",
     "pixels",
     "positions",
     "random_walk",

@@ -13,8 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import Array, Inertial, Moves, attitudes_near, turns
 from wildlab.flight.store import Flight
-
-GRAVITY = 9.81  # m/s^2; anywhere on Earth to a few per mille
+from wildlab.geometry.gravity import USUAL_GRAVITY
 
 #: Half of all samples lie above and half below: this one does not mind manoeuvres.
 PLAUSIBLE = (5.0, 20.0)  # m/s^2
@@ -46,7 +45,9 @@ def units(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Findin
         good = np.isfinite(felt_then)
         if good.sum() >= INTERVALS:
             size = float(np.median(felt_then[good]))
-            should = float(np.median(np.linalg.norm(moved.acceleration[good] - [0, 0, GRAVITY], axis=1)))
+            should = float(
+                np.median(np.linalg.norm(moved.acceleration[good] - [0, 0, USUAL_GRAVITY], axis=1))
+            )
             low, high = should / CLOSE, should * CLOSE
             expected += f", with the accelerations of the receiver {should:.3g}"
     if not low <= size <= high:
@@ -114,7 +115,7 @@ def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """On average an aircraft neither climbs nor falls: the mean force points to its upper side."""
     mean = imu.force.mean(axis=0)
     size = float(np.linalg.norm(mean))
-    if size < GRAVITY / 2 or mean[2] < -ALONG * size:
+    if size < USUAL_GRAVITY / 2 or mean[2] < -ALONG * size:
         return
     where = (
         np.array2string(mean, precision=1, separator=", ", sign=" ", floatmode="fixed").strip("[]").strip()
@@ -150,7 +151,7 @@ def _against_attitude(flight: Flight, imu: Inertial, moved: Moves | None) -> Ite
             continue
         middle = (moved.start + moved.end) / 2
         rows, R = attitudes_near(flight.nav[turn.source], middle)
-        wanted = moved.acceleration[rows] - [0.0, 0.0, GRAVITY]
+        wanted = moved.acceleration[rows] - [0.0, 0.0, USUAL_GRAVITY]
         expected = np.einsum("kji,kj->ki", R, wanted)
         felt = imu.mean_force(moved.start, moved.end)[rows]
         yield from _mapping("force", felt, expected, MOVED_FORCE, turn.source)

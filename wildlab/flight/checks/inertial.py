@@ -15,6 +15,7 @@ from wildlab.flight.checks import axes as findings_axes
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import STEP_S, Array, Inertial, Moves, fixes, moves, samples
 from wildlab.flight.store import Flight
+from wildlab.geometry.gravity import USUAL_GRAVITY
 
 #: Longer without a sample than this, the attitude is not measured any more: half a roll takes no longer.
 IMU_GAP_S = 0.5
@@ -115,7 +116,7 @@ def _overlap(imu: Inertial, table: pd.DataFrame | None) -> Iterator[Finding]:
 
 def _offset(flight: Flight, imu: Inertial, moved: Moves) -> Iterator[Finding]:
     """Whether what the receiver says was felt is felt at another time."""
-    expected = np.linalg.norm(moved.acceleration - [0.0, 0.0, findings_axes.GRAVITY], axis=1)
+    expected = np.linalg.norm(moved.acceleration - [0.0, 0.0, USUAL_GRAVITY], axis=1)
 
     def felt_at(lag: float) -> Array:
         return np.asarray(np.linalg.norm(imu.mean_force(moved.start + lag, moved.end + lag), axis=1))

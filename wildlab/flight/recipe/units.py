@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+from wildlab.geometry.gravity import STANDARD_GRAVITY
+
 Dimension = Literal["angle", "length", "speed", "acceleration", "rate", "pixel", "time", "field"]
 
 #: Of the unit g, by definition; m/s^2.
-STANDARD_GRAVITY = 9.80665
 
 UNITS: dict[Dimension, dict[str, float]] = {
     "angle": {"deg": math.radians(1), "rad": 1.0, "deg-e7": math.radians(1e-7)},

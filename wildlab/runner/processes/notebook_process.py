@@ -131,6 +131,9 @@ def _work(pipe: connection.Connection, job: Job) -> None:
             "the notebook wrote no metrics.json", "end it with report.save()", file=Path(job.notebook).name
         )
     metrics.read_metrics(folder / "metrics.json")
+    if job.seeds is not None:
+        # Once more: a notebook computes what was damaged since.
+        origin["seeds"] = job.seeds.provenance()
     origin["seconds"] = round(time.monotonic() - started, 1)
     write_json(folder / "provenance.json", origin)
     look = look_words(job.first_look)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binomtest
 
+from wildlab.evaluation.runs import share_interval as wilson
 from wildlab.pipeline.sensor_tracks import FILTERS, WHITE
 
 Array = NDArray[np.float64]
@@ -42,7 +42,7 @@ def stays(table: pd.DataFrame, mostly: float = MOSTLY) -> NDArray[np.bool_]:
 
     One that never began, or whose boat the sensor never saw, does not.
     """
-    return np.asarray(np.isfinite(table["rmse"]) & (table["share_with_target"] >= mostly), bool)
+    return np.asarray(table["share_with_target"] >= mostly, bool)
 
 
 def consistent(table: pd.DataFrame) -> NDArray[np.bool_]:
@@ -191,8 +191,7 @@ def share_interval(k: int, n: int) -> tuple[float, float]:
     """95 % interval (Wilson) of a share of which ``k`` of ``n`` was seen; NaN for none of none."""
     if n == 0:
         return float("nan"), float("nan")
-    found = binomtest(k, n).proportion_ci(method="wilson")
-    return float(found.low), float(found.high)
+    return wilson(k, n)[1:]
 
 
 def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[np.bool_]]:
@@ -207,6 +206,7 @@ def check_claims(table: pd.DataFrame, keys: Sequence[str]) -> dict[str, NDArray[
     checks = {
         "white-noise-overconfident": white["anees"] > white["nees_high"],
         "white-noise-nis-within": (white["anis"] >= white["nis_low"]) & (white["anis"] <= white["nis_high"]),
+        "white-noise-nis-low": white["anis"] < white["nis_low"],
         "differencing-whitens": _largest(correlated, "") < _largest(correlated, "_white"),
         "differencing-nearer-ideal": differenced["nearer"],
         "differencing-costs-accuracy": differenced["rmse_ratio"] > 1,

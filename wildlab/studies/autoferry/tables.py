@@ -20,7 +20,7 @@ from wildlab.studies.autoferry.comparison import (
     outcomes,
     stays,
 )
-from wildlab.studies.autoferry.text import FILTER_WORDS, KEYS, SENSOR_WORDS, named, signed
+from wildlab.studies.autoferry.text import FILTER_WORDS, KEYS, OUTCOME_WORDS, SENSOR_WORDS, named, signed
 
 TUNING_COLUMNS = {
     "sensor": "sensor",
@@ -50,15 +50,6 @@ TRACK_COLUMNS = {
     "lag1": "lag-one correlation",
 }
 TRACK_DIGITS = {"rmse": 1, "anees": 2, "anis": 2, "lag1": 2}
-#: What the outcomes are called as headings.
-OUTCOME_WORDS = {
-    "gained": "gained",
-    "too dear": "gained, but too dear",
-    "both inside": "honest with both",
-    "neither inside": "with neither",
-    "spoilt": "spoilt",
-    "lost": "lost",
-}
 CASE_COLUMNS = {
     "sensor": "sensor",
     "target": "boat",

@@ -30,6 +30,15 @@ FILTER_WORDS = {
     "schmidt": "Schmidt",
     "thinned": "thinned",
 }
+#: What the outcomes of a track are called; see `comparison.OUTCOMES`.
+OUTCOME_WORDS = {
+    "gained": "gained",
+    "too dear": "gained, but too dear",
+    "both inside": "honest with both",
+    "neither inside": "honest with neither",
+    "spoilt": "spoilt",
+    "lost": "lost",
+}
 #: Elements of a measurement, by kind: what its mean NIS should be.
 ELEMENTS = {"position": 2, "bearing": 1}
 RULE = (
@@ -89,10 +98,9 @@ def headline(found: pd.DataFrame, fixed: str, where: str) -> str:
     else:
         said = "neither clearly helps nor clearly harms"
     return (
-        f"On {where}, one filter throughout ({FILTER_WORDS[fixed]}) {said}: of {n} tracks by {by} it makes "
-        f"{gained} honest about the error that white noise left dishonest, and spoils {spoilt} that were "
-        f"honest; "
-        f"{lost} of {n} are lost."
+        f"On {where}, one filter throughout ({FILTER_WORDS[fixed]}) {said}: compared with white noise, "
+        f"{gained} of {n} tracks by {by} turned honest about their error, {spoilt} turned dishonest, and "
+        f"{lost} got lost."
     )
 
 
@@ -114,9 +122,9 @@ def use_words(use: pd.DataFrame) -> str:
     useless = use[~use["of_use"]]
     if useless.empty:
         return "Each sensor alone keeps more than half of its tracks with their boats."
-    counts = ", ".join(
+    counts = " and ".join(
         f"the {named([row['sensor']])} keeps {row['kept']} of {row['tracks']} tracks with their boats"
-        + (f" ({row['rmse']:.0f} metres off in the median)" if np.isfinite(row["rmse"]) else "")
+        + (f" (off by {row['rmse']:.0f} metres in the median)" if np.isfinite(row["rmse"]) else "")
         for _, row in useless.iterrows()
     )
     alone = "alone is" if len(useless) == 1 else "are each alone"
@@ -141,8 +149,9 @@ def tiles(found: pd.DataFrame) -> list[tuple[str, str]]:
         shown.append((f"{kept.median():.0f} m" if len(kept) else "—", about))
     gained, lost = (int((found["outcome"] == name).sum()) for name in ("gained", "lost"))
     low, high = share_interval(gained, n)
-    shown.append((f"{gained} of {n}", f"tracks gain ({100 * low:.0f} to {100 * high:.0f} %)"))
-    return [*shown, (f"{lost} of {n}", "tracks are lost, which is no gain whatever the filter says")]
+    share = f"{100 * low:.0f} to {100 * high:.0f} %"
+    shown.append((f"{gained} of {n}", f"tracks become honest about their error; 95 % interval {share}"))
+    return [*shown, (f"{lost} of {n}", "tracks are lost, whatever the filter says of them")]
 
 
 def nees_title(found: pd.DataFrame, fixed: str) -> str:
@@ -197,7 +206,7 @@ def strays(found: pd.DataFrame) -> str:
     n = len(found)
     other = {share: n - int(stays(found, share).sum()) for share in (0.5, 0.95)}
     threshold = ", ".join(f"{k} at {100 * share:.0f} %" for share, k in other.items())
-    behind = f" Were other shares of the scans asked for, {threshold} would be lost."
+    behind = f" Lost at other shares of the scans: {threshold}."
     if not named_ones:
         return f"none of {n} tracks is lost.{behind}"
     are = "is" if len(lost) == 1 else "are"
@@ -211,7 +220,7 @@ def drawn_words(found: pd.DataFrame, case: str, boat: str) -> str:
     for sensor, rows in mine.groupby("sensor", sort=False):
         outcome, same = str(rows["outcome"].iloc[0]), found[found["sensor"] == sensor]
         alike = int((same["outcome"] == outcome).sum())
-        parts.append(f"{named([sensor])}: {outcome} ({alike} of {len(same)} tracks)")
+        parts.append(f"{named([sensor])}: {OUTCOME_WORDS[outcome]} ({alike} of {len(same)} tracks)")
     return (
         f"With the filter held fixed, {'; '.join(parts)}." if parts else "It was tuned on, and is not judged."
     )

@@ -26,6 +26,7 @@ from wildlab.studies.linear_vs_nonlinear.trial import (
     every_of,
     fly_sighting,
     lag1,
+    numbers_beside,
     numbers_of,
     remembered,
     start_on_detections,
@@ -162,8 +163,8 @@ def beginnings(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
 
 
 def trial(seed: int, *, twin: str) -> Numbers:
-    """One simulated flight with the observer's poses through the three filters; `numbers_of` names the
-    numbers.
+    """One simulated flight with the observer's poses through the three filters; `numbers_of` and
+    `numbers_beside` name the numbers.
 
     Raises
     ------
@@ -173,7 +174,8 @@ def trial(seed: int, *, twin: str) -> Numbers:
     tuning = tuning_of(twin)
     _, seen = fly_sighting(twin, seed, OBSERVER)
     followed = follow(seen, tuning)
-    return numbers_of(seen, followed | follow_varied(seen, tuning)) | beginnings(seen, followed)
+    beside = numbers_beside(seen, tuning.cv, "cv", followed["cv"])
+    return numbers_of(seen, followed | follow_varied(seen, tuning)) | beginnings(seen, followed) | beside
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:

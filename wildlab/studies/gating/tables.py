@@ -10,7 +10,7 @@ import pandas as pd
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, spread_words
 from wildlab.studies.gating.monte_carlo import FORMS, GATES, Outcome
-from wildlab.studies.gating.readings import DEFAULT, READINGS, STRESS, subject
+from wildlab.studies.gating.readings import DEFAULT, READINGS, subject
 from wildlab.studies.gating.text import NAMES, Array, mostly_wrong
 from wildlab.studies.gating.variations import claim_margins, standard_error, verdict
 
@@ -74,21 +74,6 @@ def rates_table(rates: Array, published: Mapping[str, float]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def readings_table() -> pd.DataFrame:
-    """The readings, with what in the text speaks for and against each."""
-    return pd.DataFrame(
-        [
-            {
-                "track updated with": one.short,
-                "what for": one.role,
-                "what speaks for it": one.speaks_for,
-                "what speaks against it": one.speaks_against,
-            }
-            for one in READINGS.values()
-        ]
-    )
-
-
 def readings_rates(outcomes: Mapping[str, Outcome], published: Mapping[str, float]) -> pd.DataFrame:
     """Mean rates of every reading with twice their standard error, as text, below the published ones."""
     rows = [{"track updated with": "published"} | {NAMES[form]: f"{published[form]:.2f}" for form in FORMS}]
@@ -115,8 +100,8 @@ def varied_table(varied: pd.DataFrame) -> pd.DataFrame:
 
 
 def claims_table(outcomes: Mapping[str, Outcome], claims: Sequence[Mapping[str, str]]) -> pd.DataFrame:
-    """Every claim with its verdict by the default reading, what decides it, and the stress test's verdict."""
-    margins = {name: claim_margins(outcomes[name]) for name in (DEFAULT, STRESS)}
+    """Every claim with its verdict by the default reading, what decides it, and the others' verdicts."""
+    margins = {name: claim_margins(one) for name, one in outcomes.items()}
     rows = []
     for claim in claims:
         decides = [one[np.isfinite(one)] for one in margins[DEFAULT][claim["id"]]]
@@ -130,20 +115,17 @@ def claims_table(outcomes: Mapping[str, Outcome], claims: Sequence[Mapping[str, 
                 "verdict": verdict(margins[DEFAULT][claim["id"]]),
                 "margin": margin.replace("-", "−"),
                 "runs": len(least),
-                "stress": verdict(margins[STRESS][claim["id"]]),
             }
+            | {name: verdict(margins[name][claim["id"]]) for name in outcomes if name != DEFAULT}
         )
     return pd.DataFrame(rows)
 
 
-CLAIM_COLUMNS = {
-    "claim": "claim",
-    "where": "where",
-    "verdict": "verdict",
-    "margin": "least margin (points)",
-    "runs": "runs",
-    "stress": "in the stress test",
-}
+def claim_columns() -> dict[str, str]:
+    """Headings of the table that `claims_table` gives."""
+    first = {"claim": "claim", "where": "where", "verdict": "verdict", "margin": "least margin (points)"}
+    others = {name: f"with {one.short}" for name, one in READINGS.items() if name != DEFAULT}
+    return first | {"runs": "runs"} | others
 
 
 def record_rates(report: Report, outcomes: Mapping[str, Outcome]) -> None:

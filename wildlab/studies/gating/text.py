@@ -151,6 +151,15 @@ def spread_title(outcomes: Mapping[str, Outcome]) -> str:
     return f"Wrong in more than half of the images:\n{said[0]} % of the runs, {said[1]} % in the stress test"
 
 
+def readings_points() -> list[str]:
+    """The readings, with what in the text speaks for and against each, a paragraph each."""
+    return [
+        f"**Updated with {one.short}** ({one.role}). For it: {one.speaks_for} "
+        f"Against it: {one.speaks_against}"
+        for one in READINGS.values()
+    ]
+
+
 # --- pixels and angles together
 
 

@@ -19,6 +19,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import white_bound
 from wildlab.flight.store import Flight
+from wildlab.pipeline.measurement_noise import follow_variations
 from wildlab.pipeline.navigate import navigate_observer
 from wildlab.pipeline.track import (
     CvTuning,
@@ -214,8 +215,23 @@ def numbers_of(seen: Sighting, followed: dict[str, ScoredTrack]) -> Numbers:
     return result | {("measurements", name): value for name, value in measured.items()}
 
 
+def numbers_beside(seen: Sighting, tuning: CvTuning, base: str, followed: ScoredTrack) -> Numbers:
+    """Numbers of a filter on the ground with the noise that H 8.2 proposes, and with fewer detections.
+
+    The subjects are ``base`` and one of `wildlab.pipeline.measurement_noise.VARIATIONS`; ``detections`` says
+    how many each was given. ``followed`` is what the filter itself made of the sighting.
+    """
+    result: Numbers = {}
+    for name, (given, track) in follow_variations(seen, tuning, followed.track).items():
+        who = f"{base}-{name}"
+        result |= {(who, key): value for key, value in evaluate_track(seen, track).numbers.items()}
+        result[who, "detections"] = float(given.seen.sum())
+    return result
+
+
 def trial(seed: int, *, twin: str, beside: str) -> Numbers:
-    """One simulated flight through all filters but the multiple models, which take seconds; see `numbers_of`.
+    """One simulated flight through all filters but the multiple models, which take seconds; see `numbers_of`
+    and `numbers_beside`.
 
     Where ``beside`` names the twin of the other flight, its innovations' mean autocorrelation at lag one, on
     a flight of the same seed, is the number ``lag1`` of ``beside``.
@@ -225,20 +241,19 @@ def trial(seed: int, *, twin: str, beside: str) -> Numbers:
     WildlabError
         For a twin that stands for none of the flights, or a flight on which nothing can be tracked.
     """
-    found = _numbers_on(twin, seed, EVERYWHERE)
+    case = case_of(twin)
+    _, seen = fly_sighting(twin, seed, case.source)
+    followed = follow(seen, case.tuning, EVERYWHERE)
+    found = numbers_of(seen, followed) | numbers_beside(seen, case.tuning, "kf", followed["kf"])
     if beside:
-        other = _numbers_on(beside, seed, PUBLISHED)
+        case = case_of(beside)
+        _, seen = fly_sighting(beside, seed, case.source)
+        other = numbers_of(seen, follow(seen, case.tuning, PUBLISHED))
         correlations = [
             abs(other[who, f"lag1_autocorrelation_{axis}"]) for who in PUBLISHED for axis in AXES[who]
         ]
         found["beside", "lag1"] = float(np.mean(correlations))
     return found
-
-
-def _numbers_on(twin: str, seed: int, subjects: tuple[str, ...]) -> Numbers:
-    case = case_of(twin)
-    _, seen = fly_sighting(twin, seed, case.source)
-    return numbers_of(seen, follow(seen, case.tuning, subjects))
 
 
 def lag1(spread: pd.DataFrame, subject: str, axes: tuple[str, str]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""A vessel that mostly drifts, seen in eights from 200 m: H tables 5.6 and 5.7, and the filter of H 5.6.2."""
+"""A vessel that mostly drifts, seen in eights: H tables 5.6 and 5.7, and the filter of H 5.6.2."""
 
 from __future__ import annotations
 
@@ -52,6 +52,7 @@ METRICS = {(subject, name): (name, subject, "m") for subject in SUBJECTS for nam
     ("observer", "5_to_10"): ("share_5_to_10_m", "observer", "1"),
     ("reference", "mae"): ("mae", "reference", "m"),
     ("observer-exact", "mae"): ("mae_without_reference_error", "observer", "m"),
+    ("observer", "height"): ("mean_height", "observer", "m"),
     ("first-case", "mae"): ("mae", "first-case", "m"),
     ("observer", "last_tenth"): ("mean_error_last_tenth", "observer", "m"),
     ("vessel", "speed_beginning"): ("speed_beginning", "vessel", "m/s"),
@@ -157,11 +158,12 @@ def speed_in_beginning(flight: Flight, scored: pd.DataFrame) -> float:
 def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
     """Everything that is compared over many flights, by (subject, name).
 
-    The names of the tables (metres) for `SUBJECTS`. For ``observer`` also ``largest`` (m), and the shares
-    ``below_20`` and ``5_to_10`` of its points (error in m). For ``filter``, ``filter-subset`` and
-    ``filter-by-detections`` the distance of the estimate from the reference (m): ``beginning`` (the largest
-    within `BEGINNING_S`), ``mean`` and ``at_end``. ``mae`` of the ``reference`` against where the simulated
-    vessel was, and of ``observer-exact``: the observer's points against the same.
+    The names of the tables (metres) for `SUBJECTS`. For ``observer`` also ``largest`` (m), the shares
+    ``below_20`` and ``5_to_10`` of its points (error in m), and ``height``, the mean one of the aircraft at
+    its detections (m). For ``filter``, ``filter-subset`` and ``filter-by-detections`` the distance of the
+    estimate from the reference (m): ``beginning`` (the largest within `BEGINNING_S`), ``mean`` and
+    ``at_end``. ``mae`` of the ``reference`` against where the simulated vessel was, and of
+    ``observer-exact``: the observer's points against the same.
     """
     result: dict[tuple[str, str], float] = {}
     for column, table in scored.items():
@@ -183,6 +185,9 @@ def summarise_vessel(flight: Flight, scored: dict[str, pd.DataFrame]) -> dict[tu
         ("vessel", "speed_beginning"): speed_in_beginning(flight, ordered),
         ("vessel", "speed_beginning_subset"): speed_in_beginning(flight, subset_of(ordered)),
     }
+    nav = flight.nav["observer"]
+    heights = -np.interp(table["time_s"], nav["time_s"], nav["down_m"])
+    result["observer", "height"] = float(heights.mean())
     off = table[["north_m", "east_m"]].to_numpy(float) - true_positions(flight, table)
     result["observer-exact", "mae"] = float(np.nanmean(np.hypot(*off.T)))
     result["reference", "mae"] = float(np.nanmean(np.hypot(*(off - errors_of(table)).T)))

@@ -16,9 +16,10 @@ _LAGS = [("filter", "lag1_north"), ("filter", "lag1_east")]
 
 METHOD = r"""Pixels are placed on the plane at the target's height by H (5.13). Mean, standard
 deviation and mean error are those of the distances to the known position. Without synchronisation the pose is
-taken at the stamp that the on-board computer gave the image. Without calibration the observer's attitude is
-that of the IMU as it was mounted: the published misalignment is put behind it, as
-$\mathbf{R}_b^n\mathbf{R}_i^b$, and not taken out.
+taken at the stamp that the on-board computer gave the image. The simulated IMU is mounted with the published
+misalignment and feels the flight in its own axes. With calibration the observer gets its samples turned to
+the axes of the airframe; without, it gets them as they are and takes them for the airframe's, and everything
+runs on them. The antennas stand where they stand in both cases.
 
 The observer is the nonlinear one of H 5.5 on the simulated inertial samples and the two receivers' positions
 and velocities, with the gains of its defaults.

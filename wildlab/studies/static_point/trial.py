@@ -12,15 +12,15 @@ from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import autocorrelation
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
 from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.navigate import navigate_observer
+from wildlab.simulation.onboard_sensors import as_mounted, mounted_imu
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.kalman import Filtered, filter_at_rest
 
-#: The observer's poses, and the same with the attitude of the IMU taken for that of the airframe.
+#: The observer's poses, and those of one that was given the inertial samples in the axes of the IMU.
 OBSERVER, UNCALIBRATED = "observer", "observer-uncalibrated"
 #: Navigation source and camera stamps behind each column of the tables.
 COLUMNS = {
@@ -51,10 +51,10 @@ METRICS = {(column, name): (name, column, "m") for column in COLUMNS for name in
 def navigate_observers(flight: Flight) -> None:
     """Give a simulated flight the nav sources that the tables need: `OBSERVER` and `UNCALIBRATED`.
 
-    The simulated IMU is turned against the airframe by next to nothing, as if its misalignment had been
-    calibrated. Without that calibration the observer would have found the attitude of the IMU as it was
-    mounted; so the published misalignment, the same that the twin leaves in the autopilot's poses, is put
-    behind the observer's attitude.
+    The simulated IMU sits on the airframe turned by the published misalignment, and feels the flight in its
+    own axes. `OBSERVER` gets its samples calibrated, turned to the axes of the airframe. `UNCALIBRATED` gets
+    them as the IMU gave them, in the belief that they are the airframe's: it aligns itself, estimates biases
+    and finds poses with them, while the antennas are where they are on the airframe.
 
     Raises
     ------
@@ -62,8 +62,8 @@ def navigate_observers(flight: Flight) -> None:
         Where the flight is not of a twin with known misalignment of the IMU, or has no inertial samples.
     """
     made = flight.manifest.twin
-    autopilot = None if made is None else load_twin(made.name).autopilot
-    if autopilot is None or None in (autopilot.imu_roll, autopilot.imu_pitch, autopilot.imu_yaw):
+    turn = None if made is None else mounted_imu(load_twin(made.name))
+    if turn is None:
         raise WildlabError(
             "how the IMU was turned against the airframe is not known",
             "use a flight of a twin whose autopilot has imu_roll, imu_pitch and imu_yaw",
@@ -75,17 +75,12 @@ def navigate_observers(flight: Flight) -> None:
     if "time_onboard_s" in frames:
         early = frames["time_onboard_s"].to_numpy(float) - frames["time_s"].to_numpy(float)
         times = np.concatenate([times, times + early])
-    nav = navigate_observer(flight, times).nav
-    angles = (autopilot.imu_roll, autopilot.imu_pitch, autopilot.imu_yaw)
-    turn = euler_to_matrix(*(angle.si for angle in angles if angle is not None))
-    flight.nav |= {OBSERVER: nav, UNCALIBRATED: turned(nav, turn)}
-
-
-def turned(nav: pd.DataFrame, turn: ArrayLike) -> pd.DataFrame:
-    """A nav table of something mounted on the airframe with the attitude ``turn`` (3, 3), ``R_bi``."""
-    names = ["q_w", "q_x", "q_y", "q_z"]
-    attitude = quaternion_to_matrix(nav[names].to_numpy(float)) @ np.asarray(turn, float)
-    return nav.assign(**dict(zip(names, matrix_to_quaternion(attitude).T, strict=True)))
+    own_axes = flight.tables | {"imu": as_mounted(flight.table("imu"), turn)}
+    uncalibrated = Flight(flight.manifest, flight.nav, own_axes, flight.folder)
+    flight.nav |= {
+        OBSERVER: navigate_observer(flight, times).nav,
+        UNCALIBRATED: navigate_observer(uncalibrated, times).nav,
+    }
 
 
 def evaluate_columns(flight: Flight, rng: np.random.Generator) -> dict[str, pd.DataFrame]:

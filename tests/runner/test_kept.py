@@ -1,0 +1,360 @@
+"""Kept seeds that are not as they were written: none is read, each is computed again, and the run says so."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from wildlab.errors import RunFailed
+from wildlab.runner import trials
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.progress import shown
+from wildlab.runner.processes.scheduling import _Scheduler, _waiting
+from wildlab.runner.processes.worker_pool import SeedResult, WorkerPool
+from wildlab.runner.record import provenance
+from wildlab.runner.seeds.kept import (
+    SeedWork,
+    again_words,
+    faults,
+    missing_seeds,
+    read_seed,
+    seed_digest,
+    set_aside,
+    sweep_seeds,
+    take_stock,
+    write_seed,
+)
+
+VALUES = {
+    "schmidt/nees_inside": 0.9333333333333333,
+    "schmidt/median_nees": 3.25e-7,
+    "ekf/max_error": 1.0,
+    "ekf/none": math.nan,
+    "ekf/beyond": -math.inf,
+    "ekf/zero": -0.0,
+}
+
+
+def work(folder: Path, *seeds: int, key: str = "k") -> SeedWork:
+    return SeedWork(folder, "study", "case", {"twin": "t"}, "code", key, seeds or (1, 2, 3))
+
+
+def same(a: dict[str, float], b: dict[str, float]) -> bool:
+    return {name: float(value).hex() for name, value in a.items()} == {
+        name: float(value).hex() for name, value in b.items()
+    }
+
+
+def rewrite(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
+    """A damage that leaves a file laid out as it was."""
+
+    def changed(text: str) -> str:
+        content = json.loads(text)
+        change(content)
+        return json.dumps(content, indent=1) + "\n"
+
+    return changed
+
+
+# -- what is damage
+# ------------------------------------------------------------------------------------
+
+
+def test_no_flipped_bit_is_read_as_other_numbers(tmp_path: Path) -> None:
+    one, draw = work(tmp_path, 1), np.random.default_rng(7)
+    write_seed(one, 1, VALUES)
+    whole = (one.folder / "1.json").read_bytes()
+    assert read_seed(one, 1) is not None and same(read_seed(one, 1) or {}, VALUES)
+    for _ in range(400):
+        place, bit = int(draw.integers(len(whole))), int(draw.integers(8))
+        turned = bytearray(whole)
+        turned[place] ^= 1 << bit
+        (one.folder / "1.json").write_bytes(bytes(turned))
+        assert read_seed(one, 1) is None, (place, bit)
+        assert take_stock(one).damaged == (1,)
+
+
+@given(
+    values=st.dictionaries(
+        st.text("abc_-", min_size=1, max_size=4).map("s/{}".format), st.floats(), min_size=1, max_size=4
+    ),
+    place=st.integers(0, 10**6),
+    bit=st.integers(0, 7),
+)
+def test_nor_is_one_in_any_numbers(
+    tmp_path_factory: pytest.TempPathFactory, values: dict[str, float], place: int, bit: int
+) -> None:
+    one = work(tmp_path_factory.getbasetemp() / "bits", 1)
+    write_seed(one, 1, values)
+    turned = bytearray((one.folder / "1.json").read_bytes())
+    turned[place % len(turned)] ^= 1 << bit
+    (one.folder / "1.json").write_bytes(bytes(turned))
+    assert read_seed(one, 1) is None
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: "",
+        lambda text: text[:-1],
+        lambda text: text[: len(text) // 2],
+        lambda text: text + "\n",
+        lambda text: "[" * 5000,
+        lambda text: "[]",
+        lambda text: "1",
+        lambda text: text.replace("0.9333333333333333", "0.8333333333333333"),
+        lambda text: text.replace("3.25e-07", "0.000000325"),
+        lambda text: text.replace('"nan"', "NaN"),
+        rewrite(lambda content: content["values"].pop("ekf/zero")),
+        rewrite(lambda content: content["values"].update({"ekf/more": 1.0})),
+        rewrite(lambda content: content["values"].update({"ekf/zero": 0.0})),
+        rewrite(lambda content: content["names"].pop()),
+        rewrite(lambda content: content.pop("digest")),
+        rewrite(lambda content: content.update(seed=2)),
+        rewrite(lambda content: content.update(case="another")),
+    ],
+)
+def test_whatever_was_done_to_a_file_it_is_not_read(tmp_path: Path, damage: Callable[[str], str]) -> None:
+    one = work(tmp_path)
+    write_seed(one, 1, VALUES)
+    path = one.folder / "1.json"
+    assert missing_seeds(one) == [2, 3]
+    text = damage(path.read_text())
+    assert text != path.read_text()
+    path.write_text(text)
+    assert read_seed(one, 1) is None and take_stock(one).damaged == (1,) and missing_seeds(one) == [1, 2, 3]
+
+
+def test_a_file_of_another_key_study_or_seed_is_not_read(tmp_path: Path) -> None:
+    one, other = work(tmp_path), work(tmp_path, key="another")
+    for its in (one, other):
+        for seed in its.seeds:
+            write_seed(its, seed, VALUES)
+    shutil.copy(other.folder / "1.json", one.folder / "1.json")
+    shutil.copy(one.folder / "3.json", one.folder / "2.json")
+    assert take_stock(one).damaged == (1, 2) and read_seed(one, 3) is not None
+    assert take_stock(replace(one, case="another")).damaged == (1, 2, 3)
+
+
+def test_a_file_without_a_digest_counts_as_absent(tmp_path: Path) -> None:
+    one = work(tmp_path, 1)
+    one.folder.mkdir(parents=True)
+    (one.folder / "1.json").write_text('{"case": "case", "seed": 1, "values": {"a/b": 1.0}}')
+    assert take_stock(one) == ((1,), (), ()) and read_seed(one, 1) is None
+
+
+def test_a_digest_is_of_all_that_is_said_and_of_nothing_else(tmp_path: Path) -> None:
+    one = work(tmp_path, 1)
+    turned = dict(reversed(VALUES.items()))
+    assert seed_digest(one, 1, VALUES) == seed_digest(replace(one, study="b", code="c"), 1, turned)
+    others = [
+        seed_digest(one, 2, VALUES),
+        seed_digest(replace(one, key="l"), 1, VALUES),
+        seed_digest(replace(one, case="l"), 1, VALUES),
+        seed_digest(one, 1, VALUES | {"ekf/zero": 0.0}),
+        seed_digest(one, 1, VALUES | {"ekf/max_error": math.nextafter(1.0, 2.0)}),
+        seed_digest(one, 1, {name: value for name, value in VALUES.items() if name != "ekf/none"}),
+    ]
+    assert len({seed_digest(one, 1, VALUES), *others}) == 7
+
+
+# -- what is said of it
+# ------------------------------------------------------------------------------------
+
+
+def test_provenance_lists_digests_and_what_was_damaged(tmp_path: Path) -> None:
+    one = work(tmp_path)
+    for seed in one.seeds:
+        write_seed(one, seed, {"a/b": float(seed)})
+    first = one.provenance()
+    assert first["digests"] == {str(seed): seed_digest(one, seed, {"a/b": seed}) for seed in one.seeds}
+    assert first["damaged"] == {"count": 0, "seeds": []}
+    write_seed(one, 2, {"a/b": 2.5})
+    second = one.provenance()
+    assert first["digest"] != second["digest"] and first["digests"]["1"] == second["digests"]["1"]
+    (one.folder / "3.json").write_text("{")
+    set_aside(one, take_stock(one).damaged)
+    set_aside(one, [3])
+    assert take_stock(one).absent == (3,)
+    write_seed(one, 3, {"a/b": 3.0})
+    sweep_seeds(one)
+    third = one.provenance()
+    assert third["damaged"] == {"count": 1, "seeds": [3]} and third["digest"] == second["digest"]
+
+
+def test_the_foot_of_a_page_says_it(tmp_path: Path) -> None:
+    one = work(tmp_path, 1, 2)
+    for seed in one.seeds:
+        write_seed(one, seed, VALUES)
+    page = {
+        "wildlab": {"version": "1", "commit": None, "note": ""},
+        "flight": None,
+        "lock": {"sha256": None},
+        "notebook": {"sha256": "0" * 64},
+        "seed": 1,
+        "made": "",
+        "seeds": one.provenance(),
+    }
+    assert f"2 kept seeds <code>{page['seeds']['digest'][:8]}</code> ·" in provenance.footer(page)
+    (one.folder / "2.damaged").write_text("")
+    page["seeds"] = one.provenance()
+    assert "of which 1 had been damaged and computed again" in provenance.footer(page)
+
+
+def test_the_run_says_it_on_a_terminal_and_in_a_file(tmp_path: Path) -> None:
+    one = work(tmp_path, *range(1, 13))
+    for seed in one.seeds:
+        write_seed(one, seed, VALUES if seed != 12 else {"a/b": 1.0})
+    (one.folder / "11.json").write_text("{")
+    damaged, unlike = again_words(take_stock(one))
+    assert damaged == "kept numbers are damaged and are computed again: 1 seed (11)"
+    assert unlike.endswith("other names than those of most seeds and are computed again: 1 seed (12)")
+    for seed in range(1, 10):
+        (one.folder / f"{seed}.json").write_text("")
+    assert again_words(take_stock(one))[0].endswith("10 seeds (1, 2, 3, 4, 5, 6, 7, 8, ...)")
+    for terminal in (True, False):
+        text = StringIO()
+        with shown(Console(file=text, force_terminal=terminal, width=160)) as tell:
+            tell("", "plan", 1)
+            tell("study", "start", None)
+            tell("study", "again", damaged)
+        assert f"seeds study: {damaged}" in text.getvalue()
+
+
+# -- the set of names
+# ------------------------------------------------------------------------------------
+
+
+class Pool(WorkerPool):
+    """Computes at once, in this process, what the test says."""
+
+    def __init__(self, trial: Callable[[int], dict[str, float]]) -> None:
+        super().__init__()
+        self.trial, self.asked = trial, list[int]()
+        self._over: list[SeedResult] = []
+
+    def places(self, room: int) -> int:
+        return 1
+
+    def submit(self, work: SeedWork, seed: int, timeout_s: float = float("inf")) -> None:
+        self.asked.append(seed)
+        write_seed(work, seed, self.trial(seed))
+        self._over.append(SeedResult(work.study, seed))
+
+    def collect(self, wait_s: float = 0.0) -> list[SeedResult]:
+        over, self._over = self._over, []
+        return over
+
+
+def settled(
+    one: SeedWork, trial: Callable[[int], dict[str, float]]
+) -> tuple[list[int], list[Any], list[str]]:
+    """Seeds computed, failures and words of a run up to where its notebook would start."""
+    told: list[str] = []
+
+    def tell(name: str, event: str, what: Any) -> None:
+        if event == "again":
+            told.append(what)
+
+    job = Job(one.study, "", "", "", "", "", seeds=one)
+    pool = Pool(trial)
+    waiting = _waiting(job)
+    scheduler = _Scheduler([waiting], pool, 0, tell)
+    for _ in range(20):
+        if waiting.ready:
+            waiting.start(tell)
+            for words in waiting.check():
+                tell(one.study, "again", words)
+            if waiting.ready:
+                break
+        scheduler.hand_out_seeds()
+        scheduler.collect_seeds()
+    assert waiting.ready
+    return pool.asked, waiting.failures, told
+
+
+def test_a_seed_with_other_names_is_computed_again(tmp_path: Path) -> None:
+    one = work(tmp_path, 1, 2, 3, 4)
+    for seed in (1, 2, 3):
+        write_seed(one, seed, {"a/b": 1.0} if seed != 1 else {"a/b": 1.0, "a/c": 2.0})
+    asked, failures, told = settled(one, lambda seed: {"a/b": 1.0})
+    assert asked == [1, 4] and failures == [] and len(told) == 1 and "other names" in told[0]
+    assert take_stock(one).missing == ()
+
+
+def test_kept_numbers_that_fresh_ones_outvote_are_computed_again(tmp_path: Path) -> None:
+    one = work(tmp_path, 1, 2)
+    write_seed(one, 1, {"a/c": 1.0})
+    asked, failures, told = settled(one, lambda seed: {"a/b": 1.0})
+    assert asked == [2, 1] and failures == [] and told[0].endswith("1 seed (1)")
+
+
+def test_a_trial_that_gives_other_names_for_a_seed_is_an_error(tmp_path: Path) -> None:
+    def trial(seed: int) -> dict[str, float]:
+        return {"a/b": 1.0} if seed != 2 else {f"a/{letter}": 1.0 for letter in "cdef"}
+
+    one = work(tmp_path, 1, 2, 3)
+    for seed in one.seeds:
+        write_seed(one, seed, trial(seed))
+    asked, failures, _ = settled(one, trial)
+    assert asked == [2], "each is computed again once"
+    ((seed, failure),) = failures
+    assert seed == 2
+    assert failure.reason == (
+        "its numbers have other names than those of seed 1: it lacks 'a/b' and has 'a/c', 'a/d' and 2 more "
+        "besides; let the trial give the same names for each seed, and NaN for what a flight has no value "
+        "for."
+    )
+
+
+def test_a_damaged_seed_is_computed_again_and_said(tmp_path: Path) -> None:
+    one = work(tmp_path, 1, 2)
+    for seed in one.seeds:
+        write_seed(one, seed, VALUES)
+    (one.folder / "2.json").write_text("{}")
+    asked, failures, told = settled(one, lambda seed: VALUES)
+    assert asked == [2] and failures == []
+    assert told == ["kept numbers are damaged and are computed again: 1 seed (2)"]
+    assert one.provenance()["damaged"]["seeds"] == [2]
+
+
+def test_what_does_not_read_back_after_it_was_written_is_an_error(tmp_path: Path) -> None:
+    one = work(tmp_path, 1, 2)
+    write_seed(one, 1, VALUES)
+    (one.folder / "2.json").write_text("{}")
+    ((seed, reason),) = faults(one, {1, 2})
+    assert seed == 2 and reason.startswith("what was written for it does not read back")
+
+
+def test_in_a_notebook_opened_by_hand_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = {1: {"a/b": 1.0}, 2: {"a/b": 2.0}, 3: {"a/c": 3.0}, 4: {"a/b": 4.0}}
+    one = work(tmp_path, *kept)
+    for seed, values in kept.items():
+        write_seed(one, seed, values)
+    (one.folder / "4.json").write_text("")
+    monkeypatch.setattr(trials, "make_work", lambda *_: one)
+    pool = Pool(lambda seed: {"a/b": 10.0 * seed})
+    monkeypatch.setattr(trials, "WorkerPool", lambda: pool)
+    given = {"study": "study", "seed": 9, "drawn": {("a", "b"): 0.0}, "out": str(tmp_path / "x")}
+    table = trials.trials_table("case", 5, **given)
+    assert pool.asked == [3, 4] and list(table["a", "b"]) == [0.0, 1.0, 2.0, 30.0, 40.0]
+    said = capsys.readouterr().out
+    assert "study: kept numbers are damaged and are computed again: 1 seed (4)" in said
+    write_seed(one, 3, {"a/c": 3.0})
+    pool.trial = lambda seed: {"a/c": 3.0}
+    with pytest.raises(RunFailed, match=r"Seed 3 failed: its numbers have other names than those of seed 1"):
+        trials.trials_table("case", 5, **given)

@@ -1,0 +1,204 @@
+"""What sensors really are differs from flight to flight, within its tolerance, and no filter is told."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import wildlab
+from wildlab.flight.clocks import frame_times, poses_at
+from wildlab.flight.store import save_flight
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import camera_pose
+from wildlab.simulation.as_flown import as_flown
+from wildlab.simulation.manifest import true_mount, twin_manifest
+from wildlab.simulation.onboard_sensors import gnss_table
+from wildlab.simulation.parameters import each_parameter, load_twin, twin_names
+from wildlab.simulation.sensor_parameters import Tolerance
+from wildlab.simulation.trajectory import turned
+from wildlab.simulation.twin_trajectory import twin_trajectory
+from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
+
+SEEDS = range(400)
+#: Noise densities and SDs of biases of the payload.
+NOISE = ["imu.gyro_random_walk", "imu.accelerometer_random_walk", "gnss.horizontal_noise",
+         "gnss.vertical_noise", "gnss.horizontal_correlated_sd", "gnss.vertical_correlated_sd",
+         "gnss.velocity_noise", "camera.marking_sd"]  # fmt: skip
+BIAS = ["imu.gyro_bias_stability", "imu.gyro_turn_on_bias", "imu.accelerometer_bias_stability",
+        "imu.accelerometer_turn_on_bias"]  # fmt: skip
+OPTICS = ["camera.fx", "camera.fy", "camera.cx", "camera.cy"]
+ANGLES = [f"mount.misalignment_{name}" for name in ("roll", "tilt", "pan")]
+
+
+def numbers(twin) -> dict[str, float]:
+    return {
+        f"{group}.{name}": p.number for group, name, p in each_parameter(twin) if not isinstance(p.value, str)
+    }
+
+
+@pytest.fixture(scope="module")
+def stated():
+    return load_twin("static-antenna")
+
+
+@pytest.fixture(scope="module")
+def drawn(stated):
+    return pd.DataFrame([numbers(as_flown(stated, seed)) for seed in SEEDS])
+
+
+def without_tolerance(twin):
+    return twin.model_copy(update={"tolerance": None})
+
+
+@pytest.mark.parametrize("name", twin_names())
+def test_every_twin_says_how_far_its_sheets_may_be_off(name):
+    assert load_twin(name).tolerance is not None
+
+
+def test_only_noise_biases_optics_and_mount_are_drawn(stated, drawn):
+    sheet = numbers(stated)
+    moved = {name for name in drawn if (drawn[name] != sheet[name]).any()}
+    assert moved == {*NOISE, *BIAS, *OPTICS, *ANGLES}
+
+
+def test_noise_and_biases_fill_their_tolerance_evenly(stated, drawn):
+    sheet = numbers(stated)
+    for names, within in ((NOISE, stated.tolerance.noise.number), (BIAS, stated.tolerance.bias.number)):
+        for name in names:
+            factor = (drawn[name] / sheet[name]).to_numpy()
+            assert factor.min() >= 1 - within and factor.max() <= 1 + within, name
+            # An even spread has an SD of its half-width over the root of three.
+            assert factor.std() == pytest.approx(within / np.sqrt(3), rel=5 * 0.45 / np.sqrt(len(SEEDS)))
+            assert factor.mean() == pytest.approx(1.0, abs=5 * within / np.sqrt(3 * len(SEEDS)))
+
+
+def test_optics_and_mount_err_normally_by_their_standard_deviations(stated, drawn):
+    sheet, tolerance = numbers(stated), stated.tolerance
+    expected = {name: tolerance.focal_length.number * sheet[name] for name in OPTICS[:2]}
+    expected |= dict.fromkeys(OPTICS[2:], tolerance.principal_point.number)
+    expected |= dict.fromkeys(ANGLES, tolerance.mount.number)
+    for name, sd in expected.items():
+        off = (drawn[name] - sheet[name]).to_numpy()
+        assert off.std() == pytest.approx(sd, rel=5 / np.sqrt(2 * len(SEEDS))), name
+        assert abs(off.mean()) < 5 * sd / np.sqrt(len(SEEDS)), name
+
+
+def test_what_is_drawn_is_drawn_apart(stated, drawn):
+    """No two of them go together: a noisier gyro says nothing of the accelerometer beside it."""
+    together = np.corrcoef(drawn[[*NOISE, *BIAS, *OPTICS, *ANGLES]].to_numpy().T)
+    assert np.abs(together - np.eye(len(together))).max() < 5 / np.sqrt(len(SEEDS))
+
+
+def test_the_same_seed_flies_the_same_sensors(stated):
+    assert as_flown(stated, 3) == as_flown(stated, 3)
+    assert as_flown(stated, 3) != as_flown(stated, 4)
+    plain = without_tolerance(stated)
+    assert as_flown(plain, 3) is plain
+
+
+@pytest.mark.parametrize("name", ["static-antenna", "large-ship", "uav-search"])
+def test_no_file_of_a_flight_gives_away_what_was_drawn(name, tmp_path):
+    """Nothing that a filter may read differs from that of a flight whose sensors are as stated."""
+    twin = load_twin(name)
+    flight, exact = (simulate(one, 7, without=["imu"]) for one in (twin, without_tolerance(twin)))
+    assert flight.manifest == exact.manifest == twin_manifest(twin, 7)
+    for table in {**flight.nav, **flight.tables}:
+        one, other = (
+            flight.nav.get(table, flight.tables.get(table)),
+            exact.nav.get(table, exact.tables.get(table)),
+        )
+        assert list(one) == list(other)
+        for column in one:
+            if column.startswith(("sd_", "cov_", "lever_", "second_lever_")):
+                assert one[column].equals(other[column]), f"{table}.{column}"
+    save_flight(flight, tmp_path / "flight")
+    toml = tomllib.loads((tmp_path / "flight" / "flight.toml").read_text(encoding="utf-8"))
+    said = set(floats_in(toml))
+    sheet, real = numbers(twin), numbers(as_flown(twin, 7))
+    secrets = {real[key] for key in real if real[key] != sheet[key]}
+    assert secrets
+    assert not said & secrets
+
+
+def floats_in(content):
+    """All numbers of nested tables and lists."""
+    if isinstance(content, dict):
+        content = list(content.values())
+    if isinstance(content, list):
+        for part in content:
+            yield from floats_in(part)
+    elif isinstance(content, float):
+        yield content
+
+
+def test_manifests_of_two_flights_differ_in_nothing_but_the_seed(stated):
+    one, other = (twin_manifest(stated, seed).model_dump() for seed in (1, 2))
+    for key in ("name", "twin"):
+        one.pop(key), other.pop(key)
+    assert one == other
+
+
+def test_only_the_simulation_asks_what_was_drawn():
+    """Filters, navigation and the tables between them never import it."""
+    package = Path(wildlab.__file__).parent
+    asking = set()
+    for path in package.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        names |= {
+            alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names
+        }
+        if "as_flown" in names and path.stem != "as_flown":
+            asking.add(path.relative_to(package).parts[0])
+    assert asking <= {"simulation"}
+
+
+def test_the_camera_that_took_the_images_is_the_one_drawn(stated):
+    """Marks without noise lie where the real camera sees the antenna, and not where the stated one would."""
+    still = {"camera_sway": None}
+    camera = stated.camera
+    exact = {key: getattr(camera, key).model_copy(update={"value": 0.0}) for key in ("marking_sd", "latency")}
+    twin = stated.model_copy(update={"camera": camera.model_copy(update=exact), **still})
+    flight = simulate(twin, 5, without=OPTIONAL_TABLES)
+    at = pd.Series(frame_times(flight), flight.frames["frame_id"]).loc[flight.detections["frame_id"]]
+    p_nb, R_nb, _ = poses_at(flight.nav["truth"], at.to_numpy())
+    uv = flight.detections[["u_px", "v_px"]].to_numpy()
+    real = as_flown(twin, 5)
+    seen = ground_to_pixel(
+        twin_manifest(real, 5).geometry_camera(), [0.0, 0.0, -2.0], *camera_pose(true_mount(real), p_nb, R_nb)
+    )
+    assert np.abs(seen - uv).max() < 1e-6
+    m = flight.manifest
+    told = ground_to_pixel(
+        m.geometry_camera(), [0.0, 0.0, -2.0], *camera_pose(m.geometry_mount(), p_nb, R_nb)
+    )
+    assert np.abs(told - uv).max() > 1.0
+
+
+def test_the_receivers_are_as_noisy_as_drawn_and_say_what_is_stated(stated):
+    """A receiver drawn ten times noisier would show it; its columns would not."""
+    gnss = stated.gnss
+    loud = gnss.model_copy(
+        update={"horizontal_noise": gnss.horizontal_noise.model_copy(update={"value": 0.5})}
+    )
+    trajectory = twin_trajectory(stated, np.random.default_rng(0))
+    payload = lambda times: turned(trajectory(times), (np.zeros_like,) * 3)  # noqa: E731
+    quiet, noisy = (
+        gnss_table(stated.model_copy(update={"gnss": one}), payload, 1, gnss) for one in (gnss, loud)
+    )
+    assert quiet["sd_horizontal_m"].equals(noisy["sd_horizontal_m"])
+    assert np.diff(noisy["north_m"] - quiet["north_m"]).std() == pytest.approx(0.49 * np.sqrt(2), rel=0.05)
+    alone = gnss_table(stated.model_copy(update={"gnss": loud}), payload, 1)
+    assert alone["sd_horizontal_m"].iloc[0] == pytest.approx(np.hypot(0.5, 0.01))
+
+
+def test_a_tolerance_that_would_turn_a_noise_round_is_refused(stated):
+    given = stated.tolerance.model_dump()
+    given["noise"]["value"] = 1.5
+    with pytest.raises(ValueError, match=r"1\.5 is out of range; give a value from 0 to 0\.9"):
+        Tolerance.model_validate(given)

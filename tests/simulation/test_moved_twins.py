@@ -1,0 +1,138 @@
+"""Twins in another wind or at another speed still fly, see their target, and say what they cannot show."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.simulation.parameters import TwinParameters, load_twin, twin_names
+from wildlab.simulation.twin_trajectory import twin_trajectory
+from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
+from wildlab.simulation.variation import scaled, varied
+
+quick = partial(simulate, without=OPTIONAL_TABLES)
+MOVES = {
+    "half the wind": {"flight.wind_speed": 0.5},
+    "a fifth more wind": {"flight.wind_speed": 1.2},
+    "a fifth slower": {"flight.airspeed": 0.8},
+    "a fifth faster": {"flight.airspeed": 1.2},
+}
+
+
+def altitudes(twin: TwinParameters) -> tuple[float, float]:
+    """Between which the flight is to be, m, without what control leaves."""
+    known = [twin.flight.altitude.si]
+    known += [] if twin.climb is None else [twin.climb.altitude.si]
+    known += [] if twin.cable is None else [twin.cable.lowest.si, twin.cable.highest.si]
+    return min(known), max(known)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", twin_names())
+@pytest.mark.parametrize("move", MOVES)
+def test_no_twin_breaks_in_another_wind_or_at_another_speed(name: str, move: str) -> None:
+    written = load_twin(name)
+    twin = scaled(written, MOVES[move])
+    flight = simulate(twin, 1)
+    for source, nav in flight.nav.items():
+        assert np.isfinite(nav.to_numpy(float)).all(), source
+    for table in ("imu", "gnss", "gimbal"):
+        if table in flight.tables:
+            assert np.isfinite(flight.table(table).to_numpy(float)).all(), table
+    detections, truth = flight.table("detections"), flight.nav["truth"]
+    assert np.isfinite(detections[["u_px", "v_px"]].to_numpy()).all()
+    lowest, highest = altitudes(twin)
+    height, off = -truth["down_m"].to_numpy(), 5 * twin.flight.altitude_sd.si + 0.5
+    assert lowest - off < height.min() and height.max() < highest + off
+    R = quaternion_to_matrix(truth[["q_w", "q_x", "q_y", "q_z"]].to_numpy())
+    roll, pitch, _ = np.degrees(matrix_to_euler(R)).T
+    assert np.abs(roll).max() < 60 and np.abs(pitch).max() < 30
+    if twin.flight.kind is None:
+        # A fixed wing keeps its airspeed, but for what the smoothing of its turns takes off the way.
+        v = truth[[f"v_{axis}_m_s" for axis in ("north", "east", "down")]].to_numpy()
+        blows = twin.flight.wind_from.si + np.pi
+        wind = twin.flight.wind_speed.si * np.array([np.cos(blows), np.sin(blows), 0.0])
+        assert np.median(np.linalg.norm(v - wind, axis=1)) == pytest.approx(twin.flight.airspeed.si, rel=0.05)
+    printed = {target.identifier.text: int(target.observations.number) for target in written.targets}
+    seen = detections["target_id"].value_counts().to_dict()
+    assert set(printed) <= set(seen) if printed else len(detections) > 0
+    for target, most in printed.items():
+        # A fifth of the speed changes how long a pass lasts by about as much.
+        assert 0.6 * most <= seen[target] <= most
+
+
+@pytest.mark.parametrize("name", ["fast-vessel", "slow-vessel", "drifting-vessel-eight"])
+@pytest.mark.parametrize("move", MOVES)
+def test_recording_begins_at_the_same_place_of_the_lap(name: str, move: str) -> None:
+    """Against the target, which the course goes along with."""
+    written = load_twin(name)
+    begins = np.array([written.camera.recording_start.si])
+    there, moved = (
+        twin_trajectory(twin, np.random.default_rng(3))(begins)
+        for twin in (written, scaled(written, MOVES[move]))
+    )
+    # Corners are rounded by the time that rolling takes, which is another distance at another speed.
+    assert np.linalg.norm(there.position[0] - moved.position[0]) < 20
+    course = [np.arctan2(*motion.velocity[0, 1::-1]) for motion in (there, moved)]
+    assert np.degrees(abs(np.angle(np.exp(1j * (course[0] - course[1]))))) < 25
+
+
+def test_what_is_not_moved_is_as_it_is_written() -> None:
+    written = load_twin("fast-vessel")
+    assert written.moved_from is None and scaled(written, {}) is written
+    with varied({"flight.wind_speed": 0.5}):
+        assert load_twin("fast-vessel").moved_from == written
+    twice = scaled(scaled(written, {"flight.wind_speed": 0.5}), {"flight.wind_speed": 2.0})
+    assert twice.moved_from == written
+    ours, theirs = quick(twice, 1), quick(written, 1)
+    for table in ("frames", "detections", "truth"):
+        assert ours.table(table).equals(theirs.table(table)), "moved to and fro, it is where it was"
+
+
+def test_of_a_moved_twin_at_most_the_printed_number_counts() -> None:
+    slower = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 0.8}), 1)
+    faster = quick(scaled(load_twin("fast-vessel"), {"flight.airspeed": 1.2}), 1)
+    assert len(slower.table("detections")) == 264 > len(faster.table("detections")) > 150
+    both = quick(scaled(load_twin("crossing-vessels"), {"flight.airspeed": 1.2}), 1)
+    seen = both.table("detections").groupby("frame_id").size()
+    assert (seen == 2).sum() == 349, "as many images show both as printed"
+    ship = quick(scaled(load_twin("large-ship"), {"flight.wind_speed": 0.5}), 1)
+    assert len(ship.table("frames")) < 441 and len(ship.table("detections")) <= len(ship.table("frames"))
+
+
+def test_one_that_never_sees_its_target_says_so() -> None:
+    lost = scaled(load_twin("fast-vessel"), {"target.motion.speed": 3.0})
+    with pytest.raises(WildlabError, match="the target is in view in 0 images only, not in 264"):
+        quick(lost, 1)
+
+
+def test_a_wind_that_cannot_be_flown_in_is_said() -> None:
+    written = load_twin("fast-vessel")
+    with pytest.raises(WildlabError, match=r"wind_speed is more than 0\.8 of airspeed.*Move it less"):
+        scaled(written, {"flight.wind_speed": 5.0})
+    # Slower than the airframe, but not than what goes along with the vessel against it.
+    with pytest.raises(WildlabError, match="this course cannot be flown: the airspeed must exceed the wind"):
+        quick(scaled(written, {"flight.wind_speed": 3.3}), 1)
+
+
+def with_subset(first: int) -> TwinParameters:
+    """A twin with a third of its printed passes, and a subset that begins with detection ``first``."""
+    twin = scaled(load_twin("slow-vessel"), {"camera.images": 0.2})
+    assert twin.subset is not None
+    number = twin.subset.first.model_copy(update={"value": first})
+    return twin.model_copy(update={"subset": twin.subset.model_copy(update={"first": number})})
+
+
+def test_a_subset_ends_with_the_last_detection_there_is() -> None:
+    flight = quick(with_subset(500), 1)
+    count = len(flight.table("detections"))
+    assert 500 < count < 1750
+    group = flight.table("frames").set_index("frame_id")["group"]
+    inside = group[flight.table("detections")["frame_id"]]
+    assert (inside == "subset").sum() == count - 499
+    with pytest.raises(WildlabError, match=f"the subset begins with detection 3000, and there are {count}"):
+        quick(with_subset(3000), 1)
