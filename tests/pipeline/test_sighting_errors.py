@@ -75,7 +75,9 @@ def test_errors_of_the_pose_move_the_target_in_the_image(flight: Flight, seen: S
         for poses in (true, seen.poses.take(rows))
     ]
     expected = np.sqrt(np.mean((uv[0] - uv[1]) ** 2))
-    assert premise_numbers(flight, seen, "mekf", own)["shift_px"] == pytest.approx(expected, rel=0.05)
+    found = premise_numbers(flight, seen, "mekf", own)
+    assert found["shift_px"] == pytest.approx(expected, rel=0.05)
+    assert found["largest_shift_px"] == pytest.approx(np.hypot(*(uv[0] - uv[1]).T).max(), rel=0.05)
 
 
 def test_an_autopilot_that_agrees_has_no_differences(flight: Flight, seen: Sighting, own: Errors) -> None:
@@ -84,6 +86,12 @@ def test_an_autopilot_that_agrees_has_no_differences(flight: Flight, seen: Sight
     for name in ("difference_roll", "difference_yaw", "outside_pitch", "difference_turning"):
         assert found[name] == pytest.approx(0, abs=1e-6), name
     real = premise_numbers(flight, seen, "mekf", own)
+    beside = errors_against(flight.nav["autopilot"], flight.nav["mekf"], seen.times)
+    for i, axis in enumerate(("roll", "pitch", "yaw"), 6):
+        known = np.isfinite(beside.error[:, i])
+        ratio = np.abs(beside.error[known, i]) / beside.sd[known, i]
+        assert real[f"outside_{axis}"] == np.mean(ratio > 2)
+        assert np.mean(ratio > 0.5) > 0.1, "or the factor would not matter"
     inside = sorted([real["difference_turning"], real["difference_straight"]])
     assert inside[0] <= real["difference_roll"] <= inside[1]
 

@@ -158,7 +158,7 @@ def test_sensors_of_a_ferry_judged_on_one_scenario(
     folder = run("autoferry", reports, flight=tmp_path / "flight")
     found = values(folder)
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert len(content["claims"]) == 7
+    assert len(content["claims"]) == 8
     names = {name for name, subject in found if subject == "radar/havfruen/scenario-17/coloured"}
     assert {"rmse", "anees", "anis", "lag1_autocorrelation_north", "fraction_nees_inside"} <= names
     assert "lag1_autocorrelation" in {

@@ -48,7 +48,11 @@ def flight_with(**changed: float) -> dict[tuple[str, str], float]:
     row |= {("ekf", "rmse_course_start"): 1.1}
     pose = {f"{what}_{axis}": 1.0 for what in ("rms", "difference") for axis in ("roll", "pitch", "yaw")}
     pose |= {f"mean_sd_{axis}": 1.4 for axis in ("roll", "pitch", "yaw")} | {"sd_spread": 0.1}
-    pose |= {f"outside_{axis}": 0.1 for axis in ("roll", "pitch")} | {"outside_yaw": 0.4, "shift_px": 18.0}
+    pose |= {f"outside_{axis}": 0.1 for axis in ("roll", "pitch")} | {
+        "outside_yaw": 0.4,
+        "shift_px": 18.0,
+        "largest_shift_px": 70.0,
+    }
     pose |= {"rms_turning": 2.0, "rms_straight": 1.0, "difference_turning": 2.0, "difference_straight": 1.0}
     row |= {("mekf", name): value for name, value in (pose | {"difference_yaw": 2.0}).items()}
     return row | {tuple(key.split("__")): value for key, value in changed.items()}  # type: ignore[misc]
@@ -130,6 +134,7 @@ def test_what_contradicts_a_claim_is_true_elsewhere(changed: dict[str, float], w
     ("changed", "of"),
     [
         ({"mekf__shift_px": 2.9}, "ekf-nees-above"),
+        ({"mekf__largest_shift_px": 59.0}, "ekf-nis-too-large"),
         ({"flight__pauses": 0.0}, "ekf-overconfident-between"),
         ({"flight__pauses": 1.0}, "high-nis-after-pauses"),
         ({"mekf__rms_roll": 0.5, "mekf__rms_pitch": 0.5}, "schmidt-nees-inside"),

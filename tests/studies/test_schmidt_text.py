@@ -104,9 +104,9 @@ NORTH = ("north", "east", "down")
 
 
 def test_an_estimate_is_beside_the_true_errors() -> None:
-    assert "0.82 times the true errors" in headline.estimate_words(flights())
+    assert "0.82 times the true attitude errors" in headline.estimate_words(flights())
     same = flights(estimated__mean_sd_roll=lambda i, _: 1.0)
-    assert "as large as the true errors" in headline.estimate_words(same)
+    assert "as large as the true attitude errors" in headline.estimate_words(same)
 
 
 def falling(at_one: float) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Errors) ->
         autopilot; ``outside_...``: share beyond two deviations. ``difference_turning``, ``..._straight`` and
         ``rms_turning``, ``..._straight``: roll's, against autopilot and truth, while the airframe turns and
         not. ``shift_px``: RMS over detections and both axes of what the pose's error moves the target by in
-        the image.
+        the image; ``largest_shift_px``: the farthest that it does.
     """
     sd = own.sd[np.isfinite(own.sd[:, 0])][:, _POSE]
     low, middle, high = np.quantile(sd, (0.05, 0.5, 0.95), axis=0)
@@ -100,7 +100,8 @@ def premise_numbers(flight: Flight, seen: Sighting, source: str, own: Errors) ->
     rows = np.flatnonzero(seen.seen)
     J = ground_jacobians(seen.poses.take(rows), seen.uv[rows], seen.plane_down[rows])
     shift = np.linalg.solve(J.pixel, J.pose @ own.error[rows][:, _POSE, None])
-    return numbers | {"shift_px": rms(shift.ravel())}
+    far = np.hypot(*shift[:, :, 0].T)
+    return numbers | {"shift_px": rms(shift.ravel()), "largest_shift_px": float(np.nanmax(far))}
 
 
 def flight_numbers(flight: Flight, seen: Sighting) -> dict[str, float]:

@@ -19,7 +19,7 @@ def _metric(subject: str, name: str) -> Metric:
 
 
 def _unit_of_pose(subject: str, name: str) -> str:
-    if name == "shift_px":
+    if name.endswith("_px"):
         return "px"
     if name == "settled":
         return "s"

@@ -196,9 +196,10 @@ def estimate_words(spread: pd.DataFrame) -> str:
     ratio = sd.mean() / true.mean()
     how = "as large as" if 0.9 <= ratio <= 1.1 else f"{ratio:.2f} times"
     return (
-        f"The calibration flights, {CALIBRATION_S / 60:.0f} minutes of images at most, put roll and pitch at "
-        f"{sd.min():.2f} to {sd.max():.2f}° ({sd.mean():.2f}° on average), {how} the true errors of the "
-        f"flights that they are used on ({true.mean():.2f}°)."
+        f"The calibration flights, {CALIBRATION_S / 60:.0f} minutes of images at most, put roll and pitch, "
+        f"with what mount and camera are off by in them, at {sd.min():.2f} to {sd.max():.2f}° "
+        f"({sd.mean():.2f}° on average), {how} the true attitude errors of the flights that they are used on "
+        f"({true.mean():.2f}°)."
     )
 
 

@@ -149,7 +149,7 @@ def typical_sentence(table: pd.DataFrame) -> str:
         return "There is no other flight to say whether it is typical."
     if not odd.any():
         return "It is typical in all that its figures show."
-    listed = ", ".join(table["shown"][odd])
+    listed = "; ".join(table["shown"][odd])
     whole = "nothing" if odd.all() else f"{(~odd).sum()} of {len(table)} things"
     return f"It is typical in {whole} that its figures show. It is not in: {listed}."
 
