@@ -65,16 +65,25 @@ for _command in (studies.list_, studies.run, studies.vary, studies.evaluate):
 @wildlab.command(short_help="Is a flight usable, and for what?")
 @click.argument("flight", type=FOLDER)
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
-def check(flight: Path, as_json: bool) -> None:
+@click.option(
+    "--accept", is_flag=True, help="First write the checksums anew: its files were changed on purpose."
+)
+def check(flight: Path, as_json: bool, accept: bool) -> None:
     """Is a flight usable, and for what? Exits with 2 where there is a problem.
 
     \b
-    Example:
+    Examples:
       wildlab check flights/tuesday
+      wildlab check --accept flights/tuesday    after a change that was meant
     """
     from wildlab.flight.checks.check import check_flight, usable_for
+    from wildlab.flight.checksums import accept_changes
     from wildlab.flight.store import load_flight
 
+    if accept:
+        changed = accept_changes(flight)
+        said = f"accepted as they are: {', '.join(changed)}" if changed else "nothing was changed"
+        click.echo(sentence(said), err=True)
     loaded = load_flight(flight)
     findings, uses = check_flight(loaded), usable_for(loaded)
     problems = sum(finding.level == "problem" for finding in findings)

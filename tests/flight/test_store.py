@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import wildlab.flight.store as store
 from wildlab.errors import WildlabError
+from wildlab.flight.checksums import accept_changes
 from wildlab.flight.schema import NAV, TABLES, conform
 from wildlab.flight.store import Flight, load_flight, save_flight
 
@@ -116,6 +117,7 @@ def test_loading_names_the_file_and_the_missing_column(
     save_flight(make_flight(), tmp_path / "flight")
     path = tmp_path / "flight" / "nav" / "autopilot.parquet"
     pd.read_parquet(path).drop(columns=column).to_parquet(path)
+    accept_changes(tmp_path / "flight")
     with pytest.raises(WildlabError) as caught:
         load_flight(tmp_path / "flight")
     assert caught.value.file == str(path)
@@ -141,6 +143,7 @@ def test_folder_without_manifest(tmp_path: Path) -> None:
 def test_broken_parquet(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
     save_flight(make_flight(), tmp_path / "flight")
     (tmp_path / "flight" / "truth.parquet").write_bytes(b"PAR1 rubbish")
+    accept_changes(tmp_path / "flight")
     with pytest.raises(WildlabError, match=r"truth\.parquet: is not a readable Parquet file"):
         load_flight(tmp_path / "flight")
 

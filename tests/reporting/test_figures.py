@@ -77,3 +77,13 @@ def test_subjects_that_share_a_figure_have_different_colours() -> None:
     for family in (("autopilot", "observer", "mekf"), ("kf", "ekf", "schmidt", "coloured", "ukf", "imm")):
         assert len({figures.colour(name) for name in (*family, "truth")}) == len(family) + 1
     assert figures.colour("logged-pose") != figures.colour("calibrated-pose") != figures.colour("recorded")
+
+
+def test_a_first_look_draws_letters_as_shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    figure, axes = figures.new_figure()
+    axes.set_title("Error in metres")
+    figures.save_figure(figure, tmp_path, "whole")
+    monkeypatch.setenv(figures.QUICK, "1")
+    figures.save_figure(figure, tmp_path, "quick")
+    fonts = [b"/Type3" in (tmp_path / f"{name}.pdf").read_bytes() for name in ("whole", "quick")]
+    assert fonts == [False, True]

@@ -179,6 +179,31 @@ def test_a_flight_named_like_a_study_would_replace_its_report(
         )
 
 
+def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    first = make_flight()
+    save_flight(first, tmp_path / "monday")
+    evaluate_flight(tmp_path / "monday", **where)
+    # The same flight, corrected: its clock, and one table of several.
+    again = make_flight(clocks={"camera_offset_s": 0.1})
+    again.tables["frames"]["time_s"] += 0.5
+    save_flight(again, tmp_path / "monday", overwrite=True)
+    (outcome,) = evaluate_flight(tmp_path / "monday", **where)
+    assert outcome.state == "done"
+
+    other = make_flight()
+    for table in (*other.nav.values(), *other.tables.values()):
+        numbers = [name for name in table if table[name].dtype == float and name[:2] != "q_"]
+        table[numbers] = table[numbers] + 0.25
+    save_flight(other, tmp_path / "tuesday")
+    with pytest.raises(WildlabError, match="a report of another flight named 'small-flight'"):
+        evaluate_flight(tmp_path / "tuesday", **where)
+    (outcome,) = evaluate_flight(tmp_path / "tuesday", **where | {"reports": tmp_path / "elsewhere"})
+    assert outcome.state == "done"
+
+
 def several(folder: Path, **more: str) -> Path:
     show = (
         'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'

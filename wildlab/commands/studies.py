@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from wildlab.commands.shared import FOLDER, reports_folder, terminal_console
+from wildlab.commands.shared import FOLDER, Minutes, reports_folder, terminal_console
 from wildlab.terminal import print_json, print_table, shown
 
 
@@ -82,7 +82,7 @@ def list_(out: Path | None, as_json: bool) -> None:
 )
 @click.option(
     "--timeout",
-    type=click.FloatRange(0, min_open=True),
+    type=Minutes(),
     help="Minutes a notebook may take, and each seed.  [default: 30]",
 )
 @click.option("--out", type=FOLDER, help="Where reports go.  [default: reports]")
@@ -194,9 +194,7 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
 @click.argument("flight", type=FOLDER)
 @click.option("--source", help="Which poses to judge, where the flight has several (its nav/NAME.parquet).")
 @click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
-@click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), help="Minutes it may take.  [default: 30]"
-)
+@click.option("--timeout", type=Minutes(), help="Minutes it may take.  [default: 30]")
 def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float | None) -> None:
     """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
 

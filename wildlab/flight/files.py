@@ -7,7 +7,10 @@ thing pydantic finds into the one sentence a user reads.
 from __future__ import annotations
 
 import difflib
+import errno
+import os
 import re
+import stat
 import tomllib
 import typing
 from collections.abc import Iterable, Sequence
@@ -20,6 +23,10 @@ from wildlab.errors import WildlabError
 
 #: What a flight, a nav source or a twin may be called: it becomes a file name on every system.
 SAFE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+
+
+#: The most bytes of a TOML file that are read: a manifest has a few thousand.
+TOML_LIMIT = 4_000_000
 
 
 class Strict(BaseModel):
@@ -54,10 +61,17 @@ def inside(folder: Path, name: str, *, file: Path, field: str) -> Path:
     Raises
     ------
     WildlabError
-        Where the name is absolute, climbs out with ``..``, or is a symbolic link to somewhere else.
+        Where the name is absolute, climbs out with ``..``, is a symbolic link to somewhere else or in a
+        circle, or is too long.
     """
     path = folder / name
-    if leaves_folder(name) or not path.resolve().is_relative_to(folder.resolve()):
+    try:
+        stays = not leaves_folder(name) and path.resolve().is_relative_to(folder.resolve())
+    except RuntimeError:  # how Python says that links go in a circle
+        raise unreadable(OSError(errno.ELOOP, os.strerror(errno.ELOOP)), path, field) from None
+    except OSError as error:
+        raise unreadable(error, path, field) from None
+    if not stays:
         raise WildlabError(
             f"the path {name!r} leaves the folder it belongs to",
             "give a name below that folder, and copy the file there if it lies elsewhere",
@@ -89,15 +103,117 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         Where it is missing, not UTF-8 or not TOML.
     """
     try:
-        with path.open("rb") as stream:
-            return tomllib.load(stream)
+        content = read_regular(path, TOML_LIMIT)
     except FileNotFoundError:
         raise WildlabError(f"there is no such file, and it is {what}", "check the path", file=path) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
         raise WildlabError(f"is not valid TOML ({error})", "mend that line", file=path) from None
+    return parse_toml(text, path)
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """TOML text as nested dicts; `path` is only for messages.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise WildlabError(f"is not valid TOML ({error})", "mend that line", file=path) from None
+
+
+def regular_size(path: Path, limit: int | None = None, field: str | None = None) -> int:
+    """Size in bytes of a file that may be opened: a regular one, no pipe, no device, and not too large.
+
+    Parameters
+    ----------
+    path
+        Of the file; a link is followed.
+    limit
+        The most bytes it may have; None for any number.
+    field
+        Who asked for it, for messages.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    WildlabError
+        Where it is something else than a regular file, too large, or out of reach.
+    """
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        raise
     except OSError as error:
-        fix = "check the path and its permissions"
-        raise WildlabError(f"cannot be read ({error.strerror})", fix, file=path) from None
+        raise unreadable(error, path, field) from None
+    if not stat.S_ISREG(found.st_mode):
+        kind = next((word for is_one, word in _KINDS if is_one(found.st_mode)), "something else")
+        raise WildlabError(
+            f"is {kind}, and a regular file is wanted", "check the path", file=path, field=field
+        )
+    if limit is not None and found.st_size > limit:
+        raise WildlabError(
+            f"has {found.st_size:,} bytes, and {limit:,} are the most that is read of such a file",
+            "check that it is the right file",
+            file=path,
+            field=field,
+        )
+    return found.st_size
+
+
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def read_regular(path: Path, limit: int, field: str | None = None) -> bytes:
+    """The content of a regular file of at most so many bytes.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where there is none.
+    WildlabError
+        As `regular_size`, and where it cannot be read.
+    """
+    regular_size(path, limit, field)
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(limit + 1)
+    except OSError as error:
+        raise unreadable(error, path, field) from None
+    if len(content) > limit:
+        fix = "try again when nobody writes to it"
+        raise WildlabError("grew while it was read", fix, file=path, field=field)
+    return content
+
+
+def unreadable(error: OSError, path: Path, field: str | None = None) -> WildlabError:
+    """What the system said of a file, as a sentence with what to do."""
+    said = error.strerror or type(error).__name__
+    fixes = {
+        errno.EACCES: "check its permissions",
+        errno.EPERM: "check its permissions",
+        errno.ENAMETOOLONG: "give it a shorter name",
+        errno.ELOOP: "its links go in a circle; give the file itself",
+        errno.EIO: "the disk cannot give it back: copy what can be read, and restore the rest",
+    }
+    fix = fixes.get(error.errno or 0, "check the path and its permissions")
+    return WildlabError(f"cannot be read ({said})", fix, file=path, field=field)
 
 
 def check_model(model: type[Model], data: Any, path: Path | None) -> Model:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, read_toml
+from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, parse_toml, read_toml
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Origin
@@ -25,6 +25,7 @@ FILE_NAME = "flight.toml"
 Angle = Annotated[float, Field(ge=-360, le=360)]
 Spread = Annotated[float, Field(gt=0, le=1e6)]
 Vector = tuple[float, float, float]
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class LocationsPart(Strict):
@@ -218,7 +219,7 @@ class SourcePart(Strict):
     """A raw file the flight was made from, by its name below the source folder."""
 
     file: str
-    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    sha256: Sha256
     what: str = ""
 
     @field_validator("file")
@@ -252,6 +253,8 @@ class Manifest(Strict):
     scoring: ScoringPart = ScoringPart()
     twin: TwinPart | None = None
     sources: tuple[SourcePart, ...] = ()
+    #: Of the tables by file name, see `wildlab.flight.checksums`. A flight in memory has none.
+    checksums: dict[str, Sha256] = Field(default_factory=dict)
 
     @field_validator("name")
     @classmethod
@@ -348,6 +351,17 @@ def read_manifest(path: Path) -> Manifest:
         Where it is missing, not TOML, or a key is unknown, missing or wrong.
     """
     return make_manifest(read_toml(path, "the manifest of a flight"), path)
+
+
+def parse_manifest(text: str, path: Path) -> Manifest:
+    """The manifest in the text of a `flight.toml`; `path` is only for messages.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not TOML, or a key is unknown, missing or wrong.
+    """
+    return make_manifest(parse_toml(text, path), path)
 
 
 def manifest_toml(manifest: Manifest) -> str:

@@ -18,11 +18,10 @@ import pyarrow.parquet
 
 from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
-from wildlab.flight.files import inside, is_safe_name
+from wildlab.flight.checksums import TERRAIN, checksums_of, verify, with_checksums
+from wildlab.flight.files import inside, is_safe_name, regular_size
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
 from wildlab.flight.schema import NAV, TABLES, Table, conform
-
-TERRAIN = "terrain.tif"
 
 # pyarrow carries no types.
 arrow: Any = pyarrow
@@ -160,8 +159,8 @@ def load_flight(folder: Path | str) -> Flight:
     Raises
     ------
     WildlabError
-        Where the folder, the manifest, a table or a column is missing, a type is wrong, or a file lies
-        outside of the folder.
+        Where the folder, the manifest, a table or a column is missing, a type is wrong, a file lies outside
+        of the folder, or a table is not the one whose checksum the manifest has.
 
     Examples
     --------
@@ -177,6 +176,8 @@ def load_flight(folder: Path | str) -> Flight:
     if not folder.is_dir():
         raise WildlabError("there is no such folder", "check the path of the flight", file=folder)
     manifest = read_manifest(inside(folder, FILE_NAME, file=folder, field=FILE_NAME))
+    # Before anything is read: a damaged table may well be a readable one.
+    verify(folder, manifest.checksums)
     nav = {}
     nav_folder = folder / "nav"
     if nav_folder.exists():
@@ -195,19 +196,25 @@ def load_flight(folder: Path | str) -> Flight:
         if os.path.lexists(folder / f"{name}.parquet")
     }
     if os.path.lexists(folder / TERRAIN):
-        inside(folder, TERRAIN, file=folder, field=TERRAIN)
-    return Flight(manifest, nav, tables, folder)
+        _present(inside(folder, TERRAIN, file=folder, field=TERRAIN))
+    return Flight(manifest.model_copy(update={"checksums": {}}), nav, tables, folder)
+
+
+def _present(path: Path) -> None:
+    try:
+        regular_size(path)
+    except FileNotFoundError:
+        fix = "restore it, or import the flight again"
+        raise WildlabError("this file is missing", fix, file=path) from None
 
 
 def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
     path = inside(folder, name, file=folder, field=name)
+    _present(path)
     try:
         # ParquetFile, not read_table: the latter would read columns out of folder names such as "a=b".
         with parquet.ParquetFile(path) as stored:
             data = stored.read().to_pandas(ignore_metadata=True)
-    except FileNotFoundError:
-        fix = "restore it, or import the flight again"
-        raise WildlabError("this file is missing", fix, file=path) from None
     except (arrow.ArrowException, OSError, ValueError) as error:
         first = (str(error).strip() or type(error).__name__).splitlines()[0]
         problem = f"is not a readable Parquet file ({first})"
@@ -266,7 +273,6 @@ def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) 
             raise WildlabError(f"{name!r} is not a table of a flight", f"use one of {known}", file=target)
         tables[name] = conform(TABLES[name], table, name)
     with _replacing(target, overwrite) as folder_now:
-        (folder_now / FILE_NAME).write_text(manifest_toml(flight.manifest), encoding="utf-8")
         if nav:
             (folder_now / "nav").mkdir()
         for source, table in nav.items():
@@ -275,6 +281,8 @@ def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) 
             _write(table, folder_now / f"{name}.parquet")
         if flight.terrain is not None:
             shutil.copyfile(flight.terrain, folder_now / TERRAIN)
+        text = with_checksums(manifest_toml(flight.manifest), checksums_of(folder_now))
+        (folder_now / FILE_NAME).write_text(text, encoding="utf-8")
     return Flight(flight.manifest, nav, tables, target)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
 
 
@@ -47,8 +49,8 @@ def evaluate_flight(
     Raises
     ------
     WildlabError
-        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, or
-        its name is that of a study.
+        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, its
+        name is that of a study, or the report of another flight of this name would be replaced.
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
@@ -62,6 +64,7 @@ def evaluate_flight(
                 f"the flight is named {flight.name!r} like a study, whose report it would replace",
                 "give the flight another name in flight.toml, or the report another folder with --out",
             )
+        refuse_other_flight(folder, reports / name)
         study = StudyEntry(name="evaluate", title=f"Flight {name}", notebook=notebook, parameters=parameters)
         jobs.append(
             make_job(
@@ -99,6 +102,39 @@ def evaluate_flight(
             file=folder,
         )
     return run_all([jobs], skipped, studies, reports, console)
+
+
+def refuse_other_flight(folder: Path, report: Path) -> None:
+    """Two flights of one name are told apart by their content: what shares neither a raw file nor a table is
+    another flight.
+
+    Parameters
+    ----------
+    folder
+        Of the flight.
+    report
+        The folder that its report would go to.
+
+    Raises
+    ------
+    WildlabError
+        Where the report of another flight is there.
+    """
+    there = read_provenance(report).get("flight") or {}
+    mine = provenance_of_flight(folder)
+    old, new = _contents(there), _contents(mine)
+    if old and not old & new:
+        raise WildlabError(
+            f"there is a report of another flight named {mine['name']!r}: no table and no raw file is the "
+            "same",
+            "give this flight another name in flight.toml, the report another folder with --out, or move the "
+            "old report away",
+            file=report,
+        )
+
+
+def _contents(flight: Mapping[str, Any]) -> set[str]:
+    return {*flight.get("files", {}).values(), *flight.get("sources", ())}
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:

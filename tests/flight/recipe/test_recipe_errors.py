@@ -308,7 +308,7 @@ def both(*changes: Change) -> Change:
         (in_recipe("frames.file", "C:\\photos.csv"), "recipe.toml", "frames.file", "leaves the folder"),
         (in_recipe("files", {"../secret.txt": ""}), "recipe.toml", "files.file", "leaves the folder"),
         (in_recipe("poses.log.file", ""), "recipe.toml", "poses.log.file", "leaves the folder"),
-        (in_recipe("poses.log.file", "."), "raw", "poses.log.file", "cannot be read"),
+        (in_recipe("poses.log.file", "."), "raw", "poses.log.file", "is a folder"),
         # what belongs together
         (
             in_recipe("poses.log.attitude.order", None),

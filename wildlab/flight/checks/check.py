@@ -11,6 +11,7 @@ from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
 
@@ -73,6 +74,7 @@ def find(flight: Flight) -> list[Finding]:
         *_missing(flight),
         *_uncertainty(flight),
         *_clocks(flight),
+        *_checksums(flight),
     ]
     return sorted(found, key=lambda finding: ("problem", "warning", "note").index(finding.level))
 
@@ -250,6 +252,28 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "vertical.reference",
             f"heights are said to be {manifest.vertical.reference!r}, and nothing was taken off them",
             "state correction_m in the recipe and import again: inside, heights are ellipsoidal",
+        )
+
+
+def _checksums(flight: Flight) -> Iterator[Finding]:
+    if flight.folder is None:
+        return
+    changed = manifest_changed(flight.folder)
+    if changed is None:
+        yield Finding(
+            "note",
+            "flight.toml",
+            "checksums",
+            "there are no checksums, so damage to the tables would not be found",
+            "write them: wildlab check --accept",
+        )
+    elif changed:
+        yield Finding(
+            "warning",
+            "flight.toml",
+            "",
+            "its text is another one than was written: it was changed by hand, or damaged",
+            "if the change is meant: wildlab check --accept",
         )
 
 

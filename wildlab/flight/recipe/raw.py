@@ -20,7 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import did_you_mean, inside, printable
+from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import read_part
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
@@ -33,6 +33,8 @@ Nanoseconds = NDArray[np.int64]
 
 #: Stamps that end so carry their own zone.
 _ZONED = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d.*(?:[Zz]|[+-]\d\d(?::?\d\d)?)")
+#: The most bytes of a raw file that are read: ten hours of 250 a second are one gigabyte of text.
+RAW_LIMIT = 4 << 30
 #: Nanoseconds since 1970 fit 64 bits from 1678 to 2262.
 _LATEST_S = 9.2e9
 
@@ -80,22 +82,17 @@ class RawFiles:
         Raises
         ------
         WildlabError
-            Where the name leaves the folder, or there is no such file.
+            Where the name leaves the folder, there is no such file, or it is no regular file or too large.
         """
         path = inside(self.folder, name, file=self.recipe, field=f"{part}.file")
         try:
-            data = path.read_bytes()
+            data = read_regular(path, RAW_LIMIT, f"{part}.file")
         except FileNotFoundError:
             raise WildlabError(
                 f"there is no such file, and [{part}] of {self.recipe.name} asks for it",
                 "check the name in the recipe, and the source folder",
                 file=path,
                 field=f"{part}.file",
-            ) from None
-        except OSError as error:
-            fix = "check that it is a file, and its permissions"
-            raise WildlabError(
-                f"cannot be read ({error.strerror})", fix, file=path, field=f"{part}.file"
             ) from None
         self.hashes[name] = hashlib.sha256(data).hexdigest()
         return data

@@ -58,6 +58,8 @@ def _end_with_parent(job: Job) -> None:
 
 def _keep_to_ourselves(job: Job) -> None:
     """Leave the reader's own settings, history and terminal out of it: the same run everywhere."""
+    from wildlab.reporting.figures import QUICK
+
     runtime = Path(job.runtime)
     os.environ.update(
         # First place to look for the kernel `python3`: this environment, whatever else is installed.
@@ -75,6 +77,8 @@ def _keep_to_ourselves(job: Job) -> None:
         PYTHONHASHSEED="0",
         TZ="UTC",
     )
+    if job.first_look:
+        os.environ[QUICK] = "1"
     log = os.open(Path(job.work) / ".log", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     for stream in (1, 2):
         os.dup2(log, stream)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import shutil
@@ -89,14 +90,14 @@ def collect(
     others
         Folders of further flights, of which the same gets in.
     """
-    further = {"others": [_flight(other) for other in others]} if others else {}
+    further = {"others": [provenance_of_flight(other) for other in others]} if others else {}
     return {
         "study": study,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "wildlab": {"version": __version__, **git_state()},
         "lock": {"file": LOCK.name, "sha256": sha256(LOCK) if LOCK.is_file() else None},
         "notebook": {"file": notebook.name, "sha256": sha256(notebook)},
-        "flight": _flight(flight) if flight is not None else None,
+        "flight": provenance_of_flight(flight) if flight is not None else None,
         **further,
         "parameters": parameters,
         "seed": seed,
@@ -106,7 +107,17 @@ def collect(
     }
 
 
-def _flight(folder: Path) -> dict[str, Any]:
+def read_provenance(report: Path) -> dict[str, Any]:
+    """What the provenance in a report's folder says; nothing where there is none that can be read."""
+    try:
+        content = json.loads((report / "provenance.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def provenance_of_flight(folder: Path) -> dict[str, Any]:
+    """What provenance says of a flight: its name, its kind, and what its files and raw files are told by."""
     try:
         manifest = tomllib.loads((folder / "flight.toml").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -117,6 +128,7 @@ def _flight(folder: Path) -> dict[str, Any]:
         "kind": str(manifest.get("kind", "unknown")),
         "locations": str(manifest.get("locations", {}).get("sensitivity", "withheld")),
         "files": {path.relative_to(folder).as_posix(): sha256(path) for path in files},
+        "sources": [str(one.get("sha256")) for one in manifest.get("sources", []) if isinstance(one, dict)],
     }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ def follow_others(seen: Sighting) -> dict[str, Track]:
     frame = float(np.median(np.diff(seen.times)))
 
     def stepped(acceleration: float) -> Motion:
+        @cache  # nearly all steps are of one length
         def motion(dt: float) -> tuple[Array, Array]:
             return in_steps(dt, lambda step: constant_velocity(step, acceleration), frame)
 

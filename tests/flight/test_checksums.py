@@ -1,0 +1,133 @@
+"""A byte of a flight that changed by itself is found; a change on purpose is accepted, nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checksums import accept_changes, checksums_of, manifest_changed, with_checksums
+from wildlab.flight.store import Flight, load_flight, save_flight
+
+
+@pytest.fixture
+def folder(make_flight: Callable[..., Flight], tmp_path: Path) -> Path:
+    save_flight(make_flight(), tmp_path / "flight")
+    (tmp_path / "flight" / "terrain.tif").write_bytes(b"II*\x00 a terrain")
+    accept_changes(tmp_path / "flight")
+    return tmp_path / "flight"
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def test_they_are_those_of_the_files_and_the_flight_in_memory_has_none(folder: Path) -> None:
+    names = {path.relative_to(folder).as_posix() for path in _files(folder)} - {"flight.toml"}
+    found = checksums_of(folder)
+    assert set(found) == names and "nav/autopilot.parquet" in names and "terrain.tif" in names
+    for name, digest in found.items():
+        assert digest == hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        assert f'"{name}" = "{digest}"' in (folder / "flight.toml").read_text()
+    assert load_flight(folder).manifest.checksums == {}
+
+
+def test_every_flipped_bit_of_a_table_is_found(folder: Path) -> None:
+    rng = np.random.default_rng(7)
+    tables = [path for path in _files(folder) if path.name != "flight.toml"]
+    for _ in range(300):
+        path = tables[rng.integers(len(tables))]
+        whole = path.read_bytes()
+        damaged = bytearray(whole)
+        damaged[rng.integers(len(whole))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        with pytest.raises(WildlabError, match="damaged or changed since it was written") as caught:
+            load_flight(folder)
+        assert caught.value.file == str(path) and "wildlab check --accept" in (caught.value.fix or "")
+        path.write_bytes(whole)
+    load_flight(folder)
+
+
+def test_every_flipped_bit_of_the_manifest_is_an_error_or_is_said(folder: Path) -> None:
+    rng = np.random.default_rng(8)
+    path = folder / "flight.toml"
+    whole = path.read_bytes()
+    for place in rng.choice(len(whole), 300, replace=False):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        try:
+            findings = check_flight(load_flight(folder))
+        except WildlabError as error:
+            assert str(folder) in str(error.file)
+            continue
+        worst = [
+            one.level for one in findings if one.table == "flight.toml" and "another one" in one.sentence
+        ]
+        # Blank lines at the seam of the two parts say nothing.
+        assert worst == ["warning"] or bytes(damaged).split() == whole.split(), damaged[
+            place - 20 : place + 20
+        ]
+
+
+def test_a_missing_and_an_added_table_are_named(folder: Path) -> None:
+    (folder / "nav" / "other.parquet").write_bytes((folder / "nav" / "autopilot.parquet").read_bytes())
+    with pytest.raises(WildlabError, match="has no checksum of this file, so it was added later"):
+        load_flight(folder)
+    (folder / "nav" / "other.parquet").unlink()
+    (folder / "truth.parquet").unlink()
+    with pytest.raises(WildlabError, match=r"this file is missing, and flight\.toml has a checksum of it"):
+        load_flight(folder)
+
+
+def test_a_change_on_purpose_is_accepted_and_comments_stay(folder: Path) -> None:
+    path = folder / "flight.toml"
+    text = path.read_text().replace("camera_offset_s = 0.0", "camera_offset_s = 0.25  # by the flash")
+    path.write_text(text)
+    (folder / "truth.parquet").unlink()
+    ran = CliRunner().invoke(wildlab, ["check", "--accept", str(folder)])
+    assert "Accepted as they are: flight.toml, truth.parquet." in ran.stderr
+    assert "by the flash" in path.read_text()
+    flight = load_flight(folder)
+    assert flight.manifest.clocks.camera_offset_s == 0.25 and flight.truth is None
+    assert manifest_changed(folder) is False
+    again = CliRunner().invoke(wildlab, ["check", "--accept", str(folder)])
+    assert "Nothing was changed." in again.stderr
+
+
+def test_a_flight_without_checksums_is_loaded_and_told_so(folder: Path) -> None:
+    path = folder / "flight.toml"
+    path.write_text(path.read_text().split("[checksums]")[0])
+    (said,) = [one for one in check_flight(load_flight(folder)) if one.field == "checksums"]
+    assert said.level == "note" and "no checksums" in said.sentence
+
+
+def test_the_part_may_stand_anywhere_but_in_a_text(folder: Path) -> None:
+    path = folder / "flight.toml"
+    whole, part = path.read_text().split("[checksums]")
+    head, rest = whole.split("[locations]")
+    path.write_text(f"{head}\n[checksums]{part}\n[locations]{rest}")
+    load_flight(folder)
+    assert accept_changes(folder) == ["flight.toml"]  # its lines stand in another order
+    assert manifest_changed(folder) is False and path.read_text().count("[checksums]") == 1
+
+    quoted = path.read_text().replace('description = ""', 'description = """\n[checksums]\nmine"""')
+    assert quoted != path.read_text()
+    path.write_text(quoted)
+    with pytest.raises(
+        WildlabError, match=r"a text in it has a line that reads \[checksums\]|is not valid TOML"
+    ):
+        accept_changes(folder)
+    assert path.read_text() == quoted
+
+
+def test_writing_them_twice_changes_nothing() -> None:
+    once = with_checksums('name = "lake"\n', {"frames.parquet": "0" * 64})
+    assert with_checksums(once, {"frames.parquet": "0" * 64}) == once

@@ -1,0 +1,92 @@
+"""Whatever a path leads to, it is opened only where it is a regular file of a sensible size."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight import files
+from wildlab.flight.files import read_regular, read_toml, regular_size, unreadable
+from wildlab.flight.store import Flight, load_flight, save_flight
+
+
+def _refused(path: Path, limit: int = 100) -> str:
+    with pytest.raises(WildlabError) as caught:
+        read_regular(path, limit)
+    assert caught.value.file == str(path) and caught.value.fix
+    return str(caught.value)
+
+
+def test_what_is_no_regular_file_is_named_and_never_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zeros").symlink_to("/dev/zero")
+    assert "is a named pipe" in _refused(tmp_path / "pipe")
+    assert "is a device" in _refused(tmp_path / "zeros")
+    assert "is a folder" in _refused(tmp_path)
+
+
+def test_sizes_are_stated_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(b"0123456789")
+    assert read_regular(path, 10) == b"0123456789" and regular_size(path) == 10
+    assert "has 10 bytes, and 9 are the most" in _refused(path, 9)
+    with path.open("wb") as stream:
+        stream.truncate(files.TOML_LIMIT + 1)  # takes no room on the disk
+    with pytest.raises(WildlabError, match="4,000,001 bytes, and 4,000,000 are the most"):
+        read_toml(path, "a recipe")
+
+
+def test_a_file_that_grows_while_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(b"0123456789")
+    monkeypatch.setattr(files, "regular_size", lambda path, limit, field: 5)
+    assert "grew while it was read" in _refused(path, 5)
+
+
+def test_what_the_system_says_is_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    assert "Its links go in a circle" in _refused(tmp_path / "a")
+    assert "Give it a shorter name" in _refused(tmp_path / ("x" * 300))
+    assert "Check its permissions" in str(unreadable(PermissionError(13, "Permission denied"), tmp_path))
+    assert "restore the rest" in str(unreadable(OSError(5, "Input/output error"), tmp_path))
+
+
+@pytest.mark.parametrize("name", ["frames.parquet", "nav/other.parquet", "flight.toml", "terrain.tif"])
+def test_a_pipe_in_a_flight_stops_nothing(
+    make_flight: Callable[..., Flight], tmp_path: Path, name: str
+) -> None:
+    folder = tmp_path / "flight"
+    save_flight(make_flight(), folder)
+    path = folder / name
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+    with pytest.raises(WildlabError) as caught:
+        load_flight(folder)
+    assert path.name in str(caught.value)
+
+
+def test_names_that_go_in_a_circle_or_are_too_long_are_sentences_too(
+    make_flight: Callable[..., Flight], tmp_path: Path
+) -> None:
+    folder = tmp_path / "flight"
+    save_flight(make_flight(), folder)
+    (folder / "gnss.parquet").symlink_to("imu.parquet")
+    (folder / "imu.parquet").symlink_to("gnss.parquet")
+    with pytest.raises(WildlabError, match=r"(imu|gnss)\.parquet.*links go in a circle"):
+        load_flight(folder)
+    with pytest.raises(WildlabError, match="shorter name"):
+        read_regular(files.inside(folder, "x" * 300, file=folder, field="frames.file"), 10)
+
+
+@pytest.mark.parametrize("minutes", ["nan", "inf", "0", "-3", "soon", "1e9"])
+def test_minutes_that_are_none_are_refused(tmp_path: Path, minutes: str) -> None:
+    for command in (["run", "sensitivity"], ["evaluate", str(tmp_path)]):
+        ran = CliRunner().invoke(wildlab, [*command, "--timeout", minutes])
+        assert ran.exit_code == 2 and "is not a number of minutes" in ran.output

@@ -1,0 +1,187 @@
+"""Checksums of a flight's tables, kept in `flight.toml`: a byte that changed by itself is found on load.
+
+The part ``[checksums]`` is the last of the file, and has one of the text above it too. Whoever changes
+something on purpose writes the part anew with `accept_changes` (``wildlab check --accept``); the rest of the
+file, comments too, stays as it is. A changed table is refused; a changed `flight.toml` is used and said,
+since that is where a flight is corrected by hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from wildlab.errors import WildlabError
+from wildlab.files import sha256, write_atomic
+from wildlab.flight.files import TOML_LIMIT, inside, read_regular
+from wildlab.flight.manifest import FILE_NAME, parse_manifest, read_manifest
+from wildlab.flight.schema import TABLES
+from wildlab.flight.toml import dump_toml
+
+TERRAIN = "terrain.tif"
+#: The part of `flight.toml`, and its line.
+PART = "checksums"
+_HEADER = re.compile(rf"^[ \t]*\[[ \t]*{PART}[ \t]*\].*$", re.MULTILINE)
+_NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
+
+
+def table_files(folder: Path) -> dict[str, Path]:
+    """The tables and the terrain of a flight folder, by their names in it: ``"nav/logged.parquet"``."""
+    names = [f"{name}.parquet" for name in TABLES] + [TERRAIN]
+    names += sorted(f"nav/{path.name}" for path in (folder / "nav").glob("*.parquet"))
+    return {name: folder / name for name in names if (folder / name).is_file()}
+
+
+def checksums_of(folder: Path) -> dict[str, str]:
+    """SHA-256 of every table of a flight folder.
+
+    Parameters
+    ----------
+    folder
+        The flight folder.
+
+    Returns
+    -------
+    dict
+        64 hexadecimal digits by the file's name in the folder.
+
+    Raises
+    ------
+    WildlabError
+        Where a table is a link out of the folder.
+    """
+    return {
+        name: sha256(inside(folder, name, file=folder, field=name)) for name in sorted(table_files(folder))
+    }
+
+
+def verify(folder: Path, stated: Mapping[str, str]) -> None:
+    """Hold every table against its checksum. Without any checksums there is nothing to hold it against.
+
+    Parameters
+    ----------
+    folder
+        The flight folder.
+    stated
+        The checksums that `flight.toml` states.
+
+    Raises
+    ------
+    WildlabError
+        Naming the first table that is missing, was added or was changed.
+    """
+    if not stated:
+        return
+    meant = f"if it is meant: wildlab check --accept {folder}"
+    found = checksums_of(folder)
+    for name in sorted({*stated, *found} - {FILE_NAME}):
+        if name not in found:
+            raise WildlabError(
+                "this file is missing, and flight.toml has a checksum of it",
+                f"restore it, or import the flight again; {meant}",
+                file=folder / name,
+            )
+        if name not in stated:
+            raise WildlabError(
+                "flight.toml has no checksum of this file, so it was added later",
+                f"move it elsewhere; {meant}",
+                file=folder / name,
+            )
+        if found[name] != stated[name]:
+            raise WildlabError(
+                "its SHA-256 is not the one in flight.toml: it was damaged or changed since it was written",
+                f"restore it, or import the flight again; {meant}",
+                file=folder / name,
+            )
+
+
+def accept_changes(folder: Path) -> list[str]:
+    """Write the checksums of the tables as they are into `flight.toml`.
+
+    Parameters
+    ----------
+    folder
+        The flight folder.
+
+    Returns
+    -------
+    list of str
+        The tables whose checksum is another one now, were added or are gone.
+
+    Raises
+    ------
+    WildlabError
+        Where `flight.toml` cannot be read, or no part can be told in it.
+    """
+    path = inside(folder, FILE_NAME, file=folder, field=FILE_NAME)
+    before, tables = read_manifest(path).checksums, checksums_of(folder)
+    text = _text(path)
+    now = tables | {FILE_NAME: _of_text(text)}
+    changed = [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
+    if changed:
+        new = with_checksums(text, tables)
+        # What looks like the part may stand inside of a text of several lines.
+        plain: dict[str, dict[str, str]] = {"checksums": {}}
+        if read_manifest(path).model_copy(update=plain) != parse_manifest(new, path).model_copy(update=plain):
+            raise WildlabError(
+                "a text in it has a line that reads [checksums]", "reword that line", file=path, field=PART
+            )
+        write_atomic(path, new)
+    return changed
+
+
+def manifest_changed(folder: Path) -> bool | None:
+    """Whether `flight.toml` is another text than the one that was written; None where that cannot be told.
+
+    Raises
+    ------
+    WildlabError
+        Where `flight.toml` cannot be read.
+    """
+    path = inside(folder, FILE_NAME, file=folder, field=FILE_NAME)
+    stated = read_manifest(path).checksums.get(FILE_NAME)
+    return None if stated is None else stated != _of_text(_text(path))
+
+
+def _text(path: Path) -> str:
+    return read_regular(path, TOML_LIMIT).decode("utf-8")
+
+
+def _of_text(text: str) -> str:
+    """SHA-256 of a manifest's text but for the checksums."""
+    return hashlib.sha256(_without(text).encode("utf-8")).hexdigest()
+
+
+def _without(text: str) -> str:
+    header = _HEADER.search(text)
+    if header is not None:
+        rest = _NEXT.search(text, header.end())
+        text = text[: header.start()] + (text[rest.start() :] if rest is not None else "")
+    return text.rstrip("\n") + "\n"
+
+
+def with_checksums(text: str, tables: Mapping[str, str]) -> str:
+    """The text of a `flight.toml` with these checksums and its own as the last part, and no others.
+
+    Parameters
+    ----------
+    text
+        Of the file.
+    tables
+        The checksums of the tables, by file name.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> text = with_checksums('name = "lake"  # ours', {"frames.parquet": "00"})
+    >>> text.splitlines()[:3]
+    ['name = "lake"  # ours', '', '[checksums]']
+    >>> with_checksums(text, {"frames.parquet": "00"}) == text
+    True
+    """
+    return _without(text) + "\n" + dump_toml({PART: {FILE_NAME: _of_text(text), **tables}})
