@@ -134,7 +134,7 @@ def test_the_curve_says_where_stated_and_true_error_match(at_one: float, title: 
     assert found == title
     curve = headline.curve_table(spread)
     fine = (curve["verdict"] == headline.CONSISTENT).sum()
-    assert (f"({fine} of 9 points)" if fine else "at no point of the curve") in points[0]
+    assert (f"({fine} of 9 points)" if fine else "at none of the 9 points of the curve") in points[0]
     marks = charts.marks_of(spread)
     assert marks["schmidt"] == (pytest.approx(1.4), pytest.approx(at_one), marks["schmidt"][2])
 

@@ -73,7 +73,7 @@ class Comparison:
     verdict
         One of the words above.
     ratio
-        Ours to the printed one; None where one of them is not above zero.
+        Ours to the printed one; None where one of them is not above zero, and of a signed mean.
     difference
         Ours minus the printed one.
     spread
@@ -208,6 +208,8 @@ def compare_flight(
         if kind == "signed mean" and size is None:
             why = "no size of the errors is printed with it"
             return Comparison(NOT_JUDGED, ratio, difference, spread, why)
+        if kind == "signed mean":
+            ratio = None  # of a mean near zero it says nothing
         allowed = share * (size if kind == "signed mean" else 1.0)  # type: ignore[operator]
         near = abs(difference) <= allowed + 1e-9
         vague = known and high - low > WIDEST_MARGINS * allowed  # type: ignore[operator]

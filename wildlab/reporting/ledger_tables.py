@@ -50,7 +50,7 @@ def numbers_table(one: StudyStatus) -> str:
     ran = one.ran
     head = ["quantity", "published"]
     if ran:
-        head += ["here", "ratio", _strip_heading(one), "flights below the print", ""]
+        head += ["here", "ratio, or difference", _strip_heading(one), "flights below the print", ""]
     heads = "".join(
         f'<th scope="col"{_text(i == 0)}>{h}</th>' if h else '<td class="text"></td>'
         for i, h in enumerate(head)
@@ -109,12 +109,19 @@ def _row(n: Number, *, ran: bool) -> str:
         below = NOTHING if n.below is None else f"{100 * n.below:.0f} %"
         cells += [
             f"<td>{number(n.here, n.digits + 1)}{unit}</td>",
-            f"<td>{number(n.ratio, 2)}</td>",
+            f"<td>{_ratio(n, unit)}</td>",
             f"<td>{strip(n)}</td>",
             f"<td>{below}</td>",
             f'<td class="text">{_pill(n.verdict)}{_why(n)}</td>',
         ]
     return f"<tr>{''.join(cells)}</tr>"
+
+
+def _ratio(n: Number, unit: str) -> str:
+    if n.ratio is not None or n.here is None:
+        return number(n.ratio, 2)
+    off = n.here - n.published
+    return f"{'+' if off > 0 else '−' if off < 0 else ''}{number(abs(off), n.digits + 1)}{unit}"
 
 
 def _why(n: Number) -> str:

@@ -45,6 +45,9 @@ def error_name(name: str) -> str:
     return f"{name}_se"
 
 
+MINUS = "\u2212"
+
+
 def recorded_for(row: Mapping[str, Any], ours: Recorded) -> Mapping[str, Any]:
     """What a run recorded for a published number: empty where nothing, sizes where it is compared by size."""
     name, subject = str(row["name"]), str(row["subject"])
@@ -112,3 +115,21 @@ def judge(
         size=size,
     )
     return Comparison(compared.verdict, compared.ratio, here - value, compared.spread, compared.reason)
+
+
+def comparison_words(compared: Comparison) -> str:
+    """Our number beside the printed one: ``"1.21"`` times it, or where no ratio says anything ``"+3.25"``.
+
+    Parameters
+    ----------
+    compared
+        From `judge`.
+
+    Returns
+    -------
+    str
+    """
+    if compared.ratio is not None:
+        return f"{compared.ratio:.2f}"
+    off = compared.difference
+    return f"{'+' if off > 0 else MINUS if off < 0 else ''}{abs(off):.2f}"

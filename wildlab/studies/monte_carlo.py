@@ -15,11 +15,11 @@ from wildlab.evaluation.shares import HOLDS, NO_PREMISE, Check, decide, paired_d
 from wildlab.reporting.published import load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
-from wildlab.reporting.verdicts import judge, recorded_for, size_name
+from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
 from wildlab.studies.protocol import Study
 
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
-PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "ratio", "drawn"), 2)
+PUBLISHED_DIGITS = dict.fromkeys(("published", "here", "drawn"), 2)
 CLAIM_COLUMNS = {
     "claim": "claim",
     "source": "where",
@@ -91,7 +91,7 @@ def published_columns(n: int) -> dict[str, str]:
             "quantity": "quantity (m)",
             "published": "published",
             "here": "here, one flight",
-            "ratio": "ratio",
+            "ratio": "ratio, or difference",
             "verdict": "verdict",
         }
     return {
@@ -99,7 +99,7 @@ def published_columns(n: int) -> dict[str, str]:
         "quantity": "quantity (m)",
         "published": "published",
         "here": "here, median",
-        "ratio": "ratio",
+        "ratio": "ratio, or difference",
         "range": spread_words(n).heading,
         "below": "flights below the print",
         "verdict": "verdict",
@@ -192,10 +192,12 @@ def beside_published(
                     + (", by size" if by_size else ""),
                     "published": abs(row["value"]) if by_size else row["value"],
                     "here": found.get("value", np.nan),
-                    "ratio": np.nan if compared is None or compared.ratio is None else compared.ratio,
+                    "ratio": "" if compared is None else comparison_words(compared),
                     "range": range_words(values, 2 if np.nanmax(values, initial=0.0) < 2 else 1),
                     "below": "" if below is None else f"{100 * below:.0f} %",
-                    "verdict": "" if compared is None else compared.verdict,
+                    "verdict": ""
+                    if compared is None
+                    else compared.verdict + (", fitted to it" if row["fitted"] else ""),
                     "drawn": values.iloc[0],
                 }
             )

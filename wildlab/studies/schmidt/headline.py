@@ -245,8 +245,8 @@ def curve_words(spread: pd.DataFrame) -> tuple[str, list[str]]:
     fine = curve[curve["verdict"] == CONSISTENT]
     passed = curve[curve["inside"] >= 0.9]
     points = [
-        "The test over all flights finds nothing wrong "
-        + (f"at {_degrees(fine)}." if len(fine) else "at no point of the curve.")
+        "The test over all flights is passed "
+        + (f"at {_degrees(fine)}." if len(fine) else f"at none of the {len(curve)} points of the curve.")
         + " By the thesis's yardstick nine flights of ten pass "
         + (f"at {_degrees(passed)}." if len(passed) else "at no point of it."),
     ]
