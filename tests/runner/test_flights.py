@@ -116,6 +116,27 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
     assert outcome.state == "done" and outcome.name == "s-small-flight"
 
 
+@pytest.mark.parametrize(
+    "cell", ["report.save()", "raise RuntimeError(flight)", "load_flight(flight + '/x')"]
+)
+def test_no_folder_of_a_flight_gets_into_a_report(
+    tmp_path: Path, make_flight: Callable[..., Flight], cell: str
+) -> None:
+    folder = tmp_path / "north-gate" / "tuesday"
+    save_flight(make_flight(), folder)
+    show = f'from wildlab.flight.store import load_flight\nprint(flight)\nreport.head("A")\n{cell}'
+    begin = OPEN.replace("flight=flight", "flight='x'")
+    write(tmp_path / "notebooks", "n.ipynb", notebook(begin, show))
+    (tmp_path / "notebooks" / "studies.toml").write_text('[s]\ntitle = "S"\nnotebook = "n.ipynb"\n')
+    (outcome,) = run_studies(["s"], flight=folder, notebooks=tmp_path / "notebooks", reports=tmp_path / "out")
+    assert (outcome.state == "done") == (cell == "report.save()"), outcome.reason
+    left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert {"status.json", "notebook.ipynb", "report.html"} <= {path.name for path in left}
+    for path in left:
+        content = path.read_bytes()
+        assert b"north-gate" not in content and b"tuesday" not in content, path
+
+
 def test_which_poses_are_meant_is_asked_before_anything_runs(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:

@@ -2,38 +2,45 @@
 
 from __future__ import annotations
 
+import pandas as pd
 import pytest
 
 from wildlab.reporting.published import load_published, published_rows
 from wildlab.runner.catalogue import load_studies
 from wildlab.simulation.parameters import each_parameter, fitted_to, load_twin, twin_names
-from wildlab.studies.fit_and_prediction import Apart, fit_words, tables_apart
+from wildlab.studies.fit_and_prediction import Beside, fit_words, tables_apart
 
 
-def test_tables_are_parted_once_each_in_their_order():
-    sources = ["H table 5.5", "H table 5.4", "H table 5.5", "F table 1.1"]
-    assert tables_apart(sources, ["H table 5.4", "H table 7.4"]) == Apart(
-        ("H table 5.4",), ("H table 5.5", "F table 1.1")
-    )
-    assert tables_apart([], ["H table 5.4"]) == Apart((), ())
+def numbers(*rows: tuple[str, str]) -> pd.DataFrame:
+    return pd.DataFrame(list(rows), columns=["source", "fitted"])
 
 
-def test_the_words_follow_the_tables():
+def test_tables_are_parted_once_each_in_their_order() -> None:
+    rows = numbers(("H table 5.5", ""), ("H table 5.4", "a"), ("H table 5.5", "b"), ("F table 1.1", ""))
+    assert tables_apart(rows) == [
+        Beside("H table 5.5", 1, 2, ("b",)),
+        Beside("H table 5.4", 1, 1, ("a",)),
+        Beside("F table 1.1", 0, 1, ()),
+    ]
+    assert tables_apart(numbers()) == []
+
+
+def test_the_words_follow_the_numbers() -> None:
     twin = load_twin("static-antenna")
-    both = fit_words(["H table 5.4", "H table 5.5"], twin)
-    assert "What stands beside H table 5.4 is therefore a fit, and no test." in both
-    assert "What stands beside H table 5.5 is a prediction." in both
-    assert "not known" in both
-    none = fit_words(["H table 5.6"], twin)
-    assert "no test" not in none
-    assert "camera sway" in none
-    only = fit_words(["H table 7.4"], twin)
-    assert "prediction" not in only
+    words = fit_words(
+        numbers(("H table 5.4", "the sway"), ("H table 5.5", ""), ("H table 5.5", "course")), twin
+    )
+    assert "What stands beside H table 5.4 is no test: the sway." in words
+    assert "1 of 2 numbers beside H table 5.5 are no test: course." in words
+    assert "prediction" not in words and "not known" in words and "camera sway" in words
+    free = fit_words(numbers(("H table 5.6", "")), twin)
+    assert "no test" not in free and "What stands beside H table 5.6 is a prediction." in free
 
 
-def test_a_twin_without_fitted_parameters_says_so():
-    assert fit_words(["H table 6.1"], "large-ship") == (
-        "No parameter of this twin was fitted to a published table."
+def test_a_twin_without_fitted_parameters_says_so() -> None:
+    assert fit_words(numbers(("H table 6.1", "")), "large-ship") == (
+        "No parameter of this twin was fitted to a published table. What stands beside H table 6.1 is a "
+        "prediction."
     )
 
 
@@ -52,8 +59,7 @@ def test_the_names_of_tables_are_those_of_the_published_numbers():
         for source in load_published(study)["source"]
     }
     assert set(fitted_to("slow-vessel")) <= typed
-    predicted = tables_apart(load_published("slow-vessel")["source"], fitted_to("slow-vessel"))
-    assert predicted == Apart((), ("H table 5.6", "H table 5.7"))
+    assert [one.used for one in tables_apart(load_published("slow-vessel"))] == [0, 0]
 
 
 def test_numbers_of_tables_that_a_twin_was_fitted_to_are_not_judged() -> None:

@@ -158,12 +158,14 @@ def test_words_turn_with_their_numbers() -> None:
 def test_words_on_correlated_noise_turn_with_their_numbers() -> None:
     claims = {"differencing-consistent": said("holds", 1.0)}
     one = " ".join(coloured_noise_text.summary(noisy(*[{}] * 40), claims))
-    assert "The benchmark is nearer to the truth on 40 of 40 flights, by 2.0 m" in one
-    assert "Singer's model is nearer to the truth on 40" in one and "on nearly all of 40" in one
+    assert "Of the benchmark and differencing, the benchmark is nearer to the truth on 40 of 40" in one
+    assert (
+        "Singer's model, Singer's model is nearer to the truth on 40" in one and "on nearly all of 40" in one
+    )
     turned = {("coloured", "mae"): 8.0, ("singer", "mae"): 12.0, ("coloured", "nees"): 50.0}
     claims = {"differencing-consistent": said("premise not met", None)}
     other = " ".join(coloured_noise_text.summary(noisy(*[turned] * 40), claims))
-    assert "Differencing is nearer" in other and "The benchmark is nearer to the truth on 40" in other
+    assert "differencing is nearer" in other and "the benchmark is nearer to the truth on 40" in other
     assert "5.0 times as large as it states" in other and "not tested" in other
     assert "4.0 times less" in coloured_noise_text.correlation_words({"cv": 0.4, "coloured": 0.1})
     assert "no less" in coloured_noise_text.correlation_words({"cv": 0.1, "coloured": 0.4})

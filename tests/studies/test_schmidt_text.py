@@ -44,20 +44,23 @@ def drawn_times(factor: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("factor", "verdict", "words"),
     [
-        (1.0, headline.CONSISTENT, "not found wrong (1.1 times)"),
-        (4.0, headline.OPTIMISTIC, "optimistic (2.1 times)"),
-        (0.25, headline.PESSIMISTIC, "pessimistic (0.5 times)"),
+        (1.0, headline.CONSISTENT, "not found wrong ({:.1f} times)"),
+        (4.0, headline.OPTIMISTIC, "optimistic ({:.1f} times, over all flights)"),
+        (0.25, headline.PESSIMISTIC, "pessimistic ({:.1f} times, over all flights)"),
     ],
 )
 def test_a_verdict_follows_the_test_over_flights(factor: float, verdict: str, words: str) -> None:
     spread = flights(**drawn_times(factor))
     found = headline.honesty(spread, "schmidt")
-    assert found.verdict == verdict and headline.honest_words(found) == words
+    assert found.verdict == verdict and headline.honest_words(found) == words.format(found.overall)
+    assert found.overall == pytest.approx(np.sqrt(spread["schmidt", "nees_drawn"].mean() / 2))
     assert found.ratio == pytest.approx(np.sqrt(spread["schmidt", "nees"].median() / 2))
     summary = " ".join(headline.summary_words(spread))
-    assert f"as H prints it, {verdict}" in summary and f"{found.ratio:.1f} times (as H prints it)" in summary
+    assert (
+        f"tuned to H 7.5.3, {verdict}" in summary and f"{found.ratio:.1f} times (tuned to H 7.5.3)" in summary
+    )
     table = headline.honesty_table(spread)
-    assert table["verdict"].tolist()[1] == verdict and table["told"].tolist()[1] == "as H prints it"
+    assert table["verdict"].tolist()[1] == verdict and table["told"].tolist()[1] == "tuned to H 7.5.3"
     assert f"{verdict})" in headline.tile_words(spread, {("schmidt", "nees"): 0.4})[0][1]
 
 
@@ -72,7 +75,9 @@ def test_a_median_on_the_other_side_of_the_test_is_said() -> None:
         schmidt__nees=lambda i, _: 1.0, schmidt__nees_drawn=lambda i, value: 90.0 if i % 10 == 0 else value
     )
     found = headline.honesty(rare, "schmidt")
-    assert headline.honest_words(found) == "optimistic (0.7 times on the median flight, the other way)"
+    assert found.ratio < 1 < found.overall and found.verdict == headline.OPTIMISTIC
+    (words, *_) = (words for _, words in headline.tile_words(rare, {("schmidt", "nees"): 0.4}))
+    assert f"median flight; over all flights {found.overall:.1f} times: optimistic" in words
 
 
 def test_the_thesis_yardstick_counts_averages_within_the_bounds_of_single_values() -> None:
@@ -144,7 +149,10 @@ def test_one_to_two_degrees_are_judged_by_both_yardsticks() -> None:
     _, (_, good) = headline.curve_words(flights())
     _, (_, bad) = headline.curve_words(wrong)
     assert "100 % and 100 % of the flights" in good and "told 1° the filter is not found wrong" in good
-    assert "0 % and 100 % of the flights" in bad and "told 1° the filter is optimistic (3.2 times)" in bad
+    assert (
+        "0 % and 100 % of the flights" in bad
+        and "told 1° the filter is optimistic (3.2 times, over all flights)" in bad
+    )
 
 
 def test_a_drawn_flight_is_typical_or_not() -> None:

@@ -147,10 +147,14 @@ def test_words_turn_with_their_numbers():
         "at the end it is not typical: 0 of the 4 others have a smaller one, where the median is 2.2 m"
         in text.drawn_words(ends)
     )
-    assert "costs another 1.0" in text.summary(far, 0.1)[1] and "helps less" in text.summary(far, 0.1)[2]
+    assert (
+        "costs 1.0 metres beside one that is" in text.summary(far, 0.1)[1]
+        and "helps less" in text.summary(far, 0.1)[2]
+    )
     cheap = pd.DataFrame(
         [{**GOOD, **OPPOSED["synchronisation-matters"], **OPPOSED["innovations-coloured"]}] * 2
     )
     assert (
-        "costs nothing more" in text.summary(cheap, 0.1)[1] and "not all wrong" in text.summary(cheap, 0.1)[2]
+        "costs nothing on most" in text.summary(cheap, 0.1)[1]
+        and "not all wrong" in text.summary(cheap, 0.1)[2]
     )

@@ -16,7 +16,8 @@ kind                 what it is                                                 
 error size           a mean, root mean square or quantile of distances                       factor 1.25
 standard deviation   of errors, or as a filter states it                                     factor 1.3
 NEES or NIS          mean of a normalised square, two degrees of freedom                     factor 1.45
-signed mean          of one coordinate's errors: compared with the size of the errors        0.35 of it
+signed mean          of one coordinate's errors: compared with their SD                      0.44 of it
+signed mean, no SD   where that is not printed: compared with the size of the errors         0.35 of it
 rate                 a share of images or of frames                                          0.02
 ==================== ======================================================================= ==========
 
@@ -45,6 +46,10 @@ WIDEST_FACTOR = 3.0
 WIDEST_MARGINS = 5.0
 #: Of the normal distribution, for 95 %.
 _Z = 1.959963984540054
+
+
+#: Of a signed mean, in standard deviations of the same coordinate's errors.
+BY_DEVIATION = 0.44
 
 
 class Margin(NamedTuple):
@@ -158,6 +163,7 @@ def compare_flight(
     high: float | None,
     *,
     size: float | None = None,
+    deviation: float | None = None,
 ) -> Comparison:
     """Our flights beside one printed flight.
 
@@ -174,7 +180,10 @@ def compare_flight(
     low, high
         Bounds of the middle 90 % of our flights; None where there is one flight.
     size
-        Of the printed errors, in the same unit: what a signed mean is compared with.
+        Of the printed errors, in the same unit: what a signed mean is compared with. It is theirs if their
+        mean is near zero.
+    deviation
+        The printed standard deviation of the same coordinate's errors, which serves in its place.
 
     Returns
     -------
@@ -205,12 +214,14 @@ def compare_flight(
         vague = spread is None or spread > WIDEST_FACTOR
         margin = f"a factor of {factor:g}"
     else:
-        if kind == "signed mean" and size is None:
+        if kind == "signed mean" and size is None and deviation is None:
             why = "no size of the errors is printed with it"
             return Comparison(NOT_JUDGED, ratio, difference, spread, why)
         if kind == "signed mean":
             ratio = None  # of a mean near zero it says nothing
-        allowed = share * (size if kind == "signed mean" else 1.0)  # type: ignore[operator]
+            allowed = share * size if deviation is None else BY_DEVIATION * deviation  # type: ignore[operator]
+        else:
+            allowed = share
         near = abs(difference) <= allowed + 1e-9
         vague = known and high - low > WIDEST_MARGINS * allowed  # type: ignore[operator]
         margin = f"{allowed:.2g}"

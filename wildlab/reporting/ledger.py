@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from wildlab.evaluation.printed import (
     AGREES,
+    BY_DEVIATION,
     DIFFERS,
     MARGINS,
     NOT_JUDGED,
@@ -17,7 +18,7 @@ from wildlab.evaluation.printed import (
 )
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.reporting.cases import Case
-from wildlab.reporting.ledger_tables import claims_table, numbers_table
+from wildlab.reporting.ledger_tables import claims_table, flights_of, numbers_table
 from wildlab.reporting.page import TAGS, first_look_notice, page
 from wildlab.reporting.published import CALCULATED
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
@@ -32,12 +33,15 @@ is a single draw, which our simulated flights are held against:
 printed number lies in the middle 90 % of our flights (of fewer than 30: between the lowest and the highest);
 **too vague to tell** when that is so, and this middle is wider than a factor of {widest:g}; **differs** when
 it lies outside. The margins are the same for all studies: {margins}. A signed mean whose sign the thesis does
-not define is compared by its size. A number that is listed beside several tunings is counted once.
+not define is compared by its size. A number that is listed beside several tunings is counted once. What a
+simulated flight was fitted to is **not judged** by it, number or claim.
 
 A **claim** is a sentence of a thesis. It **holds** when the 95 % interval of the share of flights on which it
 is true lies at or above 90 %, **holds on most flights** above 50 %, and **fails on most flights** or **does
 not hold** likewise below 50 % and 10 %; where the interval contains 50 % it is **undecided**. Where the
-simulated flights lack what the sentence is about, its **premise is not met** and it is not judged.
+simulated flights lack what the sentence is about, its **premise is not met** and it is not judged. That a
+share is 95 % **holds** where the interval has 95 % in it and is narrow; where it is wide, that is
+**undecided**.
 
 A **first look** comes from fewer flights than the study's own. Its numbers are shown and count as nothing
 until the full ones are in.
@@ -45,7 +49,8 @@ until the full ones are in.
 The flights of the theses were never published. A **twin** is a simulated flight built from what the thesis
 prints about the real one; a **logged** flight is a real one from a public source.
 """
-_ORDER = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS, NOT_JUDGED)
+_JUDGED = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS)
+_ORDER = (*_JUDGED, NOT_JUDGED)
 
 
 def ledger_page(
@@ -72,7 +77,7 @@ def ledger_page(
     studies, flights = list(studies), list(flights)
     body = [
         "<header><h1>Ledger</h1>",
-        '<p class="sub">Every published number and claim of the two theses, and what became of it here.</p>',
+        '<p class="sub">Published numbers and claims of the two theses, and what became of them here.</p>',
         "</header>",
         _tiles(studies),
         _coverage(studies, cases),
@@ -104,7 +109,7 @@ def _tiles(studies: list[StudyStatus]) -> str:
     studied += f", {failed} failed" if failed else ""
     tiles = [(f"{len(done)} / {len(studies)}", studied)]
     # What waits for its study is in no denominator.
-    numbers = [one for study in done for one in study.counted if one.verdict != MISSING]
+    numbers = [one for study in done for one in study.counted if one.verdict in _JUDGED]
     waiting = sum(len(study.counted) for study in studies) - len(numbers)
     if numbers or waiting:
         agree = sum(one.verdict == AGREES for one in numbers)
@@ -139,7 +144,7 @@ def _coverage(studies: list[StudyStatus], cases: Sequence[Case]) -> str:
             for case in open_ones
         )
         parts.append(
-            f"<p>The two theses have {len(cases)} case studies; {built} of them "
+            f"<p>{len(cases)} case studies are counted in the two theses; {built} of them "
             f"{'has' if built == 1 else 'have'} a study here.</p>"
         )
         if open_ones:
@@ -169,13 +174,13 @@ def _coverage(studies: list[StudyStatus], cases: Sequence[Case]) -> str:
     claims = [one for study in studies if study.state == "done" for one in study.claims]
     decided = [one for one in claims if one.verdict in SHARE_VERDICTS and one.fraction is not None]
     if decided:
-        own = sum(one.own for one in claims)
+        own = sum(one.own for one in decided)
         parts.append(
-            f"<p>{len(decided)} claims were tested on flights. If each lay just at the border of its "
-            f"verdict, chance would make {expected_wrong(len(decided)):.1f} of these verdicts wrong "
-            "on average; most lie further from it. Claims of one study share their flights."
-            + (f" {own} of all are ours and not a thesis's: they are not counted above." if own else "")
-            + "</p>"
+            f"<p>{len(decided)} claims were decided by the share of flights or runs on which they are true"
+            + (f", {len(decided) - own} of the theses and {own} of ours, not counted above" if own else "")
+            + ". If each lay just at the border of its verdict, chance would make at most "
+            f"{expected_wrong(len(decided)):.1f} of these verdicts wrong on average; most lie further from "
+            "it. Claims of one study share their flights.</p>"
         )
     return f"<section><h2>What this covers</h2>{''.join(parts)}</section>" if parts else ""
 
@@ -200,7 +205,7 @@ def _section(one: StudyStatus) -> str:
         f'<p class="sub">{tag}<code>{escape(study.name)}</code>{answers}</p>',
         _state(one),
         numbers_table(one),
-        claims_table(one.claims),
+        claims_table(one.claims, flights_of(one)),
     ]
     if one.has_report:
         words = "Open the report" if one.ran else "See what went wrong"
@@ -245,4 +250,8 @@ def _explanation() -> str:
 def _margin_words(kind: str, factor: float | None, difference: float | None) -> str:
     if factor is not None:
         return f"{kind}, a factor of {factor:g}"
-    return f"{kind}, {difference:g}" + (" of the size of the errors" if kind == "signed mean" else "")
+    return f"{kind}, {difference:g}" + (
+        f" of the size of the errors, or {BY_DEVIATION:g} of their standard deviation where that is printed"
+        if kind == "signed mean"
+        else ""
+    )

@@ -81,13 +81,18 @@ def summed_up(one: StudyStatus) -> str:
 
 
 def _strip_heading(one: StudyStatus) -> str:
-    over = f"{one.seeds} flights" if one.seeds and one.seeds > 1 else "here"
+    over = f"{one.seeds} {flights_of(one)}" if one.seeds and one.seeds > 1 else "here"
     fewest = min((n.over for n in one.numbers if n.over is not None), default=MANY)
     band = f'<i class="band"></i>{spread_words(fewest).key}' if any(_has_band(n) for n in one.numbers) else ""
     return (
         f'{over}, as ratio to the print <span class="key"><i class="full"></i>here{band}'
         '<i class="hollow"></i>print</span>'
     )
+
+
+def flights_of(one: StudyStatus) -> str:
+    """What a study is computed over: simulated flights, or runs that fly nothing."""
+    return "runs" if one.study.kind == "computed" else "flights"
 
 
 def _has_band(n: Number) -> bool:
@@ -188,7 +193,7 @@ def strip(n: Number) -> str:
     )
 
 
-def claims_table(claims: list[Claim]) -> str:
+def claims_table(claims: list[Claim], flights: str = "flights") -> str:
     """Claims, the verdict on each, and on how many flights it is true; nothing where there are none."""
     if not claims:
         return ""
@@ -199,7 +204,7 @@ def claims_table(claims: list[Claim]) -> str:
         rows.append(
             # The verdict stands beside the claim: on a phone the last column may be out of sight.
             f'<tr><th scope="row" class="text wide">{escape(one.text)}{own}{source}</th>'
-            f'<td class="text">{_pill(one.verdict)}</td><td>{_tested_on(one)}</td></tr>'
+            f'<td class="text">{_pill(one.verdict)}</td><td>{_tested_on(one, flights)}</td></tr>'
         )
     return (
         '<div class="scroll" role="region" tabindex="0" aria-label="Claims"><table><thead><tr>'
@@ -208,17 +213,17 @@ def claims_table(claims: list[Claim]) -> str:
     )
 
 
-def _tested_on(one: Claim) -> str:
+def _tested_on(one: Claim, flights: str) -> str:
     if one.fraction is None:
-        return f"{one.met} of {one.seeds} flights meet the premise" if one.met is not None else ""
+        return f"{one.met} of {one.seeds} {flights} meet the premise" if one.met is not None else ""
     share = f"{100 * one.fraction:.0f} %"
     if one.low is not None and one.high is not None:
         share += f" ({100 * one.low:.0f} to {100 * one.high:.0f})"
     of = one.seeds if one.met is None else one.met
     if of is None:
-        return f"{share} of flights"
+        return f"{share} of {flights}"
     beyond = f" that meet the premise, of {one.seeds}" if one.seeds and of < one.seeds else ""
-    return f"{share} of {of} flights{beyond}"
+    return f"{share} of {of} {flights}{beyond}"
 
 
 def _text(yes: bool) -> str:

@@ -27,11 +27,11 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
+from wildlab.evaluation.shares import FITTED, NO_PREMISE, SHARE_VERDICTS, UNDECIDABLE
 from wildlab.files import write_json
 
 KINDS = ("logged", "twin", "computed")
-VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE)
+VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
 NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")

@@ -43,7 +43,9 @@ def clean_text(text: str, folders: dict[str, str] | None = None) -> str:
     for folder in sorted(known, key=len, reverse=True):
         for spelling in {folder, str(Path(folder).resolve())}:
             if len(spelling) > 1:
-                text = re.sub(re.escape(spelling) + r"(?![\w.-])", known[folder].replace("\\", r"\\"), text)
+                # A full stop behind it ends a sentence, and one before a letter goes on with the name.
+                whole = re.escape(spelling) + r"(?![\w-]|\.\w)"
+                text = re.sub(whole, known[folder].replace("\\", r"\\"), text)
     return text
 
 

@@ -36,6 +36,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
         "again": bool,
         "fitted": str,
     },
-    "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool},
+    "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool, "fitted": str},
 }
 CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight"
 #: What a file says of all its numbers, and the words allowed; the first is taken where it says nothing.
@@ -102,7 +103,8 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
     -------
     DataFrame
         ``name``, ``subject``, ``value`` (float), ``digits`` (decimals printed in the source), ``unit``,
-        ``source``, ``within`` and ``runs`` (NaN where none is stated), ``kind``, ``by_size`` (a signed mean
+        ``source``, ``within`` (of a calculation at least what rounding leaves open) and ``runs`` (NaN where
+        none is stated), ``kind``, ``by_size`` (a signed mean
         that is compared by its size), ``again``, ``fitted``; no rows where the study has none.
 
     Raises
@@ -120,7 +122,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
             **{key: entry[key] for key in ("name", "subject", "unit", "source")},
             "value": float(entry["value"]),
             "digits": _decimals(entry["value"]),
-            "within": float(entry["within"]) if "within" in entry else math.nan,
+            "within": _within(entry),
             "kind": entry["kind"],
             "by_size": entry["signs"] == "undefined" and quantity_kind(entry["name"]) == "signed mean",
             "runs": float(entry.get("runs", math.nan)),
@@ -245,6 +247,13 @@ def _check_entry(entry: dict[str, Any], kind: str, where: str, file: str) -> Non
         if not math.isfinite(entry["value"]) or not math.isfinite(entry.get("within", 0)):
             raise WildlabError("a number is not finite", "give the printed value", file=file, field=where)
         metric(entry["name"], entry["subject"], float(entry["value"]), entry["unit"])
+
+
+def _within(entry: Mapping[str, Any]) -> float:
+    """What is stated; else, of a calculation, what rounding to the printed digits leaves open."""
+    if "within" in entry:
+        return float(entry["within"])
+    return 0.5 * 10.0 ** -_decimals(entry["value"]) if entry["kind"] == CALCULATED else math.nan
 
 
 def _decimals(value: Decimal | int) -> int:

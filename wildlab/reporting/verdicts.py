@@ -106,6 +106,7 @@ def judge(
     unit = 100.0 if kind == "rate" and row["unit"] == "%" else 1.0
     low, high = found.get("low"), found.get("high")
     size = next((printed[key] for one in SIZES if (key := (one, subject)) in printed), None)
+    deviation = printed.get((name.replace("mean_", "sd_", 1), subject)) if kind == "signed mean" else None
     compared = compare_flight(
         kind,
         here / unit,
@@ -113,6 +114,7 @@ def judge(
         None if low is None else low / unit,
         None if high is None else high / unit,
         size=size,
+        deviation=deviation,
     )
     return Comparison(compared.verdict, compared.ratio, here - value, compared.spread, compared.reason)
 

@@ -79,7 +79,7 @@ def evaluate_flight(
         )
 
     places = uses["georeferencing accuracy"]
-    again = f"wildlab evaluate {folder.name}"
+    again = f"wildlab evaluate {flight.name}"
     if places.usable:
         found, _ = flight.pose_source(source)
         prepare(flight.name, "georeferencing.ipynb", {"source": found}, f"{again} --source {found}")

@@ -17,6 +17,7 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
+from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.runner.catalogue import OTHERS, STANDARD_PARAMETERS, StudyEntry, find_studies, load_studies
 from wildlab.runner.first_look import plan_passes, quick_first
@@ -66,7 +67,8 @@ def make_job(
     """
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
-    again = again or f"wildlab run {study.name}" + ("" if flight is None else f" --flight {flight.name}")
+    flight_name = "" if flight is None else _flight_name(flight)
+    again = again or f"wildlab run {study.name}" + (f" --flight {flight_name}" if flight_name else "")
     reductions = study.reductions() if first_look and seeds is None else {}
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
@@ -97,6 +99,7 @@ def make_job(
         reports=str(reports),
         seed=seed,
         flight="" if flight is None else str(flight.resolve()),
+        flight_name=flight_name,
         twin=study.twin if own else None,
         dataset=study.dataset if own else None,
         recipe=study.recipe if own else None,
@@ -282,17 +285,13 @@ def run_all(
 
 
 def _flight_name(folder: Path) -> str:
-    from wildlab.flight.store import load_flight
-
-    return str(load_flight(folder).name)
+    return read_manifest(folder / FILE_NAME).name
 
 
 def _twin_of(folder: Path) -> str | None:
     """Name of the twin that a flight folder was simulated from; None for a logged flight."""
-    from wildlab.flight.store import load_flight
-
-    twin = load_flight(folder).manifest.twin
-    return None if twin is None else str(twin.name)
+    twin = read_manifest(folder / FILE_NAME).twin
+    return None if twin is None else twin.name
 
 
 def _absent_data(study: StudyEntry) -> WildlabError | None:

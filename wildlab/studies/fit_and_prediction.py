@@ -2,61 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+import pandas as pd
 
 from wildlab.simulation.parameters import TwinParameters, each_parameter, fitted_to, load_twin
 
 
-class Apart(NamedTuple):
-    """Published tables, by what a twin has to do with them.
+class Beside(NamedTuple):
+    """What a simulated flight has to do with the published numbers of one table.
 
     Attributes
     ----------
-    fitted
-        Those that its parameters were fitted to: agreement is no test.
-    predicted
-        The others.
+    source
+        The table.
+    used, numbers
+        How many of its numbers were used in making the flight, of how many.
+    reasons
+        How, as `data/published` says.
     """
 
-    fitted: tuple[str, ...]
-    predicted: tuple[str, ...]
+    source: str
+    used: int
+    numbers: int
+    reasons: tuple[str, ...]
 
 
-def tables_apart(sources: Iterable[str], fitted: Iterable[str]) -> Apart:
-    """Published tables, parted by whether a twin was fitted to them.
+def tables_apart(published: pd.DataFrame) -> list[Beside]:
+    """Published tables, by how many of their numbers were used in making the simulated flight.
 
     Parameters
     ----------
-    sources
-        As published numbers name them, ``"H table 5.6"``; often the same one many times.
-    fitted
-        As `wildlab.simulation.parameters.fitted_to` gives them.
+    published
+        Columns ``source`` and ``fitted``, as `wildlab.reporting.published.load_published` gives them.
 
     Returns
     -------
-    Apart
-        Each table once, in the order of ``sources``.
+    list of Beside
+        Each table once, in the order of ``published``.
 
     Examples
     --------
-    >>> tables_apart(["H table 5.4", "H table 5.5", "H table 5.4"], ["H table 5.4"])
-    Apart(fitted=('H table 5.4',), predicted=('H table 5.5',))
+    >>> rows = pd.DataFrame({"source": ["H table 5.4", "H table 5.5"], "fitted": ["the sway", ""]})
+    >>> [(one.source, one.used) for one in tables_apart(rows)]
+    [('H table 5.4', 1), ('H table 5.5', 0)]
     """
-    known, tables = set(fitted), tuple(dict.fromkeys(sources))
-    return Apart(
-        tuple(table for table in tables if table in known),
-        tuple(table for table in tables if table not in known),
-    )
+    found = []
+    for source, rows in published.groupby("source", sort=False):
+        reasons = [reason for reason in rows["fitted"] if reason]
+        found.append(Beside(str(source), len(reasons), len(rows), tuple(dict.fromkeys(reasons))))
+    return found
 
 
-def fit_words(sources: Iterable[str], twin: TwinParameters | str | Path) -> str:
+def fit_words(published: pd.DataFrame, twin: TwinParameters | str | Path) -> str:
     """Which of the tables beside which a twin is held it was fitted to, in sentences.
 
     Parameters
     ----------
-    sources
+    published
         As for `tables_apart`.
     twin
         Its parameters, or its name or file.
@@ -73,16 +78,22 @@ def fit_words(sources: Iterable[str], twin: TwinParameters | str | Path) -> str:
     """
     parameters = twin if isinstance(twin, TwinParameters) else load_twin(twin)
     tables = fitted_to(parameters)
-    if not tables:
-        return "No parameter of this twin was fitted to a published table."
-    groups = dict.fromkeys(group for group, _, p in each_parameter(parameters) if p.fitted_to)
-    what = _listed([group.replace("_", " ") for group in groups])
-    parts = [f"Of this twin's parameters {what} were fitted to {_listed(tables)} ({_NOT_KNOWN})."]
-    apart = tables_apart(sources, tables)
-    if apart.fitted:
-        parts.append(f"What stands beside {_listed(apart.fitted)} is therefore a fit, and no test.")
-    if apart.predicted:
-        parts.append(f"What stands beside {_listed(apart.predicted)} is a prediction.")
+    parts = []
+    if tables:
+        groups = dict.fromkeys(group for group, _, p in each_parameter(parameters) if p.fitted_to)
+        what = _listed([group.replace("_", " ") for group in groups])
+        parts.append(f"Of this twin's parameters {what} were fitted to {_listed(tables)} ({_NOT_KNOWN}).")
+    else:
+        parts.append("No parameter of this twin was fitted to a published table.")
+    apart = tables_apart(published)
+    for one in apart:
+        if one.used:
+            what = "What stands" if one.used == one.numbers else f"{one.used} of {one.numbers} numbers"
+            verb = "is" if one.used == one.numbers else "are"
+            parts.append(f"{what} beside {one.source} {verb} no test: {'; '.join(one.reasons)}.")
+    predicted = [one.source for one in apart if not one.used]
+    if predicted:
+        parts.append(f"What stands beside {_listed(predicted)} is a prediction.")
     return " ".join(parts)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import average
-from wildlab.evaluation.shares import HOLDS, NO_PREMISE, Check, decide, paired_difference
+from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide, paired_difference
 from wildlab.reporting.published import load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
@@ -242,7 +242,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
         report.claim(
             claim["id"],
             claim["text"],
-            found.verdict,
+            FITTED if claim.get("fitted") else found.verdict,
             fraction=None if share is None else share.estimate,
             low=None if share is None else share.low,
             high=None if share is None else share.high,
@@ -258,7 +258,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             {
                 "claim": claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else ""),
                 "source": claim["source"],
-                "verdict": found.verdict,
+                "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
                 "share": _share_words(found),
                 "difference": "" if apart is None else _difference_words(apart, check.unit),
                 "premise": _premise_words(claim.get("premise", ""), check, found),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from wildlab.runner.seeds.kept import SeedWork
@@ -20,6 +21,8 @@ class Job:
     reports: str
     seed: int = 1
     flight: str = ""
+    #: What it calls itself: its folder's name may tell more than it wants to.
+    flight_name: str = ""
     twin: str | None = None
     dataset: str | None = None
     recipe: str | None = None
@@ -38,6 +41,13 @@ class Job:
     fingerprint: str = ""
     #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
     tutorial: bool = False
+
+    def hidden(self) -> dict[str, str]:
+        """Folders that get into nothing that is left behind, with what stands for each."""
+        if not self.flight:
+            return {self.work: "."}
+        around = str(Path(self.flight).parent)
+        return {self.work: ".", around: "[flights]", self.flight: f"[flight {self.flight_name}]"}
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def run_notebook(pipe: connection.Connection, job: Job) -> None:
     try:
         (_tutorial if job.tutorial else _work)(pipe, job)
     except BaseException as error:  # whatever it is, the runner must hear of it
-        pipe.send(("failed", _explain(error, Path(job.work))))
+        pipe.send(("failed", _explain(error, job)))
     else:
         pipe.send(("done",))
 
@@ -127,7 +127,7 @@ def _work(pipe: connection.Connection, job: Job) -> None:
         )
     finally:
         if executed.is_file():
-            cleaned = privacy.clean_notebook(read_notebook(executed), shown, {str(folder): "."})
+            cleaned = privacy.clean_notebook(read_notebook(executed), shown, job.hidden())
             write_atomic(executed, json.dumps(cleaned, indent=1, ensure_ascii=False) + "\n")
     pipe.send(("stage", "page"))
     if not (folder / "metrics.json").is_file():
@@ -186,9 +186,10 @@ def _others(job: Job) -> list[Path]:
 
 
 def _relative(flight: Path | None, job: Job) -> str:
-    """The flight's folder as seen from the report's, where both lie in the checkout; else its name."""
-    if flight is None:
-        return ""
+    """The flight's folder as seen from the report's, where both lie in the checkout; the name of a flight of
+    the reader's own."""
+    if flight is None or job.flight:
+        return job.flight_name
     flight, reports = flight.resolve(), Path(job.reports).resolve()
     inside = ROOT is not None and flight.is_relative_to(ROOT) and reports.is_relative_to(ROOT)
     if flight.is_relative_to(reports) or inside:
@@ -233,7 +234,7 @@ def _papermill(pipe: connection.Connection, job: Job, parameters: dict[str, Any]
     )
 
 
-def _explain(error: BaseException, folder: Path) -> Failure:
+def _explain(error: BaseException, job: Job) -> Failure:
     import traceback
 
     from wildlab.reporting.failure import step_of
@@ -267,15 +268,14 @@ def _explain(error: BaseException, folder: Path) -> Failure:
         )
     else:
         reason = f"It ended with {kind}: {error}"
-    step = ""
+    step, folder = "", Path(job.work)
     if (folder / "notebook.ipynb").is_file():
         notebook = read_notebook(folder / "notebook.ipynb")
         failed = _failed_cell(notebook)
         step = step_of(notebook, failed if failed is not None else (_STARTED or [0])[-1])
-    hidden = {str(folder): "."}
     reason = reason.strip()
     reason += "" if reason.endswith((".", "!", "?")) else "."
-    return Failure(clean_text(reason, hidden), step, clean_text(details, hidden))
+    return Failure(clean_text(reason, job.hidden()), step, clean_text(details, job.hidden()))
 
 
 def _failed_cell(notebook: Any) -> int | None:

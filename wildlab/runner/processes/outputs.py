@@ -35,8 +35,8 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             notebook = read_notebook(executed)
             # A process that was ended could not clean its notebook itself.
             shown = {**job.parameters, "study": job.name, "seed": job.seed}
-            shown |= {"flight": Path(job.flight).name, "out": ".", "expected_prefix": ""}
-            write_notebook(executed, clean_notebook(notebook, shown, {str(folder): "."}))
+            shown |= {"flight": job.flight_name, "out": ".", "expected_prefix": ""}
+            write_notebook(executed, clean_notebook(notebook, shown, job.hidden() | {str(folder): "."}))
             step = step or step_of(notebook, cell)
         except WildlabError:
             executed.unlink()
@@ -145,4 +145,4 @@ def log_of(job: Job) -> str:
         text = (Path(job.work) / ".log").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
-    return clean_text(text[-4000:], {job.work: "."})
+    return clean_text(text[-4000:], job.hidden())

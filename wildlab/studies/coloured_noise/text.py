@@ -30,17 +30,17 @@ def summary(spread: pd.DataFrame, claims: Mapping[str, Mapping[str, Any]]) -> li
         return claim_words(claims[claim]["verdict"], claims[claim]["fraction"], n)
 
     mae = pd.DataFrame({who: spread[who, "mae"] for who in ("cv", "coloured")})
-    price = accuracy_words({"cv": "The benchmark", "coloured": "Differencing"}, mae)
+    price = accuracy_words({"cv": "the benchmark", "coloured": "differencing"}, mae)
     singer = pd.DataFrame({who: spread[who, "mae"] for who in ("cv", "singer")})
-    gain = accuracy_words({"cv": "The benchmark", "singer": "Singer's model"}, singer)
+    gain = accuracy_words({"cv": "the benchmark", "singer": "Singer's model"}, singer)
     return [
         "A filter that is told nothing of errors that last is off by "
         f"{middle['cv', 'mae']:.1f} m on average, and its errors are {stated_words(middle['cv', 'nees'])}; "
         f"with differenced measurements it is {middle['coloured', 'mae']:.1f} m, and they are "
         f"{stated_words(middle['coloured', 'nees'])}. The mean NEES of the latter is within the band of a "
         f"mean {said('differencing-consistent')}.",
-        f"{price}.",
-        f"{gain}.",
+        f"Of the benchmark and differencing, {price}.",
+        f"Of the benchmark and Singer's model, {gain}.",
     ]
 
 

@@ -131,7 +131,7 @@ def show_flights(report: Report, spread: pd.DataFrame, published: Mapping[tuple[
         + ", ".join(f"{WORDS[who]} {middle[who]:.1f} ({share[who]:.0f} % within)" for who in WORDS)
         + ".",
         caption="A dot is a flight, the stroke their median; green: 95 % bounds of single values, the "
-        "thesis's yardstick; hollow diamonds: published.",
+        "the lenient band; hollow diamonds: published.",
     )
 
 

@@ -33,7 +33,7 @@ QUANTITIES = {
 }
 COLUMNS = {
     "filter": "filter",
-    "inside": "thesis's yardstick (%)",
+    "inside": "in the lenient band (%)",
     "nees": "NEES",
     "nees_predicted": "NEES, pauses",
     "nis": "NIS",
@@ -71,7 +71,7 @@ measurements; errors are truth minus estimate. Whether a filter is consistent is
 flight, at a moment drawn once for all filters: these are independent, and their mean over N flights has the
 interval of H example 3.1 for N runs. Average NEES of single flights, in the claims, are held against the
 interval for as many independent values as they are worth: their number over one plus twice the sum of their
-autocorrelations. The thesis's yardstick is an average of one flight within the interval of single values,
+autocorrelations. The lenient band is for an average of one flight within the interval of single values,
 which an average leaves far less often than 5 % of the time. The course counts where the true speed is above
 0.2 m/s."""
 
@@ -102,7 +102,7 @@ def variant_points(spread: pd.DataFrame) -> list[str]:
     return [
         f"{nearer[0].upper()}{nearer[1:]}.",
         f"With the uncertainty in attitude alone {share['schmidt-attitude-only']:.0f} % of the flights pass "
-        "the thesis's yardstick, with that in position alone "
+        "the lenient band, with that in position alone "
         f"{share['schmidt-position-only']:.0f} %.",
         "Inflation adds the pose's uncertainty to each image's noise, as if it were new in each (H "
         f"7.40, 7.41): {share['inflation']:.0f} %.",
@@ -167,7 +167,7 @@ def limits_of(spread: pd.DataFrame, frames: int) -> list[str]:
         f"Neighbouring values share their error. An average NEES over the {frames} images of a flight is "
         f"worth {worth:.0f} independent values on the median flight, and its band is as wide as theirs; that "
         "number is itself an estimate from one flight.",
-        f"The thesis's yardstick, an average between {BOUNDS[0]:.2f} and {BOUNDS[1]:.2f}, lets a filter pass "
+        f"The lenient band, an average between {BOUNDS[0]:.2f} and {BOUNDS[1]:.2f}, lets a filter pass "
         f"that states errors {np.sqrt(2 / BOUNDS[0]):.1f} times too large, or {np.sqrt(BOUNDS[1] / 2):.1f} "
         "times too small.",
         "False alarms and other vessels are left out, as in the thesis.",

@@ -61,7 +61,7 @@ ESTIMATED = "estimated"
 TUNING = CvTuning(acceleration=0.05, position_0=10.0, velocity_0=10.0, measurement=np.nan, pixel=30.0)
 #: H 7.5.3: what the pixel noise "must be increased to" for the extended filter to be consistent.
 MORE_NOISE = TUNING._replace(pixel=60.0)
-#: 95 % of single values of NEES or NIS, two degrees of freedom: the thesis's yardstick, also for averages.
+#: 95 % of single values of NEES or NIS, two degrees of freedom: the lenient band, also for averages.
 BOUNDS = chi_square_interval(2)
 
 #: What the standard deviations of `SOURCE` are multiplied by for the curve; one is ``schmidt`` itself.

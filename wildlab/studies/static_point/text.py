@@ -37,9 +37,9 @@ def summary(spread: pd.DataFrame, bound: float) -> list[str]:
     mae = {column: spread[column, "mae"] for column in (OBSERVER, AUTOPILOT, UNSYNCED, UNCALIBRATED)}
     more = float((mae[UNSYNCED] - mae[OBSERVER]).median())
     unsynced = (
-        f"a camera clock that is not synchronised costs another {more:.1f}."
+        f"a camera clock that is not synchronised costs {more:.1f} metres beside one that is."
         if more > 0
-        else "a camera clock that is not synchronised costs nothing more on most flights."
+        else "a camera clock that is not synchronised costs nothing on most flights."
     )
     watching = (
         "helps less than it seems to: images taken right after one another are wrong in the same way."
@@ -66,7 +66,7 @@ def sureness(spread: pd.DataFrame) -> str:
 def drawn_words(spread: pd.DataFrame) -> str:
     """How typical the flight of the figures is: in its single images, and in its filtered position."""
     return (
-        f"In the mean error of single images the flight of the figures is "
+        f"In the mean error of single images, with the observer's pose, the flight of the figures is "
         f"{typical_words(spread[OBSERVER, 'mae'])}; in the filtered position's error at the end it is "
         f"{typical_words(spread['filter', 'at_end'])}, where the median is "
         f"{spread['filter', 'at_end'].median():.1f} m."
@@ -88,8 +88,9 @@ def partings(
     near, met = int((mean_off <= published_off).sum()), int((ours <= theirs).sum())
     alike = float(spread[_LAGS].median().min())
     shared = (
-        f" Innovations here are correlated by {alike:.2f} or more at lag one, as figure 5.7 shows them to "
-        f"be: errors that neighbouring images share average out slowly, also over {n} images."
+        f" Innovations here are correlated by {alike:.2f} at lag one on the median flight (the less "
+        f"correlated of north and east); figure 5.7 shows correlated ones too: errors that neighbouring "
+        f"images share average out slowly, also over {n} images."
         if alike > bound and near < len(spread) / 2
         else ""
     )
@@ -99,7 +100,7 @@ def partings(
         f"The published mean error of {theirs:.2f} m or less is met by {met} of {len(spread)} flights.",
         f"The autopilot's mean error is {ratio:.1f} times the observer's here, and "
         f"{published[AUTOPILOT, 'mae'] / theirs:.1f} times in print.",
-        f"The ellipses computed from the published average uncertainties hold the truth in {coverage:.0f} % "
-        "of cases instead of 90 %"
+        f"The ellipses computed from the uncertainties that are assumed here hold the truth in "
+        f"{coverage:.0f} % of cases instead of 90 %"
         + (": they are wider than the simulated errors ask for." if coverage > 90 else "."),
     ]
