@@ -12,7 +12,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import split_images
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.pipeline.evaluate import draws_of, errors_of, known_points, score_points
+from wildlab.pipeline.evaluate import blocks_of, errors_of, known_points, score_points
 from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
 from wildlab.pipeline.track import Sighting
 
@@ -116,7 +116,7 @@ def evaluate_with_estimated_noise(
     flight: Flight, observations: Observations, scored: pd.DataFrame, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Points scored again with ellipses from pose noise estimated on the other half of the images."""
-    half = split_images(draws_of(flight, scored), rng)
+    half = split_images(blocks_of(flight, scored), rng)
     parts = []
     for seen in (half, ~half):
         deviations = as_deviations(estimate_noise(flight, observations, scored[seen]))
