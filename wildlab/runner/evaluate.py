@@ -9,8 +9,10 @@ from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import Use, usable_for
+from wildlab.flight.learnt import learnt_toml, read_learnt
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.learn import refuse_other_camera
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
@@ -23,6 +25,7 @@ def evaluate_flight(
     folder: Path,
     *,
     source: str | None = None,
+    calibration: Path | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     timeout_s: float | None = None,
@@ -38,6 +41,8 @@ def evaluate_flight(
     source
         Which of the flight's poses to judge the georeferencing of; not needed where it has one navigation
         source, or one named ``logged``.
+    calibration
+        A ``calibration.toml`` of another flight, applied before the georeferencing is judged.
 
     Returns
     -------
@@ -47,8 +52,8 @@ def evaluate_flight(
     Raises
     ------
     WildlabError
-        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, or
-        its name is that of a study.
+        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, its
+        name is that of a study, or the calibration is of another camera.
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
@@ -79,13 +84,22 @@ def evaluate_flight(
     again = f"wildlab evaluate {folder.name}"
     if places.usable:
         found, _ = flight.pose_source(source)
-        prepare(flight.name, "georeferencing.ipynb", {"source": found}, f"{again} --source {found}")
-    elif source is not None:
+        parameters, again_with = {"source": found}, f"{again} --source {found}"
+        if calibration is not None:
+            learnt = read_learnt(calibration)
+            refuse_other_camera(flight, learnt)
+            # Its text, not its path: the report can be made again without the file, and names no folder.
+            parameters["calibration"] = learnt_toml(learnt)
+            again_with += f" --calibration {calibration.name}"
+        prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
+    elif source is not None or calibration is not None:
+        option = "--source" if source is not None else "--calibration"
+        what = "poses are named" if source is not None else "a calibration is named"
         raise WildlabError(
-            f"poses are named, and the georeferencing cannot be judged: {places.why}",
-            "see what is amiss: wildlab check; or leave --source out",
+            f"{what}, and the georeferencing cannot be judged: {places.why}",
+            f"see what is amiss: wildlab check; or leave {option} out",
             file=folder,
-            field="--source",
+            field=option,
         )
     lacking = lacking_for_navigation(flight, uses["navigation"])
     if not lacking:
