@@ -89,7 +89,9 @@ def judge_ellipses(
     e, P, group = e[keep], P[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
     squared = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0])
     bound = float(chi2.ppf(stated, 2))
-    coverage = block_mean((squared <= bound).astype(float), group)
+    held = block_mean((squared <= bound).astype(float), group)
+    # Student's interval does not know that a share ends at one.
+    coverage = Interval(held.estimate, max(held.low, 0.0), min(held.high, 1.0))
     size = float(np.sqrt(np.quantile(squared, stated) / bound))
     count = int(group.max()) + 1
     if count < FEWEST:

@@ -36,7 +36,7 @@ from wildlab.pipeline.pose_noise import estimate_noise, evaluate_with_estimated_
 Array = NDArray[np.float64]
 
 #: How many times the images are halved to see what ellipses from learnt noise are worth.
-HALVINGS = 3
+HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ class Accuracy:
         The cause, where six images or more show a known point.
     remaining, averaged
         What the errors are made of once the cause is taken off, and what averaging four images gained; of
-        the errors as they are where no cause gained anything for certain.
+        the errors as they are where no cause gained anything for certain; without what is far out.
     noise, learnt
         How noisy the poses were, and the share of the truth that ellipses with noise learnt on the other half
-        of the images hold (mean over three halvings); without what is far out.
+        of the images hold (mean over five halvings); without what is far out.
     nearest, unambiguous
         Where each point is held against the nearest mark: what that may hide, and the diagnosis without
         ambiguous clicks, where enough are left.
@@ -148,6 +148,10 @@ def judge_accuracy(
     left, of = errors, scored
     if diagnosis is not None and diagnosis.counts:
         left, of = diagnosis.winner.held.mean(axis=0), diagnosis.scored
+    elif diagnosis is not None:
+        left, of = errors_of(diagnosis.scored), diagnosis.scored
+    if diagnosis is not None:
+        left, of = left[diagnosis.inliers], of[diagnosis.inliers]
     averaged = try_averaging(left, of["truth_id"], of["frame_id"], rng) if enough else None
     noise, learnt = _learn_noise(flight, observations, diagnosis, rng, source)
     nearest = look_at_nearest_rule(flight, scored) if flight.manifest.scoring.rule == "nearest" else None

@@ -33,7 +33,7 @@ _PARAMETERS = {
     "down": ("position, down", "m", 1.0),
     "north": ("position, north", "m", 1.0),
     "east": ("position, east", "m", 1.0),
-    "focal": ("both focal lengths", "%", 100.0),
+    "focal": ("focal lengths", "%", 100.0),
     "aspect": ("ratio of the focal lengths", "%", 100.0),
     "centre_u": ("principal point, right", "px", 1.0),
     "centre_v": ("principal point, down", "px", 1.0),
@@ -111,16 +111,20 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             "that it was not estimated from."
         )
     what = causes_in_words(winner.causes)
-    figures = f"from {metres(gain.without)} to {metres(gain.with_)} on images that it was not estimated from"
-    certain = f"gain {metres(*gain.gain)}"
+    digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
+    low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
+    figures = (
+        f"with it taken off, the mean error goes from {gain.without:.{digits}f} to {gain.with_:.{digits}f} m "
+        f"on images that it was not estimated from (gain {low} to {high} m)"
+    )
     if not diagnosis.counts:
-        return f"A constant error of {what} is likely, not certain: taking it off goes {figures} ({certain})."
+        return f"A constant error of {what} is possible, not certain: {figures}."
     share = gained_share(gain)
     if share >= MOST:
-        return f"Most of it is a constant error of {what}: taking it off goes {figures} ({certain})."
+        return f"Most of it is a constant error of {what}: {figures}."
     if share >= SMALL:
-        return f"Part of it is a constant error of {what}: taking it off goes {figures} ({certain})."
-    return f"A constant error of {what} is certain and small: taking it off goes {figures} ({certain})."
+        return f"Part of it is a constant error of {what}: {figures}."
+    return f"A constant error of {what} is certain and small: {figures}."
 
 
 def size_sentence(calibration: Calibration) -> str:
@@ -136,27 +140,40 @@ def size_sentence(calibration: Calibration) -> str:
     return f"What is to be added: {listed(parts)}." if parts else ""
 
 
+def ambiguity_sentence(diagnosis: Diagnosis, unambiguous: Diagnosis | None) -> str:
+    """That the cause hangs on clicks that may be of another mark; nothing where it does not."""
+    if unambiguous is None or unambiguous.winner.causes == diagnosis.winner.causes:
+        return ""
+    return (
+        "The cause hangs on clicks that may be of another mark: without them the verdict is "
+        f"{unambiguous.winner.name!r}. Record which mark was clicked before you correct anything."
+    )
+
+
 def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
     """What to do, by the measured gain and by what is far out."""
-    first = diagnosis.outliers[0] if diagnosis.outliers else None
-    if first is not None and first.kind != "click":
+    said = []
+    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
+    if first is not None:
         what = f"mark {first.mark}" if first.kind == "mark" else f"photo {first.photo}"
-        return f"Look at {what} first: it is {metres(first.off_m)} off where the others are not."
+        said.append(f"Look at {what} first: it is {metres(first.off_m)} off where the others are not.")
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL:
-        if learnt_here:
-            return "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
-        return "The calibration that was applied does not hold for this flight: look for what changed."
-    if diagnosis.counts:
-        return "It hardly matters: other things limit this flight."
-    return ""
+        said.append(
+            "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
+            if learnt_here
+            else "The calibration that was applied does not hold for this flight: look for what changed."
+        )
+    elif diagnosis.counts and not said:
+        said.append("It hardly matters: other things limit this flight.")
+    return " ".join(said)
 
 
 def alike_sentences(diagnosis: Diagnosis) -> list[str]:
     """Which causes the data cannot tell from the one that won, or from each other."""
     winner = set(diagnosis.winner.causes)
     said = [
-        f"Another explanation is as good: {causes_in_words(rival.causes)} "
-        f"({metres(rival.gain.with_)} on images that it was not estimated from)."
+        f"Explains it as well, within one standard error: {causes_in_words(rival.causes)} "
+        f"({rival.gain.with_:.2f} m on images that it was not estimated from)."
         for rival in diagnosis.rivals
         if rival.causes
     ]
@@ -164,8 +181,9 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
         if winner and not winner & {one, other}:
             continue
         said.append(f"These images cannot tell {_CAUSES[one]} from {_CAUSES[other]}.")
-    single = [model.fit.undetermined for model in diagnosis.models if len(model.causes) == 1]
-    lost = {name: partners for of in single for name, partners in of.items()}
+    # A cause that did not win was fitted to errors that it does not explain: what it lost says little.
+    of = [diagnosis.winner] if winner else [m for m in diagnosis.models if len(m.causes) == 1]
+    lost = {name: partners for model in of for name, partners in model.fit.undetermined.items()}
     for name, partners in lost.items():
         label = _PARAMETERS[name][0]
         if partners:
@@ -252,13 +270,19 @@ def outliers_sentence(outliers: Sequence[Outlier], with_: ErrorSummary, without:
     """What the figures are without what is far out."""
     count = len(outliers)
     left = with_.n - without.n
+    kinds = [f"{n} {kind}{'' if n == 1 else 's'}" for kind, n in _counted(outliers).items()]
     return (
-        f"{count} {'is' if count == 1 else 'are'} far out where the others are not. Without "
+        f"{listed(kinds)} {'is' if count == 1 else 'are'} far out where the others are not. Without "
         f"{'it' if count == 1 else 'them'} ({left} of {with_.n} points) the mean error is "
         f"{metres(without.mean)} in place of {metres(with_.mean)}, and the largest {metres(without.max)} in "
         f"place of {metres(with_.max)}. A wrong mark, a wrong pose and a wrong click look alike where "
         "only one point shows it."
     )
+
+
+def _counted(outliers: Sequence[Outlier]) -> dict[str, int]:
+    kinds = [one.kind for one in outliers]
+    return {kind: kinds.count(kind) for kind in ("mark", "photo", "click") if kind in kinds}
 
 
 def halves_sentence(halves: Halves) -> str:
@@ -291,7 +315,7 @@ def remaining_parts(scatter: Scatter, taken_off: Sequence[str]) -> list[str]:
     if not np.isfinite(scatter.image_share):
         return []
     between, within = np.hypot(*scatter.between_sd), np.hypot(*scatter.within_sd)
-    off = f" once {causes_in_words(taken_off)} is taken off" if taken_off else ""
+    off = f" left with {causes_in_words(taken_off)} taken off" if taken_off else ""
     parts = [
         (
             scatter.image_share,
@@ -324,6 +348,9 @@ def ellipse_sentence(verdict: EllipseVerdict) -> str:
         )
     if verdict.word == "too large":
         return f"**Too large**: {held}; axes {f.estimate:.1f} times as long ({span}) would do."
+    if verdict.word == "honest" and not f.low <= 1 <= f.high:
+        near = f"{f.estimate:.2f} times as long ({f.low:.2f} to {f.high:.2f})"
+        return f"**Nearly honest**: {held}; axes {near} would do."
     if verdict.word == "honest":
         return (
             f"**Honest**: {held}; the right length of their axes is {f.estimate:.1f} times theirs ({span})."

@@ -29,7 +29,8 @@ def summary_section(report: Report, found: Accuracy, applied: str = "") -> None:
     said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
     said = [lost, *said] if found.lost > cause.MANY_LOST * total else [*said, lost]
     if diagnosis is not None and logged.n >= words.FEW:
-        said += [cause.cause_sentence(diagnosis), cause.advice(diagnosis, not applied)]
+        unsure = cause.ambiguity_sentence(diagnosis, found.unambiguous)
+        said += [cause.cause_sentence(diagnosis), unsure or cause.advice(diagnosis, not applied)]
     level = cause.verdict_level(logged, found.lost, found.ellipses, diagnosis, words.FEW)
     report.summary([one for one in said if one], level=level)
     if applied:
