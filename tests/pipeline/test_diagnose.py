@@ -84,6 +84,16 @@ def test_a_mark_that_is_off_and_a_photo_that_is_turned_are_named():
     assert clean.mean <= 1.1 * untouched().winner.gain.with_ < found.held_summary().mean
 
 
+@pytest.mark.slow
+def test_a_clock_is_found_where_the_targets_move(make_flight):
+    """Both move in the time that the clock is off: the camera by 15 m/s, each target by 2 m/s of its own."""
+    flight = make_flight(moving=True, clock_s=0.3, pixel_px=1.0, attitude_deg=0.3)
+    found = diagnosed(flight)
+    assert found.winner.causes == ("clock",) and found.counts
+    low, high = found.calibration.interval("clock")
+    assert low <= 0.3 <= high and high - low < 0.1
+
+
 def test_images_without_times_are_not_asked_for_the_clock():
     found = diagnosed(simulate(Survey(timed=False, images=12)))
     assert not any("clock" in model.causes for model in found.models)

@@ -44,8 +44,8 @@ class Averaged(NamedTuple):
 
     @property
     def halves(self) -> bool:
-        """Whether the ratio is a half, within a fifth, and known to lie below seven tenths."""
-        return 0.4 <= self.ratio.estimate <= 0.6 and self.ratio.high < 0.7
+        """Whether the ratio is a half, within a tenth of it, and known to lie below two thirds."""
+        return 0.45 <= self.ratio.estimate <= 0.55 and self.ratio.high < 2 / 3
 
 
 def try_averaging(

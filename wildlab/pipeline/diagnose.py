@@ -7,7 +7,7 @@ and their sums as far as the data tell these apart: see `wildlab.evaluation.caus
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import combinations
 
@@ -40,7 +40,7 @@ from wildlab.geometry.calibration import (
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.pipeline.evaluate import blocks_of, known_points
-from wildlab.pipeline.georeference import Observations, covariances_of, shifted_poses
+from wildlab.pipeline.georeference import Observations, covariances_of, shifted_poses, truth_of
 
 Array = NDArray[np.float64]
 
@@ -57,6 +57,8 @@ CAUSES: dict[str, tuple[str, ...]] = {
 _LENS = ("focal length", "focal lengths", "lens")
 #: Images below which nothing is compared: too few to leave some out.
 FEWEST_IMAGES = 6
+#: Over which a target's speed is measured, either way, s.
+STEP_S = 0.1
 #: Causes of one model at most.
 MOST_CAUSES = 4
 
@@ -190,7 +192,7 @@ def diagnose(
     blocks = blocks_of(flight, scored)
     folds = [draw_folds(blocks, rng) for _ in range(rounds)]
     whiten = covariances_of(scored)
-    poses_at = _poses(flight, source, chosen)
+    poses_at = _poses(flight, source, chosen, scored["truth_id"].to_numpy())
 
     def place(names: tuple[str, ...], values: Array) -> Array:
         trial = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
@@ -219,13 +221,32 @@ def diagnose(
     return Diagnosis(scored, blocks, tuple(models), ranked, calibration, tuple(alike), outliers, inliers)
 
 
-def _poses(flight: Flight, source: str | None, chosen: Observations) -> Callable[[float], CameraPoses]:
-    """Poses at shifted stamps; those as they are, and the last few, without interpolating again."""
+def _poses(
+    flight: Flight, source: str | None, chosen: Observations, targets: NDArray[np.str_]
+) -> Callable[[float], CameraPoses]:
+    """Poses at shifted stamps, as seen from each point's target, which moves on at its speed at the time.
+
+    Those as they are, and the last few, are not interpolated again. What a calibration has added to the
+    position stays added.
+    """
+    named = chosen.table.assign(target_id=targets)
 
     @lru_cache(maxsize=4)
     def at(shift: float) -> CameraPoses:
-        return chosen.poses if shift == 0 else shifted_poses(flight, source, chosen, shift)
+        if shift == 0:
+            return chosen.poses
+        poses = shifted_poses(flight, source, chosen, shift)
+        place = poses.p_nb + added
+        return replace(poses, p_nb=place - shift * velocity)
 
+    added = chosen.poses.p_nb - shifted_poses(flight, source, chosen, 0.0).p_nb
+    velocity = np.zeros_like(added)
+    if flight.truth is not None and flight.truth["time_s"].notna().any():
+        after, before = (
+            truth_of(flight, named.assign(time_s=named["time_s"] + s)) for s in (STEP_S, -STEP_S)
+        )
+        # At the end of a track its target is taken to stand still.
+        velocity[:, :2] = np.nan_to_num((after - before)[:, :2] / (2 * STEP_S))
     return at
 
 

@@ -47,6 +47,8 @@ _CAUSES = {
     "focal lengths": "the focal lengths",
     "lens": "the lens (focal lengths and principal point)",
 }
+#: What a list of all that was tried calls them.
+_SHORT = {"focal length": "lens", "focal lengths": "lens", "clock": "camera's clock"}
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -105,7 +107,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     """What taking a constant error off gained on images it was not estimated from."""
     winner, gain = diagnosis.winner, diagnosis.winner.gain
     if not winner.causes:
-        tried = listed(sorted({_CAUSES[c] for m in diagnosis.models for c in m.causes}), "or")
+        causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
+        tried = listed(sorted(causes), "or")
         return (
             f"No constant error explains it: taking one off ({tried}) gains nothing for certain on images "
             "that it was not estimated from."

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.evaluation.errors import ErrorSummary
 from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting import georeferencing as words
@@ -163,7 +164,7 @@ def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) 
         )
 
 
-def tiles(found: Accuracy, others: dict[str, words.ErrorSummary]) -> list[tuple[str, str]]:
+def tiles(found: Accuracy, others: dict[str, ErrorSummary]) -> list[tuple[str, str]]:
     """The few numbers to remember; none where all points are lost."""
     logged, diagnosis, m = found.summary, found.diagnosis, words.short_length
     if not logged.n:
