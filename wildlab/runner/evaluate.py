@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import Use, usable_for
+from wildlab.flight.checks.check import Use, check_flight, usable_for
 from wildlab.flight.learnt import learnt_toml, read_learnt
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
@@ -33,7 +33,8 @@ def evaluate_flight(
 ) -> list[Outcome]:
     """Judge a flight folder by all that it has the data for.
 
-    Its georeferencing goes to ``<reports>/<name of the flight>/``, its navigation (inertial unit and GNSS
+    Its georeferencing goes to ``<reports>/<name of the flight>/`` (without truth: how far apart sightings of
+    the same things lie), its navigation (inertial unit and GNSS
     against the attitude found on board) to ``<name>-navigation``.
 
     Parameters
@@ -92,6 +93,9 @@ def evaluate_flight(
             parameters["calibration"] = learnt_toml(learnt)
             again_with += f" --calibration {calibration.name}"
         prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
+    elif lacks_only_truth(flight) and calibration is None:
+        found, _ = flight.pose_source(source)
+        prepare(flight.name, "repeat-sightings.ipynb", {"source": found}, f"{again} --source {found}")
     elif source is not None or calibration is not None:
         option = "--source" if source is not None else "--calibration"
         what = "poses are named" if source is not None else "a calibration is named"
@@ -113,6 +117,17 @@ def evaluate_flight(
             file=folder,
         )
     return run_all([jobs], skipped, studies, reports, console)
+
+
+def lacks_only_truth(flight: Flight) -> bool:
+    """Whether truth is all that the georeferencing lacks, and things are seen that have names."""
+    detections, frames, truth = flight.detections, flight.frames, flight.truth
+    if detections is None or frames is None or not len(frames) or not flight.nav:
+        return False
+    pixels = detections[detections["kind"] == "pixel"]
+    named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())
+    whole = not any(finding.level == "problem" for finding in check_flight(flight))
+    return named and whole and (truth is None or not len(truth))
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:
