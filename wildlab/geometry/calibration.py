@@ -230,7 +230,7 @@ def with_covariance(
     return Calibration(
         names=fit.names,
         values=fit.values,
-        covariance=jackknife(fit.J, fit.r, groups),
+        covariance=_jackknife(fit.J, fit.r, groups),
         undetermined=fit.undetermined,
         n_points=len(fit.r),
         n_images=len(np.unique(images)),
@@ -296,7 +296,7 @@ def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, 
     return names[involved[-1]], tuple(names[i] for i in involved[:-1])
 
 
-def jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
+def _jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
     """Covariance (P, P) of a linear fit: how far it moves when one draw is left out, each in turn.
 
     It knows that residuals of one draw go together, and errs, where there are few draws, on the safe side.

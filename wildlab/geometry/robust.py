@@ -40,7 +40,18 @@ class RobustFit(NamedTuple):
 
 
 def student_weights(squared: ArrayLike, scale: float) -> Array:
-    """Weights (N,) of two-dimensional residuals with squared lengths (N,) at a scale.
+    """Weights of two-dimensional residuals at a scale.
+
+    Parameters
+    ----------
+    squared
+        (N,) squared lengths.
+    scale
+        Of the distribution, in the unit of a length.
+
+    Returns
+    -------
+    (N,), about one for an ordinary residual
 
     Examples
     --------
@@ -78,7 +89,17 @@ def student_scale(squared: ArrayLike) -> float:
 
 
 def student_cost(squared: ArrayLike) -> float:
-    """Negative log-likelihood of squared lengths (N,) of two-dimensional residuals at their best scale."""
+    """Negative log-likelihood of two-dimensional residuals at their best scale.
+
+    Parameters
+    ----------
+    squared
+        (N,) squared lengths.
+
+    Returns
+    -------
+    float
+    """
     d = np.asarray(squared, float)
     scale = _raw_scale(d)
     tail = (DEGREES + 2) / 2 * np.log1p(d / (DEGREES * scale**2)).sum()
