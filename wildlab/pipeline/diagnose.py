@@ -2,6 +2,7 @@
 
 The models are constant errors of the position, the height, the boresight, the camera's clock and the lens,
 and their sums as far as the data tell these apart: see `wildlab.evaluation.causes` for how they are compared.
+The one that wins is tried once more with those of its parameters alone that are told from zero.
 """
 
 from __future__ import annotations
@@ -86,8 +87,10 @@ class Model:
 
     @property
     def name(self) -> str:
-        """The causes in words, ``nothing`` where there is none."""
-        return " and ".join(self.causes) or "nothing"
+        """The causes in words, ``nothing`` where there is none; with its parameters where it has not all."""
+        lacking = {name for cause in self.causes for name in CAUSES[cause]} - set(self.fit.names)
+        alone = f" ({', '.join(self.fit.names)} alone)" if lacking else ""
+        return (" and ".join(self.causes) or "nothing") + alone
 
 
 @dataclass(frozen=True)
@@ -201,8 +204,8 @@ def diagnose(
 
     logged = place((), np.zeros(0))
 
-    def model(causes: tuple[str, ...]) -> Model:
-        wanted = [name for cause in causes for name in CAUSES[cause]]
+    def model(causes: tuple[str, ...], only: tuple[str, ...] = ()) -> Model:
+        wanted = only or [name for cause in causes for name in CAUSES[cause]]
         fit = fit_points(poses_at, chosen.uv, known, wanted, whiten)
         held = held_out(Linear(fit.J, fit.r, fit.values, partial(place, fit.names)), folds)
         return Model(causes, fit, held, gain_of(logged, held, blocks))
@@ -210,6 +213,9 @@ def diagnose(
     timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     causes = [cause for cause in CAUSES if timed or cause != "clock"]
     models, alike = _search(model, causes, blocks)
+    best = models[_rank(models, blocks).winner]
+    if only := _told_from_zero(with_covariance(best.fit, scored["frame_id"].to_numpy(), blocks)):
+        models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
     ranked = _rank(models, blocks)
     winner = models[ranked.winner]
     # What is far out is looked for with the winner taken off, where that gained something for certain.
@@ -285,6 +291,16 @@ def _search(
         more = [cause for cause in causes if cause not in winner.causes]
         add(tuple(c for c in causes if c in (*winner.causes, one)) for one in more)
     return models, alike
+
+
+def _told_from_zero(calibration: Calibration) -> tuple[str, ...]:
+    """The parameters whose 95 % interval leaves zero out, where there are some and others do not."""
+    told = []
+    for name in calibration.names:
+        low, high = calibration.interval(name)
+        if low > 0 or high < 0:
+            told.append(name)
+    return tuple(told) if 0 < len(told) < len(calibration.names) else ()
 
 
 def _undetermined_alone(models: list[Model], causes: tuple[str, ...]) -> set[str]:
