@@ -40,7 +40,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "runner": BELOW_PIPELINE | {"pipeline", "reporting", "studies"},
     # What `import wildlab` offers; nothing of wildlab imports it.
     "api": BELOW_PIPELINE | {"pipeline", "reporting"},
-    "commands": BELOW_PIPELINE | {"reporting", "studies", "runner", "terminal"},
+    "commands": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "terminal"},
     "cli": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "commands", "doctor", "terminal"},
     "__main__": {"cli"},
     "brief": set(),

@@ -14,7 +14,7 @@ from wildlab.geometry.frames import (
     rotation_vector_to_matrix,
 )
 from wildlab.pipeline.calibrate import calibrate_flight
-from wildlab.pipeline.evaluate import draws_of, errors_of, recorded_answers, score_points
+from wildlab.pipeline.evaluate import blocks_of, errors_of, recorded_answers, score_points
 from wildlab.pipeline.georeference import USUAL, assumed_deviations, georeference, observe, pose_errors
 from wildlab.pipeline.pose_noise import estimate_noise, evaluate_with_estimated_noise
 
@@ -150,31 +150,33 @@ def test_no_pixels_and_too_few_images_are_errors(make_flight):
         calibrate_flight(make_flight(n_images=3), np.random.default_rng(0))
 
 
-def test_a_minute_is_one_draw_where_there_are_times(make_flight):
-    long, short = make_flight(n_images=250), make_flight(n_images=40)
+def test_a_minute_is_one_block_where_there_are_times(make_flight):
+    long, short = make_flight(n_images=430), make_flight(n_images=40)
     table = observe(long).table
-    draws = draws_of(long, table)
-    assert len(np.unique(draws)) == 5
-    for label in np.unique(draws):
-        times = table["time_s"][draws == label]
+    blocks = blocks_of(long, table)
+    assert len(np.unique(blocks)) == 8
+    for label in np.unique(blocks):
+        times = table["time_s"][blocks == label]
         assert times.max() - times.min() < 60.0
-    # Over too soon to be halved by minutes, or without times: images.
-    assert set(draws_of(short, observe(short).table)) == set(short.frames["frame_id"])
+    # Over too soon for six minutes, or without times: three neighbouring images, and more in a long flight.
+    few = pd.Series(blocks_of(short, observe(short).table))
+    assert few.is_monotonic_increasing
+    assert set(observe(short).table.groupby(few)["frame_id"].nunique()) == {3, 4}
     long.manifest = long.manifest.model_copy(
         update={"time": long.manifest.time.model_copy(update={"kind": "sequence"})}
     )
-    assert set(draws_of(long, table)) == set(long.frames["frame_id"])
+    assert len(np.unique(blocks_of(long, table))) == 20
 
 
 def test_errors_that_wander_widen_what_is_stated(make_flight):
     """The same errors in every image of a minute are worth one image of it, not sixty."""
-    flight = make_flight(n_images=300, pixel_px=1.0)
+    flight = make_flight(n_images=420, pixel_px=1.0)
     rng = np.random.default_rng(0)
-    wander = np.repeat(rng.normal(0, np.radians(1.0), (6, 3)), 600, axis=0)[: len(flight.nav["logged"])]
+    wander = np.repeat(rng.normal(0, np.radians(1.0), (8, 3)), 600, axis=0)[: len(flight.nav["logged"])]
     nav = flight.nav["logged"].iloc[: len(wander)].copy()
     R = quaternion_to_matrix(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy()) @ rotation_vector_to_matrix(wander)
     nav[["q_w", "q_x", "q_y", "q_z"]] = matrix_to_quaternion(R)
     flight.nav["logged"] = nav
     found = calibrate_flight(flight, rng, splits=1).calibration
-    # Six draws of one degree each: about 0.4 deg, where 300 images would claim 0.06.
+    # Seven draws of one degree each: about 0.4 deg, where 420 images would claim 0.05.
     assert 0.2 < np.degrees(found.sd("roll")) < 0.8

@@ -4,9 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.evaluation.errors import Scatter, summarise
+from wildlab.evaluation.errors import summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
-from wildlab.geometry.calibration import Calibration
 from wildlab.reporting import georeferencing
 from wildlab.reporting.report import open_report
 
@@ -24,34 +23,6 @@ def scored_table(n=20, seed=0):
          "error_east_m": e[:, 1],
          "error_m": np.hypot(*e.T), "inside_90": 1.0, "ellipse": "linear"}
     )  # fmt: skip
-
-
-def scatter(bias, image, within):
-    return Scatter(bias, image, within, np.array([3.0, 4.0]), np.array([0.6, 0.8]))
-
-
-@pytest.mark.parametrize(
-    ("shares", "word"),
-    [((0.7, 0.2, 0.1), "constant"), ((0.1, 0.8, 0.1), "wrong together"), ((0.1, 0.2, 0.7), "its own way")],
-)
-def test_the_largest_share_is_named(shares, word):
-    assert word in georeferencing.main_limit(scatter(*shares))
-
-
-def test_too_few_points_are_said_so():
-    nan = float("nan")
-    silent = Scatter(nan, nan, nan, np.full(2, nan), np.full(2, nan))
-    assert "too few" in georeferencing.main_limit(silent)
-    assert georeferencing.limiting_factors(silent, summarise(np.ones((2, 2))), None) == []
-
-
-def test_factors_are_sorted_by_their_share_and_carry_their_numbers():
-    logged = summarise(np.array([[3.0, 4.0], [3.0, 4.0]]))
-    factors = georeferencing.limiting_factors(scatter(0.2, 0.3, 0.5), logged, None)
-    assert ["Single" in factors[0], "pose" in factors[1], "constant" in factors[2]] == [True] * 3
-    assert "1.0 m" in factors[0]
-    assert "5.0 m" in factors[1]
-    assert "5.0 m over all images" in factors[2]
 
 
 def test_metrics_have_the_promised_names(report):
@@ -78,19 +49,6 @@ def test_noise_is_shown_in_degrees():
     assert len(table) == len(KINDS)
 
 
-def test_what_was_not_estimated_is_said_with_its_partners(report):
-    found = Calibration(
-        ("roll",), np.array([0.02]), np.array([[1e-6]]), {"clock": ("tilt",), "pan": ()}, 10, 5
-    )
-    words = georeferencing.undetermined_words(found)
-    assert "cannot tell it from tilt" in words[0]
-    assert "no effect" in words[1]
-    table = georeferencing.calibration_table(report, found)
-    assert table.loc[0, "value"] == pytest.approx(np.degrees(0.02))
-    assert table.loc[0, "verdict"] == "differs from zero"
-    assert report._metrics[0]["name"] == "boresight_roll"
-
-
 def test_lengths_in_words():
     assert georeferencing.length(5.06) == "5.1 metres"
     assert georeferencing.length(0.404) == "40 centimetres"
@@ -100,6 +58,33 @@ def test_lengths_in_words():
 
 
 def test_too_few_points_are_not_praised():
-    few, many_points = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
-    assert "too few" in georeferencing.summary_sentences(few, scatter(1, 0, 0))[0]
-    assert "nine times out of ten" in georeferencing.summary_sentences(many_points, scatter(1, 0, 0))[0]
+    few, many = summarise(np.ones((3, 2))), summarise(np.ones((20, 2)))
+    assert "too few" in georeferencing.headline(few, 3)[0]
+    assert len(georeferencing.headline(few, 3)) == 3
+    (said,) = georeferencing.headline(many, 20)
+    assert "nine times out of ten" in said and "(20 points)" in said
+    assert "(20 of 25 points)" in georeferencing.headline(many, 25)[0]
+    assert georeferencing.headline(summarise(np.empty((0, 2))), 25) == []
+
+
+def test_the_title_of_the_scatter_follows_the_bias():
+    wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
+    assert "centre on the truth" in georeferencing.scatter_title(wide)
+    assert "lie 5.0 m off" in georeferencing.scatter_title(summarise(np.tile([3.0, 4.0], (9, 1))))
+
+
+def test_what_the_vertical_correction_is_worth():
+    left_in = summarise(np.tile([30.0, 40.0], (9, 1)))
+    assert "would be 50 m" in georeferencing.vertical_words(56.8, left_in, True)
+    shared = georeferencing.vertical_words(56.8, left_in, False)
+    assert "share the fault" in shared and "50 m" not in shared
+
+
+def test_limits_speak_of_what_there_is():
+    points = pd.DataFrame({"north_m": [1.0, np.nan]})
+    nothing = georeferencing.limits_of(points, [np.nan], [], labelled=True, timed=True, enough=True)
+    assert not any("flatter views" in one for one in nothing)
+    assert any("1 of 2 points" in one for one in nothing)
+    full = georeferencing.limits_of(points[:1], [30.0], [80.0], labelled=False, timed=False, enough=False)
+    assert "30°" in full[0] and "80 m" in full[0]
+    assert any("no time of their own" in one for one in full) and any("no interval" in one for one in full)

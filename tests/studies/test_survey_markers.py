@@ -9,9 +9,15 @@ import pytest
 
 from wildlab.evaluation.errors import summarise
 from wildlab.flight.recipe.importing import import_flight
-from wildlab.geometry.frames import ned_to_geodetic
+from wildlab.geometry.frames import (
+    euler_to_matrix,
+    matrix_to_quaternion,
+    ned_to_geodetic,
+    quaternion_to_matrix,
+)
 from wildlab.paths import DATA
 from wildlab.pipeline.calibrate import calibrate_flight
+from wildlab.pipeline.diagnose import diagnose
 from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
 from wildlab.pipeline.georeference import georeference, heights_left_in, observe
 from wildlab.pipeline.pose_noise import evaluate_with_estimated_noise
@@ -89,3 +95,58 @@ def test_calibration_does_not_hurt_images_it_has_not_seen(flights):
     result = calibrate_flight(flights["openathena-f1"], np.random.default_rng(0), splits=5)
     assert np.mean(result.mean_errors) < 3.3
     assert not result.calibration.undetermined
+
+
+def diagnosed(flight, tilt_deg=0.0, down_m=0.0):
+    """The diagnosis with the logged slant and height made wrong."""
+    logged = flight.nav["logged"]
+    nav, q = logged.copy(), ["q_w", "q_x", "q_y", "q_z"]
+    turn = euler_to_matrix(0.0, np.radians(tilt_deg), 0.0)
+    nav[q] = matrix_to_quaternion(quaternion_to_matrix(nav[q].to_numpy()) @ turn)
+    nav["down_m"] += down_m
+    flight.nav["logged"] = nav
+    try:
+        observations = observe(flight)
+        return diagnose(flight, observations, errors(flight, observations), np.random.default_rng(0))
+    finally:
+        flight.nav["logged"] = logged
+
+
+@pytest.fixture(scope="module")
+def as_flown(flights):
+    return diagnosed(flights["openathena-f1"])
+
+
+@pytest.mark.slow
+def test_the_flight_as_flown_has_little_constant_error_and_one_photo_far_out(as_flown):
+    assert as_flown.winner.causes == ("height",) and as_flown.counts
+    gain = as_flown.winner.gain
+    assert 0 < gain.gain.low < gain.gain.estimate < 0.1 * gain.without
+    assert [(one.kind, one.photo) for one in as_flown.outliers] == [("photo", "T038")]
+    assert as_flown.held_summary(as_flown.inliers).mean < 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("tilt_deg", "down_m", "causes"),
+    [
+        (5.0, 0.0, {"boresight"}),
+        (-5.0, 0.0, {"boresight"}),
+        (0.0, 8.0, {"height"}),
+        (0.0, -8.0, {"height"}),
+        (-5.0, 8.0, {"boresight", "height"}),
+    ],
+)
+def test_what_is_made_wrong_is_named_and_taken_off(flights, as_flown, tilt_deg, down_m, causes):
+    """The flight has errors of its own: its correction changes by what was put in."""
+    found = diagnosed(flights["openathena-f1"], tilt_deg, down_m)
+    assert set(found.winner.causes) == causes and found.counts
+    assert found.winner.gain.with_ <= 1.1 * as_flown.winner.gain.with_
+    own = next(model for model in as_flown.models if set(model.causes) == causes)
+    before = dict(zip(own.fit.names, own.fit.values, strict=True))
+    for name, put_in in (("tilt", -np.radians(tilt_deg)), ("down", -down_m)):
+        if name in found.calibration.names:
+            low, high = found.calibration.interval(name)
+            assert low <= before[name] + put_in <= high, name
+            assert not low <= 0 <= high
+    assert [(one.kind, one.photo) for one in found.outliers] == [("photo", "T038")]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from wildlab.commands.shared import FOLDER, Minutes, reports_folder, terminal_console
+from wildlab.commands.shared import FILE, FOLDER, Minutes, reports_folder, terminal_console
 from wildlab.terminal import print_json, print_table, shown
 
 
@@ -193,9 +193,14 @@ def vary(study: str, by: str, seeds: int, jobs: int, out: Path | None) -> None:
 @click.command(short_help="What is a flight worth? One report for all that its data allow.")
 @click.argument("flight", type=FOLDER)
 @click.option("--source", help="Which poses to judge, where the flight has several (its nav/NAME.parquet).")
+@click.option(
+    "--calibration", type=FILE, help="Apply first what `wildlab calibrate` learnt on another flight."
+)
 @click.option("--out", type=FOLDER, help="Where the report goes.  [default: reports]")
 @click.option("--timeout", type=Minutes(), help="Minutes it may take.  [default: 30]")
-def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float | None) -> None:
+def evaluate(
+    flight: Path, source: str | None, calibration: Path | None, out: Path | None, timeout: float | None
+) -> None:
     """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
 
     One report on the accuracy of its georeferencing, and one on its navigation, as far as the data go.
@@ -204,12 +209,14 @@ def evaluate(flight: Path, source: str | None, out: Path | None, timeout: float 
     Examples:
       wildlab evaluate flights/tuesday
       wildlab evaluate flights/antenna --source autopilot
+      wildlab evaluate flights/wednesday --calibration calibration.toml
     """
     from wildlab.runner.evaluate import evaluate_flight
 
     outcomes = evaluate_flight(
         flight,
         source=source,
+        calibration=calibration,
         reports=reports_folder(out),
         timeout_s=None if timeout is None else timeout * 60,
         console=terminal_console(),

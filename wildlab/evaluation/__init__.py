@@ -11,9 +11,15 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `ospa`, `gospa`: how far is a set of tracks?
 - `mean_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
-  err.
+  err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
+- `held_out`, `gain_of`, `rank_models`: which constant error is behind them; `split_along`; `find_outliers`.
+- `judge_ellipses`, `try_averaging`, `spread_of_sightings`, `ambiguous`: what they are worth.
 """
 
+from wildlab.evaluation.ambiguity import ambiguous, largest_visible
+from wildlab.evaluation.axes import AlongAxis, split_along
+from wildlab.evaluation.blocks import Halves, block_mean, compare_halves, time_blocks
+from wildlab.evaluation.causes import Gain, Linear, Ranked, gain_of, held_out, rank_models
 from wildlab.evaluation.consistency import (
     ERROR_CONVENTION,
     Average,
@@ -25,16 +31,20 @@ from wildlab.evaluation.consistency import (
     share_inside,
     whiten,
 )
+from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
 from wildlab.evaluation.errors import (
     ErrorSummary,
     Scatter,
     bootstrap_interval,
+    mean_summary,
     scatter_by_image,
     summarise,
 )
+from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
 from wildlab.evaluation.runs import Interval, mean_interval, share_interval
 from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
+from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
 from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
 from wildlab.evaluation.whiteness import (
     Whiteness,
@@ -47,35 +57,58 @@ from wildlab.evaluation.whiteness import (
 
 __all__ = [
     "ERROR_CONVENTION",
+    "AlongAxis",
     "Average",
+    "Averaged",
+    "EllipseVerdict",
     "ErrorSummary",
+    "Gain",
     "Gospa",
+    "Halves",
     "Interval",
+    "Linear",
     "Ospa",
+    "Outlier",
     "PoseNoise",
+    "Ranked",
     "Scatter",
+    "Spread",
     "TrackErrors",
     "TrackSummary",
     "Whiteness",
+    "ambiguous",
     "autocorrelation",
     "average",
+    "block_mean",
     "bootstrap_interval",
     "chi_square_interval",
+    "compare_halves",
     "effective_sample_size",
     "estimate_pose_noise",
+    "find_outliers",
+    "gain_of",
     "gospa",
+    "held_out",
     "innovation_whiteness",
+    "judge_ellipses",
+    "largest_visible",
     "mean_interval",
+    "mean_summary",
     "nees",
     "nis",
     "ospa",
     "portmanteau",
     "position_nees",
+    "rank_models",
     "scatter_by_image",
     "share_inside",
     "share_interval",
+    "split_along",
+    "spread_of_sightings",
     "summarise",
     "summarise_track",
+    "time_blocks",
+    "try_averaging",
     "white_bound",
     "whiten",
 ]

@@ -57,6 +57,28 @@ def summarise(errors: ArrayLike) -> ErrorSummary:
     )
 
 
+def mean_summary(rounds: ArrayLike) -> ErrorSummary:
+    """Summary of horizontal errors that are known R times over: each figure is the mean over the rounds.
+
+    Parameters
+    ----------
+    rounds
+        (R, N, 2) north, east in n, m.
+
+    Returns
+    -------
+    ErrorSummary
+
+    Examples
+    --------
+    >>> mean_summary([[[3.0, 4.0]], [[0.0, 1.0]]]).mean
+    3.0
+    """
+    each = [summarise(one) for one in np.asarray(rounds, float)]
+    means = [float(np.mean(values)) for values in zip(*each, strict=True)]
+    return ErrorSummary(round(means[0]), *means[1:])
+
+
 class Scatter(NamedTuple):
     """Mean squared horizontal error split into what is constant, per image, and within images.
 

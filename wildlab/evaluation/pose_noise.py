@@ -28,6 +28,8 @@ KINDS: dict[str, tuple[int, ...]] = {
 }
 #: Standard deviation of the prior on the logarithm: a factor of three either way.
 PRIOR = np.log(3.0)
+#: How many times as far off as the others an image is that is far out.
+FAR = 10.0
 
 
 class PoseNoise(NamedTuple):
@@ -48,6 +50,7 @@ def estimate_pose_noise(
     noise: ArrayLike,
     image: ArrayLike,
     assumed: dict[str, float],
+    far_out: float = 0.0,
 ) -> PoseNoise:
     """Most likely standard deviations of the pose and pixel errors behind the errors of known points.
 
@@ -66,6 +69,9 @@ def estimate_pose_noise(
         (N,) which image each belongs to.
     assumed
         Standard deviations by :data:`KINDS` about which the prior lies, above zero: m, rad, pixels.
+    far_out
+        Share of the images, below one, that is taken to be :data:`FAR` times as far off as the others
+        (Tukey's contaminated normal distribution); zero takes all for normal.
 
     Returns
     -------
@@ -85,6 +91,13 @@ def estimate_pose_noise(
         raise ValueError("fewer than three images with known points: their noise cannot be estimated")
     start = np.log([assumed[kind] for kind in KINDS])
 
+    def log_density(squared: Array, size: int) -> Array:
+        if not far_out:
+            return -0.5 * squared
+        usual = np.log1p(-far_out) - 0.5 * squared
+        far = np.log(far_out) - size * np.log(FAR) - 0.5 * squared / FAR**2
+        return np.asarray(np.logaddexp(usual, far))
+
     def negative_log_posterior(log_sd: Array) -> float:
         variance = np.empty(6)
         for kind, value in zip(KINDS, log_sd, strict=True):
@@ -95,7 +108,8 @@ def estimate_pose_noise(
             spread = derivative * variance @ np.swapaxes(derivative, 1, 2)
             L = np.linalg.cholesky(own + pixel * of_pixel + spread)
             z = np.linalg.solve(L, residual[..., None])
-            total += 0.5 * np.sum(z**2) + np.log(np.diagonal(L, axis1=1, axis2=2)).sum()
+            squared = (z**2).sum(axis=(1, 2))
+            total += np.log(np.diagonal(L, axis1=1, axis2=2)).sum() - log_density(squared, z.shape[1]).sum()
         return float(total)
 
     # Bounded, for the first step along a steep slope would otherwise leap to where no prior brings it back.

@@ -1,148 +1,169 @@
-"""Boresight, lens position and camera clock from known points in the flight's own images (H 5.3.2).
+"""Boresight, lens, position and camera clock from known points in the flight's own images (H 5.3.2).
 
 H (5.15)-(5.17) finds three misalignment angles that bring georeferenced points onto known ones, by nonlinear
-least squares. Here the residuals may be weighted with each point's ground covariance, a robust loss keeps a
-wrong click from deciding, and the estimate comes with a covariance that knows that clicks of one image share
-the image's pose error. What the data cannot tell apart is named and left alone, not fitted.
+least squares. Here the residuals may be weighted with each point's ground covariance, a heavy-tailed
+likelihood keeps a wrong click from deciding, and the estimate comes with a covariance that knows that clicks
+of one image share the image's pose error. What the data cannot tell apart is named and left alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
-from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.mount import Mount
+from wildlab.geometry.corrections import (
+    BORESIGHT,
+    PARAMETERS,
+    Calibration,
+    PosesAt,
+    apply_calibration,
+    calibrated_camera,
+    calibrated_poses,
+    georeference_calibrated,
+)
+from wildlab.geometry.frames import Array
+from wildlab.geometry.robust import fit_linear, student_cost, student_scale
 
-#: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
-#: with the size an error of it would usually have (radians, seconds, metres). A parameter, or a combination,
-#: that the data determine no better than that is not worth fitting.
-PARAMETERS: dict[str, float] = {
-    "roll": np.radians(3.0),
-    "tilt": np.radians(3.0),
-    "pan": np.radians(3.0),
-    "clock": 0.5,
-    "down": 5.0,
-    "north": 5.0,
-    "east": 5.0,
-}
-BORESIGHT = ("roll", "tilt", "pan")
+__all__ = [
+    "BORESIGHT",
+    "PARAMETERS",
+    "Calibration",
+    "Fit",
+    "PosesAt",
+    "apply_calibration",
+    "calibrate",
+    "calibrated_camera",
+    "calibrated_poses",
+    "fit_points",
+    "georeference_calibrated",
+    "split_images",
+    "with_covariance",
+]
+
 #: Smallest singular value of the normalised derivatives: 0.1 is two columns with a correlation of 0.99.
 PARALLEL = 0.1
+#: Steps of an estimate, and how often a step that makes it worse is halved.
+ROUNDS, HALVINGS = 30, 8
 
-#: Poses at the times of N pixels, shifted by so many seconds.
-PosesAt = Callable[[float], CameraPoses]
 
-
-@dataclass(frozen=True)
-class Calibration:
-    """An estimate of some of :data:`PARAMETERS`.
+class Fit(NamedTuple):
+    """An estimate without its covariance, and what it looks like from there.
 
     Attributes
     ----------
     names
-        The parameters estimated.
+        The P parameters estimated.
     values
-        Corrections (P,), radians, seconds, metres: angles turn the camera's base on the airframe, ``clock``
-        is to be added to the camera's stamps, ``north``/``east``/``down`` to the logged position.
-    covariance
-        (P, P); clicks of one image count as one draw of the image's error.
+        (P,), in the units of `Calibration`.
     undetermined
-        Asked for and not estimated, with the parameters each could not be told apart from (none: it has no
-        effect that shows).
-    n_points, n_images
-        What it rests on.
+        As in `Calibration`.
+    usable
+        (N,) which points have a pose and meet the ground.
+    J
+        (M, 2, P) derivatives of the M usable residuals, whitened, per unit of each parameter.
+    r
+        (M, 2) residuals at the estimate, whitened.
     """
 
     names: tuple[str, ...]
     values: Array
-    covariance: Array
     undetermined: dict[str, tuple[str, ...]]
-    n_points: int
-    n_images: int
-
-    def value(self, name: str) -> float:
-        """The correction called ``name``, zero where it was not estimated."""
-        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
-
-    def sd(self, name: str) -> float:
-        """Its standard deviation; NaN where it was not estimated."""
-        if name not in self.names:
-            return float("nan")
-        i = self.names.index(name)
-        return float(np.sqrt(self.covariance[i, i]))
+    usable: np.ndarray
+    J: Array
+    r: Array
 
 
-def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:
-    """The mount with the estimated angles on top of its own misalignment.
+def fit_points(
+    poses_at: PosesAt,
+    uv: ArrayLike,
+    known_points: ArrayLike,
+    estimate: Sequence[str] = BORESIGHT,
+    covariance: ArrayLike | None = None,
+) -> Fit:
+    """The estimate of `calibrate`, which see, without its covariance: a tenth of the work.
 
     Parameters
     ----------
-    calibration
-        The estimate.
-    mount
-        The one it was estimated with.
+    poses_at, uv, known_points, estimate, covariance
+        As for `calibrate`.
 
     Returns
     -------
-    The mount, otherwise unchanged.
-    """
-    angles = [calibration.value(name) for name in BORESIGHT]
-    turned = euler_to_matrix(*angles) @ euler_to_matrix(*mount.misalignment)
-    roll, tilt, pan = matrix_to_euler(turned)
-    return replace(mount, misalignment=(float(roll), float(tilt), float(pan)))
-
-
-def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses:
-    """Poses with a calibration applied to clock, position and mount.
-
-    Parameters
-    ----------
-    calibration
-        The estimate.
-    poses_at
-        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
-
-    Returns
-    -------
-    The poses; their covariance is that of the logged ones.
-    """
-    poses = poses_at(calibration.value("clock"))
-    shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
-    return replace(poses, p_nb=poses.p_nb + shift, mount=apply_calibration(calibration, poses.mount))
-
-
-def georeference_calibrated(
-    calibration: Calibration, poses_at: PosesAt, uv: ArrayLike, plane_down: ArrayLike
-) -> Array:
-    """Ground points with a calibration applied to clock, position and mount.
-
-    Parameters
-    ----------
-    calibration
-        The estimate.
-    poses_at
-        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
-    uv
-        (N, 2) pixels.
-    plane_down
-        Down coordinate of the plane in n, metres, scalar or (N,).
-
-    Returns
-    -------
-    (N, 3) metres in n; NaN where a ray misses the plane.
+    Fit
 
     Raises
     ------
+    ValueError
+        Unknown parameter, or no usable point.
     WildlabError
-        Where there is another number of poses, or of planes, than of pixels.
+        Where there is another number of poses, or of points, than of pixels.
     """
-    return georeference_pixels(calibrated_poses(calibration, poses_at), uv, plane_down)
+    unknown = set(estimate) - PARAMETERS.keys()
+    if unknown:
+        raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
+    uv, known = np.asarray(uv, float), np.asarray(known_points, float)
+    whiten = _whitening(covariance, len(uv))
+
+    def residuals(names: tuple[str, ...], scaled: Array) -> Array:
+        trial = _unscaled(names, scaled)
+        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])
+        return np.asarray(np.einsum("nij,nj->ni", whiten, ground[:, :2] - known[:, :2]))
+
+    wanted = tuple(name for name in PARAMETERS if name in estimate)
+    usable = np.asarray(np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1))
+    if usable.sum() < 2:
+        raise ValueError("fewer than two points have a pose and meet the ground: nothing to calibrate with")
+
+    def fit(names: tuple[str, ...], scaled: Array) -> tuple[Array, Array, float]:
+        """Scaled estimate (P,) by Gauss and Newton, residuals (N, 2) at it, and their standard deviation."""
+        r = at(names, scaled)
+        cost = student_cost((r**2).sum(axis=1))
+        for _ in range(ROUNDS if names else 0):
+            step = fit_linear(derivative(names, scaled), r).x
+            for _ in range(HALVINGS):
+                trial = at(names, scaled + step)
+                found = student_cost((trial**2).sum(axis=1))
+                if found <= cost:
+                    break
+                step = step / 2
+            else:
+                break
+            gained, scaled, r, cost = cost - found, scaled + step, trial, found
+            if gained < 1e-6 and np.abs(step).max() < 1e-9:
+                break
+        return scaled, r, student_scale((r**2).sum(axis=1))
+
+    def at(names: tuple[str, ...], scaled: Array) -> Array:
+        # A trial that tips a ray over the horizon is far off; a large residual turns it back.
+        return np.nan_to_num(residuals(names, scaled)[usable], nan=1e6)
+
+    def derivative(names: tuple[str, ...], scaled: Array, step: float = 1e-5) -> Array:
+        """Derivative (N, 2, P) of the residuals by central differences; zero for a ray that misses."""
+        columns = [
+            (residuals(names, scaled + step * axis) - residuals(names, scaled - step * axis))[usable]
+            / (2 * step)
+            for axis in np.eye(len(names))
+        ]
+        empty = np.zeros((int(usable.sum()), 2, 0))
+        return np.nan_to_num(np.stack(columns, axis=-1)) if columns else empty
+
+    names, undetermined = wanted, dict[str, tuple[str, ...]]()
+    scaled = np.zeros(len(names))
+    while True:
+        scaled, r, noise = fit(names, scaled)
+        J = derivative(names, scaled)
+        blurred = _undetermined(names, J.reshape(2 * len(J), -1), noise) if names else None
+        if blurred is None:
+            break
+        name, partners = blurred
+        undetermined[name] = partners
+        scaled = scaled[[other != name for other in names]]
+        names = tuple(other for other in names if other != name)
+    scale = np.array([PARAMETERS[name] for name in names])
+    return Fit(names, scaled * scale, undetermined, usable, J / scale, r)
 
 
 def calibrate(
@@ -172,7 +193,7 @@ def calibrate(
         (N, 2, 2) ground covariances to weight with; without them all points count alike, as in H (5.17).
     draw
         (N,) which points share their error; those of an image, if not given. The covariance of the estimate
-        follows from how far different draws disagree.
+        follows from how far it moves when one draw is left out.
 
     Returns
     -------
@@ -185,72 +206,35 @@ def calibrate(
     WildlabError
         Where there is another number of poses, or of points, than of pixels.
     """
-    from scipy.optimize import least_squares  # as long to import as all the rest of geometry
+    fit = fit_points(poses_at, uv, known_points, estimate, covariance)
+    return with_covariance(fit, image, image if draw is None else draw)
 
-    unknown = set(estimate) - PARAMETERS.keys()
-    if unknown:
-        raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
-    uv, known = np.asarray(uv, float), np.asarray(known_points, float)
-    groups = np.unique(np.asarray(image if draw is None else draw), return_inverse=True)[1]
-    whiten = _whitening(covariance, len(uv))
 
-    def residuals(names: tuple[str, ...], scaled: Array) -> Array:
-        trial = _unscaled(names, scaled)
-        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])
-        return np.asarray(np.einsum("nij,nj->ni", whiten, ground[:, :2] - known[:, :2]))
+def with_covariance(
+    fit: Fit, image: Sequence[object] | np.ndarray, draw: Sequence[object] | np.ndarray
+) -> Calibration:
+    """An estimate with the covariance that follows from how far it moves when one draw is left out.
 
-    wanted = tuple(name for name in PARAMETERS if name in estimate)
-    usable = np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1)
-    if usable.sum() < 2:
-        raise ValueError("fewer than two points have a pose and meet the ground: nothing to calibrate with")
+    Parameters
+    ----------
+    fit
+        From `fit_points`.
+    image, draw
+        (N,) which image each point belongs to, and which points share their error.
 
-    def spread(r: Array) -> float:
-        """Robust standard deviation of one residual."""
-        return max(1.4826 * float(np.median(np.abs(r))), 1e-6)
-
-    def fit(names: tuple[str, ...]) -> tuple[Array, Array, float]:
-        """Scaled estimate (P,), residuals (2N,) at it, and the spread of those."""
-
-        def flat(scaled: Array) -> Array:
-            # A trial that tips a ray over the horizon is far off; a large residual turns it back.
-            return np.nan_to_num(residuals(names, scaled)[usable], nan=1e6).ravel()
-
-        scaled, r = np.zeros(len(names)), flat(np.zeros(len(names)))
-        if names:
-            # What counts as far out is only known once the constant errors are taken off: hence three rounds.
-            for _ in range(3):
-                solution = least_squares(flat, scaled, jac="3-point", loss="soft_l1", f_scale=spread(r))
-                scaled, r = solution.x, flat(solution.x)
-        return scaled, r, spread(r)
-
-    def derivative(names: tuple[str, ...], scaled: Array, step: float = 1e-5) -> Array:
-        """Derivative (2N, P) of the residuals by central differences."""
-        columns = [
-            (residuals(names, scaled + step * axis) - residuals(names, scaled - step * axis))[usable].ravel()
-            / (2 * step)
-            for axis in np.eye(len(names))
-        ]
-        return np.stack(columns, axis=-1) if columns else np.zeros((2 * int(usable.sum()), 0))
-
-    names, undetermined = wanted, dict[str, tuple[str, ...]]()
-    while True:
-        scaled, r, noise = fit(names)
-        J = derivative(names, scaled)
-        blurred = _undetermined(names, J, noise)
-        if blurred is None:
-            break
-        name, partners = blurred
-        undetermined[name] = partners
-        names = tuple(other for other in names if other != name)
-    scale = np.array([PARAMETERS[name] for name in names])
-    clustered = _clustered_covariance(J, r, np.repeat(groups[usable], 2), noise)
+    Returns
+    -------
+    Calibration
+    """
+    images, groups = (np.asarray(of)[fit.usable] for of in (image, draw))
     return Calibration(
-        names=names,
-        values=scaled * scale,
-        covariance=clustered * np.outer(scale, scale),
-        undetermined=undetermined,
-        n_points=int(usable.sum()),
-        n_images=len(np.unique(np.asarray(image)[usable])),
+        names=fit.names,
+        values=fit.values,
+        covariance=_jackknife(fit.J, fit.r, groups),
+        undetermined=fit.undetermined,
+        n_points=len(fit.r),
+        n_images=len(np.unique(images)),
+        n_draws=len(np.unique(groups)),
     )
 
 
@@ -312,16 +296,15 @@ def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, 
     return names[involved[-1]], tuple(names[i] for i in involved[:-1])
 
 
-def _clustered_covariance(J: Array, r: Array, groups: Array, noise: float) -> Array:
-    """Covariance (P, P) of the scaled estimate when residuals of one image go together (the sandwich).
+def _jackknife(J: Array, r: Array, groups: np.ndarray) -> Array:
+    """Covariance (P, P) of a linear fit: how far it moves when one draw is left out, each in turn.
 
-    The loss is soft_l1: its slope at ``r`` is ``r / sqrt(1 + z)`` and its curvature ``(1 + z) ** -1.5`` with
-    ``z = (r / noise) ** 2``.
+    It knows that residuals of one draw go together, and errs, where there are few draws, on the safe side.
     """
-    z = (r / noise) ** 2
-    slope, curvature = r / np.sqrt(1 + z), (1 + z) ** -1.5
-    bread = np.linalg.pinv(J.T @ (curvature[:, None] * J))
     labels = np.unique(groups)
-    scores = np.stack([J[groups == g].T @ slope[groups == g] for g in labels])
-    small_sample = len(labels) / max(len(labels) - 1, 1)
-    return np.asarray(bread @ (scores.T @ scores) @ bread * small_sample)
+    n = len(labels)
+    if n < 2 or not J.shape[-1]:
+        return np.full((J.shape[-1],) * 2, np.nan)
+    without = np.stack([fit_linear(J[groups != g], r[groups != g]).x for g in labels])
+    apart = without - without.mean(axis=0)
+    return np.asarray((n - 1) / n * apart.T @ apart)

@@ -6,8 +6,8 @@ m^2; pixels (N, 2) right and down; poses have covariances (N, 6, 6), position (m
 in b). Errors of points are point minus truth; those of tracks and poses truth minus estimate, H (3.11).
 
 Of each subject its file has more: `wildlab.pipeline.georeference.georeference` (which has its file's name, so
-that it is not repeated here), `navigation_errors` (against a reference), `sensor_tracks` and `sensor_tuning`
-(ranges and bearings of a moving platform).
+that it is not repeated here), `diagnose` (likewise), `navigation_errors` (against a reference),
+`sensor_tracks` and `sensor_tuning` (ranges and bearings of a moving platform).
 """
 
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from wildlab.lazy import offer
 
 if TYPE_CHECKING:
+    from wildlab.pipeline.accuracy import Accuracy, judge_accuracy
     from wildlab.pipeline.calibrate import Calibrated, calibrate_flight
     from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
     from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         pose_errors,
         truth_of,
     )
+    from wildlab.pipeline.learn import Applied, apply_learnt, learn_flight
     from wildlab.pipeline.navigate import (
         PUBLISHED_LIKE,
         MekfTuning,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
         navigate_observer,
     )
     from wildlab.pipeline.navigation_errors import Errors, errors_against
+    from wildlab.pipeline.repeats import Repeats, judge_repeats
     from wildlab.pipeline.track import (
         CvTuning,
         Scored,
@@ -50,13 +53,16 @@ else:
     __getattr__, __dir__ = offer(
         __name__,
         {
+            "accuracy": ("Accuracy", "judge_accuracy"),
             "calibrate": ("Calibrated", "calibrate_flight"),
             "consistency": ("Series", "mean_of_runs", "navigation_series", "worth"),
             "evaluate": ("errors_of", "score_points", "recorded_answers"),
             "follow": ("FILTERS", "usual_tuning"),
             "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
+            "learn": ("Applied", "apply_learnt", "learn_flight"),
             "navigate": ("Navigated", "PUBLISHED_LIKE", "MekfTuning", "navigate_mekf", "navigate_observer"),
             "navigation_errors": ("Errors", "errors_against"),
+            "repeats": ("Repeats", "judge_repeats"),
             "track": (
                 "CvTuning",
                 "Scored",
@@ -75,15 +81,19 @@ __all__ = [
     "FILTERS",
     "PUBLISHED_LIKE",
     "USUAL",
+    "Accuracy",
+    "Applied",
     "Calibrated",
     "CvTuning",
     "Errors",
     "MekfTuning",
     "Navigated",
     "Observations",
+    "Repeats",
     "Scored",
     "Series",
     "Sighting",
+    "apply_learnt",
     "calibrate_flight",
     "covariances_of",
     "errors_against",
@@ -93,6 +103,9 @@ __all__ = [
     "follow_pixels",
     "follow_positions",
     "follow_schmidt",
+    "judge_accuracy",
+    "judge_repeats",
+    "learn_flight",
     "mean_of_runs",
     "navigate_mekf",
     "navigate_observer",

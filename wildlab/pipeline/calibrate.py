@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import BORESIGHT, Calibration, calibrate, split_images
-from wildlab.pipeline.evaluate import draws_of, known_points, score_points
+from wildlab.pipeline.evaluate import blocks_of, known_points, score_points
 from wildlab.pipeline.georeference import (
     Observations,
     calibrated,
@@ -62,7 +62,7 @@ def fit_flight(
         observations.table["frame_id"].to_numpy(),
         estimate,
         weights,
-        draws_of(flight, observations.table),
+        blocks_of(flight, observations.table),
     )
 
 
@@ -75,7 +75,7 @@ def calibrate_flight(
 ) -> Calibrated:
     """Calibrate on a flight's known points, and judge each half of its images by the other half.
 
-    Draws (images, or minutes of them: see :func:`~wildlab.pipeline.evaluate.draws_of`) are halved at random,
+    Draws (images, or minutes of them: see :func:`~wildlab.pipeline.evaluate.blocks_of`) are halved at random,
     ``splits`` times over; a calibration from one half places the points of the other. A clock offset is
     asked for only where the flight has times.
 
@@ -113,7 +113,7 @@ def calibrate_flight(
             file=flight.folder,
             field="detections",
         )
-    draws = draws_of(flight, plain)
+    draws = blocks_of(flight, plain)
     rounds = []
     for _ in range(splits):
         half = split_images(draws, rng)

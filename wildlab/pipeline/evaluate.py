@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.evaluation.blocks import time_blocks
 from wildlab.flight.clocks import truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.uncertainty import inside_ellipse
@@ -137,25 +138,25 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
     return answers
 
 
-#: Images nearer in time than this (seconds) may share their pose error, which wanders over tens of seconds.
-DRAW_S = 60.0
-#: Fewer draws than this leave nothing to halve; then each image counts as one.
-FEWEST_DRAWS = 4
+def blocks_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.intp]:
+    """Which block in time order (N,) each point belongs to: see `wildlab.evaluation.blocks.time_blocks`.
 
+    Parameters
+    ----------
+    flight
+        Says whether its times are times, or merely number the images.
+    table
+        With ``frame_id`` and ``time_s``, N rows.
 
-def draws_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.str_]:
-    """Which detections (N,) are to be taken for one draw of the flight's errors, as labels.
-
-    Where the flight has times: all of a minute, for images that follow each other share more than images
-    show. Where it has none, or is over too soon for that: all of an image.
+    Returns
+    -------
+    (N,) integers from 0
     """
-    images = table["frame_id"].to_numpy(str)
     times = table["time_s"].to_numpy(float)
-    if flight.manifest.time.kind == "sequence" or not np.isfinite(times).any():
-        return images
-    minutes = np.floor((times - np.nanmin(times)) / DRAW_S)
-    labels = np.where(np.isfinite(minutes), np.char.mod("minute %d", np.nan_to_num(minutes)), images)
-    return images if len(np.unique(labels)) < FEWEST_DRAWS else labels
+    if flight.manifest.time.kind == "utc" and np.isfinite(times).all():
+        return time_blocks(times, seconds=True)
+    place = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(table["frame_id"]))
+    return time_blocks(place, seconds=False)
 
 
 def known_points(

@@ -174,9 +174,10 @@ def heights_left_in(flight: Flight, observations: Observations) -> Observations:
 def calibrated(
     flight: Flight, source: str | None, observations: Observations, calibration: Calibration
 ) -> Observations:
-    """The observations with estimated mount angles, position and clock offset applied."""
+    """The observations with an estimated calibration applied to mount, camera, position, and their times."""
     poses = calibrated_poses(calibration, partial(shifted_poses, flight, source, observations))
-    return replace(observations, poses=poses)
+    times = observations.table["time_s"] + calibration.value("clock")
+    return replace(observations, table=observations.table.assign(time_s=times), poses=poses)
 
 
 def pose_errors(

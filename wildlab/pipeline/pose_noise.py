@@ -12,8 +12,15 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.calibration import split_images
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.uncertainty import ground_jacobians
-from wildlab.pipeline.evaluate import draws_of, errors_of, known_points, score_points
-from wildlab.pipeline.georeference import Observations, assumed_deviations, georeference, pose_errors
+from wildlab.pipeline.calibrate import fit_flight
+from wildlab.pipeline.evaluate import blocks_of, errors_of, known_points, score_points
+from wildlab.pipeline.georeference import (
+    Observations,
+    assumed_deviations,
+    calibrated,
+    georeference,
+    pose_errors,
+)
 from wildlab.pipeline.track import Sighting
 
 Array = NDArray[np.float64]
@@ -22,15 +29,41 @@ Array = NDArray[np.float64]
 APART_S = 1.0
 
 
+#: Share of the images that is taken to be far out, where the noise is learnt from clicks.
+FAR_OUT = 0.05
+
+
 def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFrame) -> PoseNoise:
-    """Standard deviations of the poses behind the errors of known points: see ``evaluation.pose_noise``."""
+    """Standard deviations of the poses behind the errors of known points.
+
+    See `wildlab.evaluation.pose_noise`. The prior lies about what was assumed for the ellipses: what the log
+    states of its own poses, where it does. A few images may be far out.
+
+    Parameters
+    ----------
+    flight
+        What it states of pixel and ground is assumed.
+    observations
+        From `observe`, with a calibration applied where there is one.
+    scored
+        From `score_points`, of these observations.
+
+    Returns
+    -------
+    PoseNoise
+
+    Raises
+    ------
+    ValueError
+        Where fewer than three images have a usable point.
+    """
     o, _ = known_points(flight, observations, scored)
     errors = errors_of(scored.set_index("detection_id").loc[o.table["detection_id"]])
     J = ground_jacobians(o.poses, o.uv, o.plane_down)
     roll, pitch, _ = matrix_to_euler(o.poses.R_nb).T
     derivatives = J.pose.copy()
     derivatives[:, :, 3:] = J.pose[:, :, 3:] @ euler_errors_to_body(roll, pitch)
-    sd = assumed_deviations(flight)
+    sd = used_deviations(flight, o)
     plane = sd["plane_height_m"] ** 2 * J.plane[:, :, None] * J.plane[:, None, :]
     assumed = {
         "position_horizontal": sd["position_horizontal_m"],
@@ -40,7 +73,43 @@ def estimate_noise(flight: Flight, observations: Observations, scored: pd.DataFr
         "pixel": sd["pixel_px"],
     }
     images = o.table["frame_id"].to_numpy()
-    return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed)
+    return estimate_pose_noise(errors, derivatives, J.pixel, plane, images, assumed, FAR_OUT)
+
+
+def used_deviations(
+    flight: Flight, observations: Observations, assumed: dict[str, float] | None = None
+) -> dict[str, float]:
+    """The standard deviations that the ellipses of observations really come from.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    observations
+        From `observe`.
+    assumed
+        As for `pose_errors`: takes the place of what the log and the manifest state.
+
+    Returns
+    -------
+    dict
+        By the names of ``USUAL``: those of the poses are the log's own where it has a covariance (root of the
+        mean variance), otherwise the manifest's or the usual ones.
+    """
+    sd = assumed_deviations(flight) | (assumed or {})
+    covariance = observations.poses.covariance
+    if covariance is None or assumed is not None or not np.isfinite(covariance).any():
+        return sd
+    roll, pitch, _ = matrix_to_euler(observations.poses.R_nb).T
+    to_euler = np.linalg.inv(euler_errors_to_body(roll, pitch))
+    attitude = to_euler @ covariance[:, 3:, 3:] @ np.swapaxes(to_euler, 1, 2)
+    own = np.sqrt(np.nanmean(np.diagonal(covariance, axis1=1, axis2=2), axis=0))
+    angles = np.degrees(np.sqrt(np.nanmean(np.diagonal(attitude, axis1=1, axis2=2), axis=0)))
+    return sd | {
+        "position_horizontal_m": float(np.sqrt((own[:2] ** 2).mean())),
+        "position_vertical_m": float(own[2]),
+        **{f"{name}_deg": float(angle) for name, angle in zip(("roll", "pitch", "yaw"), angles, strict=True)},
+    }
 
 
 def estimate_from_sighting(flight: Flight, seen: Sighting) -> PoseNoise:
@@ -113,17 +182,48 @@ def as_deviations(noise: PoseNoise) -> dict[str, float]:
 
 
 def evaluate_with_estimated_noise(
-    flight: Flight, observations: Observations, scored: pd.DataFrame, rng: np.random.Generator
+    flight: Flight,
+    observations: Observations,
+    scored: pd.DataFrame,
+    rng: np.random.Generator,
+    source: str | None = None,
+    names: tuple[str, ...] = (),
 ) -> pd.DataFrame:
-    """Points scored again with ellipses from pose noise estimated on the other half of the images."""
-    half = split_images(draws_of(flight, scored), rng)
+    """Points scored again with ellipses from pose noise estimated on the other half of the images.
+
+    Parameters
+    ----------
+    flight, observations, scored
+        As for `estimate_noise`.
+    rng
+        Draws the halves, of whole blocks in time order.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+    names
+        Parameters that are taken off first: estimated on the other half, too.
+
+    Returns
+    -------
+    DataFrame
+        As from `score_points`.
+    """
+    half = split_images(blocks_of(flight, scored), rng)
     parts = []
     for seen in (half, ~half):
-        deviations = as_deviations(estimate_noise(flight, observations, scored[seen]))
-        chosen = observations.take(
-            observations.table["detection_id"].isin(scored["detection_id"][~seen]).to_numpy()
-        )
+        placed = observations
+        if names:
+            placed = calibrated(
+                flight, source, observations, fit_flight(flight, observations, scored[seen], source, names)
+            )
+        learnt = score_points(flight, georeference(flight, _of(placed, scored[seen]), rng))
+        deviations = as_deviations(estimate_noise(flight, placed, learnt))
+        unseen = _of(placed, scored[~seen])
         parts.append(
-            score_points(flight, georeference(flight, chosen, rng, pose_errors(flight, chosen, deviations)))
+            score_points(flight, georeference(flight, unseen, rng, pose_errors(flight, unseen, deviations)))
         )
     return pd.concat(parts, ignore_index=True)
+
+
+def _of(observations: Observations, scored: pd.DataFrame) -> Observations:
+    """The observations of a scored table."""
+    return observations.take(observations.table["detection_id"].isin(scored["detection_id"]).to_numpy())

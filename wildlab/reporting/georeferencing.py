@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.errors import ErrorSummary, Scatter, summarise
+from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.pose_noise import PoseNoise
-from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.evaluate import errors_of
 from wildlab.reporting.report import Report
 
@@ -38,16 +38,28 @@ Ellipses: covariances of pixel, pose, mount and plane height through the derivat
 Where the depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to
 be wrong, and 1000 samples decide its size.
 
-Calibration: three angles of the camera's base (and the clock, where there is one), nonlinear least squares
-with a soft-L1 loss on errors weighted with their ellipses (after H 5.15 to 5.17); standard deviations from a
-sandwich estimate. A parameter counts as undetermined where the data know it no better than one would guess,
-or where it is parallel to others with a correlation beyond 0.99.
+Blocks: points of neighbouring images, in time order; a minute where the images have times and last for six,
+otherwise three images where that leaves six blocks. Errors of one block are not taken for independent.
 
-What counts as one draw of the errors, for halves, intervals and standard deviations: all points of an image;
-where the images have times, all of a minute, because the error of a pose wanders over tens of seconds.
+Cause: constant errors of position, height, boresight, clock and lens, and their sums, are fitted by nonlinear
+least squares under Student's t with four degrees of freedom, on errors whitened with their ellipses (after H
+5.15 to 5.17). Blocks are put into five folds, ten times over; each model predicts the fold that it was not
+fitted to. Models are compared point by point, and the standard error of a difference comes from the blocks:
+rounds share most of their data, and their spread would flatter. The simplest model within one standard error
+of the best wins, tried once more with only those of its parameters that are told from zero. Its gain counts
+where its 90 % interval (Student's, by the number of blocks) is above zero.
+A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
+guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
 
-Shares of the squared error: one-way analysis of variance with images as groups. Intervals: a thousand times
-as many draws with replacement as there are, middle 90 %."""
+Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks.
+
+Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
+its interval from drawing blocks with replacement. Noise: most likely standard deviations, five images in a
+hundred taken to be ten times as far off.
+
+Shares of the squared error: one-way analysis of variance with images as groups. Intervals of the figures at
+the top: as many blocks with replacement as there are, a thousand times, middle 90 %. They say how far these
+images decide the figure, not what another day would bring."""
 
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),
@@ -62,18 +74,6 @@ _ELLIPSES = {
     "unbounded": "not given, the ray being too near the horizon",
     "none": "without a point on the ground",
 }
-_LIMITS = {
-    "bias": "Most of the error is constant: a calibration can take it off.",
-    "image": (
-        "Points of one image are wrong together: the logged pose limits the accuracy, not the "
-        "marking of the points."
-    ),
-    "point": (
-        "Points of one image are wrong each in its own way: marking and lens limit the accuracy, "
-        "not the pose."
-    ),
-    "": "There are too few points per image to tell what limits the accuracy.",
-}
 
 
 def record_errors(
@@ -87,22 +87,69 @@ def record_errors(
     ``intervals`` gives low and high by metric name.
     """
     s = summarise(errors_of(scored))
-    values = {
-        "horizontal_error_mean": s.mean,
-        "horizontal_error_median": s.median,
-        "horizontal_error_p90": s.p90,
-        "horizontal_error_max": s.max,
-        "bias_north": s.bias_north,
-        "bias_east": s.bias_east,
-        "sd_north": s.sd_north,
-        "sd_east": s.sd_east,
-    }
-    for name, value in values.items():
-        low, high = (intervals or {}).get(name, (None, None))
-        report.metric(name, subject, value, "m", n=s.n, low=low, high=high)
+    record_summary(report, subject, s, intervals)
     if scored["inside_90"].notna().any():
         report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=s.n)
     return s
+
+
+def record_summary(
+    report: Report,
+    subject: str,
+    summary: ErrorSummary,
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+) -> None:
+    """Record the figures of a summary of errors under ``subject``."""
+    values = {
+        "horizontal_error_mean": summary.mean,
+        "horizontal_error_median": summary.median,
+        "horizontal_error_p90": summary.p90,
+        "horizontal_error_max": summary.max,
+        "bias_north": summary.bias_north,
+        "bias_east": summary.bias_east,
+        "sd_north": summary.sd_north,
+        "sd_east": summary.sd_east,
+    }
+    for name, value in values.items():
+        low, high = (intervals or {}).get(name, (None, None))
+        report.metric(name, subject, value, "m", n=summary.n, low=low, high=high)
+
+
+def record_accuracy(
+    report: Report, found: Accuracy, answers: Mapping[str, pd.DataFrame]
+) -> dict[str, ErrorSummary]:
+    """Record the metrics of a flight and of other programs' answers; return the summaries of these."""
+    record_errors(report, "logged-pose", found.scored, found.intervals)
+    diagnosis = found.diagnosis
+    if diagnosis is not None:
+        gain = diagnosis.winner.gain.gain
+        report.metric("gain", "winner", gain.estimate, "m", n=found.summary.n, low=gain.low, high=gain.high)
+        if diagnosis.counts:
+            record_summary(report, "calibrated-pose", diagnosis.held_summary())
+    if np.isfinite(found.learnt):
+        report.metric("ellipse_coverage_90", "logged-pose/estimated-noise", found.learnt, "1")
+    others = {}
+    for program, table in answers.items():
+        subject = "recorded-answers" if len(answers) == 1 else f"recorded-answers/{program}"
+        others[program] = record_errors(report, subject, table)
+    return others
+
+
+def scatter_title(logged: ErrorSummary) -> str:
+    """Title of the figure of the errors: whether they centre on the truth."""
+    bias = float(np.hypot(logged.bias_north, logged.bias_east))
+    if bias < 0.25 * logged.mean:
+        return "Errors centre on the truth"
+    return f"Errors lie {short_length(bias)} off on average"
+
+
+def vertical_words(correction: float, left_in: ErrorSummary, labelled: bool) -> str:
+    """What the vertical correction that was taken off on import is worth."""
+    fault = "Aircraft and ground share the fault."
+    if labelled:
+        fault = f"Left in, the mean error would be {left_in.mean:.0f} m."
+    too_high = f"The recorded heights stand {correction:.1f} m too high; taken off on import."
+    return f"**Vertical reference.** {too_high} {fault}"
 
 
 def length(metres: float, unit: tuple[str, str] = ("metres", "centimetres")) -> str:
@@ -121,67 +168,21 @@ def span(values: Any) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def summary_sentences(logged: ErrorSummary, scatter: Scatter) -> list[str]:
-    """What a ranger needs to know, in three sentences."""
-    bias = float(np.hypot(logged.bias_north, logged.bias_east))
+def headline(logged: ErrorSummary, total: int) -> list[str]:
+    """The first sentences of the summary: how far off, of how many points."""
+    if not logged.n:
+        return []
+    of = f"{logged.n} points" if logged.n == total else f"{logged.n} of {total} points"
     if logged.n < FEW:
         return [
-            f"Only {logged.n} points could be compared with the truth, too few to say how accurate "
-            "this flight is.",
+            f"Only {of} could be compared with the truth, too few to say how accurate this flight is.",
             f"Their median error is {length(logged.median)}, the largest {length(logged.max)}.",
             "Mark more known points, in at least six images, and evaluate again.",
         ]
     return [
-        f"A position read from a single image of this flight is typically {length(logged.median)} "
-        "off, and nine "
-        f"times out of ten less than {length(logged.p90)}.",
-        f"Over all images the errors average to {length(bias)}.",
-        main_limit(scatter),
+        f"A position read from a single image of this flight is typically {length(logged.median)} off, and "
+        f"nine times out of ten less than {length(logged.p90)} ({of})."
     ]
-
-
-def main_limit(scatter: Scatter) -> str:
-    """What limits the accuracy most, in a sentence."""
-    shares = {"bias": scatter.bias_share, "image": scatter.image_share, "point": scatter.within_share}
-    return _LIMITS[max(shares, key=lambda part: shares[part]) if np.isfinite(scatter.image_share) else ""]
-
-
-def limiting_factors(scatter: Scatter, logged: ErrorSummary, gained: ErrorSummary | None) -> list[str]:
-    """The parts of the squared error, largest first, each with what can be done about it.
-
-    ``gained`` is the summary with a calibration from the other half of the images, where there was one.
-    """
-    if not np.isfinite(scatter.image_share):
-        return []
-    between, within = np.hypot(*scatter.between_sd), np.hypot(*scatter.within_sd)
-    remedy = (
-        f"A calibration from half of the images takes the other half from {logged.mean:.1f} to "
-        f"{gained.mean:.1f} m."
-        if gained
-        else "There are too few images to calibrate on half of them."
-    )
-    parts = [
-        (
-            scatter.image_share,
-            f"**The pose of each image**, {100 * scatter.image_share:.0f} % of the squared error: "
-            f"{between:.1f} m that "
-            "all points of an image share and the next image does not. No calibration removes it; "
-            "averaging over "
-            "images does, four of them halve it.",
-        ),
-        (
-            scatter.within_share,
-            f"**Single points**, {100 * scatter.within_share:.0f} %: {within:.1f} m that differs from "
-            "point to point "
-            "within an image: marking, lens, uneven ground.",
-        ),
-        (
-            scatter.bias_share,
-            f"**A constant error**, {100 * scatter.bias_share:.0f} %: "
-            f"{np.hypot(logged.bias_north, logged.bias_east):.1f} m over all images. {remedy}",
-        ),
-    ]
-    return [text for _, text in sorted(parts, key=lambda part: -part[0])]
 
 
 def errors_table(rows: Mapping[str, ErrorSummary], first: str = "pose") -> pd.DataFrame:
@@ -251,62 +252,24 @@ def noise_table(noise: PoseNoise, stated: Mapping[str, float]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def calibration_table(report: Report, calibration: Calibration) -> pd.DataFrame:
-    """Estimated constant errors in degrees and seconds, one row each; recorded as metrics too."""
-    rows = []
-    for name in calibration.names:
-        scale, unit = (180 / np.pi, "deg") if name in BORESIGHT else (1.0, "s" if name == "clock" else "m")
-        value, sd = scale * calibration.value(name), scale * calibration.sd(name)
-        label = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
-        report.metric(
-            label,
-            "calibration",
-            value,
-            unit,
-            n=calibration.n_images,
-            low=value - 1.645 * sd,
-            high=value + 1.645 * sd,
-        )
-        rows.append(
-            {
-                "what": f"camera {name}",
-                "value": value,
-                "sd": sd,
-                "unit": unit,
-                "verdict": "differs from zero" if abs(value) > 2 * sd else "not told from zero",
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def undetermined_words(calibration: Calibration) -> list[str]:
-    """What was asked for and could not be estimated, and why, one sentence each."""
-    return [
-        f"The camera's {name} was not estimated: "
-        + (
-            f"the data cannot tell it from {' and '.join(partners)}."
-            if partners
-            else "it has no effect that shows."
-        )
-        for name, partners in calibration.undetermined.items()
-    ]
-
-
 def limits_of(
     points: pd.DataFrame, depression_deg: Any, height_m: Any, *, labelled: bool, timed: bool, enough: bool
 ) -> list[str]:
     """What a report on these points does not tell."""
     missed = int(points["north_m"].isna().sum())
     limits = [
-        f"Nothing about flatter views than {np.nanmin(depression_deg):.0f}° below the horizon, or "
-        "greater heights "
-        f"than {np.nanmax(height_m):.0f} m.",
         "Whoever or whatever marked the points is part of these errors; another observer or detector "
         "adds its own.",
         "The height of the ground was taken from "
         + ("the survey of each target" if labelled else "the log")
         + "; where it is not known, the error grows.",
     ]
+    if np.isfinite(height_m).any():
+        limits.insert(
+            0,
+            f"Nothing about flatter views than {np.nanmin(depression_deg):.0f}° below the horizon, or "
+            f"greater heights than {np.nanmax(height_m):.0f} m.",
+        )
     if missed:
         limits.append(
             f"{missed} of {len(points)} points have no position: no pose, no ground height, or a ray "
@@ -317,5 +280,8 @@ def limits_of(
             "The images carry no time of their own, so an error of the camera's clock cannot be seen."
         )
     if not enough:
-        limits.append("Fewer than six images show a known point: calibration and noise were not estimated.")
+        limits.append(
+            "Fewer than six images show a known point: no interval is given, and neither cause nor noise was "
+            "looked for."
+        )
     return limits

@@ -9,9 +9,11 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import Use, usable_for
+from wildlab.flight.checks.check import Use, check_flight, usable_for
+from wildlab.flight.learnt import learnt_toml, read_learnt
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.learn import refuse_other_camera
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
@@ -25,6 +27,7 @@ def evaluate_flight(
     folder: Path,
     *,
     source: str | None = None,
+    calibration: Path | None = None,
     reports: Path = REPORTS,
     notebooks: Path = NOTEBOOKS,
     timeout_s: float | None = None,
@@ -32,7 +35,8 @@ def evaluate_flight(
 ) -> list[Outcome]:
     """Judge a flight folder by all that it has the data for.
 
-    Its georeferencing goes to ``<reports>/<name of the flight>/``, its navigation (inertial unit and GNSS
+    Its georeferencing goes to ``<reports>/<name of the flight>/`` (without truth: how far apart sightings of
+    the same things lie), its navigation (inertial unit and GNSS
     against the attitude found on board) to ``<name>-navigation``.
 
     Parameters
@@ -40,6 +44,8 @@ def evaluate_flight(
     source
         Which of the flight's poses to judge the georeferencing of; not needed where it has one navigation
         source, or one named ``logged``.
+    calibration
+        A ``calibration.toml`` of another flight, applied before the georeferencing is judged.
 
     Returns
     -------
@@ -50,7 +56,8 @@ def evaluate_flight(
     ------
     WildlabError
         If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, its
-        name is that of a study, or the report of another flight of this name would be replaced.
+        name is that of a study, the report of another flight of this name would be replaced, or the
+        calibration is of another camera.
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
@@ -82,13 +89,25 @@ def evaluate_flight(
     again = f"wildlab evaluate {flight.name}"
     if places.usable:
         found, _ = flight.pose_source(source)
-        prepare(flight.name, "georeferencing.ipynb", {"source": found}, f"{again} --source {found}")
-    elif source is not None:
+        parameters, again_with = {"source": found}, f"{again} --source {found}"
+        if calibration is not None:
+            learnt = read_learnt(calibration)
+            refuse_other_camera(flight, learnt)
+            # Its text, not its path: the report can be made again without the file, and names no folder.
+            parameters["calibration"] = learnt_toml(learnt)
+            again_with += f" --calibration {calibration.name}"
+        prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
+    elif lacks_only_truth(flight) and calibration is None:
+        found, _ = flight.pose_source(source)
+        prepare(flight.name, "repeat-sightings.ipynb", {"source": found}, f"{again} --source {found}")
+    elif source is not None or calibration is not None:
+        option = "--source" if source is not None else "--calibration"
+        what = "poses are named" if source is not None else "a calibration is named"
         raise WildlabError(
-            f"poses are named, and the georeferencing cannot be judged: {places.why}",
-            "see what is amiss: wildlab check; or leave --source out",
+            f"{what}, and the georeferencing cannot be judged: {places.why}",
+            f"see what is amiss: wildlab check; or leave {option} out",
             file=folder,
-            field="--source",
+            field=option,
         )
     lacking = lacking_for_navigation(flight, uses["navigation"])
     if not lacking:
@@ -135,6 +154,17 @@ def refuse_other_flight(folder: Path, report: Path) -> None:
 
 def _contents(flight: Mapping[str, Any]) -> set[str]:
     return {*flight.get("files", {}).values(), *flight.get("sources", ())}
+
+
+def lacks_only_truth(flight: Flight) -> bool:
+    """Whether truth is all that the georeferencing lacks, and things are seen that have names."""
+    detections, frames, truth = flight.detections, flight.frames, flight.truth
+    if detections is None or frames is None or not len(frames) or not flight.nav:
+        return False
+    pixels = detections[detections["kind"] == "pixel"]
+    named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())
+    whole = not any(finding.level == "problem" for finding in check_flight(flight))
+    return named and whole and (truth is None or not len(truth))
 
 
 def lacking_for_navigation(flight: Flight, use: Use) -> str:

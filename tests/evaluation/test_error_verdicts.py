@@ -1,0 +1,112 @@
+"""Axes, ellipses, sightings and ambiguous clicks: verdicts follow from numbers that are known."""
+
+import numpy as np
+import pytest
+
+from wildlab.evaluation.ambiguity import ambiguous, largest_visible
+from wildlab.evaluation.axes import split_along
+from wildlab.evaluation.ellipses import judge_ellipses
+from wildlab.evaluation.sightings import spread_of_sightings, try_averaging
+
+BLOCKS = np.arange(240) // 12
+
+
+def normal(seed, sd=2.0, n=240):
+    return np.random.default_rng(seed).normal(0, sd, (n, 2))
+
+
+def test_a_constant_error_is_found_along_its_axis_and_no_other():
+    """Three metres beyond the mark, seen from all sides: nothing in north and east."""
+    turn = np.linspace(0, 2 * np.pi, 240, endpoint=False)
+    away = np.column_stack([np.cos(turn), np.sin(turn)])
+    right = np.column_stack([-away[:, 1], away[:, 0]])
+    axes = {"north": [1.0, 0.0], "east": [0.0, 1.0], "away": away, "right": right}
+    # Blocks that hold all sides: seen from one side at a time, away is a direction of the world.
+    found = split_along(3.0 * away + normal(0, 0.5), axes, np.arange(240) % 12)
+    assert [name for name, one in found.items() if one.constant] == ["away"]
+    assert found["away"].mean.estimate == pytest.approx(3.0, abs=0.1)
+    assert found["away"].share > 0.9 > 0.1 > found["north"].share
+
+
+def test_points_without_an_axis_and_lost_points_are_left_out():
+    errors = np.array([[1.0, 0.0], [np.nan, np.nan], [3.0, 0.0]])
+    axes = {"seen": np.array([[1.0, 0.0], [1.0, 0.0], [np.nan, np.nan]]), "none": np.full((3, 2), np.nan)}
+    found = split_along(errors, axes, [0, 1, 2])
+    assert list(found) == ["seen"] and found["seen"].n == 1 and not found["seen"].constant
+
+
+@pytest.mark.parametrize(
+    ("stated", "word"),
+    [(2.0, "honest"), (0.7, "too small"), (6.0, "too large"), (2.1, "honest")],
+)
+def test_ellipses_are_held_against_the_errors(stated, word):
+    errors, blocks = normal(1, n=3000), np.arange(3000) // 100
+    P = np.tile(stated**2 * np.eye(2), (3000, 1, 1))
+    found = judge_ellipses(errors, P, blocks, np.random.default_rng(0))
+    assert found.word == word
+    assert found.factor.estimate == pytest.approx(2.0 / stated, rel=0.05)
+    assert 0.0 <= found.coverage.low <= found.coverage.high <= 1.0
+    wider = judge_ellipses(errors, P * found.factor.estimate**2, blocks, np.random.default_rng(0))
+    assert wider.coverage.estimate == pytest.approx(0.9, abs=0.01)
+
+
+def test_the_interval_of_the_factor_holds_what_it_says():
+    P = np.tile(4.0 * np.eye(2), (240, 1, 1))
+    inside = wrong = 0
+    for seed in range(150):
+        found = judge_ellipses(normal(seed), P, BLOCKS, np.random.default_rng(seed), draws=200)
+        inside += found.factor.low <= 1.0 <= found.factor.high
+        wrong += found.word in ("too small", "too large")
+    assert 0.8 < inside / 150 < 0.97
+    assert wrong <= 3
+
+
+def test_too_few_or_too_scattered_for_a_verdict_on_ellipses():
+    P = np.tile(np.eye(2), (240, 1, 1))
+    rng = np.random.default_rng(0)
+    assert judge_ellipses(normal(1), P, np.arange(240) // 60, rng).word == "too few"
+    assert judge_ellipses(normal(1) * np.nan, P, BLOCKS, rng).word == "too few"
+    wild = normal(2, n=240) * np.exp(np.repeat(rng.normal(0, 1.2, 8), 30))[:, None]
+    assert judge_ellipses(wild, 2 * P, np.arange(240) // 30, rng).word in ("undecided", "too small")
+    assert judge_ellipses(wild, 400 * P, np.arange(240) // 30, rng).word != "honest"
+
+
+def test_averaging_four_halves_what_images_do_not_share_and_nothing_else():
+    things, images = np.repeat(np.arange(30), 8), np.tile(np.arange(8), 30)
+    own = normal(3)
+    assert try_averaging(own, things, images, np.random.default_rng(0)).halves
+    shared = try_averaging(own + np.array([9.0, 0.0]), things, images, np.random.default_rng(0))
+    assert not shared.halves and shared.ratio.estimate > 0.8
+    constant = try_averaging(np.tile([3.0, 0.0], (240, 1)), things, images, np.random.default_rng(0))
+    assert not constant.helps
+    # Two clicks of one image are one sighting, and few things say nothing.
+    assert (
+        try_averaging(own, things, np.tile(np.repeat([0, 1, 2], [3, 3, 2]), 30), np.random.default_rng(0))
+        is None
+    )
+    assert try_averaging(own[:32], things[:32], images[:32], np.random.default_rng(0)) is None
+
+
+def test_the_spread_of_sightings_is_that_of_one_and_blind_to_what_all_share():
+    things, images = np.repeat(np.arange(60), 4), np.tile(np.arange(4), 60)
+    places = np.repeat(np.random.default_rng(1).uniform(-90, 90, (60, 2)), 4, axis=0)
+    P = np.tile(4.0 * np.eye(2), (240, 1, 1))
+    found = spread_of_sightings(places + normal(4) + np.array([50.0, 0.0]), things, images, P)
+    assert found.sd == pytest.approx(2.0, rel=0.15)
+    assert found.consistent == pytest.approx(1.0, rel=0.15)
+    assert (found.things, found.sightings) == (60, 240)
+    assert spread_of_sightings(normal(4), np.arange(240), images) is None
+    assert np.isnan(spread_of_sightings(normal(4), things, images).consistent)
+
+
+def test_a_click_is_ambiguous_where_two_marks_are_alike():
+    assert ambiguous([2.0, 2.0, 9.0], [20.0, 3.0, 9.5], 2.0).tolist() == [False, True, True]
+    assert not ambiguous([5.0], [np.inf], 2.0).any()
+    # The better the flight, the fewer.
+    assert ambiguous([1.0], [4.0], 2.0).all() and not ambiguous([1.0], [4.0], 0.5).any()
+
+
+def test_beyond_half_the_spacing_an_error_cannot_show():
+    grid = np.stack(np.meshgrid(np.arange(5) * 8.0, np.arange(5) * 8.0), -1).reshape(-1, 2)
+    assert largest_visible(grid) == pytest.approx(4.0)
+    assert largest_visible([[1.0, 2.0]]) == np.inf

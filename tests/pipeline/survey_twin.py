@@ -1,0 +1,128 @@
+"""A twin of a flight over surveyed markers: oblique photos of scattered marks, from slightly wrong poses.
+
+What is wrong on top of that is put in by name, so that a diagnosis can be held against it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from wildlab.flight.manifest import Manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount, camera_pose
+
+CAMERA = Camera(4056, 3040, 2400.0, 2400.0, 2028.0, 1520.0)
+STEP_S = 0.1
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What a survey is like and what is wrong with it.
+
+    ``tilt_deg`` stands in the log on top of the true tilt, ``clock_s`` must be added to the stamps,
+    ``down_m`` and ``north_m`` are added to the logged position; ``focal`` is by how much the stated focal
+    lengths are too large (a share). ``off`` moves what the survey says of a mark (metres, north-east),
+    ``turned_deg`` the yaw that is logged while a photo is taken. ``mark_m`` is the spacing of the marks.
+    """
+
+    seed: int = 0
+    images: int = 40
+    every_s: float = 6.0
+    tilt_deg: float = 0.0
+    clock_s: float = 0.0
+    down_m: float = 0.0
+    north_m: float = 0.0
+    focal: float = 0.0
+    off: dict[str, tuple[float, float]] = field(default_factory=dict)
+    turned_deg: dict[int, float] = field(default_factory=dict)
+    attitude_deg: float = 0.7
+    position_m: float = 0.7
+    pixel_px: float = 4.0
+    stated_deg: float = 0.7
+    slant_deg: tuple[float, float] = (35.0, 80.0)
+    rule: str = "labelled"
+    mark_m: float = 18.0
+    timed: bool = True
+
+
+def simulate(survey: Survey) -> Flight:
+    """The flight as a folder would hold it, the log wrong by what the survey says."""
+    rng = np.random.default_rng(survey.seed)
+    n = survey.images
+    at = 5.0 + survey.every_s * np.arange(n)
+    t = np.arange(0.0, at[-1] + 5.0, STEP_S)
+    turn = 2 * np.pi * t / 47.0
+    way = np.column_stack([60 * np.sin(turn), 60 * np.sin(0.61 * turn + 0.3), -70 - 15 * np.sin(0.37 * turn)])
+    # The gimbal dips while the photographs are taken from all sides of the field.
+    low, high = survey.slant_deg
+    slant = np.radians((low + high) / 2 + (high - low) / 2 * np.sin(2 * np.pi * t / 31.0))
+    yaw = np.arctan2(-way[:, 1], -way[:, 0]) + 0.5 * np.sin(2 * np.pi * t / 23.0)
+    roll = np.radians(3.0) * np.sin(2 * np.pi * t / 13.0)
+
+    index = np.round(at / STEP_S).astype(int)
+    shared = np.radians(survey.attitude_deg) * rng.normal(size=(n, 3))
+    true = np.column_stack([roll, -slant, np.unwrap(yaw)])[index] + shared
+    where = way[index] + rng.normal(0, survey.position_m, (n, 3))
+    marks = _marks(rng, survey.mark_m)
+    names = np.array([f"M{i:02d}" for i in range(len(marks))])
+    mount = Mount("forward")
+    rows = []
+    for i in range(n):
+        p, R = camera_pose(mount, where[i][None], euler_to_matrix(*true[i])[None])
+        uv = ground_to_pixel(CAMERA, marks, np.repeat(p, len(marks), 0), np.repeat(R, len(marks), 0))
+        seen = np.isfinite(uv).all(axis=1) & (uv > 40).all(axis=1) & (uv < [4016, 3000]).all(axis=1)
+        for mark in rng.permutation(np.flatnonzero(seen))[:5]:
+            rows.append((f"I{i:03d}", names[mark], *(uv[mark] + rng.normal(0, survey.pixel_px, 2))))
+    detections = pd.DataFrame(rows, columns=["frame_id", "target_id", "u_px", "v_px"])
+    detections.insert(0, "detection_id", [f"D{i:03d}" for i in range(len(detections))])
+    detections["source"], detections["kind"], detections["plane_down_m"] = "click", "pixel", 0.0
+    if survey.rule == "nearest":
+        detections["target_id"] = ""
+
+    logged = np.column_stack([roll, -slant + np.radians(survey.tilt_deg), np.unwrap(yaw)])
+    for image, degrees in survey.turned_deg.items():
+        logged[np.abs(t - at[image]) < survey.every_s / 2, 2] += np.radians(degrees)
+    q = matrix_to_quaternion(euler_to_matrix(*logged.T))
+    place = way + np.array([survey.north_m, 0.0, survey.down_m])
+    columns = ["time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z"]
+    nav = pd.DataFrame(np.column_stack([t, place, q]), columns=columns)
+    surveyed = marks[:, :2] + np.array([survey.off.get(name, (0.0, 0.0)) for name in names])
+    truth = pd.DataFrame({"target_id": names, "time_s": np.nan, "north_m": surveyed[:, 0],
+                          "east_m": surveyed[:, 1], "down_m": 0.0})  # fmt: skip
+    frames = pd.DataFrame({"frame_id": [f"I{i:03d}" for i in range(n)], "time_s": at - survey.clock_s})
+    time = {"kind": "utc", "epoch": "2024-01-01T00:00:00Z"} if survey.timed else {"kind": "sequence"}
+    if not survey.timed:
+        # Photos without times: each has its own pose, and the numbers of the photos stand for times.
+        rate = index - round(survey.clock_s / STEP_S)
+        nav = nav.iloc[rate].assign(time_s=np.arange(float(n)), frame_id=frames["frame_id"].to_numpy())
+        frames["time_s"] = np.arange(float(n))
+    stated = survey.stated_deg
+    f = CAMERA.fx * (1 + survey.focal)
+    manifest = Manifest.model_validate(
+        {
+            "name": "survey", "kind": "logged",
+            "origin": {"latitude_deg": 60.0, "longitude_deg": 10.0, "height_m": 0.0},
+            "platform": {"name": "made up"},
+            "camera": {"name": "made up", "width_px": CAMERA.width, "height_px": CAMERA.height, "fx_px": f,
+                       "fy_px": f, "cx_px": CAMERA.cx, "cy_px": CAMERA.cy},
+            "mount": {"looks": "forward"}, "time": time, "scoring": {"rule": survey.rule},
+            "uncertainty": {"pixel_px": 4.0, "position_horizontal_m": 0.7, "position_vertical_m": 0.7,
+                            "roll_deg": stated, "pitch_deg": stated, "yaw_deg": stated,
+                            "plane_height_m": 0.1},
+        }
+    )  # fmt: skip
+    return Flight(manifest, {"logged": nav.reset_index(drop=True)},
+                  {"frames": frames, "detections": detections, "truth": truth})  # fmt: skip
+
+
+def _marks(rng: np.random.Generator, spacing: float) -> np.ndarray:
+    """Marks (M, 3) on level ground, about so many metres apart."""
+    line = np.arange(-70.0, 71.0, spacing)
+    grid = np.stack(np.meshgrid(line, line), -1).reshape(-1, 2)
+    return np.column_stack([grid + rng.uniform(-0.25, 0.25, grid.shape) * spacing, np.zeros(len(grid))])

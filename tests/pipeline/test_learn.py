@@ -1,0 +1,149 @@
+"""What is learnt on one flight is kept in a file, helps the next, and is refused where it does not belong."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.pipeline.survey_twin import Survey, simulate
+from wildlab.errors import WildlabError
+from wildlab.flight.learnt import learnt_toml, parse_learnt, read_learnt, write_learnt
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.pipeline.diagnose import diagnose
+from wildlab.pipeline.evaluate import score_points
+from wildlab.pipeline.georeference import georeference, observe, pose_errors
+from wildlab.pipeline.learn import apply_learnt, learn_flight
+
+
+def tuesday(**more):
+    return simulate(Survey(tilt_deg=5.0, clock_s=0.3, **more))
+
+
+def named(flight, name):
+    flight.manifest = replace_in_manifest(flight.manifest, {"name": name})
+    return flight
+
+
+@cache
+def learnt():
+    return learn_flight(named(tuesday(), "tuesday"), np.random.default_rng(0))[0]
+
+
+def errors_of(flight, observations, deviations=None):
+    rng = np.random.default_rng(0)
+    points = georeference(flight, observations, rng, pose_errors(flight, observations, deviations))
+    return score_points(flight, points)
+
+
+def test_it_comes_back_from_its_file_as_it_was(tmp_path):
+    write_learnt(learnt(), tmp_path / "calibration.toml")
+    assert read_learnt(tmp_path / "calibration.toml") == learnt() == parse_learnt(learnt_toml(learnt()))
+    values = {one.name: one for one in learnt().parameter}
+    assert {"tilt", "clock"} <= set(values) <= {"roll", "tilt", "pan", "clock"}
+    assert values["tilt"].low <= -5.0 <= values["tilt"].high and values["tilt"].unit == "deg"
+    assert values["clock"].low <= 0.3 <= values["clock"].high
+    assert (learnt().learnt_on.flight, learnt().learnt_on.images) == ("tuesday", 40)
+    assert learnt().conditions.height_m[0] == pytest.approx(55.0, abs=3.0)
+    # The place of a flight is in no calibration.
+    assert "latitude" not in learnt_toml(learnt())
+
+
+def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
+    flight = named(tuesday(seed=5), "wednesday")
+    logged = observe(flight)
+    applied = apply_learnt(flight, None, logged, learnt())
+    after = errors_of(flight, applied.observations, applied.deviations)
+    well = simulate(Survey(seed=5))
+    untouched = errors_of(well, observe(well))
+    assert errors_of(flight, logged)["error_m"].mean() > 10.0
+    assert after["error_m"].mean() <= 1.1 * untouched["error_m"].mean()
+    assert 0.83 < after["inside_90"].mean() < 0.97
+    assert "learnt on the flight tuesday" in applied.sentence and "flatter it" not in applied.sentence
+
+
+def test_on_the_very_flight_it_was_learnt_on_that_is_said():
+    flight = named(tuesday(), "tuesday")
+    said = apply_learnt(flight, None, observe(flight), learnt()).sentence
+    assert "this very flight" in said and "flatter" in said
+    # By its clicks and poses, whatever its name is.
+    renamed = named(tuesday(), "friday")
+    assert "this very flight" in apply_learnt(renamed, None, observe(renamed), learnt()).sentence
+    other = named(tuesday(seed=5), "tuesday")
+    said = apply_learnt(other, None, observe(other), learnt()).sentence
+    assert "this very flight" not in said and "has the name of this flight" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"camera": {"fx_px": 2500.0}}, "another camera: fx_px is 2400 there and 2500 here"),
+        ({"camera": {"width_px": 640}}, "another camera: width_px"),
+        ({"camera": {"k1": 0.1}}, "another camera: k1"),
+        ({"mount": {"looks": "down"}}, "another mount: looks is forward there and down here"),
+        ({"mount": {"tilt_deg": -30.0}}, "another mount: tilt_deg"),
+    ],
+)
+def test_another_camera_or_mount_is_refused(change, words):
+    flight = tuesday(images=8)
+    flight.manifest = replace_in_manifest(flight.manifest, change)
+    with pytest.raises(WildlabError, match=words):
+        apply_learnt(flight, None, observe(flight), learnt())
+
+
+@pytest.mark.slow
+def test_what_was_applied_is_not_found_again():
+    """Diagnosed with its calibration applied, a flight has no cause left, its clock included."""
+    flight = named(tuesday(seed=5), "wednesday")
+    flight.nav["logged"]["east_m"] += 6.0
+    own = learn_flight(flight, np.random.default_rng(0))[0]
+    assert {"east", "clock", "tilt"} <= {one.name for one in own.parameter}
+    applied = apply_learnt(flight, None, observe(flight), own)
+    scored = errors_of(flight, applied.observations)
+    again = diagnose(flight, applied.observations, scored, np.random.default_rng(0))
+    assert not again.counts
+    clock = next(model for model in again.models if model.causes == ("clock",))
+    assert abs(clock.fit.values[0]) < 0.02
+    place = next(model for model in again.models if model.causes == ("position",))
+    assert np.abs(place.fit.values).max() < 0.5
+
+
+def test_views_beyond_those_it_was_learnt_from_are_said():
+    flight = named(tuesday(seed=5, slant_deg=(20.0, 30.0)), "flat")
+    assert "flatter or steeper" in apply_learnt(flight, None, observe(flight), learnt()).sentence
+
+
+def test_where_nothing_gains_for_certain_the_noise_alone_is_kept():
+    found, diagnosis = learn_flight(simulate(Survey(seed=1)), np.random.default_rng(0))
+    assert not diagnosis.counts
+    assert found.parameter == () and found.gain is None
+    assert 0.4 < found.noise.roll_deg < 1.1
+    assert parse_learnt(learnt_toml(found)) == found
+    flight = named(tuesday(seed=5), "wednesday")
+    applied = apply_learnt(flight, None, observe(flight), found)
+    assert "no corrections" in applied.sentence
+    assert np.allclose(applied.observations.poses.p_nb, observe(flight).poses.p_nb)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('unit = "deg"', 'unit = "rad"', "no parameter 'tilt' in 'rad'"),
+        ("covariance = [[", "covariance = [[0.0], [", "covariance does not fit the . parameters"),
+        ('name = "clock"', 'name = "tilt"', "stands there twice|no parameter 'tilt' in 's'"),
+        ("format = 1", "format = 2", "format"),
+        ("format = 1", "format = 1\nshoe = 3", "shoe: this key is not known"),
+        ("format = 1", "format = ", "not valid TOML"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_a_sentence(old, new, words):
+    text = learnt_toml(learnt())
+    assert old in text
+    with pytest.raises(WildlabError, match=words):
+        parse_learnt(text.replace(old, new, 1))
+
+
+def test_files_that_cannot_be_read_or_written_are_sentences(tmp_path):
+    with pytest.raises(WildlabError, match="no such file"):
+        read_learnt(tmp_path / "none.toml")
+    with pytest.raises(WildlabError, match="cannot be written"):
+        write_learnt(learnt(), tmp_path / "nowhere" / "calibration.toml")

@@ -1,0 +1,72 @@
+"""Without truth: the scatter of sightings is found, and nothing is claimed that takes truth."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.pipeline.survey_twin import Survey, simulate
+from wildlab.errors import WildlabError
+from wildlab.evaluation.sightings import Spread
+from wildlab.pipeline.evaluate import score_points
+from wildlab.pipeline.georeference import observe
+from wildlab.pipeline.repeats import Repeats, judge_repeats
+from wildlab.reporting import repeats as words
+
+
+def judged(flight):
+    full = flight.tables.pop("truth")
+    found = judge_repeats(flight, observe(flight), np.random.default_rng(0))
+    flight.tables["truth"] = full
+    return found
+
+
+def test_the_scatter_is_that_of_the_errors_that_images_do_not_share():
+    flight = simulate(Survey())
+    found = judged(flight)
+    errors = score_points(flight, found.points)[["error_north_m", "error_east_m"]].to_numpy()
+    assert found.spread.sd == pytest.approx(errors.std(), rel=0.2)
+    assert 0.8 < found.spread.consistent < 1.2
+    assert found.lost == 0
+    assert found.things["sightings"].sum() == len(errors)
+    # What all images share does not show.
+    shifted = judged(simulate(Survey(north_m=30.0)))
+    assert shifted.spread.sd == pytest.approx(found.spread.sd, rel=1e-3)
+
+
+def test_without_names_there_is_nothing_to_compare():
+    with pytest.raises(WildlabError, match="no detection names what it is of"):
+        judged(simulate(Survey(images=8, rule="nearest")))
+
+
+def table(lost=0, consistent=1.0, spread=True, images=3):
+    found = Spread(2.0, consistent, 5, 40) if spread else None
+    things = pd.DataFrame({"thing": ["a"], "sightings": [4], "images": [images], "sd": [1.0]})
+    return Repeats(pd.DataFrame(index=range(40)), lost, found, things)
+
+
+@pytest.mark.parametrize(
+    ("found", "inside"),
+    [
+        (table(), "fits the ellipses"),
+        (table(consistent=3.0), "too small: the scatter is 3.0 times"),
+        (table(consistent=0.3), "too large"),
+        (table(consistent=float("nan")), "cannot be said without known points"),
+        (table(spread=False), "Nothing was seen in two images"),
+    ],
+)
+def test_sentences_follow_the_numbers(found, inside):
+    said = " ".join(words.summary_sentences(found))
+    assert inside in said
+    every = ("fits the ellipses", "too small", "too large", "Nothing was seen")
+    assert sum(one in said for one in every) == (0 if "known points" in inside else 1)
+    assert ("scatter by 2.0 m" in said) == (found.spread is not None)
+    assert "have no position" not in said
+
+
+def test_lost_points_and_things_seen_once_are_said():
+    assert words.level(table()) == "neutral"
+    assert words.level(table(lost=20)) == "bad"
+    assert words.summary_sentences(table(lost=20))[0].startswith("20 of 40 points")
+    assert "2 of 40 points" in words.summary_sentences(table(lost=2))[-1]
+    assert any("1 of 1 things" in one for one in words.limits(table(images=1)))
+    assert not any("one image only" in one for one in words.limits(table()))

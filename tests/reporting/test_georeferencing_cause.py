@@ -1,0 +1,260 @@
+"""Every sentence on the cause follows from its numbers: where it would be false it does not stand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from wildlab.evaluation.axes import AlongAxis
+from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.causes import Gain
+from wildlab.evaluation.ellipses import EllipseVerdict
+from wildlab.evaluation.errors import Scatter, summarise
+from wildlab.evaluation.outliers import Outlier
+from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.sightings import Averaged
+from wildlab.geometry.calibration import Calibration
+from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.reporting import georeferencing_cause as cause
+
+MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
+
+
+def model(causes, without=10.0, with_=10.0, half=0.5, undetermined=None):
+    names = tuple(
+        name for one in causes for name in {"boresight": ("tilt",), "height": ("down",)}.get(one, (one,))
+    )
+    gain = without - with_
+    return SimpleNamespace(
+        causes=tuple(causes), name=" and ".join(causes) or "nothing",
+        fit=SimpleNamespace(names=names, undetermined=undetermined or {}),
+        gain=Gain(without, with_, Interval(gain, gain - half, gain + half)), held=np.zeros((2, 4, 2)),
+    )  # fmt: skip
+
+
+def diagnosis(winner, *others, outliers=(), alike=(), rivals=()):
+    """A diagnosis whose winner is given; its properties are those of the real one."""
+    models = (model(()), winner, *others) if winner.causes else (winner, *others)
+    place = models.index(winner)
+    ranked = SimpleNamespace(
+        winner=place, rivals=tuple(models.index(one) for one in rivals),
+        means=np.array([one.gain.with_ for one in models]),
+    )  # fmt: skip
+    return Diagnosis(None, np.zeros(4, int), models, ranked, None, alike, outliers, np.ones(4, bool))
+
+
+def verdict(word, factor=1.0, low=0.9, high=1.1, coverage=0.9):
+    return EllipseVerdict(word, Interval(coverage, 0.0, 1.0), Interval(factor, low, high), 0.9, 50)
+
+
+MOST = model(["boresight"], with_=2.0)
+PART = model(["boresight"], with_=7.0)
+LITTLE = model(["boresight"], with_=9.4)
+UNSURE = model(["boresight"], with_=9.4, half=2.0)
+NOTHING = model(())
+
+
+@pytest.mark.parametrize(
+    ("winner", "words"),
+    [
+        (MOST, "Most of it is a constant error of the boresight"),
+        (PART, "Part of it is a constant error of the boresight"),
+        (LITTLE, "is certain and small"),
+        (UNSURE, "is possible, not certain"),
+        (NOTHING, "No constant error explains it"),
+    ],
+)
+def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
+    said = cause.cause_sentence(diagnosis(winner, model(["height"])))
+    assert words in said
+    others = {
+        "Most of it",
+        "Part of it",
+        "certain and small",
+        "possible, not certain",
+        "No constant error explains",
+    }
+    assert sum(one in said for one in others) == 1
+    assert "No calibration" not in said
+    if winner.causes:
+        assert f"to {winner.gain.with_:.1f}" in said
+
+
+def test_what_was_tried_is_listed_where_nothing_was_found():
+    said = cause.cause_sentence(diagnosis(NOTHING, model(["height"]), model(["clock"])))
+    assert "camera's clock or height" in said and "lens" not in said
+
+
+def test_sizes_are_stated_only_where_the_interval_leaves_zero_out():
+    found = Calibration(
+        ("tilt", "clock"), np.array([np.radians(-5.0), 0.1]), np.diag([1e-6, 1.0]), {}, 40, 20, 10
+    )
+    said = cause.size_sentence(found)
+    assert "camera's tilt -5.00 °" in said and "clock" not in said
+    assert cause.size_sentence(Calibration(("clock",), np.array([0.1]), np.eye(1), {}, 40, 20, 10)) == ""
+
+
+FAR = Outlier("mark", "", "M7", 8, 25.0)
+CLICK = Outlier("click", "P1", "M7", 1, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "here", "words"),
+    [
+        (diagnosis(MOST), True, "wildlab calibrate"),
+        (diagnosis(MOST), False, "does not hold for this flight"),
+        (diagnosis(LITTLE), True, "hardly matters"),
+        (diagnosis(NOTHING), True, None),
+        (diagnosis(UNSURE), True, None),
+        (diagnosis(NOTHING, outliers=(FAR,)), True, "Look at mark M7 first: it is 25.0 m off"),
+        (diagnosis(NOTHING, outliers=(FAR._replace(kind="photo", photo="P3"),)), True, "Look at photo P3"),
+        (diagnosis(NOTHING, outliers=(CLICK,)), True, None),
+    ],
+)
+def test_advice_follows_from_gain_and_outliers(found, here, words):
+    said = cause.advice(found, here)
+    assert (words in said) if words else said == ""
+    every = ("wildlab calibrate", "does not hold", "hardly matters", "Look at")
+    assert sum(one in said for one in every) == (words is not None)
+
+
+def test_lost_points_have_their_denominator():
+    assert cause.lost_sentence(0, 50) == ""
+    few, many, every = (cause.lost_sentence(lost, 50) for lost in (5, 11, 50))
+    assert "5 of 50 points (10 %)" in few and "in no figure below" in few and "too many" not in few
+    assert "11 of 50" in many and "too many to trust" in many and "None" not in many
+    assert every.startswith("None of the 50 points") and "too many" not in every
+
+
+@pytest.mark.parametrize(
+    ("lost", "ellipses", "found", "level"),
+    [
+        (0, "honest", NOTHING, "good"),
+        (0, "honest", LITTLE, "good"),
+        (0, "honest", UNSURE, "good"),
+        (0, "honest", PART, "warn"),
+        (0, "too small", NOTHING, "warn"),
+        (13, "honest", NOTHING, "bad"),
+        (10, "honest", NOTHING, "good"),
+    ],
+)
+def test_the_colour_of_the_verdict(lost, ellipses, found, level):
+    assert cause.verdict_level(MANY, lost, verdict(ellipses), diagnosis(found), 10) == level
+    assert cause.verdict_level(summarise(np.empty((0, 2))), 5, verdict(ellipses), None, 10) == "bad"
+
+
+def test_what_cannot_be_told_apart_is_said_of_the_winner():
+    rival = model(["height"], with_=2.0)
+    said = cause.alike_sentences(
+        diagnosis(MOST, rival, alike=(("boresight", "lens"), ("position", "clock")), rivals=(rival,))
+    )
+    assert len(said) == 2
+    assert "as well, within one standard error: the height" in said[0]
+    assert "cannot tell the boresight" in said[1] and "lens" in said[1]
+    assert cause.alike_sentences(diagnosis(MOST)) == []
+    lost = model(["boresight"], with_=2.0, undetermined={"pan": ("tilt",), "roll": ()})
+    said = cause.alike_sentences(diagnosis(lost))
+    assert "cannot tell the camera's pan from the camera's tilt" in said[0]
+    assert "camera's roll would not show" in said[1]
+    # What a cause that did not win has lost says nothing.
+    assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
+
+
+def test_halves_are_mentioned_only_where_they_disagree():
+    assert cause.halves_sentence(Halves(2.0, 2.2, Interval(0.2, -0.5, 0.9))) == ""
+    said = cause.halves_sentence(Halves(2.0, 6.0, Interval(4.0, 3.0, 5.0)))
+    assert "2.0 m in the first and 6.0 m in the second" in said
+
+
+@pytest.mark.parametrize(
+    ("averaged", "inside", "outside"),
+    [
+        (None, "", "Averaging"),
+        (Averaged(4, 4.0, 2.0, Interval(0.5, 0.4, 0.6), 9), "which halves it", "no certain gain"),
+        (Averaged(4, 4.0, 3.0, Interval(0.75, 0.6, 0.9), 9), "from 4.0 m to 3.0 m", "halves"),
+        (Averaged(4, 4.0, 3.9, Interval(0.98, 0.8, 1.2), 9), "no certain gain", "halves"),
+    ],
+)
+def test_averaging_is_said_where_it_was_tried(averaged, inside, outside):
+    said = cause.averaging_sentence(averaged)
+    assert inside in said and outside not in said
+
+
+@pytest.mark.parametrize(
+    ("found", "inside"),
+    [
+        (verdict("honest"), "**Honest**"),
+        (verdict("honest", 1.1, 1.02, 1.3), "**Nearly honest**"),
+        (verdict("too small", 3.0, 2.5, 3.5, 0.2), "do not use these ellipses"),
+        (verdict("too large", 0.5, 0.4, 0.6, 1.0), "**Too large**"),
+        (verdict("undecided", 1.0, 0.5, 2.0), "**Not decided**"),
+        (verdict("too few", 1.0, float("nan"), float("nan")), "**Too few images to tell**"),
+    ],
+)
+def test_ellipses_get_one_verdict(found, inside):
+    said = cause.ellipse_sentence(found)
+    assert inside in said
+    every = (
+        "**Honest**",
+        "**Nearly honest**",
+        "**Too small**",
+        "**Too large**",
+        "**Not decided**",
+        "**Too few",
+    )
+    assert sum(one in said for one in every) == 1
+    if found.word == "too small":
+        assert "3.0 times as long (2.5 to 3.5)" in said
+
+
+def test_what_the_nearest_mark_hides():
+    said = " ".join(cause.nearest_sentences(0.3, 10.0, 9.0))
+    assert "30 %" in said and "10.0 m" in said and "may be larger" in said
+    said = " ".join(cause.nearest_sentences(0.0, 10.0, 1.0))
+    assert "ambiguous" not in said and "may be larger" not in said
+
+
+def test_a_cause_that_hangs_on_ambiguous_clicks_is_said_to():
+    assert cause.ambiguity_sentence(diagnosis(MOST), None) == ""
+    assert cause.ambiguity_sentence(diagnosis(MOST), diagnosis(PART)) == ""
+    said = cause.ambiguity_sentence(diagnosis(MOST), diagnosis(NOTHING))
+    assert "'nothing'" in said and "before you correct" in said
+
+
+def test_outliers_are_counted_by_kind_with_the_figures_without_them():
+    without = summarise(np.tile([0.6, 0.8], (41, 1)))
+    said = cause.outliers_sentence((FAR, CLICK), MANY, without)
+    assert said.startswith("1 mark and 1 click are far out")
+    assert "9 of 50 points" in said and "1.0 m in place of 5.0 m" in said
+    assert cause.outliers_sentence((FAR,), MANY, without).startswith("1 mark is far out")
+    table = cause.outliers_table((FAR, CLICK))
+    assert table["photo"].tolist() == ["several", "P1"]
+
+
+def test_what_is_left_is_sorted_and_says_what_was_taken_off():
+    scatter = Scatter(0.1, 0.3, 0.6, np.array([3.0, 4.0]), np.array([0.6, 0.8]))
+    parts = cause.remaining_parts(scatter, ("height",))
+    assert ["Single" in parts[0], "pose" in parts[1], "all images" in parts[2]] == [True] * 3
+    assert "left with the height taken off" in parts[1] and "5.0 m" in parts[1]
+    assert "taken off" not in " ".join(cause.remaining_parts(scatter, ()))
+    assert not any(word in " ".join(parts) for word in ("halve", "calibration", "flown"))
+    nan = np.full(2, np.nan)
+    assert cause.remaining_parts(Scatter(np.nan, np.nan, np.nan, nan, nan), ()) == []
+
+
+def test_an_axis_is_constant_by_its_interval():
+    table = cause.axes_table(
+        {
+            "north": AlongAxis(Interval(3.0, 2.0, 4.0), 0.5, 9),
+            "east": AlongAxis(Interval(1.0, -1.0, 3.0), 0.1, 9),
+        }
+    )
+    assert table["verdict"].tolist() == ["constant", "not told from zero"]
+
+
+def test_the_table_of_models_shows_nothing_and_the_winner():
+    others = [model([f"clock{i}"], with_=3.0 + i) for i in range(12)]
+    table = cause.models_table(diagnosis(MOST, *others))
+    assert table["what"].iloc[0] == "**boresight**"
+    assert "nothing" in table["what"].tolist()
+    assert len(table) == cause.SHOWN + 1

@@ -1,0 +1,57 @@
+"""What is constantly wrong with a camera's poses, learnt on one flight and kept for the next."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from wildlab.commands.shared import FILE, FOLDER
+from wildlab.terminal import print_json, print_table, shown
+
+
+@click.command(short_help="Learn on a flight's known points what the next one is to be corrected by.")
+@click.argument("flight", type=FOLDER)
+@click.option("--into", type=FILE, required=True, help="The file to write, calibration.toml for instance.")
+@click.option("--source", help="Which poses, where the flight has several (its nav/NAME.parquet).")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="What was learnt, as JSON.")
+def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: bool) -> None:
+    """Learn on the known points of FLIGHT what is constantly wrong with position, boresight, clock or lens.
+
+    Only what gained something for certain on images that it was not estimated from is written down, with its
+    covariance; how noisy the poses were always is. Judge it on another flight.
+
+    \b
+    Examples:
+      wildlab calibrate flights/tuesday --into calibration.toml
+      wildlab evaluate flights/wednesday --calibration calibration.toml
+    """
+    import numpy as np
+
+    from wildlab.flight.learnt import write_learnt
+    from wildlab.flight.store import load_flight
+    from wildlab.pipeline.learn import learn_flight
+
+    learnt, diagnosis = learn_flight(load_flight(flight), np.random.default_rng(seed), source)
+    write_learnt(learnt, into)
+    if as_json:
+        print_json(learnt.model_dump())
+        return
+    gain = learnt.gain
+    if gain is None:
+        click.echo(
+            f"No constant error gains anything for certain ({len(diagnosis.models)} models tried): "
+            "the file holds the noise of the poses alone."
+        )
+    else:
+        click.echo(
+            f"{diagnosis.winner.name}: mean error {gain.without_m:.2f} m as logged, {gain.with_m:.2f} m on "
+            f"images that it was not estimated from (gain {gain.low_m:.2f} to {gain.high_m:.2f} m)."
+        )
+        rows = [
+            [one.name, f"{one.value:+.3f}", f"{one.low:+.3f} to {one.high:+.3f}", one.unit]
+            for one in learnt.parameter
+        ]
+        print_table(["to be added to", "estimate", "95 % interval", "unit"], rows)
+    click.echo(shown(into))

@@ -1,0 +1,74 @@
+"""Errors split along axes: what is constant along one of them is a cause that a parameter can take off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.evaluation.blocks import PROBABILITY, block_mean
+from wildlab.evaluation.runs import Interval
+
+
+class AlongAxis(NamedTuple):
+    """Errors along one axis.
+
+    Attributes
+    ----------
+    mean
+        Of the component, m, with its interval from the blocks.
+    share
+        Of the mean square of the whole error that a constant of that size takes off, 0 to 1.
+    n
+        Points that have the axis.
+    """
+
+    mean: Interval
+    share: float
+    n: int
+
+    @property
+    def constant(self) -> bool:
+        """Whether the interval of the mean leaves zero out."""
+        return bool(self.mean.low > 0 or self.mean.high < 0)
+
+
+def split_along(
+    errors: ArrayLike, axes: Mapping[str, ArrayLike], blocks: ArrayLike, probability: float = PROBABILITY
+) -> dict[str, AlongAxis]:
+    """Mean error along each axis, by name.
+
+    Parameters
+    ----------
+    errors
+        (N, 2) north-east, m; rows with NaN are left out.
+    axes
+        Unit vectors (N, 2) or (2,), by name; a point with NaN there has no such axis.
+    blocks
+        (N,) from `wildlab.evaluation.blocks.time_blocks`.
+    probability
+        Of the intervals.
+
+    Returns
+    -------
+    dict
+        An `AlongAxis` for each axis that any point has.
+
+    Examples
+    --------
+    >>> split_along([[3.0, 0.0], [3.0, 1.0]], {"north": [1.0, 0.0]}, [0, 1])["north"].mean.estimate
+    3.0
+    """
+    e = np.asarray(errors, float)
+    square = float(np.nanmean((e**2).sum(axis=1))) if np.isfinite(e).any() else float("nan")
+    found = {}
+    for name, vectors in axes.items():
+        component = (e * np.asarray(vectors, float)).sum(axis=1)
+        n = int(np.isfinite(component).sum())
+        if n:
+            mean = block_mean(component, blocks, probability)
+            share = mean.estimate**2 / square if square > 0 else 0.0
+            found[name] = AlongAxis(mean, float(share), n)
+    return found

@@ -1,0 +1,164 @@
+"""Blocks in time order: what is drawn, left out and compared where errors that follow each other are alike.
+
+The error of a pose wanders over tens of seconds, so that neighbouring images say less than their number. A
+block is a stretch of neighbouring images; blocks are taken for independent of each other, images are not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import t
+
+from wildlab.evaluation.runs import Interval
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.intp]
+
+#: Fewest and most blocks, images in a block where there are enough, and how long one is at least, s.
+FEWEST, MOST, IMAGES, LONG_S = 6, 20, 3, 60.0
+#: With what probability an interval holds, unless another is asked for.
+PROBABILITY = 0.9
+
+
+def time_blocks(order: ArrayLike, seconds: bool) -> Labels:
+    """Number of the block (N,) that each point belongs to, in time order.
+
+    Where there are times and the flight lasts for six blocks of a minute: by the clock. Otherwise by the
+    number of images: three to a block, as far as that leaves six blocks.
+
+    Parameters
+    ----------
+    order
+        (N,) when the image of each point was taken: seconds, or its place in the order. NaN stands first.
+    seconds
+        Whether these are seconds.
+
+    Returns
+    -------
+    (N,) integers from 0
+
+    Examples
+    --------
+    >>> time_blocks([5, 5, 6, 7, 8, 9, 10], seconds=False).tolist()
+    [0, 0, 1, 2, 3, 4, 5]
+    """
+    when = np.nan_to_num(np.asarray(order, float), nan=-np.inf)
+    images, place = np.unique(when, return_inverse=True)
+    known = images[np.isfinite(images)]
+    if seconds and len(known) and (known[-1] - known[0]) >= FEWEST * LONG_S:
+        length = max(LONG_S, (known[-1] - known[0]) / MOST)
+        number = np.floor((np.maximum(when, known[0]) - known[0]) / length)
+        return np.asarray(np.unique(number, return_inverse=True)[1])
+    count = min(MOST, max(FEWEST, len(images) // IMAGES), len(images))
+    return np.asarray(place * count // len(images))
+
+
+def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBABILITY) -> Interval:
+    """Mean of values that go together within blocks, with Student's interval by the number of blocks.
+
+    Parameters
+    ----------
+    values
+        (N,) in any unit; NaN are left out.
+    blocks
+        (N,) which block each belongs to.
+    probability
+        With which the interval holds the mean that more such blocks would have.
+
+    Returns
+    -------
+    Interval
+        Low and high are NaN where fewer than two blocks are left, all is NaN where no value is.
+
+    Examples
+    --------
+    >>> block_mean([1.0, 1.0, 3.0, 3.0], [0, 0, 1, 1]).estimate
+    2.0
+    """
+    x = np.asarray(values, float)
+    keep = np.isfinite(x)
+    x, group = x[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
+    if not len(x):
+        return Interval(np.nan, np.nan, np.nan)
+    mean, count = float(x.mean()), int(group.max()) + 1
+    if count < 2:
+        return Interval(mean, np.nan, np.nan)
+    half = float(t.ppf((1 + probability) / 2, count - 1)) * standard_error(x, group)
+    return Interval(mean, mean - half, mean + half)
+
+
+def standard_error(values: Array, blocks: Labels) -> float:
+    """Standard error of the mean of values (N,) in blocks (N,): as of a ratio of sums over blocks."""
+    group = np.unique(blocks, return_inverse=True)[1]
+    count = int(group.max()) + 1
+    if count < 2:
+        return float("nan")
+    apart = np.bincount(group, weights=values - values.mean())
+    return float(np.sqrt(count / (count - 1) * (apart**2).sum()) / len(values))
+
+
+class Halves(NamedTuple):
+    """First and second half of a flight.
+
+    Attributes
+    ----------
+    first, second
+        Mean of either.
+    difference
+        Second minus first, with its interval.
+    """
+
+    first: float
+    second: float
+    difference: Interval
+
+    @property
+    def disagree(self) -> bool:
+        """Whether the interval of the difference leaves zero out."""
+        return bool(self.difference.low > 0 or self.difference.high < 0)
+
+
+def compare_halves(values: ArrayLike, blocks: ArrayLike, probability: float = 0.95) -> Halves:
+    """Mean of values (N,) in the first and the second half of the blocks (N,), and whether they differ.
+
+    Parameters
+    ----------
+    values
+        (N,); NaN are left out.
+    blocks
+        (N,) from `time_blocks`.
+    probability
+        Of the interval of the difference.
+
+    Returns
+    -------
+    Halves
+        The interval is NaN where a half has fewer than two blocks.
+
+    Examples
+    --------
+    >>> compare_halves([1.0, 1.1, 5.0, 5.1], [0, 1, 2, 3]).disagree
+    True
+    """
+    x, group = np.asarray(values, float), np.asarray(blocks)
+    keep = np.isfinite(x)
+    x, group = x[keep], np.unique(group[keep], return_inverse=True)[1]
+    late = group >= (group.max() + 1) / 2 if len(x) else np.zeros(0, bool)
+    if late.all() or not late.any():
+        nan = float("nan")
+        return Halves(nan, nan, Interval(nan, nan, nan))
+    parts = [x[~late], x[late]]
+    blocks_of = [group[~late], group[late]]
+    first, second = (float(part.mean()) for part in parts)
+    errors = [standard_error(part, of) for part, of in zip(parts, blocks_of, strict=True)]
+    freedom = min(len(np.unique(of)) for of in blocks_of) - 1
+    half = (
+        float(t.ppf((1 + probability) / 2, freedom) * np.hypot(errors[0], errors[1]))
+        if freedom > 0
+        else float("nan")
+    )
+    apart = second - first
+    return Halves(first, second, Interval(apart, apart - half, apart + half))

@@ -1,0 +1,114 @@
+"""Are error ellipses honest? How often they hold the truth, and how much larger they should be."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+from wildlab.evaluation.blocks import FEWEST, PROBABILITY, block_mean
+from wildlab.evaluation.runs import Interval
+
+Array = NDArray[np.float64]
+Word = Literal["honest", "too small", "too large", "undecided", "too few"]
+
+#: A factor nearer to one than this, either way, is of no consequence.
+CLOSE = 1.15
+#: Honest is said only where the factor is known to lie between these.
+WIDEST = (1 / 1.5, 1.5)
+
+
+class EllipseVerdict(NamedTuple):
+    """What ellipses are worth.
+
+    Attributes
+    ----------
+    word
+        ``honest``, ``too small``, ``too large``, ``undecided``, or ``too few`` blocks to tell.
+    coverage
+        Share of the ellipses that hold the truth, with its interval.
+    factor
+        What to multiply their axes by so that they hold it as often as they say, with its interval.
+    stated
+        How often they say they do.
+    n
+        How many there are.
+    """
+
+    word: Word
+    coverage: Interval
+    factor: Interval
+    stated: float
+    n: int
+
+
+def judge_ellipses(
+    errors: ArrayLike,
+    covariances: ArrayLike,
+    blocks: ArrayLike,
+    rng: np.random.Generator,
+    stated: float = 0.9,
+    draws: int = 500,
+) -> EllipseVerdict:
+    """Hold the ellipses of errors against the errors.
+
+    Parameters
+    ----------
+    errors
+        (N, 2) north-east, m.
+    covariances
+        (N, 2, 2) m^2; rows with NaN, here or in the errors, are left out.
+    blocks
+        (N,) which points are drawn together.
+    rng
+        Draws blocks with replacement, for the interval of the factor.
+    stated
+        Share of the truth that an ellipse promises to hold.
+    draws
+        How often.
+
+    Returns
+    -------
+    EllipseVerdict
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> e = rng.normal(0, 3.0, (300, 2))
+    >>> verdict = judge_ellipses(e, np.tile(np.eye(2), (300, 1, 1)), np.arange(300) // 10, rng)
+    >>> verdict.word, round(verdict.factor.estimate)
+    ('too small', 3)
+    """
+    e, P = np.asarray(errors, float), np.asarray(covariances, float)
+    keep = np.isfinite(e).all(axis=1) & np.isfinite(P).all(axis=(1, 2))
+    nan = float("nan")
+    if not keep.any():
+        return EllipseVerdict("too few", Interval(nan, nan, nan), Interval(nan, nan, nan), stated, 0)
+    e, P, group = e[keep], P[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
+    squared = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0])
+    bound = float(chi2.ppf(stated, 2))
+    held = block_mean((squared <= bound).astype(float), group)
+    # Student's interval does not know that a share ends at one.
+    coverage = Interval(held.estimate, max(held.low, 0.0), min(held.high, 1.0))
+    size = float(np.sqrt(np.quantile(squared, stated) / bound))
+    count = int(group.max()) + 1
+    if count < FEWEST:
+        return EllipseVerdict("too few", coverage, Interval(size, nan, nan), stated, len(e))
+    members = [squared[group == g] for g in range(count)]
+    drawn = [
+        np.quantile(np.concatenate([members[g] for g in rng.integers(0, count, count)]), stated)
+        for _ in range(draws)
+    ]
+    ends = np.sqrt(np.quantile(drawn, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) / bound)
+    factor = Interval(size, float(ends[0]), float(ends[1]))
+    return EllipseVerdict(_word(factor), coverage, factor, stated, len(e))
+
+
+def _word(factor: Interval) -> Word:
+    if factor.low > 1 and factor.estimate > CLOSE:
+        return "too small"
+    if factor.high < 1 and factor.estimate < 1 / CLOSE:
+        return "too large"
+    return "honest" if WIDEST[0] < factor.low and factor.high < WIDEST[1] else "undecided"

@@ -1,0 +1,149 @@
+"""What was learnt on one flight for others: ``calibration.toml``, checked like any file of a stranger."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from wildlab.errors import WildlabError
+from wildlab.files import write_atomic
+from wildlab.flight.files import Strict, check_model, read_toml
+from wildlab.flight.manifest import CameraPart, MountPart, Spread
+from wildlab.flight.toml import dump_toml
+
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+#: Units of the parameters, by name; the file is for people, so angles are in degrees and shares in percent.
+UNITS: dict[str, str] = {
+    "roll": "deg", "tilt": "deg", "pan": "deg", "clock": "s", "down": "m", "north": "m", "east": "m",
+    "focal": "%", "aspect": "%", "centre_u": "px", "centre_v": "px",
+}  # fmt: skip
+
+
+class LearntOn(Strict):
+    """Which flight, told again by a hash of its clicks and poses, and how much of it."""
+
+    flight: str
+    source: str
+    fingerprint: Sha256
+    images: Annotated[int, Field(gt=0)]
+    points: Annotated[int, Field(gt=0)]
+    blocks: Annotated[int, Field(gt=0)]
+
+
+class Conditions(Strict):
+    """Under which it was learnt: least and greatest."""
+
+    height_m: tuple[float, float]
+    depression_deg: tuple[float, float]
+
+
+class LearntGain(Strict):
+    """Mean error on images that it was not estimated from, without and with it; the gain, low and high."""
+
+    without_m: float
+    with_m: float
+    gain_m: float
+    low_m: float
+    high_m: float
+
+
+class LearntParameter(Strict):
+    """A correction, to be added, with its 95 % interval."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+    @model_validator(mode="after")
+    def _known(self) -> LearntParameter:
+        if UNITS.get(self.name) != self.unit:
+            known = ", ".join(f"{name} ({unit})" for name, unit in UNITS.items())
+            raise ValueError(f"there is no parameter {self.name!r} in {self.unit!r}; use one of: {known}")
+        return self
+
+
+class LearntNoise(Strict):
+    """Standard deviations of poses and pixels, learnt with the corrections taken off."""
+
+    pixel_px: Spread
+    position_horizontal_m: Spread
+    position_vertical_m: Spread
+    roll_deg: Spread
+    pitch_deg: Spread
+    yaw_deg: Spread
+
+
+class Learnt(Strict):
+    """The whole file. ``covariance`` is that of the parameters, in their order and units."""
+
+    format: Literal[1] = 1
+    learnt_on: LearntOn
+    conditions: Conditions
+    camera: CameraPart
+    mount: MountPart
+    noise: LearntNoise
+    gain: LearntGain | None = None
+    covariance: tuple[tuple[float, ...], ...] = ()
+    parameter: tuple[LearntParameter, ...] = ()
+
+    @model_validator(mode="after")
+    def _fits(self) -> Learnt:
+        n = len(self.parameter)
+        if len(self.covariance) != n or any(len(row) != n for row in self.covariance):
+            raise ValueError(
+                f"the covariance does not fit the {n} parameters; give a row and a column for each of them"
+            )
+        if len({one.name for one in self.parameter}) != n:
+            raise ValueError("a parameter stands there twice; take one out")
+        return self
+
+
+def read_learnt(path: Path) -> Learnt:
+    """Read a ``calibration.toml``.
+
+    Raises
+    ------
+    WildlabError
+        Where it is missing, not TOML, or a key is unknown, missing or wrong.
+    """
+    return check_model(Learnt, read_toml(path, "what `wildlab calibrate` wrote"), path)
+
+
+def parse_learnt(text: str) -> Learnt:
+    """The same from its text, as a notebook is given it.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not TOML, or a key is unknown, missing or wrong.
+    """
+    try:
+        data: dict[str, Any] = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise WildlabError(f"the calibration is not valid TOML ({error})", "mend that line") from None
+    return check_model(Learnt, data, None)
+
+
+def learnt_toml(learnt: Learnt) -> str:
+    """The file's text."""
+    return dump_toml(learnt.model_dump(exclude_none=True))
+
+
+def write_learnt(learnt: Learnt, path: Path) -> None:
+    """Write a ``calibration.toml``, whole or not at all.
+
+    Raises
+    ------
+    WildlabError
+        Where it cannot be written.
+    """
+    try:
+        write_atomic(path, learnt_toml(learnt))
+    except OSError as error:
+        fix = "name a file in a folder that is there and may be written to"
+        raise WildlabError(f"cannot be written ({error.strerror})", fix, file=path) from None

@@ -1,0 +1,184 @@
+"""Constant corrections to what a camera's poses are made of: mount, position, clock and lens (H 5.3.2).
+
+`wildlab.geometry.calibration` estimates them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import stdtrit
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.mount import Mount
+
+#: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
+#: with the size an error of it would usually have (radians, seconds, metres, shares, pixels). A parameter, or
+#: a combination, that the data determine no better than that is not worth fitting.
+PARAMETERS: dict[str, float] = {
+    "roll": np.radians(3.0),
+    "tilt": np.radians(3.0),
+    "pan": np.radians(3.0),
+    "clock": 0.5,
+    "down": 5.0,
+    "north": 5.0,
+    "east": 5.0,
+    "focal": 0.02,
+    "aspect": 0.02,
+    "centre_u": 20.0,
+    "centre_v": 20.0,
+}
+BORESIGHT = ("roll", "tilt", "pan")
+
+#: Poses at the times of N pixels, shifted by so many seconds.
+PosesAt = Callable[[float], CameraPoses]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An estimate of some of :data:`PARAMETERS`.
+
+    Attributes
+    ----------
+    names
+        The parameters estimated.
+    values
+        Corrections (P,), radians, seconds, metres, shares, pixels: angles turn the camera's base on the
+        airframe, ``clock`` is to be added to the camera's stamps, ``north``/``east``/``down`` to the logged
+        position, ``centre_u``/``centre_v`` to the principal point. Both focal lengths are multiplied by
+        ``exp(focal)``, and their ratio (that of columns over that of rows) by ``exp(aspect)``.
+    covariance
+        (P, P); clicks of one image count as one draw of the image's error.
+    undetermined
+        Asked for and not estimated, with the parameters each could not be told apart from (none: it has no
+        effect that shows).
+    n_points, n_images, n_draws
+        What it rests on; no draws: not known.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    undetermined: dict[str, tuple[str, ...]]
+    n_points: int
+    n_images: int
+    n_draws: int = 0
+
+    def value(self, name: str) -> float:
+        """The correction called ``name``, zero where it was not estimated."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def sd(self, name: str) -> float:
+        """Its standard deviation; NaN where it was not estimated."""
+        if name not in self.names:
+            return float("nan")
+        i = self.names.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+    def interval(self, name: str, probability: float = 0.95) -> tuple[float, float]:
+        """Student's interval of the correction called ``name``, by the number of draws; NaN without one."""
+        freedom = self.n_draws - 1 if self.n_draws > 1 else 1e9
+        half = float(stdtrit(freedom, (1 + probability) / 2)) * self.sd(name)
+        return self.value(name) - half, self.value(name) + half
+
+
+def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:
+    """The mount with the estimated angles on top of its own misalignment.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    mount
+        The one it was estimated with.
+
+    Returns
+    -------
+    The mount, otherwise unchanged.
+    """
+    angles = [calibration.value(name) for name in BORESIGHT]
+    turned = euler_to_matrix(*angles) @ euler_to_matrix(*mount.misalignment)
+    roll, tilt, pan = matrix_to_euler(turned)
+    return replace(mount, misalignment=(float(roll), float(tilt), float(pan)))
+
+
+def calibrated_camera(calibration: Calibration, camera: Camera) -> Camera:
+    """The camera with the estimated focal lengths and principal point.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    camera
+        The one it was estimated with.
+
+    Returns
+    -------
+    The camera, otherwise unchanged.
+    """
+    both, half = calibration.value("focal"), calibration.value("aspect") / 2
+    return replace(
+        camera,
+        fx=camera.fx * float(np.exp(both + half)),
+        fy=camera.fy * float(np.exp(both - half)),
+        cx=camera.cx + calibration.value("centre_u"),
+        cy=camera.cy + calibration.value("centre_v"),
+    )
+
+
+def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses:
+    """Poses with a calibration applied to clock, position, mount and camera.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    poses_at
+        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
+
+    Returns
+    -------
+    The poses; their covariance is that of the logged ones.
+    """
+    poses = poses_at(calibration.value("clock"))
+    shift = np.array([calibration.value(name) for name in ("north", "east", "down")])
+    return replace(
+        poses,
+        p_nb=poses.p_nb + shift,
+        mount=apply_calibration(calibration, poses.mount),
+        camera=calibrated_camera(calibration, poses.camera),
+    )
+
+
+def georeference_calibrated(
+    calibration: Calibration, poses_at: PosesAt, uv: ArrayLike, plane_down: ArrayLike
+) -> Array:
+    """Ground points with a calibration applied to clock, position and mount.
+
+    Parameters
+    ----------
+    calibration
+        The estimate.
+    poses_at
+        Gives the poses, as logged, at the times of the pixels shifted by an offset in seconds.
+    uv
+        (N, 2) pixels.
+    plane_down
+        Down coordinate of the plane in n, metres, scalar or (N,).
+
+    Returns
+    -------
+    (N, 3) metres in n; NaN where a ray misses the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
+    """
+    return georeference_pixels(calibrated_poses(calibration, poses_at), uv, plane_down)

@@ -1,0 +1,315 @@
+"""What is constantly wrong with a flight's georeferencing? Nested models on images that they have not seen.
+
+The models are constant errors of the position, the height, the boresight, the camera's clock and the lens,
+and their sums as far as the data tell these apart: see `wildlab.evaluation.causes` for how they are compared.
+The one that wins is tried once more with those of its parameters alone that are told from zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.blocks import Labels
+from wildlab.evaluation.causes import (
+    ROUNDS,
+    Gain,
+    Linear,
+    Ranked,
+    distances,
+    draw_folds,
+    gain_of,
+    held_out,
+    rank_models,
+)
+from wildlab.evaluation.errors import ErrorSummary, mean_summary
+from wildlab.evaluation.outliers import Outlier, find_outliers
+from wildlab.flight.store import Flight
+from wildlab.geometry.calibration import (
+    Calibration,
+    Fit,
+    fit_points,
+    georeference_calibrated,
+    with_covariance,
+)
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.pipeline.evaluate import blocks_of, known_points
+from wildlab.pipeline.georeference import Observations, covariances_of, shifted_poses, truth_of
+
+Array = NDArray[np.float64]
+
+#: What may be constantly wrong, each with its parameters. Of the last three one holds the next.
+CAUSES: dict[str, tuple[str, ...]] = {
+    "position": ("north", "east"),
+    "height": ("down",),
+    "boresight": ("roll", "tilt", "pan"),
+    "clock": ("clock",),
+    "focal length": ("focal",),
+    "focal lengths": ("focal", "aspect"),
+    "lens": ("focal", "aspect", "centre_u", "centre_v"),
+}
+_LENS = ("focal length", "focal lengths", "lens")
+#: Images below which nothing is compared: too few to leave some out.
+FEWEST_IMAGES = 6
+#: Over which a target's speed is measured, either way, s.
+STEP_S = 0.1
+#: Causes of one model at most.
+MOST_CAUSES = 4
+
+
+@dataclass(frozen=True)
+class Model:
+    """A sum of causes, fitted to all points and scored on those that a fit had not seen.
+
+    Attributes
+    ----------
+    causes
+        Names of :data:`CAUSES`; none: the poses as logged.
+    fit
+        From all points.
+    held
+        (R, N, 2) m, held-out errors of R rounds.
+    gain
+        Over the poses as logged.
+    """
+
+    causes: tuple[str, ...]
+    fit: Fit
+    held: Array
+    gain: Gain
+
+    @property
+    def name(self) -> str:
+        """The causes in words, ``nothing`` where there is none; with its parameters where it has not all."""
+        lacking = {name for cause in self.causes for name in CAUSES[cause]} - set(self.fit.names)
+        alone = f" ({', '.join(self.fit.names)} alone)" if lacking else ""
+        return (" and ".join(self.causes) or "nothing") + alone
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is constantly wrong, and what taking it off gained.
+
+    Attributes
+    ----------
+    scored
+        The N points it rests on: of the scored table those that have an error and an ellipse.
+    blocks
+        (N,) their blocks in time order.
+    models
+        Every model that was tried, as logged first.
+    ranked
+        Their order.
+    calibration
+        Of the winner, from all points, with the covariance from the blocks.
+    alike
+        Pairs of causes that these data cannot tell apart.
+    outliers
+        Photos, marks and clicks that are far out once the winner is taken off.
+    inliers
+        (N,) bool, the points that are in none of these.
+    """
+
+    scored: pd.DataFrame
+    blocks: Labels
+    models: tuple[Model, ...]
+    ranked: Ranked
+    calibration: Calibration
+    alike: tuple[tuple[str, str], ...]
+    outliers: tuple[Outlier, ...]
+    inliers: NDArray[np.bool_]
+
+    @property
+    def winner(self) -> Model:
+        """The simplest model within one standard error of the best."""
+        return self.models[self.ranked.winner]
+
+    @property
+    def rivals(self) -> tuple[Model, ...]:
+        """Other models that explain the errors as well."""
+        return tuple(self.models[m] for m in self.ranked.rivals)
+
+    @property
+    def counts(self) -> bool:
+        """Whether taking the winner off gained something for certain."""
+        return bool(self.winner.causes) and self.winner.gain.counts
+
+    def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
+        """Held-out errors of the winner, each figure the mean over the rounds; of some rows (N,) or all."""
+        held = self.winner.held if rows is None else self.winner.held[:, rows]
+        return mean_summary(held)
+
+
+def diagnose(
+    flight: Flight,
+    observations: Observations,
+    scored: pd.DataFrame,
+    rng: np.random.Generator,
+    source: str | None = None,
+    rounds: int = ROUNDS,
+) -> Diagnosis:
+    """Find what is constantly wrong with the poses, the camera or its clock.
+
+    Parameters
+    ----------
+    flight
+        With truth.
+    observations
+        From `observe`, or with a calibration applied.
+    scored
+        From `score_points`, of these observations.
+    rng
+        Draws the folds.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+    rounds
+        How many times the blocks are put into folds.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than six images have a point with an error and an ellipse.
+    """
+    scored = scored[np.isfinite(scored["error_m"]) & np.isfinite(scored["cov_nn"])].reset_index(drop=True)
+    images = scored["frame_id"].nunique()
+    if images < FEWEST_IMAGES:
+        raise WildlabError(
+            f"the error of a point is known in {images} images, too few to find a cause",
+            f"mark known points in at least {FEWEST_IMAGES} images",
+            file=flight.folder,
+            field="detections",
+        )
+    chosen, known = known_points(flight, observations, scored)
+    scored = scored.set_index("detection_id").loc[chosen.table["detection_id"]].reset_index()
+    blocks = blocks_of(flight, scored)
+    folds = [draw_folds(blocks, rng) for _ in range(rounds)]
+    whiten = covariances_of(scored)
+    poses_at = _poses(flight, source, chosen, scored["truth_id"].to_numpy())
+
+    def place(names: tuple[str, ...], values: Array) -> Array:
+        trial = Calibration(names, values, np.zeros((len(names),) * 2), {}, 0, 0)
+        ground = georeference_calibrated(trial, poses_at, chosen.uv, known[:, 2])
+        return np.asarray(ground[:, :2] - known[:, :2])
+
+    logged = place((), np.zeros(0))
+
+    def model(causes: tuple[str, ...], only: tuple[str, ...] = ()) -> Model:
+        wanted = only or [name for cause in causes for name in CAUSES[cause]]
+        fit = fit_points(poses_at, chosen.uv, known, wanted, whiten)
+        held = held_out(Linear(fit.J, fit.r, fit.values, partial(place, fit.names)), folds)
+        return Model(causes, fit, held, gain_of(logged, held, blocks))
+
+    timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
+    causes = [cause for cause in CAUSES if timed or cause != "clock"]
+    models, alike = _search(model, causes, blocks)
+    best = models[_rank(models, blocks).winner]
+    if only := _told_from_zero(with_covariance(best.fit, scored["frame_id"].to_numpy(), blocks)):
+        models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
+    ranked = _rank(models, blocks)
+    winner = models[ranked.winner]
+    # What is far out is looked for with the winner taken off, where that gained something for certain.
+    shown = winner if winner.gain.counts else models[0]
+    marks = scored["truth_id"].to_numpy(str)
+    metres = place(shown.fit.names, shown.fit.values)
+    outliers, inliers = find_outliers(shown.fit.r, metres, scored["frame_id"].to_numpy(str), marks)
+    calibration = with_covariance(winner.fit, scored["frame_id"].to_numpy(), blocks)
+    return Diagnosis(scored, blocks, tuple(models), ranked, calibration, tuple(alike), outliers, inliers)
+
+
+def _poses(
+    flight: Flight, source: str | None, chosen: Observations, targets: NDArray[np.str_]
+) -> Callable[[float], CameraPoses]:
+    """Poses at shifted stamps, as seen from each point's target, which moves on at its speed at the time.
+
+    Those as they are, and the last few, are not interpolated again. What a calibration has added to the
+    position stays added.
+    """
+    named = chosen.table.assign(target_id=targets)
+
+    @lru_cache(maxsize=4)
+    def at(shift: float) -> CameraPoses:
+        if shift == 0:
+            return chosen.poses
+        poses = shifted_poses(flight, source, chosen, shift)
+        place = poses.p_nb + added
+        return replace(poses, p_nb=place - shift * velocity)
+
+    added = chosen.poses.p_nb - shifted_poses(flight, source, chosen, 0.0).p_nb
+    velocity = np.zeros_like(added)
+    if flight.truth is not None and flight.truth["time_s"].notna().any():
+        after, before = (
+            truth_of(flight, named.assign(time_s=named["time_s"] + s)) for s in (STEP_S, -STEP_S)
+        )
+        # At the end of a track its target is taken to stand still.
+        velocity[:, :2] = np.nan_to_num((after - before)[:, :2] / (2 * STEP_S))
+    return at
+
+
+def _search(
+    model: Callable[[tuple[str, ...]], Model], causes: list[str], blocks: Labels
+) -> tuple[list[Model], list[tuple[str, str]]]:
+    """All single causes, all pairs, and larger sums as long as the largest so far wins."""
+    models = [model(())]
+    alike: list[tuple[str, str]] = []
+    silent: set[str] = set()
+    for cause in causes:
+        single = model((cause,))
+        if single.fit.names:
+            models.append(single)
+        else:
+            silent.add(cause)
+
+    def add(sums: Iterable[tuple[str, ...]]) -> None:
+        for one in sums:
+            if silent & set(one) or sum(cause in _LENS for cause in one) > 1:
+                continue
+            if any(pair <= set(one) for pair in map(set, alike)):
+                continue
+            joint = model(one)
+            if joint.fit.undetermined.keys() - _undetermined_alone(models, one):
+                if len(one) == 2:
+                    alike.append((one[0], one[1]))
+            else:
+                models.append(joint)
+
+    add(combinations(causes, 2))
+    for size in range(2, MOST_CAUSES):
+        winner = models[_rank(models, blocks).winner]
+        if len(winner.causes) < size:
+            break
+        more = [cause for cause in causes if cause not in winner.causes]
+        add(tuple(c for c in causes if c in (*winner.causes, one)) for one in more)
+    return models, alike
+
+
+def _told_from_zero(calibration: Calibration) -> tuple[str, ...]:
+    """The parameters whose 95 % interval leaves zero out, where there are some and others do not."""
+    told = []
+    for name in calibration.names:
+        low, high = calibration.interval(name)
+        if low > 0 or high < 0:
+            told.append(name)
+    return tuple(told) if 0 < len(told) < len(calibration.names) else ()
+
+
+def _undetermined_alone(models: list[Model], causes: tuple[str, ...]) -> set[str]:
+    """Parameters that the single causes of a sum had lost already."""
+    single = {model.causes[0]: model for model in models if len(model.causes) == 1}
+    return {name for cause in causes if cause in single for name in single[cause].fit.undetermined}
+
+
+def _rank(models: list[Model], blocks: Labels) -> Ranked:
+    return rank_models(
+        [distances(one.held) for one in models], [frozenset(one.fit.names) for one in models], blocks
+    )

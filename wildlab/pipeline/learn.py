@@ -1,0 +1,265 @@
+"""A calibration learnt on one flight and applied to another: corrections, and how noisy the poses were."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import NamedTuple
+
+import numpy as np
+
+from wildlab.errors import WildlabError
+from wildlab.flight.learnt import (
+    UNITS,
+    Conditions,
+    Learnt,
+    LearntGain,
+    LearntNoise,
+    LearntOn,
+    LearntParameter,
+    parse_learnt,
+)
+from wildlab.flight.manifest import CameraPart, MountPart
+from wildlab.flight.store import Flight
+from wildlab.geometry.corrections import Calibration
+from wildlab.pipeline.accuracy import noise_without
+from wildlab.pipeline.diagnose import Diagnosis, diagnose
+from wildlab.pipeline.evaluate import score_points
+from wildlab.pipeline.georeference import Observations, calibrated, georeference, observe
+from wildlab.pipeline.pose_noise import as_deviations
+
+__all__ = ["Applied", "apply_learnt", "learn_flight", "learn_from", "parse_learnt"]
+
+_SCALES = {"deg": 180 / np.pi, "%": 100.0}
+#: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
+SAME_CAMERA = 1e-3
+
+
+def learn_flight(
+    flight: Flight, rng: np.random.Generator, source: str | None = None
+) -> tuple[Learnt, Diagnosis]:
+    """Learn on a flight's known points what is constantly wrong, and how noisy its poses are.
+
+    Parameters
+    ----------
+    flight
+        With pixel detections, poses and truth.
+    rng
+        Draws the folds.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+
+    Returns
+    -------
+    Learnt, Diagnosis
+        What to keep, and what it follows from.
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than six images show a known point, or poses are not clear.
+    """
+    observations = observe(flight, source)
+    scored = score_points(flight, georeference(flight, observations, rng))
+    diagnosis = diagnose(flight, observations, scored, rng, source)
+    return learn_from(flight, observations, diagnosis, rng, source), diagnosis
+
+
+def learn_from(
+    flight: Flight,
+    observations: Observations,
+    diagnosis: Diagnosis,
+    rng: np.random.Generator,
+    source: str | None = None,
+) -> Learnt:
+    """What a diagnosis teaches: corrections only where they gained something for certain.
+
+    Parameters
+    ----------
+    flight, observations
+        The flight, as `diagnose` had it.
+    diagnosis
+        Of it.
+    rng
+        Draws samples of flat rays.
+    source
+        Name of the ``nav`` table.
+
+    Returns
+    -------
+    Learnt
+    """
+    name, _ = flight.pose_source(source)
+    camera = flight.manifest.camera
+    if camera is None:
+        raise WildlabError(f"the flight {flight.name} has no camera", "there is nothing to calibrate")
+    rows = observations.table["detection_id"].isin(diagnosis.scored["detection_id"]).to_numpy()
+    used = observations.take(rows)
+    depression = np.degrees(np.arcsin(np.clip(used.poses.R_nc[:, 2, 2], -1, 1)))
+    height = used.plane_down - used.poses.p_nc[:, 2]
+    calibration, gain = diagnosis.calibration, diagnosis.winner.gain
+    parameters, scales = [], []
+    for one in calibration.names if diagnosis.counts else ():
+        unit = UNITS[one]
+        scale = _SCALES.get(unit, 1.0)
+        low, high = calibration.interval(one)
+        parameters.append(
+            LearntParameter(
+                name=one, value=scale * calibration.value(one), low=scale * low, high=scale * high, unit=unit
+            )
+        )
+        scales.append(scale)
+    covariance = calibration.covariance * np.outer(scales, scales) if scales else np.zeros((0, 0))
+    noise = as_deviations(noise_without(flight, observations, diagnosis, rng, source))
+    return Learnt(
+        learnt_on=LearntOn(
+            flight=flight.name,
+            source=name,
+            fingerprint=fingerprint(observations),
+            images=calibration.n_images,
+            points=calibration.n_points,
+            blocks=calibration.n_draws,
+        ),
+        conditions=Conditions(height_m=_range(height), depression_deg=_range(depression)),
+        camera=camera,
+        mount=flight.manifest.mount,
+        noise=LearntNoise(**noise),
+        gain=LearntGain(
+            without_m=gain.without,
+            with_m=gain.with_,
+            gain_m=gain.gain.estimate,
+            low_m=gain.gain.low,
+            high_m=gain.gain.high,
+        )
+        if diagnosis.counts
+        else None,
+        covariance=tuple(tuple(map(float, row)) for row in covariance),
+        parameter=tuple(parameters),
+    )
+
+
+def fingerprint(observations: Observations) -> str:
+    """SHA-256 of what a calibration is learnt from: clicks and poses, rounded to thousandths."""
+    digest = hashlib.sha256()
+    for values in (observations.uv, observations.poses.p_nb, observations.poses.R_nb):
+        digest.update(np.round(np.nan_to_num(values, nan=-1.0), 3).tobytes())
+    return digest.hexdigest()
+
+
+class Applied(NamedTuple):
+    """A flight with a calibration applied.
+
+    Attributes
+    ----------
+    observations
+        With corrected poses and camera.
+    deviations
+        Standard deviations for `pose_errors`, by its names.
+    sentence
+        Which calibration that is, and whether it may be judged here.
+    """
+
+    observations: Observations
+    deviations: dict[str, float]
+    sentence: str
+
+
+def apply_learnt(flight: Flight, source: str | None, observations: Observations, learnt: Learnt) -> Applied:
+    """Apply what was learnt on another flight.
+
+    Parameters
+    ----------
+    flight
+        The flight that is judged.
+    source
+        Name of its ``nav`` table.
+    observations
+        As logged.
+    learnt
+        From `wildlab.flight.learnt.read_learnt`.
+
+    Returns
+    -------
+    Applied
+
+    Raises
+    ------
+    WildlabError
+        Where it was learnt with another camera or another mount.
+    """
+    refuse_other_camera(flight, learnt)
+    n = len(learnt.parameter)
+    scales = np.array([1 / _SCALES.get(one.unit, 1.0) for one in learnt.parameter])
+    calibration = Calibration(
+        tuple(one.name for one in learnt.parameter),
+        np.array([one.value for one in learnt.parameter]) * scales,
+        np.array(learnt.covariance, float).reshape(n, n) * np.outer(scales, scales),
+        {},
+        learnt.learnt_on.points,
+        learnt.learnt_on.images,
+        learnt.learnt_on.blocks,
+    )
+    placed = calibrated(flight, source, observations, calibration)
+    deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
+    return Applied(placed, deviations, _sentence(flight, observations, learnt))
+
+
+def refuse_other_camera(flight: Flight, learnt: Learnt) -> None:
+    """Refuse a calibration that belongs to another camera, or to one that sits in another way.
+
+    Raises
+    ------
+    WildlabError
+        Which part differs, and how.
+    """
+    here, there = flight.manifest.camera, learnt.camera
+    fix = "learn one on a flight with this camera: wildlab calibrate"
+    if here is None:
+        raise WildlabError("the calibration is of a camera and this flight has none", "leave it out")
+    for name in CameraPart.model_fields:
+        one, other = getattr(here, name), getattr(there, name)
+        if name == "name":
+            continue
+        pixels = here.fx_px if name in ("fx_px", "fy_px", "cx_px", "cy_px", "skew_px") else 0.0
+        if abs(one - other) > SAME_CAMERA * max(abs(other), pixels):
+            raise WildlabError(
+                f"the calibration was learnt with another camera: {name} is {other:g} there and {one:g} here",
+                fix,
+            )
+    for name in MountPart.model_fields:
+        one, other = getattr(flight.manifest.mount, name), getattr(learnt.mount, name)
+        same = one == other if isinstance(one, str) else np.allclose(one, other, atol=1e-6)
+        if not same:
+            raise WildlabError(
+                f"the calibration was learnt with another mount: {name} is {other} there and {one} here",
+                "give both flights the same [mount], or learn one on a flight with this mount",
+            )
+
+
+def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str:
+    on = learnt.learnt_on
+    if fingerprint(observations) == on.fingerprint:
+        return (
+            f"The calibration that is applied was learnt on this very flight ({on.flight}): the figures "
+            "flatter it. Judge it on another one."
+        )
+    what = (
+        f"corrections of {', '.join(one.name for one in learnt.parameter)}"
+        if learnt.parameter
+        else "no corrections"
+    )
+    said = (
+        f"Applied: a calibration learnt on the flight {on.flight} ({on.images} images, {on.points} points), "
+        f"with {what} and its standard deviations of the poses."
+    )
+    if on.flight == flight.name:
+        said += " It has the name of this flight, and other clicks or poses."
+    depression = np.degrees(np.arcsin(np.clip(observations.poses.R_nc[:, 2, 2], -1, 1)))
+    low, high = learnt.conditions.depression_deg
+    outside = float(np.mean((depression < low - 5) | (depression > high + 5)))
+    if outside > 0.1:
+        said += f" {100 * outside:.0f} % of the views here are flatter or steeper than any there."
+    return said
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    return float(np.nanmin(values)), float(np.nanmax(values))

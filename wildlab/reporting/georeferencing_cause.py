@@ -1,0 +1,382 @@
+"""What the report on single images says of the cause: words that follow from a measured gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.axes import AlongAxis
+from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.causes import Gain
+from wildlab.evaluation.ellipses import EllipseVerdict
+from wildlab.evaluation.errors import ErrorSummary, Scatter
+from wildlab.evaluation.outliers import Outlier
+from wildlab.evaluation.sightings import Averaged
+from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.reporting.report import Report
+
+#: Beyond this share of lost points the verdict is bad.
+MANY_LOST = 0.2
+#: A gain below this share of the error is called small, and above half of it most of the error.
+SMALL, MOST = 0.1, 0.5
+#: Rows of the table of models.
+SHOWN = 8
+#: Of each parameter: what it is called, its unit and how many of that are one.
+_PARAMETERS = {
+    "roll": ("camera's roll", "deg", 180 / np.pi),
+    "tilt": ("camera's tilt", "deg", 180 / np.pi),
+    "pan": ("camera's pan", "deg", 180 / np.pi),
+    "clock": ("camera's clock", "s", 1.0),
+    "down": ("position, down", "m", 1.0),
+    "north": ("position, north", "m", 1.0),
+    "east": ("position, east", "m", 1.0),
+    "focal": ("focal lengths", "%", 100.0),
+    "aspect": ("ratio of the focal lengths", "%", 100.0),
+    "centre_u": ("principal point, right", "px", 1.0),
+    "centre_v": ("principal point, down", "px", 1.0),
+}
+_CAUSES = {
+    "position": "the position (north and east)",
+    "height": "the height",
+    "boresight": "the boresight (how the camera sits on the airframe)",
+    "clock": "the camera's clock",
+    "focal length": "the focal length",
+    "focal lengths": "the focal lengths",
+    "lens": "the lens (focal lengths and principal point)",
+}
+#: What a list of all that was tried calls them.
+_SHORT = {"focal length": "lens", "focal lengths": "lens", "clock": "camera's clock"}
+
+
+def listed(parts: Sequence[str], last: str = "and") -> str:
+    """``a, b and c``."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
+
+
+def causes_in_words(causes: Sequence[str]) -> str:
+    """Causes as they stand in a sentence."""
+    return listed([_CAUSES[cause] for cause in causes])
+
+
+def metres(value: float, low: float | None = None, high: float | None = None) -> str:
+    """``4.3 m``, or with its interval ``4.3 m (3.9 to 4.8)``."""
+    digits = 1 if not abs(value) < 0.95 else 2
+    if low is None or high is None or not np.isfinite([low, high]).all():
+        return f"{value:.{digits}f} m"
+    return f"{value:.{digits}f} m ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def verdict_level(
+    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, few: int
+) -> str:
+    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done."""
+    total = logged.n + lost
+    if not logged.n or lost > MANY_LOST * total:
+        return "bad"
+    amiss = diagnosis is not None and (
+        bool(diagnosis.outliers) or (diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL)
+    )
+    return "warn" if amiss or ellipses.word == "too small" or logged.n < few else "good"
+
+
+def gained_share(gain: Gain) -> float:
+    """Gain as a share of the error without."""
+    return gain.gain.estimate / gain.without if gain.without > 0 else 0.0
+
+
+def lost_sentence(lost: int, total: int) -> str:
+    """How many points have no position, with their denominator; nothing where none is lost."""
+    if not lost:
+        return ""
+    if lost == total:
+        return (
+            f"None of the {total} points has a position: no ray of theirs has a pose and meets the ground. "
+            "Where the camera looks, the signs of roll and pitch and the height of the ground come first: "
+            "see `wildlab check`."
+        )
+    first = f"{lost} of {total} points ({100 * lost / total:.0f} %) have no position on the ground"
+    if lost > MANY_LOST * total:
+        return f"{first}: that is too many to trust the figures of the others."
+    return f"{first}; they are in no figure below."
+
+
+def cause_sentence(diagnosis: Diagnosis) -> str:
+    """What taking a constant error off gained on images it was not estimated from."""
+    winner, gain = diagnosis.winner, diagnosis.winner.gain
+    if not winner.causes:
+        causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
+        tried = listed(sorted(causes), "or")
+        return (
+            f"No constant error explains it: taking one off ({tried}) gains nothing for certain on images "
+            "that it was not estimated from."
+        )
+    what = causes_in_words(winner.causes)
+    digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
+    low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
+    figures = (
+        f"with it taken off, the mean error goes from {gain.without:.{digits}f} to {gain.with_:.{digits}f} m "
+        f"on images that it was not estimated from (gain {low} to {high} m)"
+    )
+    if not diagnosis.counts:
+        return f"A constant error of {what} is possible, not certain: {figures}."
+    share = gained_share(gain)
+    if share >= MOST:
+        return f"Most of it is a constant error of {what}: {figures}."
+    if share >= SMALL:
+        return f"Part of it is a constant error of {what}: {figures}."
+    return f"A constant error of {what} is certain and small: {figures}."
+
+
+def size_sentence(calibration: Calibration) -> str:
+    """The corrections whose interval leaves zero out, with it; nothing where there is none."""
+    parts = []
+    for name in calibration.names:
+        label, unit, scale = _PARAMETERS[name]
+        low, high = (scale * end for end in calibration.interval(name))
+        if low > 0 or high < 0:
+            digits = 2 if unit in ("deg", "s", "%") else 1
+            size = f"{scale * calibration.value(name):+.{digits}f} {unit.replace('deg', '°')}"
+            parts.append(f"{label} {size} ({low:+.{digits}f} to {high:+.{digits}f})")
+    return f"What is to be added: {listed(parts)}." if parts else ""
+
+
+def ambiguity_sentence(diagnosis: Diagnosis, unambiguous: Diagnosis | None) -> str:
+    """That the cause hangs on clicks that may be of another mark; nothing where it does not."""
+    if unambiguous is None or unambiguous.winner.causes == diagnosis.winner.causes:
+        return ""
+    return (
+        "The cause hangs on clicks that may be of another mark: without them the verdict is "
+        f"{unambiguous.winner.name!r}. Record which mark was clicked before you correct anything."
+    )
+
+
+def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
+    """What to do, by the measured gain and by what is far out."""
+    said = []
+    first = next((one for one in diagnosis.outliers if one.kind != "click"), None)
+    if first is not None:
+        what = f"mark {first.mark}" if first.kind == "mark" else f"photo {first.photo}"
+        said.append(f"Look at {what} first: it is {metres(first.off_m)} off where the others are not.")
+    if diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL:
+        said.append(
+            "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
+            if learnt_here
+            else "The calibration that was applied does not hold for this flight: look for what changed."
+        )
+    elif diagnosis.counts and not said:
+        said.append("It hardly matters: other things limit this flight.")
+    return " ".join(said)
+
+
+def alike_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Which causes the data cannot tell from the one that won, or from each other."""
+    winner = set(diagnosis.winner.causes)
+    said = [
+        f"Explains it as well, within one standard error: {causes_in_words(rival.causes)} "
+        f"({rival.gain.with_:.2f} m on images that it was not estimated from)."
+        for rival in diagnosis.rivals
+        if rival.causes
+    ]
+    for one, other in diagnosis.alike:
+        if winner and not winner & {one, other}:
+            continue
+        said.append(f"These images cannot tell {_CAUSES[one]} from {_CAUSES[other]}.")
+    # A cause that did not win was fitted to errors that it does not explain: what it lost says little.
+    of = [diagnosis.winner] if winner else [m for m in diagnosis.models if len(m.causes) == 1]
+    lost = {name: partners for model in of for name, partners in model.fit.undetermined.items()}
+    for name, partners in lost.items():
+        label = _PARAMETERS[name][0]
+        if partners:
+            others = listed([_PARAMETERS[p][0] for p in partners])
+            said.append(f"These images cannot tell the {label} from the {others}; it was left as it is.")
+        else:
+            said.append(f"An error of the {label} would not show in these images; it was left as it is.")
+    return said
+
+
+def models_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """The best models, and nothing, by their held-out error."""
+    means = diagnosis.ranked.means
+    shown = [m for m in np.argsort(means, kind="stable")][:SHOWN]
+    shown += [m for m in (diagnosis.ranked.winner, 0) if m not in shown]
+    rows = []
+    for m in shown:
+        model = diagnosis.models[m]
+        gain = model.gain.gain
+        rows.append(
+            {
+                "what": f"**{model.name}**" if m == diagnosis.ranked.winner else model.name,
+                "parameters": len(model.fit.names),
+                "error": means[m],
+                "gain": gain.estimate if model.causes else np.nan,
+                "interval": f"{gain.low:.2f} to {gain.high:.2f}" if model.causes else "",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
+    """Estimated corrections with their 95 % intervals, one row each; recorded as metrics too."""
+    rows = []
+    for name in calibration.names:
+        label, unit, scale = _PARAMETERS[name]
+        value, (low, high) = scale * calibration.value(name), (scale * x for x in calibration.interval(name))
+        metric = f"boresight_{name}" if name in BORESIGHT else f"{name}_offset"
+        report.metric(metric, "calibration", value, unit, n=calibration.n_images, low=low, high=high)
+        zero = low <= 0 <= high
+        rows.append(
+            {
+                "what": label,
+                "value": value,
+                "interval": f"{low:+.2f} to {high:+.2f}",
+                "unit": unit,
+                "verdict": "not told from zero" if zero else "differs from zero",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def axes_table(axes: dict[str, AlongAxis]) -> pd.DataFrame:
+    """Mean error along each axis."""
+    rows = [
+        {
+            "axis": name,
+            "mean": one.mean.estimate,
+            "interval": f"{one.mean.low:+.1f} to {one.mean.high:+.1f}",
+            "share": 100 * one.share,
+            "verdict": "constant" if one.constant else "not told from zero",
+        }
+        for name, one in axes.items()
+    ]
+    return pd.DataFrame(rows)
+
+
+def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
+    """What is far out, largest first."""
+    rows = [
+        {
+            "kind": {"click": "one click"}.get(one.kind, one.kind),
+            "photo": one.photo or "several",
+            "mark": one.mark or ("several" if one.kind == "photo" else "not known"),
+            "points": one.points,
+            "off": one.off_m,
+        }
+        for one in outliers
+    ]
+    return pd.DataFrame(rows)
+
+
+def outliers_sentence(outliers: Sequence[Outlier], with_: ErrorSummary, without: ErrorSummary) -> str:
+    """What the figures are without what is far out."""
+    count = len(outliers)
+    left = with_.n - without.n
+    kinds = [f"{n} {kind}{'' if n == 1 else 's'}" for kind, n in _counted(outliers).items()]
+    return (
+        f"{listed(kinds)} {'is' if count == 1 else 'are'} far out where the others are not. Without "
+        f"{'it' if count == 1 else 'them'} ({left} of {with_.n} points) the mean error is "
+        f"{metres(without.mean)} in place of {metres(with_.mean)}, and the largest {metres(without.max)} in "
+        f"place of {metres(with_.max)}. A wrong mark, a wrong pose and a wrong click look alike where "
+        "only one point shows it."
+    )
+
+
+def _counted(outliers: Sequence[Outlier]) -> dict[str, int]:
+    kinds = [one.kind for one in outliers]
+    return {kind: kinds.count(kind) for kind in ("mark", "photo", "click") if kind in kinds}
+
+
+def halves_sentence(halves: Halves) -> str:
+    """That first and second half disagree; nothing where they do not."""
+    if not halves.disagree:
+        return ""
+    low, high = halves.difference.low, halves.difference.high
+    return (
+        f"The two halves of the flight disagree: the mean error is {metres(halves.first)} in the first and "
+        f"{metres(halves.second)} in the second (difference {low:+.1f} to {high:+.1f} m), so something "
+        "changed on the way, and no one figure stands for both."
+    )
+
+
+def averaging_sentence(averaged: Averaged | None) -> str:
+    """What averaging gained where it was tried; nothing where it could not be."""
+    if averaged is None:
+        return ""
+    tried = (
+        f"Averaging {averaged.k} images was tried on {averaged.things} marks: the mean error goes from "
+        f"{metres(averaged.single)} to {metres(averaged.averaged)}"
+    )
+    if averaged.halves:
+        return f"{tried}, which halves it."
+    return f"{tried}." if averaged.helps else f"{tried}, which is no certain gain."
+
+
+def remaining_parts(scatter: Scatter, taken_off: Sequence[str]) -> list[str]:
+    """What the rest of the squared error is made of, largest first; nothing where it cannot be told."""
+    if not np.isfinite(scatter.image_share):
+        return []
+    between, within = np.hypot(*scatter.between_sd), np.hypot(*scatter.within_sd)
+    off = f" left with {causes_in_words(taken_off)} taken off" if taken_off else ""
+    parts = [
+        (
+            scatter.image_share,
+            f"**The pose of each image**, {100 * scatter.image_share:.0f} % of the squared error{off}: "
+            f"{metres(between)} that all points of an image share and the next image does not.",
+        ),
+        (
+            scatter.within_share,
+            f"**Single points**, {100 * scatter.within_share:.0f} %: {metres(within)} that differs from "
+            "point to point within an image: marking, lens, uneven ground.",
+        ),
+        (
+            scatter.bias_share,
+            f"**The same in north and east for all images**, {100 * scatter.bias_share:.0f} %.",
+        ),
+    ]
+    return [text for _, text in sorted(parts, key=lambda part: -part[0])]
+
+
+def ellipse_sentence(verdict: EllipseVerdict) -> str:
+    """Whether the ellipses are honest, and how much larger they should be."""
+    stated, inside = f"{100 * verdict.stated:.0f} %", f"{100 * verdict.coverage.estimate:.0f} %"
+    f = verdict.factor
+    held = f"The {stated} ellipses hold the truth in {inside} of {verdict.n} cases"
+    span = f"{f.low:.1f} to {f.high:.1f}"
+    if verdict.word == "too small":
+        return (
+            f"**Too small**: do not use these ellipses. {held}; their axes should be {f.estimate:.1f} times "
+            f"as long ({span})."
+        )
+    if verdict.word == "too large":
+        return f"**Too large**: {held}; axes {f.estimate:.1f} times as long ({span}) would do."
+    if verdict.word == "honest" and not f.low <= 1 <= f.high:
+        near = f"{f.estimate:.2f} times as long ({f.low:.2f} to {f.high:.2f})"
+        return f"**Nearly honest**: {held}; axes {near} would do."
+    if verdict.word == "honest":
+        return (
+            f"**Honest**: {held}; the right length of their axes is {f.estimate:.1f} times theirs ({span})."
+        )
+    if verdict.word == "undecided":
+        return f"**Not decided**: {held}, and the right length of their axes may be {span} times theirs."
+    return f"**Too few images to tell**: {held}."
+
+
+def nearest_sentences(share: float, visible_m: float, p90: float) -> list[str]:
+    """What the rule of the nearest mark hides."""
+    hidden = [
+        "Which mark was clicked is not recorded, and each click is held against the nearest one. An error "
+        f"beyond about {metres(visible_m)}, half the spacing of the marks, goes to another mark and "
+        "looks small."
+    ]
+    if p90 > 0.7 * visible_m:
+        hidden.append(
+            "Errors here are of that size: the true ones may be larger than every figure on this page."
+        )
+    if share > 0:
+        hidden.append(
+            f"{100 * share:.0f} % of the clicks are ambiguous: the second nearest mark is not clearly "
+            "farther off."
+        )
+    return hidden

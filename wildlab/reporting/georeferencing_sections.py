@@ -1,0 +1,185 @@
+"""Sections of the report on positions read from single images: what is shown, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wildlab.evaluation.errors import ErrorSummary
+from wildlab.pipeline.accuracy import Accuracy
+from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.reporting import georeferencing as words
+from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting.report import Report
+
+
+def summary_section(report: Report, found: Accuracy, applied: str = "") -> None:
+    """The summary: how far off, how many points are lost, the cause and what to do.
+
+    Parameters
+    ----------
+    report
+        Is added to.
+    found
+        What is shown.
+    applied
+        What is to be said of the calibration that was applied, where one was.
+    """
+    logged, total, diagnosis = found.summary, len(found.scored), found.diagnosis
+    said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
+    said = [lost, *said] if found.lost > cause.MANY_LOST * total else [*said, lost]
+    if diagnosis is not None and logged.n >= words.FEW:
+        unsure = cause.ambiguity_sentence(diagnosis, found.unambiguous)
+        said += [cause.cause_sentence(diagnosis), unsure or cause.advice(diagnosis, not applied)]
+    level = cause.verdict_level(logged, found.lost, found.ellipses, diagnosis, words.FEW)
+    report.summary([one for one in said if one], level=level)
+    if applied:
+        report.text(applied)
+
+
+def cause_section(report: Report, found: Accuracy) -> None:
+    """Models, parameters, axes, what is far out, and what the nearest mark hides; nothing if undiagnosed."""
+    diagnosis = found.diagnosis
+    if diagnosis is None:
+        return
+    said = [cause.size_sentence(diagnosis.calibration), cause.halves_sentence(found.halves)]
+    report.section("The cause", " ".join(filter(None, said)))
+    report.table(
+        cause.models_table(diagnosis),
+        columns={
+            "what": "constant error taken off",
+            "parameters": "parameters",
+            "error": "mean error (m)",
+            "gain": "gain (m)",
+            "interval": "90 % interval",
+        },
+        digits={"parameters": 0, "error": 2, "gain": 2},
+        caption="Mean error on images that the parameters were not estimated from, over "
+        f"{len(diagnosis.winner.held)} rounds of {diagnosis.blocks.max() + 1} blocks. Bold: the simplest "
+        "within one standard error of the best.",
+    )
+    if diagnosis.winner.causes:
+        report.table(
+            cause.parameters_table(report, diagnosis.calibration),
+            columns={
+                "what": "to be added to",
+                "value": "estimate",
+                "interval": "95 % interval",
+                "unit": "unit",
+                "verdict": "verdict",
+            },
+            digits={"value": 2},
+            caption=f"From all {diagnosis.calibration.n_images} images with a known point.",
+        )
+    if alike := cause.alike_sentences(diagnosis):
+        report.points(alike)
+    report.table(
+        cause.axes_table(found.axes),
+        columns={
+            "axis": "axis",
+            "mean": "mean error (m)",
+            "interval": "90 % interval",
+            "share": "of the squared error (%)",
+            "verdict": "verdict",
+        },
+        digits={"mean": 1, "share": 0},
+        caption="Errors along axes of the world, of the camera and of the track, nothing taken off.",
+    )
+    _far_out(report, diagnosis)
+    if found.nearest is not None:
+        report.subsection("What the nearest mark hides")
+        share = float(found.nearest.ambiguous.mean())
+        said = cause.nearest_sentences(share, found.nearest.visible_m, found.summary.p90)
+        if found.unambiguous is not None:
+            said.append(f"Without ambiguous clicks: {cause.cause_sentence(found.unambiguous)}")
+        report.points(said)
+
+
+def _far_out(report: Report, diagnosis: Diagnosis) -> None:
+    if not diagnosis.outliers:
+        return
+    with_, without = diagnosis.held_summary(), diagnosis.held_summary(diagnosis.inliers)
+    report.subsection("Far out", cause.outliers_sentence(diagnosis.outliers, with_, without))
+    report.table(
+        cause.outliers_table(diagnosis.outliers),
+        columns={"kind": "what", "photo": "photo", "mark": "mark", "points": "points", "off": "off by (m)"},
+        digits={"points": 0, "off": 1},
+        caption="Farther off than its like, the cause above taken off where it is certain.",
+    )
+
+
+def left_section(report: Report, found: Accuracy, more: Sequence[str] = ()) -> None:
+    """What the errors are made of once the cause is taken off, what averaging gained, and ``more``."""
+    diagnosis = found.diagnosis
+    taken = diagnosis.winner.causes if diagnosis is not None and diagnosis.counts else ()
+    parts = [*(cause.remaining_parts(found.remaining, taken) if found.summary.n else []), *more]
+    if parts:
+        report.section("What is left", cause.averaging_sentence(found.averaged))
+        report.points(parts, ordered=True)
+
+
+def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) -> None:
+    """The verdict on the ellipses, what they come from, and what noise the errors themselves tell."""
+    if not found.summary.n:
+        return
+    own = found.observations.poses.covariance is not None and not learnt_elsewhere
+    pose = (
+        "the log's own, on average"
+        if own
+        else "learnt with the calibration"
+        if learnt_elsewhere
+        else "assumed"
+    )
+    report.section("Does it know how wrong it is?")
+    report.text(
+        f"{cause.ellipse_sentence(found.ellipses)}\n\nOf {len(found.scored)} ellipses "
+        f"{words.ellipse_words(found.scored)}. The uncertainty of the pose is {pose}: "
+        f"{words.assumed_words(found.assumed)}."
+    )
+    if found.noise is None:
+        return
+    report.text(
+        "Learnt from the errors on one half of the flight and scored on the other, without what is far out, "
+        f"90 % ellipses hold the truth in {100 * found.learnt:.0f} % (mean over several halvings). A number "
+        "with a factor near 3 is one the data could not decide; it stays near what was assumed."
+    )
+    report.table(
+        words.noise_table(found.noise, found.assumed),
+        columns={
+            "what": "standard deviation of",
+            "assumed": "used above",
+            "estimated": "learnt",
+            "unit": "unit",
+            "factor": "uncertain by a factor",
+        },
+        digits={"assumed": 2, "estimated": 2, "factor": 1},
+        caption="How noisy poses and pixels were, the cause taken off where it is certain.",
+    )
+    camera = found.observations.poses.camera
+    if found.noise.sd["pixel"] > 5 * found.assumed["pixel_px"]:
+        report.text(
+            f"{found.noise.sd['pixel']:.0f} pixels are more than marking explains. Look at the calibration "
+            f"of the camera: its focal lengths are {camera.fx:.0f} and {camera.fy:.0f} pixels."
+        )
+
+
+def tiles(found: Accuracy, others: dict[str, ErrorSummary]) -> list[tuple[str, str]]:
+    """The few numbers to remember; none where all points are lost."""
+    logged, diagnosis, m = found.summary, found.diagnosis, words.short_length
+    if not logged.n:
+        return []
+    interval = found.intervals.get("horizontal_error_mean")
+    again = f", {m(interval[0])} to {m(interval[1])} for these images, resampled" if interval else ""
+    shown = [
+        (m(logged.mean), f"mean error{again}"),
+        (m(logged.median), "median"),
+        (m(logged.p90), "nine of ten points within"),
+    ]
+    if diagnosis is not None and diagnosis.counts:
+        shown.append((m(diagnosis.held_summary().mean), "mean error of unseen images, the cause taken off"))
+    shown += [(m(s.mean), f"mean error of the answers recorded by {name}") for name, s in others.items()]
+    if np.isfinite(found.ellipses.coverage.estimate):
+        held = 100 * found.ellipses.coverage.estimate
+        shown.append((f"{held:.0f} %", "of the 90 % ellipses hold the truth"))
+    return [*shown, (f"{found.lost} of {len(found.scored)}", "points have no position")]

@@ -1,0 +1,64 @@
+"""What the report on a flight without truth says: spread and consistency, and what cannot be said."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wildlab.pipeline.repeats import Repeats
+from wildlab.reporting.georeferencing import short_length
+from wildlab.reporting.georeferencing_cause import MANY_LOST, lost_sentence
+
+#: Ellipses whose size is off by less than this factor fit the spread.
+CLOSE = 1.25
+
+
+def summary_sentences(found: Repeats) -> list[str]:
+    """How far apart sightings lie, whether the ellipses fit that, and what was lost."""
+    lost = lost_sentence(found.lost, len(found.points))
+    if found.spread is None:
+        return [
+            "Nothing was seen in two images or more, so nothing can be said of how good the positions are.",
+            *([lost] if lost else []),
+        ]
+    s = found.spread
+    said = [
+        f"Sightings of the same thing from different images scatter by {short_length(s.sd)} along either "
+        f"axis ({s.sightings} sightings of {s.things} things).",
+        "How far off they are together cannot be said without known points.",
+    ]
+    if np.isfinite(s.consistent):
+        said.append(consistency_sentence(s.consistent))
+    return [lost, *said] if found.lost > MANY_LOST * len(found.points) else [*said, *([lost] if lost else [])]
+
+
+def consistency_sentence(ratio: float) -> str:
+    """Whether the ellipses fit the spread; ``ratio`` is the spread over what they say."""
+    if ratio > CLOSE:
+        return (
+            f"The ellipses are too small: the scatter is {ratio:.1f} times what they say, and what all "
+            "images share comes on top."
+        )
+    if ratio < 1 / CLOSE:
+        return (
+            f"The scatter is {ratio:.1f} times what the ellipses say: they are too large, or what they hold "
+            "is mostly shared by all images."
+        )
+    return "The scatter fits the ellipses, as far as images differ."
+
+
+def level(found: Repeats) -> str:
+    """Colour of the summary: never good, for the errors themselves are not known."""
+    return "bad" if found.lost > MANY_LOST * len(found.points) else "neutral"
+
+
+def limits(found: Repeats) -> list[str]:
+    """What such a report does not tell."""
+    said = [
+        "How far off the positions are: an error that all images share (height, clock, boresight seen from "
+        "one side) moves all sightings together and does not show.",
+        "Which cause is behind it: that takes points whose position is known.",
+    ]
+    if (found.things["images"] < 2).any():
+        alone = int((found.things["images"] < 2).sum())
+        said.append(f"Anything about {alone} of {len(found.things)} things that were seen in one image only.")
+    return said
