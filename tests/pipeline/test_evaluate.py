@@ -14,9 +14,16 @@ from wildlab.geometry.frames import (
     rotation_vector_to_matrix,
 )
 from wildlab.pipeline.calibrate import calibrate_flight
-from wildlab.pipeline.evaluate import blocks_of, errors_of, recorded_answers, score_points
+from wildlab.pipeline.evaluate import (
+    blocks_of,
+    errors_of,
+    recorded_answers,
+    score_points,
+    unlabelled_programs,
+)
 from wildlab.pipeline.georeference import USUAL, assumed_deviations, georeference, observe, pose_errors
 from wildlab.pipeline.pose_noise import estimate_noise, evaluate_with_estimated_noise
+from wildlab.reporting.georeferencing import unlabelled_words
 
 
 def scored(flight, seed=0, **kwargs):
@@ -103,6 +110,19 @@ def test_what_is_not_stated_is_the_usual(make_flight):
     flight = make_flight()
     assert assumed_deviations(flight)["pixel_px"] == 2.0
     assert assumed_deviations(flight)["misalignment_deg"] == USUAL["misalignment_deg"]
+
+
+def test_answers_that_name_no_target_are_left_out_and_said(make_flight):
+    flight = make_flight()
+    rows = flight.tables["detections"].assign(kind="position", source="Other 1.2", target_id="")
+    rows[["north_m", "east_m", "down_m"]] = 0.0
+    flight.tables["detections"] = pd.concat([flight.tables["detections"], rows], ignore_index=True)
+    assert unlabelled_programs(flight) == ["Other 1.2"] and "Other 1.2" not in recorded_answers(flight)
+    (said,) = unlabelled_words(["Other 1.2"])
+    assert "recorded by Other 1.2 name no target" in said and unlabelled_words([]) == []
+    named = flight.tables["detections"]
+    named.loc[named["source"] == "Other 1.2", "target_id"] = flight.truth["target_id"].iloc[0]
+    assert unlabelled_programs(flight) == [] and "Other 1.2" in recorded_answers(flight)
 
 
 def test_recorded_answers_are_judged_by_the_same_rule(make_flight):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wildlab.pipeline.accuracy import Accuracy, judge_accuracy
     from wildlab.pipeline.calibrate import Calibrated, calibrate_flight
     from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series, worth
-    from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points
+    from wildlab.pipeline.evaluate import errors_of, recorded_answers, score_points, unlabelled_programs
     from wildlab.pipeline.follow import FILTERS, usual_tuning
     from wildlab.pipeline.georeference import (
         USUAL,
@@ -56,7 +56,7 @@ else:
             "accuracy": ("Accuracy", "judge_accuracy"),
             "calibrate": ("Calibrated", "calibrate_flight"),
             "consistency": ("Series", "mean_of_runs", "navigation_series", "worth"),
-            "evaluate": ("errors_of", "score_points", "recorded_answers"),
+            "evaluate": ("errors_of", "score_points", "recorded_answers", "unlabelled_programs"),
             "follow": ("FILTERS", "usual_tuning"),
             "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
             "learn": ("Applied", "apply_learnt", "learn_flight"),
@@ -113,6 +113,7 @@ __all__ = [
     "observe",
     "pose_errors",
     "recorded_answers",
+    "unlabelled_programs",
     "score_points",
     "sighting",
     "truth_of",

@@ -106,6 +106,9 @@ def errors_of(scored: pd.DataFrame) -> Array:
 def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
     """Positions that other programs gave for the same detections, scored like ours, by program.
 
+    A program whose answers name no target, where targets have to be named, is left out: see
+    `unlabelled_programs`.
+
     Parameters
     ----------
     flight
@@ -119,7 +122,10 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
     detections = flight.table("detections")
     frames = flight.table("frames")
     answers = {}
+    left_out = unlabelled_programs(flight)
     for program, rows in detections[detections["kind"] == "position"].groupby("source", sort=False):
+        if program in left_out:
+            continue
         at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
         points = pd.DataFrame(
             {
@@ -136,6 +142,27 @@ def recorded_answers(flight: Flight) -> dict[str, pd.DataFrame]:
         )
         answers[str(program)] = score_points(flight, points)
     return answers
+
+
+def unlabelled_programs(flight: Flight) -> list[str]:
+    """Programs whose positions cannot be scored, since none of them names a target that has a truth.
+
+    Parameters
+    ----------
+    flight
+        With detections.
+
+    Returns
+    -------
+    list of str
+    """
+    positions = flight.table("detections")
+    positions = positions[positions["kind"] == "position"]
+    if flight.manifest.scoring.rule != "labelled" or flight.truth is None:
+        return []
+    names = positions["target_id"] if "target_id" in positions else pd.Series("", positions.index)
+    known = names.isin(set(flight.truth["target_id"])).groupby(positions["source"], sort=False).any()
+    return [str(program) for program, some in known.items() if not some]
 
 
 def blocks_of(flight: Flight, table: pd.DataFrame) -> NDArray[np.intp]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -188,6 +188,16 @@ def headline(logged: ErrorSummary, total: int) -> list[str]:
 def errors_table(rows: Mapping[str, ErrorSummary], first: str = "pose") -> pd.DataFrame:
     """One row of errors for each summary, with its name in the column ``first``."""
     return pd.DataFrame([{first: name, **summary._asdict()} for name, summary in rows.items()])
+
+
+def unlabelled_words(programs: Sequence[str]) -> list[str]:
+    """That answers of other programs could not be judged, as a list of no or one sentence."""
+    if not programs:
+        return []
+    return [
+        f"Positions recorded by {', '.join(programs)} name no target with a known position, so they are not "
+        "judged: fill target_id of those detections."
+    ]
 
 
 def beside_published(published: pd.DataFrame, theirs: ErrorSummary, ours: ErrorSummary) -> pd.DataFrame:
