@@ -281,7 +281,7 @@ def limits_of(
         )
     if not enough:
         limits.append(
-            "Fewer than six images show a known point: no interval is given, and neither cause nor noise was "
-            "looked for."
+            "Fewer than six images have a point with a position: no interval is given, and neither cause nor "
+            "noise was looked for."
         )
     return limits

@@ -229,10 +229,9 @@ def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
         zero = low <= 0 <= high
         rows.append(
             {
-                "what": label,
+                "what": f"{label} ({unit})",
                 "value": value,
                 "interval": f"{low:+.2f} to {high:+.2f}",
-                "unit": unit,
                 "verdict": "not told from zero" if zero else "differs from zero",
             }
         )
