@@ -86,6 +86,13 @@ def test_what_was_tried_is_listed_where_nothing_was_found():
     assert "camera's clock or height" in said and "lens" not in said
 
 
+def test_nothing_is_not_said_to_gain_nothing_where_something_does():
+    some = cause.cause_sentence(diagnosis(NOTHING, model(["height"], with_=9.0)))
+    assert "the height taken off gains 0.50 to 1.50 m" in some and "gains nothing" not in some
+    none = cause.cause_sentence(diagnosis(NOTHING, model(["height"], with_=9.0, half=2.0)))
+    assert "gains nothing for certain" in none and "stands out" not in none
+
+
 def test_sizes_are_stated_only_where_the_interval_leaves_zero_out():
     found = Calibration(
         ("tilt", "clock"), np.array([np.radians(-5.0), 0.1]), np.diag([1e-6, 1.0]), {}, 40, 20, 10
