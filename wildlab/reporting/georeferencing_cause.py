@@ -112,7 +112,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             least = min(certain, key=lambda model: (len(model.fit.names), model.gain.with_))
             some = f"{least.gain.gain.low:.2f} to {least.gain.gain.high:.2f} m"
             return (
-                f"No constant error stands out: {causes_in_words(least.causes)} taken off gains {some} on images that it was not estimated from, and the best of all that was tried "
+                f"No constant error stands out: {causes_in_words(least.causes)} taken off gains {some} on "
+                "images that it was not estimated from, and the best of all that was tried "
                 "is within one standard error of taking nothing off."
             )
         causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
