@@ -16,6 +16,7 @@ from wildlab.evaluation.sightings import Averaged
 from wildlab.geometry.calibration import Calibration
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
 
@@ -83,6 +84,13 @@ def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
 def test_what_was_tried_is_listed_where_nothing_was_found():
     said = cause.cause_sentence(diagnosis(NOTHING, model(["height"]), model(["clock"])))
     assert "camera's clock or height" in said and "lens" not in said
+
+
+def test_nothing_is_not_said_to_gain_nothing_where_something_does():
+    some = cause.cause_sentence(diagnosis(NOTHING, model(["height"], with_=9.0)))
+    assert "the height taken off gains 0.50 to 1.50 m" in some and "gains nothing" not in some
+    none = cause.cause_sentence(diagnosis(NOTHING, model(["height"], with_=9.0, half=2.0)))
+    assert "gains nothing for certain" in none and "stands out" not in none
 
 
 def test_sizes_are_stated_only_where_the_interval_leaves_zero_out():
@@ -258,3 +266,15 @@ def test_the_table_of_models_shows_nothing_and_the_winner():
     assert table["what"].iloc[0] == "**boresight**"
     assert "nothing" in table["what"].tolist()
     assert len(table) == cause.SHOWN + 1
+
+
+def test_parameters_are_called_different_from_zero_by_their_interval():
+    report = open_report(study="made-up", kind="twin")
+    covariance = np.diag([1e-4, 1.0])
+    found = Calibration(("tilt", "north"), np.array([np.radians(-5.0), 1.5]), covariance, {}, 40, 20, 10)
+    table = cause.parameters_table(report, found)
+    assert table["verdict"].tolist() == ["differs from zero", "not told from zero"]
+    assert table["what"].tolist() == ["camera's tilt (deg)", "position, north (m)"]
+    # Student's with nine degrees of freedom, not the 1.96 of many draws.
+    assert report.recorded["north_offset", "calibration"]["low"] == pytest.approx(1.5 - 2.262, abs=1e-3)
+    assert report.recorded["boresight_tilt", "calibration"]["value"] == pytest.approx(-5.0)

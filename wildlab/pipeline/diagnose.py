@@ -2,7 +2,8 @@
 
 The models are constant errors of the position, the height, the boresight, the camera's clock and the lens,
 and their sums as far as the data tell these apart: see `wildlab.evaluation.causes` for how they are compared.
-The one that wins is tried once more with those of its parameters alone that are told from zero.
+Where the one that wins gains something for certain, it is tried once more with only those of its parameters
+that are told from zero.
 """
 
 from __future__ import annotations
@@ -214,7 +215,9 @@ def diagnose(
     causes = [cause for cause in CAUSES if timed or cause != "clock"]
     models, alike = _search(model, causes, blocks)
     best = models[_rank(models, blocks).winner]
-    if only := _told_from_zero(with_covariance(best.fit, scored["frame_id"].to_numpy(), blocks)):
+    # Only where the whole of it gained something: the best parameter of a chance gain would look certain.
+    told = with_covariance(best.fit, scored["frame_id"].to_numpy(), blocks) if best.gain.counts else None
+    if told is not None and (only := _told_from_zero(told)):
         models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
     ranked = _rank(models, blocks)
     winner = models[ranked.winner]

@@ -46,8 +46,8 @@ least squares under Student's t with four degrees of freedom, on errors whitened
 5.15 to 5.17). Blocks are put into five folds, ten times over; each model predicts the fold that it was not
 fitted to. Models are compared point by point, and the standard error of a difference comes from the blocks:
 rounds share most of their data, and their spread would flatter. The simplest model within one standard error
-of the best wins, tried once more with only those of its parameters that are told from zero. Its gain counts
-where its 90 % interval (Student's, by the number of blocks) is above zero.
+of the best wins. Its gain counts where its 90 % interval (Student's, by the number of blocks) is above zero;
+then it is tried once more with only those of its parameters that are told from zero.
 A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
 guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
 
@@ -291,7 +291,7 @@ def limits_of(
         )
     if not enough:
         limits.append(
-            "Fewer than six images show a known point: no interval is given, and neither cause nor noise was "
-            "looked for."
+            "Fewer than six images have a point with a position: no interval is given, and neither cause nor "
+            "noise was looked for."
         )
     return limits

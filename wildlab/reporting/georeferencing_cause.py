@@ -107,6 +107,15 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     """What taking a constant error off gained on images it was not estimated from."""
     winner, gain = diagnosis.winner, diagnosis.winner.gain
     if not winner.causes:
+        certain = [model for model in diagnosis.models if model.causes and model.gain.counts]
+        if certain:
+            least = min(certain, key=lambda model: (len(model.fit.names), model.gain.with_))
+            some = f"{least.gain.gain.low:.2f} to {least.gain.gain.high:.2f} m"
+            return (
+                f"No constant error stands out: {causes_in_words(least.causes)} taken off gains {some} on "
+                "images that it was not estimated from, and the best of all that was tried "
+                "is within one standard error of taking nothing off."
+            )
         causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
         tried = listed(sorted(causes), "or")
         return (
@@ -229,10 +238,9 @@ def parameters_table(report: Report, calibration: Calibration) -> pd.DataFrame:
         zero = low <= 0 <= high
         rows.append(
             {
-                "what": label,
+                "what": f"{label} ({unit})",
                 "value": value,
                 "interval": f"{low:+.2f} to {high:+.2f}",
-                "unit": unit,
                 "verdict": "not told from zero" if zero else "differs from zero",
             }
         )

@@ -66,7 +66,6 @@ def cause_section(report: Report, found: Accuracy) -> None:
                 "what": "to be added to",
                 "value": "estimate",
                 "interval": "95 % interval",
-                "unit": "unit",
                 "verdict": "verdict",
             },
             digits={"value": 2},
