@@ -48,7 +48,7 @@ def wrong_meanings(flight: Flight) -> list[WrongMeaning]:
         found += _poses(flight, source)
     found += places("truth", "truth") if flight.truth is not None else []
     if flight.gnss is not None:
-        found += sensors.gnss_meanings()
+        found += sensors.gnss_meanings(flight)
     if flight.imu is not None:
         found += sensors.imu_meanings()
     if "magnetometer" in flight.tables:

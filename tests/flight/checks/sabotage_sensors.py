@@ -11,9 +11,20 @@ import sabotage as s
 from wildlab.flight.store import Flight
 
 
-def gnss_meanings() -> Iterator[s.WrongMeaning]:
-    """Of satellite positions and velocities."""
-    yield from s.places("gnss", "gnss")
+def gnss_meanings(flight: Flight) -> Iterator[s.WrongMeaning]:
+    """Of satellite positions and velocities; a nav source without its own takes its positions from them."""
+    follow = [f"nav/{n}" for n, nav in flight.nav.items() if n == "onboard" and s.VELOCITY[0] not in nav]
+    along = [s.places(table, "") for table in follow]
+    for one in s.places("gnss", "gnss"):
+        apply, others = one.apply, [next(meanings).apply for meanings in along]
+
+        def both(f: Flight, apply: s.Change = apply, others: list[s.Change] = others) -> Flight:
+            f = apply(f)
+            for other in others:
+                f = other(f)
+            return f
+
+        yield s.WrongMeaning(one.name, both, one.named)
     yield from s.velocities("gnss", "gnss")
     yield s.WrongMeaning(
         "gnss: lever arm in mm",

@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense.bounds import bounds
 from wildlab.flight.checks.sense.camera import lens
+from wildlab.flight.checks.sense.felt import forces
+from wildlab.flight.checks.sense.field import field
 from wildlab.flight.checks.sense.ground import ground
+from wildlab.flight.checks.sense.motion import motion
 from wildlab.flight.checks.sense.origin import origin, together
+from wildlab.flight.checks.sense.positions import positions
+from wildlab.flight.checks.sense.scans import scans
 from wildlab.flight.checks.sense.seen import seen
+from wildlab.flight.checks.sense.stamps import stamps
+from wildlab.flight.checks.sense.targets import targets
 from wildlab.flight.store import Flight
 
 __all__ = ["sense", "sense_sentences"]
@@ -27,9 +35,22 @@ def sense(flight: Flight) -> Iterator[Finding]:
     Finding
         In clauses, as from `wildlab.flight.checks.check.find`.
     """
+    yield from bounds(flight)
     apart = [*origin(flight), *together(flight)]
     yield from apart
+    late = list(stamps(flight))
+    yield from late
+    if not apart and not late:
+        moving = list(motion(flight))
+        yield from moving
+        yield from positions(flight)
+        yield from forces(flight)
+        yield from field(flight)
     yield from lens(flight)
+    scanned = list(scans(flight))
+    yield from scanned
+    if not scanned:
+        yield from targets(flight)
     found = list(seen(flight))
     yield from found
     if not found:

@@ -28,7 +28,7 @@ USUAL = 3.0
 #: well, or instead. A fall by this factor counts all the same: what is expected may be stated too small.
 LIKE_NOISE, FALL = 3.0, 8.0
 #: Two that come within this factor of each other explain it equally well, and are both named.
-ALIKE = 1.3
+ALIKE = 1.6
 #: More than so many names are no help.
 MOST_NAMED = 3
 #: Misfits are in units of what noise is expected. What lies below this is not told apart.
