@@ -38,8 +38,8 @@ class WrongMeaning:
 
 def wrong_meanings(flight: Flight) -> list[WrongMeaning]:
     """Every wrong meaning that changes something in this flight."""
-    import sabotage_camera as cameras
-    import sabotage_sensors as sensors
+    from tests.flight.checks import sabotage_camera as cameras
+    from tests.flight.checks import sabotage_sensors as sensors
 
     found: list[WrongMeaning] = []
     if flight.manifest.camera is not None and flight.detections is not None:

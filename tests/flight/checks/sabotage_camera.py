@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pandas as pd
 import pymap3d
-import sabotage as s
 from scipy.spatial.transform import Rotation
 
+from tests.flight.checks import sabotage as s
 from wildlab.flight.store import Flight
 
 

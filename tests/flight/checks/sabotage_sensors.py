@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
-import sabotage as s
 
+from tests.flight.checks import sabotage as s
 from wildlab.flight.store import Flight
 
 

@@ -45,8 +45,7 @@ def raised(s: Sightings, by: float) -> Sightings:
 
 def shifted(s: Sightings, by: float) -> Sightings:
     """The same sightings, had the camera's clock been so many seconds later."""
-    p, R, points = s.looked(by)
-    return replace(s, p_nb=p, R_nb=R, points=points)
+    return replace(s, **s.looked(by)._asdict())
 
 
 def height_mistakes(s: Sightings) -> Iterator[Mistake[Sightings]]:

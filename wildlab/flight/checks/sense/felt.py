@@ -110,7 +110,7 @@ def felt(flight: Flight, source: str, imu: Inertial) -> Felt | None:
 
 def misfit(f: Felt) -> Misfit:
     """Turns (first row) and forces (second row), (2, 3), in units of what is usual."""
-    turned = Rotation.from_matrix(np.swapaxes(f.before, 1, 2) @ f.after).as_rotvec() / f.length[:, None]
+    turned = _turns(f)
     rate = f.rate - turned
     rate -= np.nanmedian(rate, axis=0) * (np.abs(np.nanmedian(rate, axis=0)) < RATE)  # a bias
     expected = np.einsum("nji,nj->ni", f.R_force, f.acceleration - [0.0, 0.0, USUAL_GRAVITY])
@@ -256,8 +256,20 @@ def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
                     f"{key}: {said.split('is in ')[1]}",
                     said,
                     f'`unit = "{write}"` in [imu.{key}]',
-                    lambda f, k=scale, key=key: replace(f, **{key: k * getattr(f, key)}),  # type: ignore[misc]
+                    lambda f, k=scale, key=key: _scaled(f, key, k),  # type: ignore[misc]
                 )
+
+
+def _scaled(f: Felt, key: str, by: float) -> Felt | None:
+    """Another unit; of rates only where something turned, since without all that is compared is noise."""
+    if key == "force":
+        return replace(f, force=by * f.force)
+    return None if _rms(_turns(f)) < RATE else replace(f, rate=by * f.rate)
+
+
+def _turns(f: Felt) -> Array:
+    turned = Rotation.from_matrix(np.swapaxes(f.before, 1, 2) @ f.after).as_rotvec()
+    return np.asarray(turned / f.length[:, None])
 
 
 def axes_words(M: Array) -> str:

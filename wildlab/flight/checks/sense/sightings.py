@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -32,6 +33,16 @@ ALLOWED_TURN, ALLOWED_HORIZONTAL, ALLOWED_VERTICAL = np.radians(3.0), 3.0, 5.0
 ROUNDS = 4
 #: Attitudes are not known better than this at the lens, whatever is stated: mounts give and clocks differ.
 LEAST_ATTITUDE = np.radians(0.3)
+
+
+class Look(NamedTuple):
+    """What changes with time: poses, points (M, N, 3), angles of the gimbal."""
+
+    p_nb: Array
+    R_nb: Array
+    points: Array
+    pan: Array
+    tilt: Array
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,7 @@ class Sightings:
     image: NDArray[np.intp]
     sd: Array
     origin: Origin
-    looked: Callable[[float], tuple[Array, Array, Array]]
+    looked: Callable[[float], Look]
     labels: NDArray[np.object_]
     frames: NDArray[np.object_]
     own_gimbal: bool = False
@@ -82,9 +93,9 @@ class Sightings:
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
 
-        def looked(shift: float) -> tuple[Array, Array, Array]:
-            p, R, points = self.looked(shift)
-            return p[rows], R[rows], points[:, rows]
+        def looked(shift: float) -> Look:
+            at = self.looked(shift)
+            return Look(at.p_nb[rows], at.R_nb[rows], at.points[:, rows], at.pan[rows], at.tilt[rows])
 
         return replace(
             self,
@@ -143,13 +154,18 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     tracks = _tracks(flight, labels)
     try:
         times = frame_times(flight)[frame]
-        pan, tilt = gimbal_angles(flight)
+        still = tuple(angle[frame] for angle in gimbal_angles(flight))
+        moving = None if "pan_rad" in frames else flight.gimbal
 
-        def looked(shift: float) -> tuple[Array, Array, Array]:
+        def looked(shift: float) -> Look:
             p, R, _ = poses_at(brief, times + shift, ids)
-            return p, R, _points(tracks, times + shift, labels)
+            pan, tilt = still
+            if moving is not None:
+                turns = np.unwrap(moving[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)
+                pan, tilt = between(moving["time_s"].to_numpy(float), turns, times + shift, "gimbal").T
+            return Look(p, R, _points(tracks, times + shift, labels), pan, tilt)
 
-        p, R, points = looked(0.0)
+        p, R, points, pan, tilt = looked(0.0)
         _, _, P = poses_at(nav, times, ids)
     except (WildlabError, ValueError):  # said by the checks of times
         return None
@@ -160,8 +176,8 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         source=source,
         camera=manifest.geometry_camera(),
         mount=manifest.geometry_mount(),
-        pan=pan[frame],
-        tilt=tilt[frame],
+        pan=pan,
+        tilt=tilt,
         uv=detections[["u_px", "v_px"]].to_numpy(float),
         p_nb=p,
         R_nb=R,

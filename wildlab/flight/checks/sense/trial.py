@@ -22,6 +22,10 @@ T = TypeVar("T")
 FAR_BETTER = 2.0
 #: Where only the whole can be looked at, or nothing is allowed for (see `Misfit`), it has to be clearer.
 FAR_BETTER_ALONE = 4.0
+#: Where both ways to count fall, so much on their geometric mean: as where one falls threefold and one stays.
+BOTH = 3**0.5
+#: What is expected of noise is no misfit: less of it, as by a smaller unit, proves nothing.
+EXPECTED = 1.0
 #: Where nothing is allowed for, misfits below this (times what is expected) are no wrong meaning.
 USUAL = 3.0
 #: What is left has to be like noise, at most so many times what is expected: else something else is wrong as
@@ -97,9 +101,10 @@ def far_better(before: Misfit, after: Misfit, *, fitted: bool = False) -> bool:
     alone = np.isnan(ratio[:, 1:]).any(axis=1)
     needed = np.where(alone, FAR_BETTER_ALONE, [FAR_BETTER, FAR_BETTER_ALONE])
     clear = np.where(alone, ratio[:, 0], ratio.min(axis=1)) >= needed
-    clear[1] &= before[1, 0] > USUAL
+    clear &= before[:, 0] > [EXPECTED, USUAL]
     both = np.sqrt(ratio.prod(axis=0))
-    return bool(clear.any() or (not fitted and not alone.any() and (both >= FAR_BETTER).all()))
+    in_both = not fitted and not alone.any() and before[:, 0].max() > EXPECTED and (both >= BOTH).all()
+    return bool(clear.any() or in_both)
 
 
 def explain(
