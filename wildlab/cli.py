@@ -121,10 +121,13 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
     Example:
       wildlab import recipe.toml --source logs --into flights/mine
     """
+    from wildlab.flight.checks.sense.sense import sense_sentences
     from wildlab.flight.recipe.importing import import_flight
 
-    import_flight(recipe, source, into, overwrite=overwrite)
+    flight = import_flight(recipe, source, into, overwrite=overwrite)
     click.echo(shown(into))
+    for line in sense_sentences(flight):
+        click.echo(line, err=True)
     click.echo(f'Next: wildlab check "{shown(into)}"', err=True)
 
 

@@ -29,9 +29,32 @@ DETECTION_KINDS: dict[str, tuple[str, ...]] = {
 COVARIANCE_COLUMNS = tuple(f"cov_{i}{j}" for i in range(6) for j in range(i, 6))
 
 
+Bounds = tuple[float, float]
+
+#: Physical bounds, wide enough for all that flies or floats with a camera; beyond is a wrong unit, a wrong
+#: column or a broken row. Level distance: the local level at the origin is of no use further out, m.
+PLACE: Bounds = (-1e6, 1e6)
+#: From above the highest balloon to below the deepest place, and what the Earth falls away in `PLACE`, m.
+DOWN: Bounds = (-60e3, 100e3)
+#: Twice the speed of sound, m/s.
+SPEED: Bounds = (-700.0, 700.0)
+#: Twice as fast as small gyros measure, rad/s.
+TURN: Bounds = (-80.0, 80.0)
+#: A hundred times gravity: launches and hard landings stay below, m/s^2.
+FELT: Bounds = (-1000.0, 1000.0)
+#: What small magnetometers can measure, uT; the Earth's field is a fortieth of it.
+MAGNETIC: Bounds = (-2500.0, 2500.0)
+#: As far as radars of boats see, m.
+RANGE: Bounds = (0.0, 200e3)
+#: Twice around, rad.
+AROUND: Bounds = (-4 * np.pi, 4 * np.pi)
+ABOVE_ZERO: Bounds = (0.0, np.inf)
+
+
 @dataclass(frozen=True)
 class Column:
-    """One column. `may_be_nan`: a row without the value is fine."""
+    """One column. `may_be_nan`: a row without the value is fine; `bounds`: outside, no UAV, boat or animal
+    was ever, in the column's unit."""
 
     name: str
     dtype: DType
@@ -39,6 +62,7 @@ class Column:
     meaning: str
     required: bool = True
     may_be_nan: bool = False
+    bounds: Bounds | None = None
 
 
 @dataclass(frozen=True)
@@ -57,22 +81,29 @@ class Table:
 
 def _position(of: str, *, required: bool = True, may_be_nan: bool = False) -> tuple[Column, ...]:
     return tuple(
-        Column(f"{axis}_m", "float", "m", f"{axis} coordinate of {of} in frame n", required, may_be_nan)
+        Column(
+            f"{axis}_m",
+            "float",
+            "m",
+            f"{axis} coordinate of {of} in frame n",
+            required,
+            may_be_nan,
+            DOWN if axis == "down" else PLACE,
+        )
         for axis in ("north", "east", "down")
     )
 
 
 def _velocity() -> tuple[Column, ...]:
     return tuple(
-        Column(f"v_{axis}_m_s", "float", "m/s", f"velocity of b towards {axis}", False, True)
+        Column(f"v_{axis}_m_s", "float", "m/s", f"velocity of b towards {axis}", False, True, SPEED)
         for axis in ("north", "east", "down")
     )
 
 
 _TIME = Column("time_s", "float", "s", "flight time: seconds since the epoch")
 _GIMBAL = tuple(
-    Column(f"{axis}_rad", "float", "rad", f"gimbal {axis}", required=False, may_be_nan=True)
-    for axis in ("pan", "tilt")
+    Column(f"{axis}_rad", "float", "rad", f"gimbal {axis}", False, True, AROUND) for axis in ("pan", "tilt")
 )
 
 #: Of a second antenna on the same clock, at the same times: two of them give a heading.
@@ -135,8 +166,8 @@ TABLES: dict[str, Table] = {
             "gimbal angles over time",
             (
                 _TIME,
-                Column("pan_rad", "float", "rad", "gimbal pan"),
-                Column("tilt_rad", "float", "rad", "gimbal tilt"),
+                Column("pan_rad", "float", "rad", "gimbal pan", bounds=AROUND),
+                Column("tilt_rad", "float", "rad", "gimbal tilt", bounds=AROUND),
             ),
         ),
         Table(
@@ -144,8 +175,14 @@ TABLES: dict[str, Table] = {
             "inertial measurements in b",
             (
                 _TIME,
-                *(Column(f"f_{a}_m_s2", "float", "m/s^2", f"specific force along {a}") for a in "xyz"),
-                *(Column(f"w_{a}_rad_s", "float", "rad/s", f"angular rate about {a}") for a in "xyz"),
+                *(
+                    Column(f"f_{a}_m_s2", "float", "m/s^2", f"specific force along {a}", bounds=FELT)
+                    for a in "xyz"
+                ),
+                *(
+                    Column(f"w_{a}_rad_s", "float", "rad/s", f"angular rate about {a}", bounds=TURN)
+                    for a in "xyz"
+                ),
             ),
         ),
         Table(
@@ -153,7 +190,10 @@ TABLES: dict[str, Table] = {
             "magnetic field in b, as measured: what is magnetic on board still in it",
             (
                 _TIME,
-                *(Column(f"field_{a}_ut", "float", "uT", f"magnetic field along {a}") for a in "xyz"),
+                *(
+                    Column(f"field_{a}_ut", "float", "uT", f"magnetic field along {a}", bounds=MAGNETIC)
+                    for a in "xyz"
+                ),
             ),
         ),
         Table(
@@ -163,9 +203,19 @@ TABLES: dict[str, Table] = {
                 _TIME,
                 *_position("the antenna"),
                 *_velocity(),
-                Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
-                Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
-                Column("sd_velocity_m_s", "float", "m/s", "SD of each axis of the velocity", False, True),
+                Column(
+                    "sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True, ABOVE_ZERO
+                ),
+                Column("sd_vertical_m", "float", "m", "SD of the height", False, True, ABOVE_ZERO),
+                Column(
+                    "sd_velocity_m_s",
+                    "float",
+                    "m/s",
+                    "SD of each axis of the velocity",
+                    False,
+                    True,
+                    ABOVE_ZERO,
+                ),
                 Column("satellites", "float", "", "satellites the fix is from", False, True),
                 Column("fix", "float", "", "kind of fix, as the receiver numbers them", False, True),
                 *_SECOND,
@@ -191,12 +241,14 @@ TABLES: dict[str, Table] = {
                 Column("kind", "text", "", " | ".join(DETECTION_KINDS)),
                 Column("u_px", "float", "px", "to the right, as the calibration counts", False, True),
                 Column("v_px", "float", "px", "downwards", False, True),
-                Column("azimuth_rad", "float", "rad", "from north towards east", False, True),
-                Column("elevation_rad", "float", "rad", "above the horizon", False, True),
-                Column("range_m", "float", "m", "slant range", False, True),
+                Column("azimuth_rad", "float", "rad", "from north towards east", False, True, AROUND),
+                Column("elevation_rad", "float", "rad", "above the horizon", False, True, AROUND),
+                Column("range_m", "float", "m", "slant range", False, True, RANGE),
                 *_position("the detection", required=False, may_be_nan=True),
                 Column("target_id", "text", "", "target it is of, empty = not known", False),
-                Column("plane_down_m", "float", "m", "down coordinate of the ground there", False, True),
+                Column(
+                    "plane_down_m", "float", "m", "down coordinate of the ground there", False, True, DOWN
+                ),
                 Column("area_px", "float", "px^2", "area of what is seen of it", False, True),
                 Column("major_px", "float", "px", "longer axis of the ellipse with its moments", False, True),
                 Column("minor_px", "float", "px", "shorter axis of that ellipse", False, True),
@@ -213,8 +265,10 @@ TABLES: dict[str, Table] = {
                     "time_s", "float", "s", "when, on the truth's own clock; NaN = never moves", True, True
                 ),
                 *_position("the target"),
-                Column("sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True),
-                Column("sd_vertical_m", "float", "m", "SD of the height", False, True),
+                Column(
+                    "sd_horizontal_m", "float", "m", "SD of each horizontal axis", False, True, ABOVE_ZERO
+                ),
+                Column("sd_vertical_m", "float", "m", "SD of the height", False, True, ABOVE_ZERO),
             ),
         ),
     )

@@ -113,10 +113,10 @@ __all__ = [
     "observe",
     "pose_errors",
     "recorded_answers",
-    "unlabelled_programs",
     "score_points",
     "sighting",
     "truth_of",
+    "unlabelled_programs",
     "usual_tuning",
     "worth",
 ]

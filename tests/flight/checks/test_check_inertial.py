@@ -330,7 +330,7 @@ def test_the_suggested_offset_and_a_latency_are_taken_into_account(right: Flight
     wrong = dataclasses.replace(
         flight, manifest=replace_in_manifest(flight.manifest, {"clocks": {"gnss_offset_s": 2.0}})
     )
-    (found,) = _found(wrong)
+    found = next(one for one in _found(wrong) if one.table == "gnss")
     assert "gnss_offset_s = -3.0" in found.fix
 
 

@@ -11,6 +11,7 @@ from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense.sense import sense
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
@@ -61,8 +62,9 @@ def check_flight(flight: Flight) -> list[Finding]:
     ]
 
 
-def find(flight: Flight) -> list[Finding]:
-    """The same in clauses, for those who make sentences of their own."""
+def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
+    """The same in clauses, for those who make sentences of their own; without `meaning`, whether a flight can
+    be read, and not whether it makes sense."""
     found = [
         *findings.values(flight),
         *findings.order(flight),
@@ -75,6 +77,7 @@ def find(flight: Flight) -> list[Finding]:
         *_uncertainty(flight),
         *_clocks(flight),
         *_checksums(flight),
+        *(sense(flight) if meaning else ()),
     ]
     return sorted(found, key=lambda finding: ("problem", "warning", "note").index(finding.level))
 
@@ -98,7 +101,7 @@ def usable_for(flight: Flight) -> list[Use]:
     >>> [use.usable for use in usable_for(simulate_twin("large-ship", 1))]
     [True, True, False]
     """
-    broken = {finding.table for finding in find(flight) if finding.level == "problem"}
+    broken = {finding.table for finding in find(flight, meaning=False) if finding.level == "problem"}
     good_nav = [name for name in flight.nav if f"nav/{name}" not in broken and len(flight.nav[name])]
     kinds = _kinds(flight)
     scored = flight.truth is not None and len(flight.truth) > 0
@@ -246,8 +249,10 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "estimate the offset from known points: at 20 m/s a tenth of a second is 2 m",
         )
     if manifest.vertical.reference != "ellipsoid" and manifest.vertical.correction_m == 0:
+        # Where nothing is placed on the ground, a constant height changes no result.
+        placed = manifest.camera is not None or flight.truth is not None
         yield Finding(
-            "warning",
+            "warning" if placed else "note",
             "flight.toml",
             "vertical.reference",
             f"heights are said to be {manifest.vertical.reference!r}, and nothing was taken off them",

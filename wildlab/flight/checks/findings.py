@@ -20,6 +20,9 @@ Level = Literal["problem", "warning", "note"]
 #: Logs print quaternions with few digits: four leave an error of 2e-4 in the norm.
 NORM_TOLERANCE = 1e-3
 
+#: Logs do not begin and end together: fewer frames outside than this share are good to know, no more.
+FEW_OUTSIDE = 0.02
+
 POSE = ("time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z")
 QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 POSITION = ("north_m", "east_m", "down_m")
@@ -31,7 +34,7 @@ class Finding:
 
     ``problem``: what it concerns cannot be used. ``warning``: it can, but look. ``note``: good to know.
     `table` is ``nav/<source>``, the name of a table, or ``flight.toml``. What `check_flight` returns are
-    whole sentences, which name table and field.
+    whole sentences, which name table and field. `causes`: the usual mistakes that explain it.
     """
 
     level: Level
@@ -39,6 +42,7 @@ class Finding:
     field: str
     sentence: str
     fix: str
+    causes: tuple[str, ...] = ()
 
 
 def values(flight: Flight) -> Iterator[Finding]:
@@ -195,8 +199,9 @@ def _within(table: str, what: str, times: np.ndarray, stamps: np.ndarray, of: st
     low, high = np.nanmin(stamps), np.nanmax(stamps)
     outside = ~((times >= low) & (times <= high))
     if outside.any():
+        few = outside.mean() < FEW_OUTSIDE
         yield Finding(
-            "problem" if outside.all() else "warning",
+            "problem" if outside.all() else "note" if few else "warning",
             table,
             "time_s",
             f"the {what} run from {low:.3f} s to {high:.3f} s, the {of} from {np.nanmin(times):.3f} s to "

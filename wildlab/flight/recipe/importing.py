@@ -292,7 +292,7 @@ def _manifest(
 
 def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     """Raise the first problem that `check_flight` finds, in terms of the raw file it comes from."""
-    for finding in find(flight):
+    for finding in find(flight, meaning=False):
         if finding.level != "problem":
             continue
         sensor = recipe.sensors.get(finding.table)

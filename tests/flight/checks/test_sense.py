@@ -1,0 +1,252 @@
+"""The parts of the sense checks by themselves: rule, pairs, bounds, each with a right and a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, sense, stamps, targets, trial
+from wildlab.flight.checks.sense.attitudes import attitude_mistakes, rotations_of_axes
+from wildlab.flight.checks.sense.places import place_mistakes
+from wildlab.flight.checks.sense.sightings import Look, Sightings, metres, missed
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount, camera_pose
+
+ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
+Make = Callable[..., Flight]
+
+
+def _mistake(cause: str, factor: float, *, fitted: bool = False) -> trial.Mistake[float]:
+    return trial.Mistake(cause, cause, cause, lambda x: x * factor, fitted)
+
+
+def _misfit(x: float) -> np.ndarray:
+    return np.full((2, 3), x)
+
+
+def test_only_what_is_far_better_is_named() -> None:
+    named = trial.explain(
+        _misfit, 4.0, [_mistake("little", 0.7), _mistake("much", 0.2), _mistake("worse", 3.0)]
+    )
+    assert [(one.mistake.cause, one.before) for one in named] == [("much", 4.0)]
+    assert trial.explain(_misfit, 4.0, [_mistake("little", 0.7)]) == []
+
+
+def test_two_that_explain_alike_are_both_named_and_the_fitted_one_last() -> None:
+    ways = [_mistake("fitted", 0.2, fitted=True), _mistake("plain", 0.22), _mistake("third", 0.4)]
+    named = trial.explain(_misfit, 4.0, ways)
+    assert [one.mistake.cause for one in named] == ["plain", "fitted"]
+
+
+def test_a_half_that_gets_worse_is_no_cause() -> None:
+    before, after = np.full((2, 3), 9.0), np.full((2, 3), 1.0)
+    assert trial.far_better(before, after)
+    after[:, 2] = 8.0
+    assert not trial.far_better(before, after)
+
+
+def test_what_is_left_has_to_be_like_noise() -> None:
+    assert not trial.far_better(np.full((2, 3), 20.0), np.full((2, 3), 5.0))
+    assert trial.far_better(np.full((2, 3), 20.0), np.full((2, 3), 2.0))
+
+
+def test_there_are_24_ways_to_sit_and_all_turn() -> None:
+    ways = rotations_of_axes()
+    assert len(ways) == 24
+    assert np.allclose([np.linalg.det(R) for R in ways], 1)
+
+
+def test_every_attitude_mistake_gives_rotations() -> None:
+    R = euler_to_matrix(*np.random.default_rng(1).uniform(-0.9, 0.9, (3, 20)))
+    for mistake in attitude_mistakes("poses.x"):
+        undone = mistake.undo(R)
+        if undone is not None:
+            assert np.allclose(undone @ np.swapaxes(undone, 1, 2), np.eye(3), atol=1e-9), mistake.cause
+            assert np.allclose(np.linalg.det(undone), 1)
+        assert "[poses.x.attitude]" in mistake.write
+
+
+@pytest.mark.parametrize(
+    ("cause", "read"),
+    [
+        ("latitude and longitude exchanged", lambda lat, lon, h: (lon, lat, h)),
+        ("height in ft, read as m", lambda lat, lon, h: (lat, lon, h / 0.3048)),
+        ("longitude negated", lambda lat, lon, h: (lat, -lon, h)),
+    ],
+)
+def test_a_place_mistake_is_undone_exactly(cause: str, read: Callable[..., tuple[np.ndarray, ...]]) -> None:
+    from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
+
+    right = np.random.default_rng(2).normal(0, 300, (10, 3))
+    wrong = geodetic_to_ned(*read(*ned_to_geodetic(right, ORIGIN).T), ORIGIN)
+    (mistake,) = [one for one in place_mistakes("gnss", ORIGIN) if one.cause == cause]
+    undone = mistake.undo(wrong)
+    assert undone is not None
+    np.testing.assert_allclose(undone, right, atol=1e-3)
+
+
+def _sightings(mount: Mount, seen_by: Mount) -> Sightings:
+    rng = np.random.default_rng(3)
+    lens = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
+    n = 40
+    p = np.column_stack([rng.uniform(-200, 200, (n, 2)), np.full(n, -90.0)])
+    R = euler_to_matrix(*rng.uniform(-0.2, 0.2, (2, n)), rng.uniform(-3, 3, n))
+    points = np.column_stack([p[:, :2] + rng.uniform(-20, 20, (n, 2)), np.zeros(n)])
+    uv = ground_to_pixel(lens, points, *camera_pose(seen_by, p, R))
+    zero, name = np.zeros(n), np.arange(n).astype(str).astype(object)
+    return Sightings(
+        "log", lens, mount, zero, zero, uv, p, R, points[None], np.arange(n) // 4,
+        np.tile([0.02, 2.0, 2.0], (n, 1)), ORIGIN, lambda shift: Look(p, R, points[None], zero, zero),
+        name, name,
+    )  # fmt: skip
+
+
+def test_rays_pass_the_points_by_nothing_where_all_is_right() -> None:
+    right = _sightings(Mount("down"), Mount("down"))
+    assert metres(right) < 1e-6
+    assert np.abs(missed(right).turn).max() < 1e-9
+
+
+def test_a_camera_that_looks_the_other_way_is_ninety_degrees_off() -> None:
+    wrong = _sightings(Mount("forward"), Mount("down"))
+    angle = np.degrees(np.linalg.norm(missed(wrong).turn, axis=1))
+    assert np.median(angle) == pytest.approx(90, abs=15)
+    assert metres(wrong) > 80
+    assert metres(replace(wrong, mount=Mount("down"))) < 1e-6
+
+
+def _log(**changes: float) -> pd.DataFrame:
+    t = np.arange(0, 120.0)
+    v = np.column_stack([15 * np.cos(t / 9), 15 * np.sin(t / 9), 2 * np.sin(t / 5)])
+    p = np.column_stack([135 * np.sin(t / 9), -135 * np.cos(t / 9), -100 - 10 * np.cos(t / 5)])
+    table = pd.DataFrame(np.column_stack([t, p, v]))
+    table.columns = ["time_s", "north_m", "east_m", "down_m", "v_north_m_s", "v_east_m_s", "v_down_m_s"]
+    for name, factor in changes.items():
+        table[name] *= factor
+    return table
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"v_down_m_s": -1.0}, "down (or up) has the wrong sign"),
+        ({"v_north_m_s": -1.0}, "north has the wrong sign"),
+        ({name: 1 / 0.514444 for name in ("v_north_m_s", "v_east_m_s", "v_down_m_s")}, "in kn"),
+    ],
+)
+def test_displacement_against_velocity(
+    make_flight: Make, changes: dict[str, float], said: str | None
+) -> None:
+    flight = make_flight()
+    flight.tables["gnss"] = _log(**changes)
+    flight.nav.clear()
+    found = list(motion.motion(flight))
+    assert (said is None) == (found == [])
+    if said is not None:
+        assert found[0].level == "problem"
+        assert said in found[0].sentence
+        assert "[gnss.velocity]" in found[0].fix
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "value"),
+    [("imu", "w_x_rad_s", 500.0), ("imu", "f_z_m_s2", -9810.0), ("gnss", "v_east_m_s", 2000.0)],
+)
+def test_beyond_bounds_is_a_problem_with_row_and_value(
+    make_flight: Make, table: str, column: str, value: float
+) -> None:
+    flight = make_flight()
+    flight.tables["gnss"] = _log()
+    names = ["time_s", *(f"f_{a}_m_s2" for a in "xyz"), *(f"w_{a}_rad_s" for a in "xyz")]
+    flight.tables["imu"] = pd.DataFrame(np.zeros((20, 7)), columns=names)
+    assert list(bounds.bounds(flight)) == []
+    flight.tables[table].loc[7, column] = value
+    (found,) = bounds.bounds(flight)
+    assert (found.level, found.table, found.field) == ("problem", table, column)
+    assert f"first in row 7 with {value:g}" in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, None),
+        ({"fx_px": 19.0, "fy_px": 19.0}, "millimetres"),
+        ({"cx_px": 256.0, "cy_px": 320.0}, "cx and cy are exchanged"),
+        ({"cx_px": 640.0, "cy_px": 512.0, "width_px": 1280, "height_px": 1024}, None),
+        ({"cx_px": 160.0, "cy_px": 128.0}, "times as large"),
+    ],
+)
+def test_numbers_of_a_camera(make_flight: Make, changes: dict[str, float], said: str | None) -> None:
+    flight = make_flight()
+    flight.manifest = replace_in_manifest(flight.manifest, {"camera": changes})
+    found = list(camera.lens(flight))
+    assert (said is None) == (found == [])
+    assert said is None or said in found[0].sentence
+
+
+def test_a_degree_of_latitude_turns_level_by_a_degree() -> None:
+    assert origin.turned(np.array([111_195.0, 0.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
+    # Along a parallel, north turns by the sine of the latitude and level by its cosine.
+    assert origin.turned(np.array([0.0, 49_900.0, 0.0]), ORIGIN) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("north", "level"), [(5e3, None), (30e3, "warning"), (300e3, "problem")])
+def test_an_origin_far_away(make_flight: Make, north: float, level: str | None) -> None:
+    flight = make_flight()
+    flight.nav["autopilot"]["north_m"] += north
+    found = list(origin.origin(flight))
+    assert [one.level for one in found] == ([] if level is None else [level])
+    if level is not None:
+        assert "deg, and so does every attitude" in found[0].sentence
+
+
+def test_whole_hours_between_stamps_are_a_zone(make_flight: Make) -> None:
+    flight = make_flight()
+    assert list(stamps.stamps(flight)) == []
+    flight.tables["frames"]["time_s"] += 7200.0
+    (found,) = stamps.stamps(flight)
+    assert found.table == "frames"
+    assert "2 h late" in found.sentence
+    assert "`zone`" in found.fix
+    flight.tables["frames"]["time_s"] += 400.0  # no whole quarter of an hour
+    assert list(stamps.stamps(flight)) == []
+
+
+def test_ground_heights_against_the_truth(make_flight: Make) -> None:
+    flight = make_flight()
+    rows = pd.concat([flight.tables["detections"]] * 4, ignore_index=True)
+    rows["target_id"] = "buoy"
+    flight.tables["detections"] = rows
+    assert [one for one in ground.ground(flight) if one.field == "plane_down_m"] == []
+    flight.tables["detections"] = rows.assign(plane_down_m=-45.0)
+    (found,) = [one for one in ground.ground(flight) if one.field == "plane_down_m"]
+    assert "45 m above the known points" in found.sentence
+    assert 'taken_off = ["ground"]' in found.fix
+
+
+def test_a_target_seen_beside_its_truth() -> None:
+    beside = np.random.default_rng(4).normal([25, 0], 2, (60, 2))
+    offset, there, here = targets.offset_of(beside)
+    assert offset == pytest.approx([25, 0], abs=1.5)
+    assert there > 0.9
+    assert here == 0
+
+
+def test_sentences_are_whole_and_worst_first(make_flight: Make) -> None:
+    flight = make_flight()
+    flight.nav["autopilot"]["north_m"] += 30e3
+    flight.manifest = replace_in_manifest(flight.manifest, {"camera": {"fx_px": 19.0, "fy_px": 19.0}})
+    said = sense.sense_sentences(flight)
+    assert said[0].startswith("problem: ")
+    assert any(line.startswith("warning: flight.toml, origin: ") for line in said)
+    assert all(line.endswith(".") for line in said)
+    assert sense.sense_sentences(make_flight()) == []

@@ -1,0 +1,190 @@
+"""Whether known points are where the poses have them, and if not, which mistake it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense import words
+from wildlab.flight.checks.sense.attitudes import attitude_mistakes
+from wildlab.flight.checks.sense.constants import clock_mistakes, height_mistakes
+from wildlab.flight.checks.sense.lens import calibration_mistakes, mount_mistakes, pixel_mistakes
+from wildlab.flight.checks.sense.places import place_mistakes
+from wildlab.flight.checks.sense.sightings import (
+    Missed,
+    Sightings,
+    degrees,
+    finite,
+    glance,
+    left_over,
+    metres,
+    misfit,
+    missed,
+    sightings,
+)
+from wildlab.flight.checks.sense.trial import Mistake, Named, explain
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
+
+#: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
+UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
+#: A single photo or mark is named where half of its misses are so many times those of all, by at least so
+#: many points, and so many times what is expected.
+SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
+
+
+def seen(flight: Flight) -> Iterator[Finding]:
+    """Clicks on known points against the poses, for each nav source.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+
+    Yields
+    ------
+    Finding
+    """
+    for name in flight.nav:
+        if name.startswith("truth"):  # a twin's own, no log
+            continue
+        given = sightings(flight, name)
+        if given is not None:
+            yield from judge(flight, given)
+
+
+def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
+    """The findings about one nav source."""
+    named = explain(misfit, given, camera_mistakes(flight, given), glance)
+    if named:
+        yield _finding(given, named)
+        given = named[0].undone
+    else:
+        now = misfit(given)[0, 0]
+        angle = degrees(given)
+        if now > UNEXPLAINED and angle > UNEXPLAINED_DEG:
+            yield Finding(
+                "warning",
+                f"nav/{given.source}",
+                "",
+                f"the rays of clicks on known points pass them by {words.number(metres(given))} m, "
+                f"{angle:.0f} deg (median), and none of the usual mistakes explains it",
+                "check mount, attitude, clock and names of the points: the report shows how errors go "
+                "together",
+            )
+    yield from _single(given)
+
+
+def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
+    """All usual mistakes that change where known points are seen."""
+    part = f"poses.{s.source}"
+    yield from mount_mistakes(s)
+    for b in attitude_mistakes(part):
+        yield Mistake(b.cause, b.said, b.write, _attitude(b.undo))
+    yield from pixel_mistakes(s)
+    yield from calibration_mistakes(s)
+    for a in place_mistakes(part, s.origin):
+        yield Mistake(f"poses: {a.cause}", f"poses: {a.said}", a.write, _position(a.undo))
+    for a in place_mistakes("truth", s.origin):
+        yield Mistake(f"truth: {a.cause}", f"truth: {a.said}", a.write, _points(a.undo))
+    yield from height_mistakes(s)
+    if flight.manifest.time.kind == "utc":
+        yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
+
+
+def _attitude(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
+    def change(s: Sightings) -> Sightings | None:
+        R = undo(s.R_nb)
+        return None if R is None else replace(s, R_nb=R)
+
+    return change
+
+
+def _position(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
+    def change(s: Sightings) -> Sightings | None:
+        p = undo(s.p_nb)
+        return None if p is None else replace(s, p_nb=p)
+
+    return change
+
+
+def _points(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
+    def change(s: Sightings) -> Sightings | None:
+        p = undo(s.points)
+        return None if p is None else replace(s, points=p)
+
+    return change
+
+
+def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
+    before = metres(given)
+    first, *others = named
+    said = (
+        f"{first.mistake.said}: that brings the distance by which rays pass known points from "
+        f"{words.number(before)} m to {words.number(metres(first.undone))} m (median)"
+    )
+    if others:
+        alike = [f"{one.mistake.said} ({words.number(metres(one.undone))} m)" for one in others]
+        said += f"; as well explained: {words.joined(alike)}"
+    fix = f"write {first.mistake.write}" + "".join(f"; or {one.mistake.write}" for one in others)
+    return Finding(
+        "problem",
+        f"nav/{given.source}",
+        "",
+        said,
+        f"{fix}, and import again",
+        tuple(one.mistake.cause for one in named),
+    )
+
+
+def _single(s: Sightings) -> Iterator[Finding]:
+    """One photo, or one mark, that is off while the others are not."""
+    m = missed(s)
+    good = finite(m)
+    if good.sum() < 8:
+        return
+    size = left_over(m, good) / m.expected
+    usual = float(np.median(size[good]))
+    for what, names, table in (("photo", s.frames, "frames"), ("mark", s.labels, "truth")):
+        off = list(_off(size, names, good, usual))
+        if not off or len(off) > max(1, len(set(names)) // 5):
+            continue
+        listed = words.joined(
+            [
+                f"{name!r} ({words.number(float(np.degrees(angle)))} deg)"
+                for name, angle in _angles(m, names, off)[:5]
+            ],
+            "and",
+        )
+        many = len(off) > 1
+        yield Finding(
+            "warning",
+            table,
+            "frame_id" if what == "photo" else "target_id",
+            f"{'some' if many else 'one'} {what}{'s' if many else ''} off while the others fit, with "
+            f"nav/{s.source}: {listed}",
+            "check "
+            f"{'pose, time and name' if what == 'photo' else 'place and name'}, "
+            f"or leave {'them' if many else 'it'} out",
+            (f"one {what} off",),
+        )
+
+
+def _angles(m: Missed, names: NDArray[np.object_], off: list[str]) -> list[tuple[str, float]]:
+    size = np.linalg.norm(m.turn, axis=1)
+    return [(name, float(np.nanmedian(size[names == name]))) for name in off]
+
+
+def _off(size: Array, names: NDArray[np.object_], good: NDArray[np.bool_], usual: float) -> Iterator[str]:
+    for name in dict.fromkeys(names):
+        rows = (names == name) & good
+        if name == "" or rows.sum() < SINGLE_POINTS:
+            continue
+        # Half of them: one wrong click is not a wrong photo.
+        half = float(np.median(size[rows]))
+        if half > SINGLE * usual and half > SINGLE_EXPECTED:
+            yield str(name)
