@@ -88,3 +88,15 @@ def test_limits_speak_of_what_there_is():
     full = georeferencing.limits_of(points[:1], [30.0], [80.0], labelled=False, timed=False, enough=False)
     assert "30°" in full[0] and "80 m" in full[0]
     assert any("no time of their own" in one for one in full) and any("no interval" in one for one in full)
+
+
+def test_names_that_may_tell_of_a_place_are_numbered_unless_it_is_open() -> None:
+    tables = {name: pd.DataFrame() for name in ("Flight 1", "Flight  1", "north gate")}
+    assert list(georeferencing.named(tables, "part", shown=False)) == ["part-1", "part-2", "part-3"]
+    assert list(georeferencing.named(tables, "part", shown=True)) == [
+        "Flight-1",
+        "Flight-1-again",
+        "north-gate",
+    ]
+    assert "north gate" not in georeferencing.unlabelled_words(["north gate"], shown=False)[0]
+    assert "40" not in georeferencing.vertical_words(40.3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -135,6 +136,32 @@ def record_accuracy(
     return others
 
 
+def named(tables: Mapping[str, pd.DataFrame], kind: str, *, shown: bool) -> dict[str, pd.DataFrame]:
+    """Tables by the names that a report and its metrics may have for them.
+
+    Parameters
+    ----------
+    tables
+        By the names that the flight gives, which may tell of a place.
+    kind
+        What they are, ``"part"``: where their names are not shown, they are numbered.
+    shown
+        Whether the flight's locations are open.
+
+    Returns
+    -------
+    dict
+        In the same order; blanks are hyphens, and no two names are alike.
+    """
+    found: dict[str, pd.DataFrame] = {}
+    for i, (name, table) in enumerate(tables.items(), 1):
+        short = re.sub(r"\s+", "-", name.strip()) if shown else f"{kind}-{i}"
+        while short in found:
+            short += "-again"
+        found[short] = table
+    return found
+
+
 def scatter_title(logged: ErrorSummary) -> str:
     """Title of the figure of the errors: whether they centre on the truth."""
     bias = float(np.hypot(logged.bias_north, logged.bias_east))
@@ -143,8 +170,13 @@ def scatter_title(logged: ErrorSummary) -> str:
     return f"Errors lie {short_length(bias)} off on average"
 
 
-def vertical_words(correction: float, left_in: ErrorSummary, labelled: bool) -> str:
-    """What the vertical correction that was taken off on import is worth."""
+def vertical_words(correction: float, left_in: ErrorSummary | None = None, labelled: bool = False) -> str:
+    """What the vertical correction that was taken off on import is worth; ``left_in``, the errors without it.
+
+    Without these it is only said that there is one: the height of the geoid tells of a place.
+    """
+    if left_in is None:
+        return "**Vertical reference.** The recorded heights were of another kind; corrected on import."
     fault = "Aircraft and ground share the fault."
     if labelled:
         fault = f"Left in, the mean error would be {left_in.mean:.0f} m."
@@ -190,12 +222,13 @@ def errors_table(rows: Mapping[str, ErrorSummary], first: str = "pose") -> pd.Da
     return pd.DataFrame([{first: name, **summary._asdict()} for name, summary in rows.items()])
 
 
-def unlabelled_words(programs: Sequence[str]) -> list[str]:
+def unlabelled_words(programs: Sequence[str], *, shown: bool = True) -> list[str]:
     """That answers of other programs could not be judged, as a list of no or one sentence."""
     if not programs:
         return []
+    who = ", ".join(programs) if shown else "other programs"
     return [
-        f"Positions recorded by {', '.join(programs)} name no target with a known position, so they are not "
+        f"Positions recorded by {who} name no target with a known position, so they are not "
         "judged: fill target_id of those detections."
     ]
 

@@ -363,10 +363,14 @@ def left_over(m: Missed, fit: NDArray[np.bool_]) -> Array:
 def metres(s: Sightings) -> float:
     """Median distance (m) by which the rays pass the known points; all of it for points behind the lens."""
     m = missed(s)
-    angle = np.linalg.norm(m.turn, axis=1)
-    return float(np.nanmedian(m.distance * np.sin(np.minimum(angle, np.pi / 2))))
+    good = finite(m)
+    angle = np.linalg.norm(m.turn[good], axis=1)
+    past = m.distance[good] * np.sin(np.minimum(angle, np.pi / 2))
+    return float(np.median(past)) if good.any() else float("nan")
 
 
 def degrees(s: Sightings) -> float:
     """The same as an angle, in degrees."""
-    return float(np.degrees(np.nanmedian(np.linalg.norm(missed(s).turn, axis=1))))
+    m = missed(s)
+    good = finite(m)
+    return float(np.degrees(np.median(np.linalg.norm(m.turn[good], axis=1)))) if good.any() else float("nan")
