@@ -51,7 +51,8 @@ def verdict(word, factor=1.0, low=0.9, high=1.1, coverage=0.9):
 MOST = model(["boresight"], with_=2.0)
 PART = model(["boresight"], with_=7.0)
 LITTLE = model(["boresight"], with_=9.4)
-UNSURE = model(["boresight"], with_=9.4, half=2.0)
+UNSURE = model(["boresight"], with_=7.0, half=4.0)
+SLIGHT = model(["boresight"], with_=9.4, half=2.0)
 NOTHING = model(())
 
 
@@ -62,6 +63,7 @@ NOTHING = model(())
         (PART, "Part of it is a constant error of the boresight"),
         (LITTLE, "is certain and small"),
         (UNSURE, "is possible, not certain"),
+        (SLIGHT, "No constant error explains it. The nearest is one of the boresight"),
         (NOTHING, "No constant error explains it"),
     ],
 )
@@ -97,9 +99,12 @@ def test_sizes_are_stated_only_where_the_interval_leaves_zero_out():
     found = Calibration(
         ("tilt", "clock"), np.array([np.radians(-5.0), 0.1]), np.diag([1e-6, 1.0]), {}, 40, 20, 10
     )
-    said = cause.size_sentence(found)
+    said = cause.size_sentence(found, True)
+    assert cause.size_sentence(found, False).startswith("Not to be added unless another flight")
     assert "camera's tilt -5.00 °" in said and "clock" not in said
-    assert cause.size_sentence(Calibration(("clock",), np.array([0.1]), np.eye(1), {}, 40, 20, 10)) == ""
+    assert (
+        cause.size_sentence(Calibration(("clock",), np.array([0.1]), np.eye(1), {}, 40, 20, 10), True) == ""
+    )
 
 
 FAR = Outlier("mark", "", "M7", 8, 25.0)

@@ -129,6 +129,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
         f"with it taken off, the mean error goes from {gain.without:.{digits}f} to {gain.with_:.{digits}f} m "
         f"on images that it was not estimated from (gain {low} to {high} m)"
     )
+    if not diagnosis.counts and gained_share(gain) < SMALL:
+        return f"No constant error explains it. The nearest is one of {what}: {figures}."
     if not diagnosis.counts:
         return f"A constant error of {what} is possible, not certain: {figures}."
     share = gained_share(gain)
@@ -139,8 +141,11 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     return f"A constant error of {what} is certain and small: {figures}."
 
 
-def size_sentence(calibration: Calibration) -> str:
-    """The corrections whose interval leaves zero out, with it; nothing where there is none."""
+def size_sentence(calibration: Calibration, counts: bool) -> str:
+    """The corrections whose interval leaves zero out, with it; nothing where there is none.
+
+    ``counts``: whether taking them off gained something for certain.
+    """
     parts = []
     for name in calibration.names:
         label, unit, scale = _PARAMETERS[name]
@@ -149,7 +154,8 @@ def size_sentence(calibration: Calibration) -> str:
             digits = 2 if unit in ("deg", "s", "%") else 1
             size = f"{scale * calibration.value(name):+.{digits}f} {unit.replace('deg', '°')}"
             parts.append(f"{label} {size} ({low:+.{digits}f} to {high:+.{digits}f})")
-    return f"What is to be added: {listed(parts)}." if parts else ""
+    said = "What is to be added" if counts else "Not to be added unless another flight confirms it"
+    return f"{said}: {listed(parts)}." if parts else ""
 
 
 def ambiguity_sentence(diagnosis: Diagnosis, unambiguous: Diagnosis | None) -> str:

@@ -43,7 +43,7 @@ def cause_section(report: Report, found: Accuracy) -> None:
     diagnosis = found.diagnosis
     if diagnosis is None:
         return
-    said = [cause.size_sentence(diagnosis.calibration), cause.halves_sentence(found.halves)]
+    said = [cause.size_sentence(diagnosis.calibration, diagnosis.counts), cause.halves_sentence(found.halves)]
     report.section("The cause", " ".join(filter(None, said)))
     report.table(
         cause.models_table(diagnosis),
