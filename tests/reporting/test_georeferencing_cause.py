@@ -283,3 +283,9 @@ def test_parameters_are_called_different_from_zero_by_their_interval():
     # Student's with nine degrees of freedom, not the 1.96 of many draws.
     assert report.recorded["north_offset", "calibration"]["low"] == pytest.approx(1.5 - 2.262, abs=1e-3)
     assert report.recorded["boresight_tilt", "calibration"]["value"] == pytest.approx(-5.0)
+
+
+def test_a_flight_that_contradicts_itself_is_said_only_where_a_problem_says_so():
+    assert cause.amiss_sentence([]) == "" == cause.amiss_sentence(["warning: nav: a. Do b."])
+    assert "one thing does not fit" in cause.amiss_sentence(["problem: nav: a. Do b.", "warning: c: d. E."])
+    assert "2 things do not fit" in cause.amiss_sentence(["problem: a: b. C."] * 2)

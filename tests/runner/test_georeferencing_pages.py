@@ -45,3 +45,14 @@ def test_the_page_says_which_calibration_and_names_no_folder(tmp_path):
     assert "flown again" not in text
     for path in (tmp_path / "reports").rglob("*.json"):
         assert str(tmp_path) not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("shown", ["open", "withheld"])
+def test_what_does_not_fit_together_stands_first(tmp_path, shown):
+    flight = simulate(Survey(images=12))
+    changes = {"mount": {"looks": "down"}, "locations": {"sensitivity": shown}}
+    flight.manifest = replace_in_manifest(flight.manifest, changes)
+    text = page(flight, tmp_path)
+    assert 'class="summary bad"' in text and "contradict each other" in text
+    assert ("looks = &quot;forward&quot;" in text or 'looks = "forward"' in text) == (shown == "open")
+    assert ("says which" in text) == (shown == "withheld")

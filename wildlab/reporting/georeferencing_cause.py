@@ -82,6 +82,15 @@ def verdict_level(
     return "warn" if amiss or ellipses.word == "too small" or logged.n < few else "good"
 
 
+def amiss_sentence(amiss: Sequence[str]) -> str:
+    """That the flight does not make sense, where a problem and not only a warning says so."""
+    problems = sum(one.startswith("problem") for one in amiss)
+    if not problems:
+        return ""
+    what = "one thing does" if problems == 1 else f"{problems} things do"
+    return f"The logs of this flight contradict each other: {what} not fit. Mend that first."
+
+
 def gained_share(gain: Gain) -> float:
     """Gain as a share of the error without."""
     return gain.gain.estimate / gain.without if gain.without > 0 else 0.0

@@ -14,7 +14,9 @@ from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting.report import Report
 
 
-def summary_section(report: Report, found: Accuracy, applied: str = "") -> None:
+def summary_section(
+    report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = (), *, shown: bool = True
+) -> None:
     """The summary: how far off, how many points are lost, the cause and what to do.
 
     Parameters
@@ -25,6 +27,10 @@ def summary_section(report: Report, found: Accuracy, applied: str = "") -> None:
         What is shown.
     applied
         What is to be said of the calibration that was applied, where one was.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+    shown
+        Whether the flight's locations are open: what does not fit may tell of a place.
     """
     logged, total, diagnosis = found.summary, len(found.scored), found.diagnosis
     said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
@@ -33,7 +39,16 @@ def summary_section(report: Report, found: Accuracy, applied: str = "") -> None:
         unsure = cause.ambiguity_sentence(diagnosis, found.unambiguous)
         said += [cause.cause_sentence(diagnosis), unsure or cause.advice(diagnosis, not applied)]
     level = cause.verdict_level(logged, found.lost, found.ellipses, diagnosis, words.FEW)
+    first = cause.amiss_sentence(amiss)
+    if first:
+        said, level = [first, *said], "bad"
     report.summary([one for one in said if one], level=level)
+    if amiss:
+        report.section("What does not fit together")
+        if shown:
+            report.points(list(amiss))
+        else:
+            report.text(f"{len(amiss)} of the checks; `wildlab check` on the flight's folder says which.")
     if applied:
         report.text(applied)
 
