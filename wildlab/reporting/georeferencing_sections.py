@@ -14,9 +14,7 @@ from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting.report import Report
 
 
-def summary_section(
-    report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = (), *, shown: bool = True
-) -> None:
+def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = ()) -> None:
     """The summary: how far off, how many points are lost, the cause and what to do.
 
     Parameters
@@ -29,8 +27,6 @@ def summary_section(
         What is to be said of the calibration that was applied, where one was.
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
-    shown
-        Whether the flight's locations are open: what does not fit may tell of a place.
     """
     logged, total, diagnosis = found.summary, len(found.scored), found.diagnosis
     said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
@@ -43,14 +39,20 @@ def summary_section(
     if first:
         said, level = [first, *said], "bad"
     report.summary([one for one in said if one], level=level)
-    if amiss:
-        report.section("What does not fit together")
-        if shown:
-            report.points(list(amiss))
-        else:
-            report.text(f"{len(amiss)} of the checks; `wildlab check` on the flight's folder says which.")
     if applied:
         report.text(applied)
+
+
+def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
+    """What does not fit together in the flight; only how much where its locations are not open (``shown``)."""
+    if not amiss:
+        return
+    report.section("What does not fit together")
+    if shown:
+        report.points(list(amiss))
+    else:
+        count = "1 finding" if len(amiss) == 1 else f"{len(amiss)} findings"
+        report.text(f"{count}: `wildlab check` on the flight's folder says which.")
 
 
 def cause_section(report: Report, found: Accuracy) -> None:
