@@ -44,7 +44,7 @@ def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: S
 
 
 def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
-    """What does not fit together in the flight; only how much where its locations are not open (``shown``)."""
+    """What does not fit together in the flight; only how much where its locations are not open."""
     if not amiss:
         return
     report.section("What does not fit together")
