@@ -19,6 +19,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount, camera_pose
+from wildlab.simulation.twins import simulate_twin
 
 ORIGIN = (np.radians(63.4), np.radians(10.4), 40.0)
 Make = Callable[..., Flight]
@@ -250,3 +251,11 @@ def test_sentences_are_whole_and_worst_first(make_flight: Make) -> None:
     assert any(line.startswith("warning: flight.toml, origin: ") for line in said)
     assert all(line.endswith(".") for line in said)
     assert sense.sense_sentences(make_flight()) == []
+
+
+def test_positions_that_stand_still_are_no_unit_of_speed() -> None:
+    flight = simulate_twin("fast-vessel", 1)
+    nav = flight.nav["autopilot"]
+    flight.nav = {"autopilot": nav.assign(north_m=0.0, east_m=0.0, down_m=-300.0)}
+    (said,) = [one for one in motion.motion(flight) if one.table != "gnss"]
+    assert said.level == "warning" and "none of the usual mistakes explains it" in said.sentence

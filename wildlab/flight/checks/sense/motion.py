@@ -91,7 +91,8 @@ def motion(flight: Flight) -> Iterator[Finding]:
         if given is None:
             continue
         before = misfit(given)[0, 0]
-        named = explain(misfit, given, motion_mistakes(words.part_of(name), flight.manifest.origin_tuple()))
+        mistakes = motion_mistakes(words.part_of(name), flight.manifest.origin_tuple())
+        named = explain(misfit, given, map(_still_moving, mistakes))
         if not named:
             if before > 10.0:
                 yield Finding(
@@ -118,6 +119,19 @@ def motion(flight: Flight) -> Iterator[Finding]:
 
 def _apart(m: Moved) -> float:
     return _size((m.after - m.before) / m.length[:, None] - m.velocity)
+
+
+def _still_moving(mistake: Mistake[Moved]) -> Mistake[Moved]:
+    """The mistake, where undoing it leaves something that moves: nothing agrees with nothing in any unit."""
+
+    def undo(m: Moved) -> Moved | None:
+        found = mistake.undo(m)
+        if found is None:
+            return None
+        gone = (found.after - found.before) / found.length[:, None]
+        return found if max(_size(gone), _size(found.velocity)) > MOVING else None
+
+    return replace(mistake, undo=undo)
 
 
 def motion_mistakes(part: str, origin: Origin) -> Iterator[Mistake[Moved]]:
