@@ -80,8 +80,8 @@ OF_FLIGHTS = {"repeat-sightings.ipynb": "gating"}
 
 
 def by_notebook() -> dict[str, StudyEntry]:
-    """The study that each notebook shows by hand, the one that its parameters name; without `OF_FLIGHTS`, which
-    belong to no study."""
+    """The study that each notebook shows by hand, the one that its parameters name; not of `OF_FLIGHTS`,
+    which belong to no study."""
     found = {}
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
         if path.name in OF_FLIGHTS:
