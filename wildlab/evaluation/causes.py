@@ -72,9 +72,9 @@ def held_out(model: Linear, rounds: Sequence[Labels]) -> Array:
     Examples
     --------
     >>> r = np.array([[1.0, 0.0], [1.2, 0.0], [0.8, 0.0]])
-    >>> shift = Linear(np.tile(np.eye(2), (3, 1, 1)), r - 1.0, np.array([1.0, 1.0]), lambda x: r - x)
-    >>> held_out(shift, [np.array([0, 1, 2])])[0, 0].round(1).tolist()
-    [-0.0, 0.0]
+    >>> shift = Linear(np.tile(-np.eye(2), (3, 1, 1)), r - 1.0, np.array([1.0, 1.0]), lambda x: r - x)
+    >>> held_out(shift, [np.array([0, 1, 2])])[0, 1].round(1).tolist()  # the mean of the others is 0.9
+    [0.3, 0.0]
     """
     if not model.J.shape[-1]:
         return np.repeat(model.place(model.values)[None], len(rounds), axis=0)

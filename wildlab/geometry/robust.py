@@ -81,7 +81,7 @@ def student_scale(squared: ArrayLike) -> float:
     >>> e = np.random.default_rng(0).normal(0, 2.0, (4000, 2))
     >>> e[:200] += 500.0  # one in twenty is far out
     >>> round(student_scale((e**2).sum(axis=1)), 1)
-    2.1
+    2.2
     """
     d = np.asarray(squared, float)
     d = d[np.isfinite(d)]
