@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +29,8 @@ def middle_flight(spread: pd.DataFrame) -> dict[str, float]:
     dict
         Of the subject ``mekf``, by name.
     """
-    names = [str(name) for who, name in spread.columns.tolist() if who == "mekf"]
+    columns: list[Any] = list(spread)
+    names = [name for who, name in columns if who == "mekf"]
     return {name: float(spread["mekf", name].median()) for name in names}
 
 
