@@ -24,9 +24,9 @@ MOSTLY_NOT, FAILS = "fails on most flights", "does not hold"
 NO_PREMISE = "premise not met"
 #: No flight here could decide it.
 UNDECIDABLE = "cannot be decided"
-#: From the most to the least true.
 #: Of a claim that the simulated flights were made to meet.
 FITTED = "not judged: fitted"
+#: From the most to the least true.
 SHARE_VERDICTS = (HOLDS, MOSTLY, UNDECIDED, MOSTLY_NOT, FAILS)
 #: Shares of all flights between the verdicts.
 ALMOST_ALL, HALF, ALMOST_NONE = 0.9, 0.5, 0.1

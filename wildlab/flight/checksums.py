@@ -74,7 +74,7 @@ def verify(folder: Path, stated: Mapping[str, str]) -> None:
     """
     if not stated:
         return
-    meant = f"if it is meant: wildlab check --accept {folder}"
+    meant = f'if it is meant: wildlab check --accept "{folder}"'
     found = checksums_of(folder)
     for name in sorted({*stated, *found} - {FILE_NAME}):
         if name not in found:

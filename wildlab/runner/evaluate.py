@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.flight.checks.check import Use, check_flight, usable_for
+from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.learnt import learnt_toml, read_learnt
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
@@ -163,7 +163,7 @@ def lacks_only_truth(flight: Flight) -> bool:
         return False
     pixels = detections[detections["kind"] == "pixel"]
     named = "target_id" in pixels and bool(pixels["target_id"].fillna("").ne("").any())
-    whole = not any(finding.level == "problem" for finding in check_flight(flight))
+    whole = not any(one.level == "problem" for one in find(flight, meaning=False))
     return named and whole and (truth is None or not len(truth))
 
 

@@ -17,8 +17,8 @@ from wildlab.errors import WildlabError
 from wildlab.flight.clocks import covariances
 from wildlab.flight.recipe.parts import Attitude, Stamp, parse_zone
 from wildlab.flight.recipe.poses import _covariance, _rotation
-from wildlab.flight.recipe.units import UNITS, factor
 from wildlab.flight.store import Flight
+from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.flodell import geodetic_to_enu_linear
 from wildlab.geometry.frames import euler_to_matrix, geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
 

@@ -16,8 +16,8 @@ from wildlab.flight.clocks import frame_poses, frame_times, truth_at
 from wildlab.flight.files import check_model
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.recipe.model import Recipe
-from wildlab.flight.recipe.units import UNITS
 from wildlab.flight.store import load_flight
+from wildlab.flight.units import UNITS
 from wildlab.geometry.georeference import pixel_to_plane
 from wildlab.geometry.mount import camera_pose
 from wildlab.paths import DATA

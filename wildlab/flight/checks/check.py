@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,14 +52,7 @@ def check_flight(flight: Flight) -> list[Finding]:
     >>> {finding.level for finding in check_flight(simulate_twin("large-ship", 1))}
     {'note'}
     """
-    return [
-        replace(
-            one,
-            sentence=f"{', '.join(filter(None, (one.table, one.field)))}: {one.sentence}.",
-            fix=f"{one.fix[:1].upper()}{one.fix[1:]}.",
-        )
-        for one in find(flight)
-    ]
+    return [findings.whole(one) for one in find(flight)]
 
 
 def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -43,6 +43,12 @@ class Finding:
     sentence: str
     fix: str
     causes: tuple[str, ...] = ()
+
+
+def whole(one: Finding) -> Finding:
+    """The finding in whole sentences, the first of which names table and field."""
+    where = ", ".join(filter(None, (one.table, one.field)))
+    return replace(one, sentence=f"{where}: {one.sentence}.", fix=f"{one.fix[:1].upper()}{one.fix[1:]}.")
 
 
 def values(flight: Flight) -> Iterator[Finding]:

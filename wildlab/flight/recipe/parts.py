@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict
-from wildlab.flight.recipe.units import Dimension, factor
+from wildlab.flight.units import Dimension, factor
 
 
 class Quantity(Strict):

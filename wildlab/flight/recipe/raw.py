@@ -25,7 +25,7 @@ from wildlab.flight.readers.autoferry import read_part
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
 from wildlab.flight.recipe.series import LogTable, MatlabTable, Series
-from wildlab.flight.recipe.units import Dimension, factor
+from wildlab.flight.units import Dimension, factor
 
 Array = NDArray[np.float64]
 Text = NDArray[np.object_]

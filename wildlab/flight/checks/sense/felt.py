@@ -24,6 +24,7 @@ from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
 from wildlab.flight.checks.sense.trial import Misfit, Mistake, Named, explain
 from wildlab.flight.store import Flight
+from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import USUAL_GRAVITY
 
@@ -222,29 +223,25 @@ def felt_mistakes(source: str) -> Iterator[Mistake[Felt]]:
     """Mistakes about the attitude, and about axes and units of the sensor."""
     for a in attitude_mistakes(f"poses.{source}"):
         yield Mistake(f"attitude: {a.cause}", f"attitude: {a.said}", a.write, _attitude(a.undo))
-    for order in permutations(range(3)):
-        for signs in product((1, -1), repeat=3):
-            M = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            if (np.eye(3) == M).all():
-                continue
-            for key in ("rate", "force", "both"):
-                if key == "both" and np.linalg.det(M) < 0 and list(order) != [0, 1, 2]:
-                    continue  # a sensor is no mirror, but a wrong sign is
-                parts = "[imu.rate] and [imu.force]" if key == "both" else f"[imu.{key}]"
-                yield Mistake(
-                    f"axes of {parts}: {axes_words(M)}",
-                    f"the axes of the sensor ({key if key != 'both' else 'rate and force'}) are others: "
-                    f"{axes_words(M)}",
-                    f"columns and `negate` in {parts} so that {axes_words(M)} of now",
-                    lambda f, M=M, key=key: replace(  # type: ignore[misc]
-                        f,
-                        rate=f.rate @ M.T if key != "force" else f.rate,
-                        force=f.force @ M.T if key != "rate" else f.force,
-                    ),
-                )
+    for M in other_axes():
+        for key in ("rate", "force", "both"):
+            if key == "both" and np.linalg.det(M) < 0 and not np.diag(M).all():
+                continue  # a sensor is no mirror, but a wrong sign is
+            parts = "[imu.rate] and [imu.force]" if key == "both" else f"[imu.{key}]"
+            yield Mistake(
+                f"axes of {parts}: {axes_words(M)}",
+                f"the axes of the sensor ({key if key != 'both' else 'rate and force'}) are others: "
+                f"{axes_words(M)}",
+                f"columns and `negate` in {parts} so that {axes_words(M)} of now",
+                lambda f, M=M, key=key: replace(  # type: ignore[misc]
+                    f,
+                    rate=f.rate @ M.T if key != "force" else f.rate,
+                    force=f.force @ M.T if key != "rate" else f.force,
+                ),
+            )
     for key, factors in (
-        ("rate", {"deg/s": np.radians(1.0), "mrad/s": 1e-3, "deg/h": np.radians(1.0) / 3600}),
-        ("force", {"g": 9.80665, "mg": 9.80665e-3, "ft/s2": 0.3048, "cm/s2": 0.01}),
+        ("rate", other_units("rate")),
+        ("force", other_units("acceleration")),
     ):
         si = "rad/s" if key == "rate" else "m/s2"
         for unit, factor in factors.items():
@@ -270,6 +267,15 @@ def _scaled(f: Felt, key: str, by: float) -> Felt | None:
 def _turns(f: Felt) -> Array:
     turned = Rotation.from_matrix(np.swapaxes(f.before, 1, 2) @ f.after).as_rotvec()
     return np.asarray(turned / f.length[:, None])
+
+
+def other_axes() -> Iterator[Array]:
+    """The 47 ways (3, 3) to exchange axes and turn them round, but for leaving them as they are."""
+    for order in permutations(range(3)):
+        for signs in product((1, -1), repeat=3):
+            M = np.eye(3)[list(order)] * np.array(signs)[:, None]
+            if not (np.eye(3) == M).all():
+                yield M
 
 
 def axes_words(M: Array) -> str:

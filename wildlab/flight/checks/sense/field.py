@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import attitudes_near
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
-from wildlab.flight.checks.sense.felt import axes_words
+from wildlab.flight.checks.sense.felt import axes_words, other_axes
 from wildlab.flight.checks.sense.trial import Misfit, Mistake, explain
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
@@ -147,17 +146,13 @@ def field_mistakes(source: str) -> Iterator[Mistake[Seen]]:
     """Axes of the magnetometer that are exchanged or count the other way, and a yaw from elsewhere."""
     for a in attitude_mistakes(f"poses.{source}"):
         yield Mistake(f"attitude: {a.cause}", f"attitude: {a.said}", a.write, _attitude(a.undo))
-    for order in permutations(range(3)):
-        for signs in product((1, -1), repeat=3):
-            M = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            if (np.eye(3) == M).all():
-                continue
-            yield Mistake(
-                f"axes of the magnetometer: {axes_words(M)}",
-                f"its axes are others: {axes_words(M)}",
-                f"columns and `negate` in [magnetometer.field] so that {axes_words(M)} of now",
-                lambda s, M=M: replace(s, before=s.before @ M.T, after=s.after @ M.T),  # type: ignore[misc]
-            )
+    for M in other_axes():
+        yield Mistake(
+            f"axes of the magnetometer: {axes_words(M)}",
+            f"its axes are others: {axes_words(M)}",
+            f"columns and `negate` in [magnetometer.field] so that {axes_words(M)} of now",
+            lambda s, M=M: replace(s, before=s.before @ M.T, after=s.after @ M.T),  # type: ignore[misc]
+        )
 
 
 def _attitude(undo: Callable[[Array], Array | None]) -> Callable[[Seen], Seen | None]:

@@ -14,6 +14,7 @@ from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.trial import Misfit, Mistake, explain
 from wildlab.flight.store import Flight
+from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, Origin
 
 #: Velocity and displacement of a small receiver agree to this (m/s), level and vertical, and to this share.
@@ -23,7 +24,7 @@ STEP_S, LONGEST_S, MOST, ENOUGH, MOVING = 1.0, 5.0, 400, 20, 1.0
 #: The largest twentieth of what is left does not count: steps of a receiver.
 COUNTED = 0.95
 #: Units of speed as a recipe names them, in m/s.
-SPEEDS = {"kn": 1852 / 3600, "km/h": 1 / 3.6, "ft/s": 0.3048, "cm/s": 0.01}
+SPEEDS = other_units("speed")
 
 
 @dataclass(frozen=True)

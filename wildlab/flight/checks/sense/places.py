@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from wildlab.flight.checks.sense import words
+from wildlab.flight.units import other_units
 from wildlab.geometry.frames import Array, Origin, geodetic_to_ned, ned_to_geodetic
 
 #: Units of length that a height or a coordinate may be in, by what they are called in recipes.
-LENGTHS = {"ft": 0.3048, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+LENGTHS = other_units("length")
 
 
 @dataclass(frozen=True)

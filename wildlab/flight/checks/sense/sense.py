@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.findings import Finding, whole
 from wildlab.flight.checks.sense.bounds import bounds
 from wildlab.flight.checks.sense.camera import lens
 from wildlab.flight.checks.sense.felt import forces
@@ -78,8 +78,4 @@ def sense_sentences(flight: Flight) -> list[str]:
     """
     found = [one for one in sense(flight) if one.level != "note"]
     found.sort(key=lambda one: ("problem", "warning").index(one.level))
-    return [
-        f"{one.level}: {', '.join(filter(None, (one.table, one.field)))}: {one.sentence}. "
-        f"{one.fix[:1].upper()}{one.fix[1:]}."
-        for one in found
-    ]
+    return [f"{one.level}: {one.sentence} {one.fix}" for one in map(whole, found)]

@@ -9,8 +9,6 @@ from wildlab.geometry.gravity import STANDARD_GRAVITY
 
 Dimension = Literal["angle", "length", "speed", "acceleration", "rate", "pixel", "time", "field"]
 
-#: Of the unit g, by definition; m/s^2.
-
 UNITS: dict[Dimension, dict[str, float]] = {
     "angle": {"deg": math.radians(1), "rad": 1.0, "deg-e7": math.radians(1e-7)},
     "length": {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048},
@@ -23,6 +21,17 @@ UNITS: dict[Dimension, dict[str, float]] = {
     "field": {"uT": 1.0, "nT": 1e-3, "T": 1e6, "G": 100.0, "mG": 0.1},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
 }
+
+
+def other_units(dimension: Dimension) -> dict[str, float]:
+    """The units of a dimension that are not the one that is used inside, with what takes a value to that one.
+
+    Examples
+    --------
+    >>> sorted(other_units("rate"))
+    ['deg/h', 'deg/s', 'mrad/s']
+    """
+    return {unit: to for unit, to in UNITS[dimension].items() if to != 1}
 
 
 def factor(unit: str, dimension: Dimension, width_px: float = math.nan, height_px: float = math.nan) -> float:
