@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wildlab.evaluation.blocks import block_mean, compare_halves, time_blocks
+from wildlab.evaluation.blocks import block_mean, compare_halves, standard_error, time_blocks
 
 
 def test_blocks_are_stretches_of_time():
@@ -51,3 +51,13 @@ def test_halves_that_disagree_are_found(step, disagree):
     halves = compare_halves(values, blocks)
     assert halves.disagree is disagree
     assert halves.difference.estimate == pytest.approx(halves.second - halves.first)
+
+
+def test_blocks_of_equal_size_give_the_standard_error_of_their_means():
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=6)
+    assert standard_error(values, np.arange(6)) == pytest.approx(values.std(ddof=1) / np.sqrt(6))
+    blocks = np.repeat(np.arange(5), 4)
+    many = rng.normal(size=20) + blocks
+    means = many.reshape(5, 4).mean(axis=1)
+    assert standard_error(many, blocks) == pytest.approx(means.std(ddof=1) / np.sqrt(5))

@@ -56,6 +56,16 @@ def test_a_signed_mean_is_held_against_the_size_of_the_errors() -> None:
     assert (alone.verdict, alone.reason) == (p.NOT_JUDGED, "no size of the errors is printed with it")
 
 
+def test_where_the_deviation_is_printed_a_signed_mean_is_held_against_that() -> None:
+    """Of a mean that is most of the error itself, the size of the errors would grant anything."""
+    spread = {"low": -20.0, "high": 20.0, "size": 100.0, "deviation": 10.0}
+    found = [p.compare_flight("signed mean", 90.0 + off, 90.0, **spread).verdict for off in (4.3, -4.3)]
+    assert found == [p.AGREES] * 2
+    far = p.compare_flight("signed mean", 94.5, 90.0, **spread)
+    assert far.verdict == p.DIFFERS and far.ratio is None
+    assert p.compare_flight("signed mean", 94.5, 90.0, **spread | {"deviation": None}).verdict == p.AGREES
+
+
 def test_three_facts_go_with_a_verdict() -> None:
     found = p.compare_flight("error size", 9.0, 6.0, 5.0, 12.5)
     assert (found.ratio, found.difference, found.spread) == (1.5, 3.0, 2.5)
@@ -123,3 +133,5 @@ def test_margins_are_what_twenty_independent_values_leave_open() -> None:
         assert np.quantile(np.abs(values - 1), 0.95) == pytest.approx(factor - 1, abs=0.025), kind
     mean = np.quantile(np.abs(errors[..., 0].mean(axis=1)), 0.95) / math.sqrt(math.pi / 2)
     assert mean == pytest.approx(p.MARGINS["signed mean"].difference, abs=0.01)
+    by_deviation = np.quantile(np.abs(errors[..., 0].mean(axis=1)), 0.95)
+    assert by_deviation == pytest.approx(p.BY_DEVIATION, abs=0.01)

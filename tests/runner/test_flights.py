@@ -117,7 +117,13 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
 
 
 @pytest.mark.parametrize(
-    "cell", ["report.save()", "raise RuntimeError(flight)", "load_flight(flight + '/x')"]
+    "cell",
+    [
+        "report.save()",
+        "raise RuntimeError(flight)",
+        "load_flight(flight + '/x')",
+        "load_flight(flight.replace('tuesday', 'monday'))",
+    ],
 )
 def test_no_folder_of_a_flight_gets_into_a_report(
     tmp_path: Path, make_flight: Callable[..., Flight], cell: str

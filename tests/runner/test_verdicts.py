@@ -92,6 +92,29 @@ def test_a_mean_whose_sign_nobody_defines_is_held_against_sizes(tmp_path: Path) 
     assert study_status(a_study(), tmp_path, folder).numbers[1].here == 4.0
 
 
+def test_a_mean_whose_deviation_is_printed_is_held_against_that(tmp_path: Path) -> None:
+    """Off by half the deviation: too far for it, and near beside the size of the errors."""
+    extra = '[[number]]\nstudy = "s"\nname = "{}"\nsubject = "obs"\nvalue = {}\nunit = "m"\nsource = "H 1"\n'
+    numbers = [("mean_north", 38.0), ("mae", 41.0), ("sd_east", 90.0)]
+    for sd, verdict in ((None, "agrees"), (5.0, "differs"), (50.0, "agrees")):
+        more = numbers if sd is None else [*numbers, ("sd_north", sd)]
+        text = "\n".join(extra.format(*one) for one in more)
+        ran(tmp_path, metrics.metric("mean_north", "obs", 35.5, "m", low=34, high=37))
+        one = study_status(a_study(), tmp_path, published(tmp_path / "published", text))
+        assert one.numbers[0].verdict == verdict, sd
+
+
+@pytest.mark.parametrize(("value", "within"), [("5.30", 0.005), ("5.3", 0.05), ("21", 0.5)])
+def test_a_calculation_is_granted_half_of_its_last_printed_digit(
+    tmp_path: Path, value: str, within: float
+) -> None:
+    text = f'kind = "calculated"\n[[number]]\nstudy = "s"\nname = "error"\nsubject = "a"\nvalue = {value}\n'
+    folder = published(tmp_path / "published", text + 'unit = "m"\nsource = "H 1"\n')
+    for off, verdict in ((0.99, "agrees"), (-0.99, "agrees"), (1.1, "differs")):
+        ran(tmp_path, metrics.metric("error", "a", float(value) + off * within, "m"))
+        assert study_status(a_study(), tmp_path, folder).numbers[0].verdict == verdict, off
+
+
 def test_a_printed_number_is_counted_once_and_what_was_fitted_to_it_not_at_all(tmp_path: Path) -> None:
     number = PUBLISHED.split("[[number]]")[1].replace("within = 0.15\n", "")
     plain, tuned = (number.replace("kf/all", who) for who in ("plain", "tuned"))

@@ -11,6 +11,8 @@ import pytest
 
 from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, sense, stamps, targets, trial
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes, rotations_of_axes
+from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, other_axes
+from wildlab.flight.checks.sense.field import Seen, field_mistakes
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.sightings import Look, Sightings, metres, missed
 from wildlab.flight.manifest import replace_in_manifest
@@ -259,3 +261,33 @@ def test_positions_that_stand_still_are_no_unit_of_speed() -> None:
     flight.nav = {"autopilot": nav.assign(north_m=0.0, east_m=0.0, down_m=-300.0)}
     (said,) = [one for one in motion.motion(flight) if one.table != "gnss"]
     assert said.level == "warning" and "none of the usual mistakes explains it" in said.sentence
+
+
+def said_of(words: str) -> np.ndarray:
+    """The matrix that ``"x is minus y"`` stands for: what is right, of what is read."""
+    M = np.eye(3)
+    for clause in words.split(", "):
+        right, read = clause.split(" is ")
+        row = np.zeros(3)
+        row["xyz".index(read[-1])] = -1.0 if read.startswith("minus") else 1.0
+        M["xyz".index(right)] = row
+    return M
+
+
+def test_axes_are_undone_as_the_words_say() -> None:
+    rng = np.random.default_rng(4)
+    right = rng.normal(size=(5, 3))
+    turns = np.tile(np.eye(3), (5, 1, 1))
+    everything = list(other_axes())
+    assert len(everything) == 47 and len({M.tobytes() for M in everything}) == 47
+    for M in everything:
+        words = axes_words(M)
+        assert np.array_equal(said_of(words), M)
+        read = right @ said_of(words)  # row by row: right = M read, and M has its transpose for inverse
+        (mistake,) = [one for one in felt_mistakes("log") if one.cause == f"axes of [imu.rate]: {words}"]
+        undone = mistake.undo(Felt(turns, turns, np.ones(5), read, read, turns, right))
+        assert undone is not None
+        assert np.allclose(undone.rate, right) and np.array_equal(undone.force, read)
+        (mistake,) = [one for one in field_mistakes("log") if one.cause.endswith(f"magnetometer: {words}")]
+        seen = mistake.undo(Seen(read, read, turns, turns, None))
+        assert seen is not None and np.allclose(seen.before, right) and np.allclose(seen.after, right)
