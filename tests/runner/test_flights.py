@@ -122,7 +122,7 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
         "report.save()",
         "raise RuntimeError(flight)",
         "load_flight(flight + '/x')",
-        # A folder beside the flight; the line itself, which a failure quotes, must not hold the name looked for.
+        # A folder beside the flight. A failure quotes this line: it must not hold the name looked for.
         "load_flight(flight[:-7] + 'monday')",
     ],
 )

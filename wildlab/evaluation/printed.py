@@ -216,7 +216,7 @@ def compare_flight(
     else:
         if kind == "signed mean" and size is None and deviation is None:
             why = "no size of the errors is printed with it"
-            return Comparison(NOT_JUDGED, ratio, difference, spread, why)
+            return Comparison(NOT_JUDGED, None, difference, spread, why)
         if kind == "signed mean":
             ratio = None  # of a mean near zero it says nothing
             allowed = share * size if deviation is None else BY_DEVIATION * deviation  # type: ignore[operator]

@@ -97,7 +97,8 @@ def judge(
             theirs = error * math.sqrt(found["n"] / row["runs"])
         return compare_mean(here, value, error, theirs, within or 0.0)
     if row["fitted"]:
-        ratio = here / value if here > 0 and value > 0 else None
+        # Of a signed mean near zero a ratio says nothing.
+        ratio = here / value if here > 0 and value > 0 and quantity_kind(name) != "signed mean" else None
         return Comparison(NOT_JUDGED, ratio, here - value, None, str(row["fitted"]))
     kind = quantity_kind(name)
     if not kind:
