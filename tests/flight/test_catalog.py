@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -46,6 +48,7 @@ def dataset(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
             DataFile.model_construct(
                 path=name,
                 url=f"{address}/{name}",
+                size=len(data),
                 sha256=hashlib.sha256(data).hexdigest(),
                 mirror=f"deep/{name}",
             )
@@ -188,3 +191,74 @@ def test_openathena_from_the_mirror(
     assert [path.suffix for path in paths] == [".csv", ".csv"]
     assert is_fetched("openathena", tmp_path)
     assert read_catalog()["openathena"].licence == "MIT"
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_no_more_bytes_are_taken_than_the_catalog_says(
+    web: tuple[str, Path],
+    dataset: Callable[[str], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    mirrored: bool,
+) -> None:
+    dataset(web[0])
+    _put(web[1], a=b"x" * 1_000_000)
+    if mirrored:
+        monkeypatch.setenv("WILDLAB_DATA_MIRROR", str(web[1]))
+    with pytest.raises(WildlabError, match=r"a\.csv.*larger than the 4 bytes that the catalog says"):
+        fetch("small", tmp_path / "here")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]
+
+
+def test_a_folder_in_the_way_of_a_file(
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path
+) -> None:
+    dataset(web[0])
+    _put(web[1])
+    (tmp_path / "here" / "small" / "b.csv").mkdir(parents=True)
+    with pytest.raises(WildlabError, match=r"b\.csv: is in the way of a file to be fetched"):
+        fetch("small", tmp_path / "here")
+    assert not (tmp_path / "here" / "small" / "a.csv").exists()
+
+
+def test_a_file_in_the_way_of_the_folder(
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path
+) -> None:
+    dataset(web[0])
+    _put(web[1])
+    (tmp_path / "here").write_text("mine")
+    with pytest.raises(WildlabError, match="here: is a file where a folder is wanted"):
+        fetch("small", tmp_path / "here")
+    assert (tmp_path / "here").read_text() == "mine"
+
+
+def test_a_link_out_of_the_folder_is_not_written_through(
+    web: tuple[str, Path], dataset: Callable[[str], None], tmp_path: Path
+) -> None:
+    dataset(web[0])
+    _put(web[1])
+    mine = tmp_path / "mine.csv"
+    mine.write_text("mine")
+    (tmp_path / "here" / "small").mkdir(parents=True)
+    (tmp_path / "here" / "small" / "a.csv").symlink_to(mine)
+    with pytest.raises(WildlabError, match="leaves the folder it belongs to"):
+        fetch("small", tmp_path / "here")
+    assert mine.read_text() == "mine"
+
+
+def test_a_full_disk_is_one_sentence(
+    web: tuple[str, Path],
+    dataset: Callable[[str], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    dataset(web[0])
+    _put(web[1])
+
+    def full(self: object, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(catalog._Limited, "write", full)
+    with pytest.raises(WildlabError, match=r"No space left on device.*Free some space on its disk"):
+        fetch("small", tmp_path / "here")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]

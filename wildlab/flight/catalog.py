@@ -6,13 +6,13 @@ stands in for the network.
 
 from __future__ import annotations
 
-import logging
+import errno
 import os
 import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, BinaryIO
 
 import pooch
 from pydantic import Field, RootModel, field_validator
@@ -23,9 +23,12 @@ from wildlab.flight.files import (
     Strict,
     check_model,
     did_you_mean,
+    inside,
     is_safe_name,
     leaves_folder,
     read_toml,
+    regular_size,
+    unreadable,
 )
 from wildlab.paths import DATA, fetched
 
@@ -34,6 +37,8 @@ MIRROR_VARIABLE = "WILDLAB_DATA_MIRROR"
 #: Seconds without an answer after which a download is given up.
 TIMEOUT_S = 30
 
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
 #: Told before each file is fetched: its name, how many are done, how many there are.
 Progress = Callable[[str, int, int], None]
 
@@ -41,6 +46,7 @@ Progress = Callable[[str, int, int], None]
 class DataFile(Strict):
     path: str
     url: Annotated[str, Field(pattern=r"^https://")]
+    size: Annotated[int, Field(gt=0)]
     sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     mirror: str
 
@@ -169,31 +175,54 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
     Raises
     ------
     WildlabError
-        Where there is no such data set, no network and no mirror, or a checksum is wrong.
+        Where there is no such data set, no network and no mirror, a file is larger than the catalog says, its
+        checksum is wrong, or the folder cannot take it (a link out of it, a folder in the way, a full disk).
     """
     dataset = find_dataset(name)
     folder = dataset_folder(name, into)
     missing = [file for file in dataset.files if not _is_right(folder / file.path, file)]
     if missing:
+        for file in missing:
+            _place(folder, file)
         mirror = os.environ.get(MIRROR_VARIABLE)
         existing = next(parent for parent in (folder, *folder.parents) if parent.is_dir())
-        with tempfile.TemporaryDirectory(dir=existing, prefix=".fetch.") as temporary:
-            for number, file in enumerate(missing):
-                if progress is not None:
-                    progress(file.path, number, len(missing))
-                target = Path(temporary) / str(number)
-                if mirror:
-                    _copy(Path(mirror), file, target)
-                else:
-                    _download(file, target)
-            for number, file in enumerate(missing):
-                (folder / file.path).parent.mkdir(parents=True, exist_ok=True)
-                (Path(temporary) / str(number)).replace(folder / file.path)
+        try:
+            with tempfile.TemporaryDirectory(dir=existing, prefix=".fetch.") as temporary:
+                for number, file in enumerate(missing):
+                    if progress is not None:
+                        progress(file.path, number, len(missing))
+                    target = Path(temporary) / str(number)
+                    if mirror:
+                        _copy(Path(mirror), file, target)
+                    else:
+                        _download(file, target)
+                for number, file in enumerate(missing):
+                    place = _place(folder, file)
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                    (Path(temporary) / str(number)).replace(place)
+        except OSError as error:
+            raise _unwritable(error, folder) from None
     return [folder / file.path for file in dataset.files]
 
 
+def _place(folder: Path, file: DataFile) -> Path:
+    """Where a file goes: nothing is written through links that leave the folder, no folder is replaced."""
+    place = inside(folder, file.path, file=folder, field=file.path)
+    for parent in (place.parent, *place.parent.parents):
+        if parent.exists():
+            if parent.is_dir():
+                break
+            raise WildlabError("is a file where a folder is wanted", "move it away", file=parent)
+    if place.exists() and not place.is_file():
+        raise WildlabError("is in the way of a file to be fetched", "move it away", file=place)
+    return place
+
+
 def _is_right(path: Path, file: DataFile) -> bool:
-    return path.is_file() and sha256(path) == file.sha256
+    try:
+        return regular_size(path, file.size) == file.size and sha256(path) == file.sha256
+    except (OSError, WildlabError):
+        return False
 
 
 def _copy(mirror: Path, file: DataFile, target: Path) -> None:
@@ -206,21 +235,24 @@ def _copy(mirror: Path, file: DataFile, target: Path) -> None:
             file=mirror,
         )
     try:
-        shutil.copyfile(found, target)
+        with found.open("rb") as source, target.open("wb") as copy:
+            shutil.copyfileobj(source, _Limited(copy, file))
     except OSError as error:
-        raise WildlabError(
-            f"cannot be read ({error.strerror})", "check its permissions", file=found
-        ) from None
+        if error.errno in _FULL:
+            raise
+        raise unreadable(error, found) from None
     _verify(target, file, found, "replace it by the published file")
 
 
 def _download(file: DataFile, target: Path) -> None:
-    pooch.get_logger().setLevel(logging.WARNING)
-    downloader = pooch.HTTPDownloader(timeout=TIMEOUT_S)
+    # Asked not to compress: a small answer must not become a large file.
+    download = pooch.HTTPDownloader(timeout=TIMEOUT_S, headers={"Accept-Encoding": "identity"})
     try:
-        # Checked below: pooch would not name the hash it found.
-        pooch.retrieve(file.url, None, target.name, target.parent, downloader=downloader)
+        with target.open("wb") as copy:
+            download(file.url, _Limited(copy, file), None)
     except OSError as error:  # what requests raises is an OSError too
+        if error.errno in _FULL:
+            raise
         raise WildlabError(
             f"the file cannot be downloaded from {file.url} ({_in_words(error)})",
             f"check the network, or set {MIRROR_VARIABLE} to a folder that has the file",
@@ -235,6 +267,33 @@ def _verify(path: Path, file: DataFile, whence: Path | str, fix: str) -> None:
         raise WildlabError(
             f"has the SHA-256 {found}, and the catalog says {file.sha256} for {file.path}", fix, file=whence
         )
+
+
+class _Limited:
+    """A file that takes no more bytes than the catalog says."""
+
+    def __init__(self, file: BinaryIO, told: DataFile) -> None:
+        self.file, self.told, self.left = file, told, told.size
+
+    def write(self, data: bytes) -> int:
+        self.left -= len(data)
+        if self.left < 0:
+            raise WildlabError(
+                f"is larger than the {self.told.size:,} bytes that the catalog says",
+                "do not trust the source",
+                file=self.told.path,
+            )
+        return self.file.write(data)
+
+    def flush(self) -> None:
+        self.file.flush()
+
+
+def _unwritable(error: OSError, folder: Path) -> WildlabError:
+    """What the system said of a folder to write into, as a sentence with what to do."""
+    said = error.strerror or type(error).__name__
+    fix = "free some space on its disk" if error.errno in _FULL else "check that it can be written to"
+    return WildlabError(f"the data set cannot be kept there ({said})", fix, file=folder)
 
 
 def _in_words(error: OSError) -> str:
