@@ -3,7 +3,7 @@
 # Every path here is relative, so that a checkout may lie in a folder with blanks in its name.
 
 .DEFAULT_GOAL := help
-.PHONY: help environment reports first-look tutorials test test-all style docs strip lab lock bench doctor clean
+.PHONY: help environment reports first-look tutorials test test-all style docs strip lab lock audit bench doctor clean
 
 # How many notebooks or test processes at once.
 JOBS ?= 2
@@ -57,6 +57,9 @@ lab: environment ## open JupyterLab on the notebooks; git then strips outputs on
 
 lock: ## rewrite environment.lock from pyproject.toml, keeping versions (LOCK_UPGRADE=1 takes newer ones)
 	@sh tools/environment.sh lock
+
+audit: environment ## known faults of the packages in environment.lock (asks the network)
+	@$(BIN)/python tools/audit.py
 
 bench: environment ## compare speed with other packages, as ratios
 	@$(BIN)/python -m benchmarks $(ARGS)
