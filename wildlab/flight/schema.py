@@ -280,7 +280,7 @@ def extra_columns(table: Table, data: pd.DataFrame) -> list[str]:
     return [str(name) for name in data.columns if name not in table.column_names]
 
 
-def conform(table: Table, data: pd.DataFrame, file: Path | str) -> pd.DataFrame:
+def conform(table: Table, data: pd.DataFrame, file: Path | str, *, ours: bool = False) -> pd.DataFrame:
     """The table with every known column in its type (float64, or text as str), rows numbered from 0.
 
     `file` is only for the message. Values are not judged here (see `check_flight`), only their shape.
@@ -293,6 +293,8 @@ def conform(table: Table, data: pd.DataFrame, file: Path | str) -> pd.DataFrame:
         What was read or computed.
     file
         Where it comes from, for messages.
+    ours
+        Nobody else holds `data`: columns that have their type already are not copied.
 
     Returns
     -------
@@ -311,12 +313,14 @@ def conform(table: Table, data: pd.DataFrame, file: Path | str) -> pd.DataFrame:
     >>> set(conform(TABLES["gimbal"], read, "gimbal").dtypes.astype(str))
     {'float64'}
     """
-    result = data.reset_index(drop=True)
+    result = data if ours and isinstance(data.index, pd.RangeIndex) else data.reset_index(drop=True)
     if not result.columns.is_unique or not all(isinstance(name, str) for name in result.columns):
         problem = "two columns have the same name, or one has none"
         raise WildlabError(problem, "give each its own name", file=file)
     for column in table.columns:
         if column.name in result.columns:
+            if ours and column.dtype == "float" and result[column.name].dtype == np.float64:
+                continue
             result[column.name] = _typed(column, result[column.name], file)
         elif column.required:
             raise _missing(column.name, table, file)

@@ -32,12 +32,15 @@ MOVED_RATE, MOVED_FORCE, INTERVALS, CLEAR = 0.02, 0.7, 30, 0.6
 #: The mean force points within 45 deg of where it should, or away from it.
 ALONG = 0.7
 
+#: Of so many seconds, spread over the flight, it is asked how far the airframe turned in each.
+SECONDS = 300_000
+
 AXES = "xyz"
 
 
 def units(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """Specific force in g, without gravity, or in another unit; angular rate in deg/s."""
-    size = float(np.median(np.linalg.norm(imu.force, axis=1)))
+    size = float(np.median(imu.sizes_of_forces()))
     low, high = PLAUSIBLE
     expected = "gravity alone is 9.8"
     if moved is not None and moved.measured:
@@ -98,6 +101,7 @@ def _rate_unit(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[F
                 yield Finding("warning", "imu", "w_z_rad_s", said, fix)
                 return
     end = imu.times[imu.times >= imu.times[0] + 1.0]
+    end = end[:: max(1, len(end) // SECONDS)]
     fast = np.linalg.norm(imu.mean_rate(end - 1.0, end), axis=1) if len(end) else np.zeros(1)
     if float(np.nanmax(fast)) > FASTEST:
         turned = float(np.nanmax(fast)) / (2 * np.pi)
@@ -113,7 +117,7 @@ def axes(flight: Flight, imu: Inertial, moved: Moves | None) -> Iterator[Finding
 
 def _gravity(imu: Inertial, moved: Moves | None) -> Iterator[Finding]:
     """On average an aircraft neither climbs nor falls: the mean force points to its upper side."""
-    mean = imu.force.mean(axis=0)
+    mean = imu.mean_of_forces()
     size = float(np.linalg.norm(mean))
     if size < USUAL_GRAVITY / 2 or mean[2] < -ALONG * size:
         return

@@ -6,7 +6,7 @@ are means over an interval.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,32 +34,57 @@ MOST = 3000
 TURN = 2.5
 
 
-@dataclass(frozen=True)
 class Inertial:
-    """Samples: times (N,), specific force and angular rate (N, 3), and the integrals of both over time, one
-    row per axis (3, N)."""
+    """Samples: times (N,), specific force and angular rate, a column per axis (N,) each.
 
-    times: Array
-    force: Array
-    rate: Array
-    force_sum: Array
-    rate_sum: Array
+    Ten hours at 250 Hz are nine million rows: columns are not copied, and what is made of them is made of one
+    column at a time.
+    """
+
+    def __init__(self, times: Array, columns: Mapping[str, Array]) -> None:
+        self.times = times
+        self._columns = columns
+        self._sums: dict[str, Array] = {}
 
     def mean_force(self, start: Array, end: Array) -> Array:
         """Mean over intervals (K,) each, (K, 3); NaN where they are not inside of the samples."""
-        return self._mean(self.force_sum, start, end)
+        return self._mean(FORCE, start, end)
 
     def mean_rate(self, start: Array, end: Array) -> Array:
         """The same of the angular rate."""
-        return self._mean(self.rate_sum, start, end)
+        return self._mean(RATE, start, end)
 
-    def _mean(self, total: Array, start: Array, end: Array) -> Array:
+    def mean_of_forces(self) -> Array:
+        """Mean of all samples of the specific force. (3,)"""
+        return np.array([self._columns[name].mean() for name in FORCE])
+
+    def sizes_of_forces(self) -> Array:
+        """How long the specific force of each sample is. (N,)"""
+        total = np.zeros(len(self.times))
+        for name in FORCE:
+            total += self._columns[name] ** 2
+        return np.sqrt(total, out=total)
+
+    def _mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
         first, last = (
-            np.column_stack([np.interp(at, self.times, one) for one in total]) for at in (start, end)
+            np.column_stack([np.interp(at, self.times, self._sum(name)) for name in names])
+            for at in (start, end)
         )
         mean = (last - first) / (end - start)[:, None]
         mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
         return np.asarray(mean)
+
+    def _sum(self, name: str) -> Array:
+        """Integral over time of a column, from the first sample on. (N,)"""
+        if name not in self._sums:
+            value = self._columns[name]
+            total = np.empty(len(value))
+            total[0] = 0.0
+            np.add(value[1:], value[:-1], out=total[1:])
+            total[1:] *= 0.5
+            total[1:] *= np.diff(self.times)
+            self._sums[name] = np.cumsum(total, out=total)
+        return self._sums[name]
 
 
 @dataclass(frozen=True)
@@ -104,15 +129,16 @@ def samples(flight: Flight) -> Inertial | None:
     table = flight.imu
     if table is None:
         return None
-    values = table[["time_s", *FORCE, *RATE]].to_numpy(float)
-    values = values[np.isfinite(values).all(axis=1)]
-    times = np.ascontiguousarray(values[:, 0])
+    columns = {name: table[name].to_numpy(dtype=float) for name in ("time_s", *FORCE, *RATE)}
+    good = np.ones(len(table), bool)
+    for value in columns.values():
+        good &= np.isfinite(value)
+    if not good.all():
+        columns = {name: value[good] for name, value in columns.items()}
+    times = columns.pop("time_s")
     if len(times) < 2 or (np.diff(times) <= 0).any():
         return None
-    step = np.diff(times)[:, None]
-    sums = np.zeros((6, len(times)))
-    sums[:, 1:] = np.cumsum((values[1:, 1:] + values[:-1, 1:]) / 2 * step, axis=0).T
-    return Inertial(times, values[:, 1:4], values[:, 4:7], sums[:3], sums[3:])
+    return Inertial(times, columns)
 
 
 def fixes(flight: Flight) -> pd.DataFrame | None:

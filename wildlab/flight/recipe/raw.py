@@ -5,9 +5,7 @@ Every error names the file, the column, the line, and the part of the recipe tha
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import math
 import re
 from dataclasses import dataclass, field
@@ -17,11 +15,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import read_part
+from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
 from wildlab.flight.recipe.series import LogTable, MatlabTable, Series
@@ -41,12 +41,12 @@ _LATEST_S = 9.2e9
 
 @dataclass(frozen=True)
 class RawTable:
-    """One table: its columns of text or (out of a MATLAB file) numbers, and for each row the line it ends on,
-    or its number."""
+    """One table: its columns, packed text (`read_delimited`) or (from a MATLAB file) arrays, and for each row
+    the line it ends on, or its number."""
 
     path: Path
     header: tuple[str, ...]
-    cells: dict[str, Text | Array]
+    cells: dict[str, Any]
     lines: NDArray[np.int64]
     counted_in: str = "line"
 
@@ -55,8 +55,16 @@ class RawTable:
 
     def rows(self, chosen: NDArray[np.intp]) -> RawTable:
         """Some of the rows."""
-        cells = {name: column[chosen] for name, column in self.cells.items()}
+        cells = {
+            name: column.take(pyarrow.array(chosen)) if is_packed(column) else column[chosen]
+            for name, column in self.cells.items()
+        }
         return RawTable(self.path, self.header, cells, self.lines[chosen], self.counted_in)
+
+    def cell(self, column: str, row: int) -> str:
+        """One cell as text."""
+        found = self.cells[column][row]
+        return str(found.as_py() if is_packed(self.cells[column]) else found)
 
     def fail(self, problem: str, fix: str, column: str, part: str, row: int | None = None) -> WildlabError:
         """An error about this table, to be raised."""
@@ -113,7 +121,8 @@ class RawFiles:
             return self._matlab_table(name)
         if (name, separator) not in self._tables:
             data = self.read(name, part)
-            self._tables[name, separator] = _parse(self.folder / name, data, separator)
+            header, cells, lines = read_delimited(self.folder / name, data, separator)
+            self._tables[name, separator] = RawTable(self.folder / name, header, cells, lines)
         return self._tables[name, separator]
 
     def _matlab_table(self, name: str) -> RawTable:
@@ -167,38 +176,6 @@ class RawFiles:
         return table.rows(np.flatnonzero(counts))
 
 
-def _parse(path: Path, data: bytes, separator: str) -> RawTable:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise WildlabError(f"line {line} is not UTF-8 text", "save the file as UTF-8", file=path) from None
-    rows, lines = [], []
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
-    try:
-        header = tuple(name.strip() for name in next(reader, []))
-        for row in reader:
-            if not row:
-                continue
-            if len(row) != len(header):
-                raise WildlabError(
-                    f"line {reader.line_num} has {len(row)} cells, and the first line has {len(header)}",
-                    "mend that line, or check the separator in the recipe",
-                    file=path,
-                )
-            rows.append(row)
-            lines.append(reader.line_num)
-    except csv.Error as error:
-        raise WildlabError(f"line {reader.line_num}: {error}", "mend that line", file=path) from None
-    if not rows:
-        raise WildlabError("there are no rows in it", "give it a line of column names and rows", file=path)
-    cells: dict[str, Text | Array] = {
-        name: np.array([cell.strip() for cell in column], dtype=object)
-        for name, column in zip(header, zip(*rows, strict=True), strict=True)
-    }
-    return RawTable(path, header, cells, np.array(lines))
-
-
 def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Text:
     """A column as text, blanks at both ends removed. (N,)
 
@@ -207,6 +184,18 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
     WildlabError
         Where there is no such column, or a cell is empty that may not be.
     """
+    found = _column(table, column, part)
+    if is_packed(found):
+        cells = np.asarray(found.to_numpy(), dtype=object)
+    else:  # numbers, as a name or a label: without a needless fraction
+        cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
+    if not may_be_empty:
+        _refuse_empty(cells == "", table, column, part)
+    return cells
+
+
+def _column(table: RawTable, column: str, part: str) -> Any:
+    """A column as it is kept: packed text, or an array of numbers."""
     if column not in table.header:
         fix = did_you_mean(column, table.header)
         if len(table.header) == 1:
@@ -215,15 +204,13 @@ def texts(table: RawTable, column: str, part: str, *, may_be_empty: bool = False
     if table.header.count(column) > 1:
         raise table.fail("two columns have this name", "rename one of them", column, part)
     found = table.cells[column]
-    if found.dtype == object:
-        cells = np.asarray(found, dtype=object)
-    else:  # numbers, as a name or a label: without a needless fraction
-        cells = np.array(["" if np.isnan(one) else f"{one:.15g}" for one in found], dtype=object)
-    empty = cells == ""
-    if empty.any() and not may_be_empty:
+    return packed(found) if not is_packed(found) and found.dtype == object else found
+
+
+def _refuse_empty(empty: NDArray[np.bool_], table: RawTable, column: str, part: str) -> None:
+    if empty.any():
         row = int(np.argmax(empty))
         raise table.fail("this cell is empty", "fill it, or take out the row", column, part, row)
-    return cells
 
 
 def numbers(
@@ -259,18 +246,25 @@ def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool
     WildlabError
         Where there is no such column, or a cell is not a finite number.
     """
-    cells = table.cells.get(column)
-    if cells is not None and cells.dtype != object:
+    cells = _column(table, column, part)
+    if is_packed(cells):
+        found, empty = np.empty(len(table)), np.empty(len(table), bool)
+        start = 0
+        for chunk in cells.iterchunks():  # a block at a time are Python's own strings
+            block = slice(start, start := start + len(chunk))
+            words = chunk.to_numpy(zero_copy_only=False)
+            found[block] = pd.to_numeric(pd.Series(words), errors="coerce").to_numpy(dtype=float)
+            empty[block] = words == ""
+        if not may_be_empty:
+            _refuse_empty(empty, table, column, part)
+        bad = ~np.isfinite(found) & ~empty
+    else:
         found = np.asarray(cells, float)
         bad = np.isinf(found) if may_be_empty else ~np.isfinite(found)
-    else:
-        cells = texts(table, column, part, may_be_empty=may_be_empty)
-        found = pd.to_numeric(pd.Series(cells), errors="coerce").to_numpy(dtype=float)
-        bad = ~np.isfinite(found) & (cells != "")
     if bad.any():
         row = int(np.argmax(bad))
         raise table.fail(
-            f"{_short(str(cells[row]))} is not a finite number",
+            f"{_short(table.cell(column, row))} is not a finite number",
             "mend the cell (a point before the decimals, no unit behind them), or take out the row",
             column,
             part,
@@ -352,7 +346,7 @@ def _counted(table: RawTable, stamp: Stamp, part: str, epoch: datetime | None) -
     far = np.abs(seconds) + abs(start) / 1e9 > _LATEST_S
     if far.any():
         row = int(np.argmax(far))
-        problem = f"{_short(str(table.cells[name][row]))} {stamp.unit} is centuries away"
+        problem = f"{_short(table.cell(name, row))} {stamp.unit} is centuries away"
         raise table.fail(problem, "check the unit of the time in the recipe (s, ms or us)", name, part, row)
     return np.asarray(start + np.round(seconds * 1e9).astype(np.int64))
 

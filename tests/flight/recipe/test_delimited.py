@@ -1,0 +1,65 @@
+"""Text tables read block by block say what Python's own reader says of the whole."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.flight.recipe import delimited
+from wildlab.flight.recipe.delimited import packed, read_delimited
+from wildlab.flight.recipe.raw import RawTable, plain_numbers, texts
+
+CELLS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=6)
+
+
+@given(st.lists(st.tuples(CELLS, CELLS, CELLS), min_size=1, max_size=12), st.integers(1, 5))
+def test_blocks_and_whole_say_the_same(rows: list[tuple[str, str, str]], block: int) -> None:
+    written = io.StringIO(newline="")
+    writer = csv.writer(written, quoting=csv.QUOTE_ALL)
+    writer.writerows([("a", "b", "c"), *rows])
+    text = written.getvalue()
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+    expected = [([cell.strip() for cell in row], reader.line_num) for row in reader][1:]
+    before, delimited.BLOCK = delimited.BLOCK, block
+    try:
+        header, cells, lines = read_delimited(Path("t.csv"), text.encode(), ",")
+    finally:
+        delimited.BLOCK = before
+    assert header == ("a", "b", "c")
+    assert [list(row) for row in zip(*(cells[name].to_pylist() for name in header), strict=True)] == [
+        row for row, _ in expected
+    ]
+    assert lines.tolist() == [line for _, line in expected]
+
+
+def test_numbers_over_several_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delimited, "BLOCK", 2)
+    text = "t,x\n1,0.1\n2,1e-3\n3,\n4,7\n5, -8 \n"
+    table = RawTable(Path("t.csv"), *read_delimited(Path("t.csv"), text.encode(), ","))
+    np.testing.assert_array_equal(plain_numbers(table, "t", "p"), [1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(
+        plain_numbers(table, "x", "p", may_be_empty=True), [0.1, 1e-3, np.nan, 7, -8]
+    )
+    assert texts(table, "x", "p", may_be_empty=True).tolist() == ["0.1", "1e-3", "", "7", "-8"]
+    some = table.rows(np.array([4, 0]))
+    np.testing.assert_array_equal(plain_numbers(some, "x", "p"), [-8, 0.1])
+    assert some.cell("x", 0) == "-8" and some.lines.tolist() == [6, 2]
+    with pytest.raises(WildlabError, match=r"x \(in \[p\]\): line 4: this cell is empty"):
+        plain_numbers(table, "x", "p")
+
+
+def test_the_line_of_a_wrong_byte_far_into_the_file() -> None:
+    data = b"a,b\n" + b"1,2\n" * 50_000 + b"1,\xff\n"
+    with pytest.raises(WildlabError, match="line 50002 is not UTF-8 text"):
+        read_delimited(Path("t.csv"), data, ",")
+
+
+def test_text_out_of_other_files_is_packed_alike() -> None:
+    assert packed(np.array(["a", ""], dtype=object)).to_pylist() == ["a", ""]
