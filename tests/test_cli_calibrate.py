@@ -1,14 +1,18 @@
 """`wildlab calibrate` and `wildlab evaluate --calibration`, through the real command."""
 
 import json
+import re
 
 import pytest
 
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
-from wildlab.flight.learnt import read_learnt
+from wildlab.errors import WildlabError
+from wildlab.flight.learnt import parse_learnt, read_learnt, write_learnt
 from wildlab.flight.manifest import replace_in_manifest
-from wildlab.flight.store import save_flight
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.paths import DATA
+from wildlab.runner.evaluate import evaluate_flight
 
 
 def call(capsys, *arguments):
@@ -66,3 +70,62 @@ def test_help_has_an_example(capsys):
     code, out, _ = call(capsys, "calibrate", "--help")
     assert code == 0 and "wildlab calibrate flights/tuesday --into" in out
     assert "--calibration calibration.toml" in call(capsys, "evaluate", "--help")[1]
+
+
+def example_recipe(into):
+    """The worked example of the recipes' README, as files."""
+    text = (DATA / "recipes" / "README.md").read_text(encoding="utf-8")
+    for name, table in re.findall(r"`(\w+\.csv)`,.*?```csv\n(.*?)```", text, re.DOTALL):
+        (into / name).write_text(table, encoding="utf-8")
+    recipe, *_ = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    (into / "recipe.toml").write_text(recipe, encoding="utf-8")
+    return into / "recipe.toml"
+
+
+def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
+    capsys, folder, tmp_path, monkeypatch
+):
+    code, _, err = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    assert code == 0, err
+    recipe = example_recipe(tmp_path)
+    code, _, err = call(
+        capsys, "import", recipe, "--into", tmp_path / "f", "--calibration", tmp_path / "c.toml"
+    )
+    assert code == 2 and "another camera" in err and not (tmp_path / "f").exists()
+    assert call(capsys, "import", recipe, "--into", tmp_path / "f")[0] == 0
+    flight, learnt = load_flight(tmp_path / "f"), read_learnt(tmp_path / "c.toml")
+    # The same learnt values, of this flight's own camera.
+    mine = learnt.model_copy(update={"camera": flight.manifest.camera, "mount": flight.manifest.mount})
+    write_learnt(mine, tmp_path / "mine.toml")
+    code, _, err = call(
+        capsys,
+        "import",
+        recipe,
+        "--into",
+        tmp_path / "f",
+        "--calibration",
+        tmp_path / "mine.toml",
+        "--overwrite",
+    )
+    assert code == 0, err
+    kept = load_flight(tmp_path / "f")
+    assert kept.calibration is not None and read_learnt(kept.calibration) == mine
+    assert call(capsys, "import", recipe, "--into", tmp_path / "f", "--overwrite")[0] == 0
+    assert load_flight(tmp_path / "f").calibration is None
+
+    jobs = []
+    monkeypatch.setattr("wildlab.runner.evaluate.run_all", lambda groups, *rest: jobs.extend(groups[0]) or [])
+    save_flight(load_flight(folder / "tilted"), tmp_path / "g", calibration=learnt)
+    save_flight(load_flight(tmp_path / "g"), tmp_path / "h")
+    for name, expected in (("g", True), ("h", True), ("tilted", False)):
+        jobs.clear()
+        evaluate_flight(tmp_path / name if expected else folder / name, reports=tmp_path / "reports")
+        assert (
+            (parse_learnt(jobs[0].parameters["calibration"]) == learnt)
+            if expected
+            else ("calibration" not in jobs[0].parameters)
+        )
+    text = (tmp_path / "g" / "calibration.toml").read_text().replace("tilt", "roll", 1)
+    (tmp_path / "g" / "calibration.toml").write_text(text)
+    with pytest.raises(WildlabError, match=r"calibration\.toml: its SHA-256 is not the one"):
+        load_flight(tmp_path / "g")

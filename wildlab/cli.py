@@ -111,11 +111,13 @@ def check(flight: Path, as_json: bool, accept: bool) -> None:
 @click.argument("recipe", type=FILE)
 @click.option("--source", type=FOLDER, help="Folder of the raw files.  [default: the recipe's]")
 @click.option("--into", type=FOLDER, required=True, help="Folder of the flight to make.")
+@click.option("--calibration", type=FILE, help="What `wildlab calibrate` learnt, to be kept with the flight.")
 @click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
-def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> None:
+def import_(recipe: Path, source: Path | None, into: Path, calibration: Path | None, overwrite: bool) -> None:
     """Make a flight folder from raw logs, as RECIPE says. The raw files are not changed.
 
-    How to write one is in data/recipes/README.md; `wildlab doctor` says where that data folder is.
+    How to write one is in data/recipes/README.md; `wildlab doctor` says where that data folder is. With
+    --calibration, what was learnt on another flight is kept with this one and applied when it is evaluated.
 
     \b
     Example:
@@ -124,7 +126,7 @@ def import_(recipe: Path, source: Path | None, into: Path, overwrite: bool) -> N
     from wildlab.flight.checks.sense.sense import sense_sentences
     from wildlab.flight.recipe.importing import import_flight
 
-    flight = import_flight(recipe, source, into, overwrite=overwrite)
+    flight = import_flight(recipe, source, into, overwrite, calibration)
     click.echo(shown(into))
     for line in sense_sentences(flight):
         click.echo(line, err=True)

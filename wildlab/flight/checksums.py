@@ -21,6 +21,8 @@ from wildlab.flight.schema import TABLES
 from wildlab.flight.toml import dump_toml
 
 TERRAIN = "terrain.tif"
+#: What was learnt on another flight, where this one came with it.
+CALIBRATION = "calibration.toml"
 #: The part of `flight.toml`, and its line.
 PART = "checksums"
 _HEADER = re.compile(rf"^[ \t]*\[[ \t]*{PART}[ \t]*\].*$", re.MULTILINE)
@@ -28,8 +30,8 @@ _NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
 def table_files(folder: Path) -> dict[str, Path]:
-    """The tables and the terrain of a flight folder, by their names in it: ``"nav/logged.parquet"``."""
-    names = [f"{name}.parquet" for name in TABLES] + [TERRAIN]
+    """Tables, terrain and calibration of a flight folder, by their names in it: ``"nav/logged.parquet"``."""
+    names = [f"{name}.parquet" for name in TABLES] + [TERRAIN, CALIBRATION]
     names += sorted(f"nav/{path.name}" for path in (folder / "nav").glob("*.parquet"))
     return {name: folder / name for name in names if (folder / name).is_file()}
 

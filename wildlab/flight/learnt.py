@@ -6,14 +6,17 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, read_toml
-from wildlab.flight.manifest import CameraPart, MountPart, Spread
+from wildlab.flight.manifest import CameraPart, Manifest, MountPart, Spread
 from wildlab.flight.toml import dump_toml
 
+#: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
+SAME_CAMERA = 1e-3
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 #: Units of the parameters, by name; the file is for people, so angles are in degrees and shares in percent.
 UNITS: dict[str, str] = {
@@ -147,3 +150,35 @@ def write_learnt(learnt: Learnt, path: Path) -> None:
     except OSError as error:
         fix = "name a file in a folder that is there and may be written to"
         raise WildlabError(f"cannot be written ({error.strerror})", fix, file=path) from None
+
+
+def refuse_other_camera(manifest: Manifest, learnt: Learnt) -> None:
+    """Refuse a calibration that belongs to another camera, or to one that sits in another way.
+
+    Raises
+    ------
+    WildlabError
+        Which part differs, and how.
+    """
+    here, there = manifest.camera, learnt.camera
+    fix = "learn one on a flight with this camera: wildlab calibrate"
+    if here is None:
+        raise WildlabError("the calibration is of a camera and this flight has none", "leave it out")
+    for name in CameraPart.model_fields:
+        one, other = getattr(here, name), getattr(there, name)
+        if name == "name":
+            continue
+        pixels = here.fx_px if name in ("fx_px", "fy_px", "cx_px", "cy_px", "skew_px") else 0.0
+        if abs(one - other) > SAME_CAMERA * max(abs(other), pixels):
+            raise WildlabError(
+                f"the calibration was learnt with another camera: {name} is {other:g} there and {one:g} here",
+                fix,
+            )
+    for name in MountPart.model_fields:
+        one, other = getattr(manifest.mount, name), getattr(learnt.mount, name)
+        same = one == other if isinstance(one, str) else np.allclose(one, other, atol=1e-6)
+        if not same:
+            raise WildlabError(
+                f"the calibration was learnt with another mount: {name} is {other} there and {one} here",
+                "give both flights the same [mount], or learn one on a flight with this mount",
+            )

@@ -18,8 +18,9 @@ import pyarrow.parquet
 
 from wildlab.brief import Brief, Summary
 from wildlab.errors import WildlabError
-from wildlab.flight.checksums import TERRAIN, checksums_of, verify, with_checksums
+from wildlab.flight.checksums import CALIBRATION, TERRAIN, checksums_of, verify, with_checksums
 from wildlab.flight.files import inside, is_safe_name, regular_size
+from wildlab.flight.learnt import Learnt, write_learnt
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
 from wildlab.flight.schema import NAV, TABLES, Table, conform
 
@@ -81,6 +82,12 @@ class Flight(Brief):
     def terrain(self) -> Path | None:
         """The elevation model, where the flight has one."""
         path = self.folder / TERRAIN if self.folder is not None else None
+        return path if path is not None and path.is_file() else None
+
+    @property
+    def calibration(self) -> Path | None:
+        """What was learnt on another flight, where this one was imported with it."""
+        path = self.folder / CALIBRATION if self.folder is not None else None
         return path if path is not None and path.is_file() else None
 
     def brief(self) -> Summary:
@@ -195,8 +202,9 @@ def load_flight(folder: Path | str) -> Flight:
         for name, table in TABLES.items()
         if os.path.lexists(folder / f"{name}.parquet")
     }
-    if os.path.lexists(folder / TERRAIN):
-        _present(inside(folder, TERRAIN, file=folder, field=TERRAIN))
+    for name in (TERRAIN, CALIBRATION):
+        if os.path.lexists(folder / name):
+            _present(inside(folder, name, file=folder, field=name))
     return Flight(manifest.model_copy(update={"checksums": {}}), nav, tables, folder)
 
 
@@ -231,7 +239,9 @@ def _read(folder: Path, name: str, table: Table) -> pd.DataFrame:
     return conform(table, data, path, ours=True)
 
 
-def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) -> Flight:
+def save_flight(
+    flight: Flight, folder: Path | str, *, overwrite: bool = False, calibration: Learnt | None = None
+) -> Flight:
     """Write a flight folder, whole or not at all. Returns the flight as it now stands there.
 
     Parameters
@@ -242,6 +252,8 @@ def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) 
         A new or an empty folder, or one that holds a flight.
     overwrite
         Whether a flight that is there may be replaced.
+    calibration
+        What was learnt on another flight; left out, the one that the flight has, if any.
 
     Returns
     -------
@@ -290,6 +302,10 @@ def save_flight(flight: Flight, folder: Path | str, *, overwrite: bool = False) 
             _write(table, folder_now / f"{name}.parquet")
         if flight.terrain is not None:
             shutil.copyfile(flight.terrain, folder_now / TERRAIN)
+        if calibration is not None:
+            write_learnt(calibration, folder_now / CALIBRATION)
+        elif flight.calibration is not None:
+            shutil.copyfile(flight.calibration, folder_now / CALIBRATION)
         text = with_checksums(manifest_toml(flight.manifest), checksums_of(folder_now))
         (folder_now / FILE_NAME).write_text(text, encoding="utf-8")
     return Flight(flight.manifest, nav, tables, target)
@@ -316,7 +332,7 @@ def _refuse(target: Path, overwrite: bool) -> None:
     if there and not overwrite:
         fix = "choose another folder, or overwrite it (--overwrite; in Python overwrite=True)"
         raise WildlabError("there is a flight in this folder already", fix, file=target)
-    known = {FILE_NAME, TERRAIN, *(f"{name}.parquet" for name in TABLES)}
+    known = {FILE_NAME, TERRAIN, CALIBRATION, *(f"{name}.parquet" for name in TABLES)}
     for name in there:
         if name not in known and not re.fullmatch(r"nav/[^/]+\.parquet", name):
             problem = f"{name!r} is no part of a flight, and overwriting would lose it"

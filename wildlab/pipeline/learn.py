@@ -17,8 +17,8 @@ from wildlab.flight.learnt import (
     LearntOn,
     LearntParameter,
     parse_learnt,
+    refuse_other_camera,
 )
-from wildlab.flight.manifest import CameraPart, MountPart
 from wildlab.flight.store import Flight
 from wildlab.geometry.corrections import Calibration
 from wildlab.pipeline.accuracy import noise_without
@@ -30,8 +30,6 @@ from wildlab.pipeline.pose_noise import as_deviations
 __all__ = ["Applied", "apply_learnt", "learn_flight", "learn_from", "parse_learnt"]
 
 _SCALES = {"deg": 180 / np.pi, "%": 100.0}
-#: Focal lengths and principal points that differ by no more than this share of the focal length are the same.
-SAME_CAMERA = 1e-3
 
 
 def learn_flight(
@@ -186,7 +184,7 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
     WildlabError
         Where it was learnt with another camera or another mount.
     """
-    refuse_other_camera(flight, learnt)
+    refuse_other_camera(flight.manifest, learnt)
     n = len(learnt.parameter)
     scales = np.array([1 / _SCALES.get(one.unit, 1.0) for one in learnt.parameter])
     calibration = Calibration(
@@ -201,38 +199,6 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
     placed = calibrated(flight, source, observations, calibration)
     deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
     return Applied(placed, deviations, _sentence(flight, observations, learnt))
-
-
-def refuse_other_camera(flight: Flight, learnt: Learnt) -> None:
-    """Refuse a calibration that belongs to another camera, or to one that sits in another way.
-
-    Raises
-    ------
-    WildlabError
-        Which part differs, and how.
-    """
-    here, there = flight.manifest.camera, learnt.camera
-    fix = "learn one on a flight with this camera: wildlab calibrate"
-    if here is None:
-        raise WildlabError("the calibration is of a camera and this flight has none", "leave it out")
-    for name in CameraPart.model_fields:
-        one, other = getattr(here, name), getattr(there, name)
-        if name == "name":
-            continue
-        pixels = here.fx_px if name in ("fx_px", "fy_px", "cx_px", "cy_px", "skew_px") else 0.0
-        if abs(one - other) > SAME_CAMERA * max(abs(other), pixels):
-            raise WildlabError(
-                f"the calibration was learnt with another camera: {name} is {other:g} there and {one:g} here",
-                fix,
-            )
-    for name in MountPart.model_fields:
-        one, other = getattr(flight.manifest.mount, name), getattr(learnt.mount, name)
-        same = one == other if isinstance(one, str) else np.allclose(one, other, atol=1e-6)
-        if not same:
-            raise WildlabError(
-                f"the calibration was learnt with another mount: {name} is {other} there and {one} here",
-                "give both flights the same [mount], or learn one on a flight with this mount",
-            )
 
 
 def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str:

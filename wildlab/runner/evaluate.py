@@ -10,10 +10,9 @@ from rich.console import Console
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import Use, find, usable_for
-from wildlab.flight.learnt import learnt_toml, read_learnt
+from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
-from wildlab.pipeline.learn import refuse_other_camera
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
@@ -45,7 +44,8 @@ def evaluate_flight(
         Which of the flight's poses to judge the georeferencing of; not needed where it has one navigation
         source, or one named ``logged``.
     calibration
-        A ``calibration.toml`` of another flight, applied before the georeferencing is judged.
+        A ``calibration.toml`` of another flight, applied before the georeferencing is judged; left out, the
+        one that the flight was imported with, if any.
 
     Returns
     -------
@@ -90,12 +90,13 @@ def evaluate_flight(
     if places.usable:
         found, _ = flight.pose_source(source)
         parameters, again_with = {"source": found}, f"{again} --source {found}"
-        if calibration is not None:
-            learnt = read_learnt(calibration)
-            refuse_other_camera(flight, learnt)
+        applied = calibration or flight.calibration
+        if applied is not None:
+            learnt = read_learnt(applied)
+            refuse_other_camera(flight.manifest, learnt)
             # Its text, not its path: the report can be made again without the file, and names no folder.
             parameters["calibration"] = learnt_toml(learnt)
-            again_with += f" --calibration {calibration.name}"
+            again_with += f" --calibration {calibration.name}" if calibration else ""
         prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
     elif lacks_only_truth(flight) and calibration is None:
         found, _ = flight.pose_source(source)

@@ -17,6 +17,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import check_model
+from wildlab.flight.learnt import read_learnt, refuse_other_camera
 from wildlab.flight.manifest import (
     CameraPart,
     GnssPart,
@@ -40,7 +41,11 @@ from wildlab.flight.store import Flight, save_flight
 
 
 def import_flight(
-    recipe_path: Path | str, source: Path | str | None, into: Path | str, overwrite: bool = False
+    recipe_path: Path | str,
+    source: Path | str | None,
+    into: Path | str,
+    overwrite: bool = False,
+    calibration: Path | None = None,
 ) -> Flight:
     """Make a flight folder from plain tables, whole or not at all. The tables are only read.
 
@@ -54,6 +59,8 @@ def import_flight(
         Folder of the flight.
     overwrite
         Whether a flight that is there already may be replaced.
+    calibration
+        What `wildlab calibrate` learnt on another flight: kept with this one, applied when it is evaluated.
 
     Returns
     -------
@@ -64,7 +71,7 @@ def import_flight(
     ------
     WildlabError
         Naming the file, the column and the part of the recipe where something is missing or wrong, or what
-        `check_flight` calls a problem.
+        `check_flight` calls a problem; or where the calibration is of another camera.
 
     Examples
     --------
@@ -76,9 +83,12 @@ def import_flight(
     folder = recipe_path.parent if source is None else Path(source)
     if not folder.is_dir():
         raise WildlabError("there is no such folder to import from", "check the source folder", file=folder)
+    learnt = None if calibration is None else read_learnt(calibration)
     flight = _build(recipe, RawFiles(folder, recipe_path, recipe.tables, recipe.logs))
     _refuse_problems(flight, recipe, folder)
-    return save_flight(flight, into, overwrite=overwrite)
+    if learnt is not None:
+        refuse_other_camera(flight.manifest, learnt)
+    return save_flight(flight, into, overwrite=overwrite, calibration=learnt)
 
 
 def _build(recipe: Recipe, raw: RawFiles) -> Flight:
