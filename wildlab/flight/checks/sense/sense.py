@@ -10,6 +10,7 @@ from wildlab.flight.checks.sense.camera import lens
 from wildlab.flight.checks.sense.felt import forces
 from wildlab.flight.checks.sense.field import field
 from wildlab.flight.checks.sense.ground import ground
+from wildlab.flight.checks.sense.heading import heading
 from wildlab.flight.checks.sense.motion import motion
 from wildlab.flight.checks.sense.origin import origin, together
 from wildlab.flight.checks.sense.positions import positions
@@ -44,8 +45,11 @@ def sense(flight: Flight) -> Iterator[Finding]:
         moving = list(motion(flight))
         yield from moving
         yield from positions(flight)
-        yield from forces(flight)
+        felt = list(forces(flight))
+        yield from felt
         yield from field(flight)
+        if not moving and not felt:
+            yield from heading(flight)
     yield from lens(flight)
     scanned = list(scans(flight))
     yield from scanned

@@ -1,0 +1,78 @@
+"""Heading and course: what is named on a circle, and where nothing may be said."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.checks.inertial_data import POSITION, QUATERNION
+from wildlab.flight.checks.sense.heading import follows, headed, heading
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion
+
+T = np.arange(0, 300, 0.5)
+COURSE = 2 * np.pi * T / 120
+
+
+class _Flight:
+    def __init__(self, yaw: Any, course: Any = COURSE, speed: float = 15.0) -> None:
+        step = speed * 0.5 * np.column_stack([np.cos(course), np.sin(course), 0 * course])
+        table = pd.DataFrame({"time_s": T})
+        table[list(POSITION)] = np.cumsum(step, axis=0)
+        R = euler_to_matrix(0.1 + 0 * T, 0.02 + 0 * T, yaw)
+        table[list(QUATERNION)] = matrix_to_quaternion(R)
+        self.nav = {"log": table}
+
+
+def causes(flight: _Flight) -> list[str]:
+    return [cause for one in heading(flight) for cause in one.causes]  # type: ignore[arg-type]
+
+
+def wrapped(angle: Any) -> Any:
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+@pytest.mark.parametrize(
+    ("yaw", "cause"),
+    [
+        (-COURSE, "attitude: sign of yaw"),
+        (COURSE - np.pi / 2, "attitude: yaw off by 90 deg"),
+        (COURSE + np.pi / 2, "attitude: yaw off by -90 deg"),
+        (COURSE + np.pi, "attitude: yaw off by 180 deg"),
+        (np.pi / 2 - COURSE, "attitude: yaw counted from east towards north"),
+        (np.radians(wrapped(COURSE)), "attitude: yaw in radians, read as degrees"),
+    ],
+)
+def test_the_usual_mistakes_about_yaw_are_named(yaw: Any, cause: str) -> None:
+    assert causes(_Flight(yaw)) == [cause]
+
+
+@pytest.mark.parametrize(
+    "flight",
+    [
+        _Flight(COURSE),
+        _Flight(COURSE + 0.4 * np.sin(T)),  # wind
+        _Flight(0 * T + 0.3),  # a multirotor that always looks one way
+        _Flight(np.pi / 2 + 0 * T, course=0 * T),  # straight on, sideways
+        _Flight(-COURSE, speed=1.0),  # too slow for a course
+        _Flight(np.random.default_rng(1).uniform(-np.pi, np.pi, len(T))),
+    ],
+)
+def test_nothing_is_said_where_no_mistake_explains_it(flight: _Flight) -> None:
+    assert causes(flight) == []
+
+
+def test_it_is_a_warning_with_its_numbers() -> None:
+    (found,) = heading(_Flight(-COURSE))  # type: ignore[arg-type]
+    assert found.level == "warning" and found.table == "nav/log"
+    assert "and it does if yaw has the wrong sign (1.00)" in found.sentence
+    assert "leave it for an aircraft that flies sideways or backwards" in found.fix
+
+
+def test_the_mean_cosine_is_that_of_a_known_angle() -> None:
+    given = headed(_Flight(COURSE + 0.3).nav["log"])
+    assert given is not None
+    # The course over two seconds is that of their middle, but for the half step the positions lie late.
+    np.testing.assert_allclose(follows(*given), np.cos(0.3), atol=0.02)
