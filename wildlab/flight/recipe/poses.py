@@ -152,7 +152,7 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
             f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
             "position was known yet",
             "take out these rows",
-            position.latitude.column or "value",
+            (position.latitude.column if position.latitude else None) or "value",
             f"{part}.latitude",
             int(np.argmax(nowhere)),
         )
