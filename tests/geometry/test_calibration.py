@@ -103,6 +103,40 @@ def test_clock_and_position_come_back_too():
     assert np.allclose([found.value(k) for k in ("north", "east", "down")], [-1.0, 2.0, -1.5], atol=0.1)
 
 
+def noisy_log(survey, seed, position_sd, attitude_sd, every=0.1):
+    """Poses out of a log whose samples have noise of their own, the images in step with the samples."""
+    nodes = np.arange(-30, 31)
+    sd = np.repeat([position_sd, attitude_sd], 3)
+    noise = np.random.default_rng([7, seed]).normal(0, sd, (survey.image[-1] + 1, len(nodes), 6))[
+        survey.image
+    ]
+
+    def at(offset):
+        low = int(np.clip(np.floor(offset / every), -30, 29))
+        share = offset / every - low
+        between = (1 - share) * noise[:, low + 30] + share * noise[:, low + 31]
+        p, R = survey.truth(offset)
+        turned = R @ rotation_vector_to_matrix(between[:, 3:])
+        return CameraPoses(TAU2, PLAIN, p + survey.wrong + between[:, :3], turned)
+
+    return at
+
+
+def test_noise_of_a_fast_log_does_not_hold_the_clock():
+    """Between two samples the slope is noise, and half way the noise is least: a well at each of them."""
+    far_off, clocks = [], []
+    for seed, clock in enumerate([0.34, -0.55, 0.1] * 4):
+        survey = Survey(seed, EVERY_WAY, clock=clock, pixel_sd=1.5)
+        log = noisy_log(survey, seed, position_sd=0.5, attitude_sd=0.005)
+        found = calibrate(log, survey.uv, survey.known, survey.image, (*BORESIGHT, "clock"))
+        off = found.values - [*TRUE.misalignment, clock]
+        far_off.append(off / np.sqrt(np.diag(found.covariance)))
+        clocks.append(off[-1])
+    # Held by the wells, it would be off by tenths of a second, and by ten stated standard deviations.
+    assert np.sqrt(np.mean(np.square(clocks))) < 0.05
+    assert (np.sqrt(np.mean(np.square(far_off), axis=0)) < 3.0).all()
+
+
 def test_flying_one_way_cannot_tell_clock_or_position_from_the_angles():
     """Straight and level at one height: tilt, clock and the position along the course look the same."""
     survey = Survey(3, [0.0], pixel_sd=2.0, plain=True)

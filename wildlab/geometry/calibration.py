@@ -47,6 +47,13 @@ __all__ = [
 PARALLEL = 0.1
 #: Steps of an estimate, and how often a step that makes it worse is halved.
 ROUNDS, HALVINGS = 30, 8
+#: Seconds either way over which the derivative by the clock is taken. Between two samples of a log the slope
+#: is mostly their noise, and it goes together with the noise of the pose that lies between them.
+CLOCK_STEP = 0.2
+#: Clocks (s) from which the estimate is tried besides zero, as noise of the log makes wells in the
+#: likelihood, and the share of the points that has to have a pose there.
+CLOCK_STARTS = tuple(float(s) for s in np.linspace(-1.0, 1.0, 21))
+START_SHARE = 0.8
 
 
 class Fit(NamedTuple):
@@ -118,7 +125,7 @@ def fit_points(
         raise ValueError("fewer than two points have a pose and meet the ground: nothing to calibrate with")
 
     def fit(names: tuple[str, ...], scaled: Array) -> tuple[Array, Array, float]:
-        """Scaled estimate (P,) by Gauss and Newton, residuals (N, 2) at it, and their standard deviation."""
+        """Scaled estimate (P,) by Gauss and Newton, residuals (N, 2) at it, and their cost."""
         r = at(names, scaled)
         cost = student_cost((r**2).sum(axis=1))
         for _ in range(ROUNDS if names else 0):
@@ -134,33 +141,68 @@ def fit_points(
             gained, scaled, r, cost = cost - found, scaled + step, trial, found
             if gained < 1e-6 and np.abs(step).max() < 1e-9:
                 break
-        return scaled, r, student_scale((r**2).sum(axis=1))
+        return scaled, r, cost
+
+    def settle(names: tuple[str, ...], scaled: Array) -> Array:
+        """Where derivatives wider than the wells see nothing to gain; as it was where that is not near."""
+        first, reach = scaled, 2 * CLOCK_STEP / PARAMETERS["clock"]
+        for _ in range(ROUNDS):
+            step = fit_linear(derivative(names, scaled), at(names, scaled)).x
+            scaled = scaled + step
+            if np.abs(scaled - first).max() > reach:
+                return first
+            if np.abs(step).max() < 1e-4:
+                return scaled
+        return first
+
+    def start(names: tuple[str, ...]) -> Array:
+        """The clock under which the points fit best, all else taken as linear; scaled (P,)."""
+        clock = PARAMETERS["clock"]
+        axis = np.array([name == "clock" for name in names], float)
+        others = derivative(names, np.zeros(len(names)))[..., axis == 0]
+        best, found = np.inf, np.zeros(len(names))
+        for seconds in CLOCK_STARTS:
+            r = residuals(names, seconds / clock * axis)[usable]
+            good = np.isfinite(r).all(axis=1)
+            if good.mean() < START_SHARE:
+                continue
+            x = fit_linear(others[good], r[good]).x
+            cost = student_cost(((r + others @ x)[good] ** 2).sum(axis=1)) / good.sum()
+            if cost < best:
+                best, found = cost, seconds / clock * axis
+                found[axis == 0] = x
+        return found
 
     def at(names: tuple[str, ...], scaled: Array) -> Array:
         # A trial that tips a ray over the horizon is far off; a large residual turns it back.
         return np.nan_to_num(residuals(names, scaled)[usable], nan=1e6)
 
-    def derivative(names: tuple[str, ...], scaled: Array, step: float = 1e-5) -> Array:
+    def derivative(names: tuple[str, ...], scaled: Array) -> Array:
         """Derivative (N, 2, P) of the residuals by central differences; zero for a ray that misses."""
+        steps = [CLOCK_STEP / PARAMETERS[name] if name == "clock" else 1e-5 for name in names]
         columns = [
             (residuals(names, scaled + step * axis) - residuals(names, scaled - step * axis))[usable]
             / (2 * step)
-            for axis in np.eye(len(names))
+            for step, axis in zip(steps, np.eye(len(names)), strict=True)
         ]
         empty = np.zeros((int(usable.sum()), 2, 0))
         return np.nan_to_num(np.stack(columns, axis=-1)) if columns else empty
 
     names, undetermined = wanted, dict[str, tuple[str, ...]]()
-    scaled = np.zeros(len(names))
+    starts = [np.zeros(len(names))] + ([start(names)] if "clock" in names else [])
     while True:
-        scaled, r, noise = fit(names, scaled)
+        scaled, r, _ = min((fit(names, at_first) for at_first in starts), key=lambda found: found[2])
+        if "clock" in names:
+            scaled = settle(names, scaled)
+            r = at(names, scaled)
+        noise = student_scale((r**2).sum(axis=1))
         J = derivative(names, scaled)
         blurred = _undetermined(names, J.reshape(2 * len(J), -1), noise) if names else None
         if blurred is None:
             break
         name, partners = blurred
         undetermined[name] = partners
-        scaled = scaled[[other != name for other in names]]
+        starts = [scaled[[other != name for other in names]]]
         names = tuple(other for other in names if other != name)
     scale = np.array([PARAMETERS[name] for name in names])
     return Fit(names, scaled * scale, undetermined, usable, J / scale, r)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,7 +10,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wildlab.flight.checks.sense import bounds, camera, ground, motion, origin, sense, stamps, targets, trial
+from wildlab.flight.checks.sense import (
+    bounds,
+    camera,
+    ground,
+    motion,
+    origin,
+    seen,
+    sense,
+    stamps,
+    targets,
+    trial,
+)
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes, rotations_of_axes
 from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, other_axes
 from wildlab.flight.checks.sense.field import Seen, field_mistakes
@@ -124,6 +136,20 @@ def test_a_camera_that_looks_the_other_way_is_ninety_degrees_off() -> None:
     assert np.median(angle) == pytest.approx(90, abs=15)
     assert metres(wrong) > 80
     assert metres(replace(wrong, mount=Mount("down"))) < 1e-6
+
+
+def test_what_a_mistake_gains_is_shown_where_a_tilted_mount_hides_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays pass the points by as much as before, unless the tilt, which is no mistake, is taken off."""
+    undone = _sightings(Mount("down"), Mount("down", misalignment=(0.06, 0.0, 0.0)))
+    scatter = np.random.default_rng(4).normal(0, [2.0, 2.0, 0.0], undone.points.shape)
+    given = replace(undone, points=undone.points + scatter)
+    assert metres(undone) > 0.7 * metres(given)
+    named = [trial.Named(trial.Mistake("x", "x is wrong", "`x`", lambda s: s), undone, 9.0, 1.0)]
+    monkeypatch.setattr(seen, "explain", lambda *_: named)
+    finding = next(seen.judge(simulate_twin("static-antenna", 1), given))
+    before, after = re.findall(r"([\d.]+) m\b", finding.sentence)
+    assert "taken off" in finding.sentence
+    assert float(after) < 0.2 * float(before)
 
 
 def _log(**changes: float) -> pd.DataFrame:

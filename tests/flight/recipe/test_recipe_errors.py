@@ -106,6 +106,13 @@ def both(*changes: Change) -> Change:
             "line 4: 634.4 deg is no latitude. Check the column and its unit",
         ),
         (
+            in_table("nav.csv", "63.440200,10.4,", "0,0,"),
+            "nav.csv",
+            "lat",
+            "line 4: latitude and longitude are both 0, here and in 0 other rows: no position "
+            "was known yet. Take out these rows",
+        ),
+        (
             in_table(
                 "nav.csv", "10.4,140,1,0,0,0\n2024-06-12T09:30:04Z", "10.4,140,1,1,0,0\n2024-06-12T09:30:04Z"
             ),
@@ -165,7 +172,7 @@ def both(*changes: Change) -> Change:
             lambda raw: raw.tables.update({"photos.csv": raw.tables["photos.csv"].replace("T09", "T11")}),
             "nav.csv",
             "time_s (from [poses.log])",
-            "they do not overlap in time. Check the time zone of both",
+            "they do not overlap in time. Check the time zone, the format and the unit of the stamps of both",
         ),
         (
             in_recipe("time.epoch", "2024-06-12T12:30:00Z"),
@@ -285,6 +292,12 @@ def both(*changes: Change) -> Change:
         ),
         (in_recipe("detections.0.pixels", 1), "recipe.toml", "detections[0].pixels", "Did you mean 'pixel'"),
         (in_recipe("name", "../x"), "recipe.toml", "name", "cannot be the name of a flight"),
+        (
+            in_recipe("name", "9" * 400),
+            "recipe.toml",
+            "name",
+            "Use letters, digits, - and _ only, 100 at most",
+        ),
         (
             in_recipe("poses", {}),
             "recipe.toml",

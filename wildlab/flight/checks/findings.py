@@ -213,7 +213,9 @@ def _within(table: str, what: str, times: np.ndarray, stamps: np.ndarray, of: st
             f"the {what} run from {low:.3f} s to {high:.3f} s, the {of} from {np.nanmin(times):.3f} s to "
             f"{np.nanmax(times):.3f} s: "
             + ("they do not overlap in time" if outside.all() else f"{count(outside, 'frame')} outside"),
-            "check the time zone of both, and [clocks]",
+            "check the time zone, the format and the unit of the stamps of both, and [clocks]"
+            if outside.all()
+            else "check the time zone of both, and [clocks]",
         )
 
 

@@ -172,7 +172,11 @@ class Recipe(Strict):
     @classmethod
     def _safe_name(cls, value: str) -> str:
         if not is_safe_name(value):
-            raise ValueError(f"{value!r} cannot be the name of a flight; use letters, digits, - and _ only")
+            shown = repr(value if len(value) <= 40 else value[:40] + "...")
+            raise ValueError(
+                f"{shown} cannot be the name of a flight; use letters, digits, - and _ only, 100 at most, "
+                "the first a letter or digit"
+            )
         return value
 
     @field_validator("poses")

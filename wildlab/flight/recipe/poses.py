@@ -145,6 +145,17 @@ def read_position(table: RawTable, position: Position, part: str) -> RawPosition
                 row,
             )
         columns.append(values)
+    nowhere = (columns[0] == 0) & (columns[1] == 0)
+    # A receiver writes zeros until it knows where it is; a local position may well be zero.
+    if form == "wgs84" and nowhere.any():
+        raise table.fail(
+            f"latitude and longitude are both 0, here and in {int(nowhere.sum()) - 1} other rows: no "
+            "position was known yet",
+            "take out these rows",
+            (position.latitude.column if position.latitude else None) or "value",
+            f"{part}.latitude",
+            int(np.argmax(nowhere)),
+        )
     return RawPosition(form, position.linear, np.column_stack(columns))
 
 

@@ -72,7 +72,7 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
     if abs(by) > 0.05:
         yield Mistake(
             "clock of the camera",
-            f"the images are of {abs(by):.2f} s {'later' if by > 0 else 'earlier'} than their stamps say",
+            f"the images were taken {abs(by):.2f} s {'later' if by > 0 else 'earlier'} than their stamps say",
             f"`camera_offset_s = {offset_s + by:.2f}` in [clocks]",
             lambda x: shifted(x, by),
             fitted=True,
@@ -80,8 +80,8 @@ def clock_mistakes(s: Sightings, offset_s: float) -> Iterator[Mistake[Sightings]
     for seconds in LEAP_S:
         yield Mistake(
             f"leap seconds ({seconds:g} s)",
-            f"the images are of {abs(seconds):g} s {'later' if seconds > 0 else 'earlier'} than their stamps "
-            "say, as between GPS time and UTC",
+            f"the images were taken {abs(seconds):g} s {'later' if seconds > 0 else 'earlier'} than their "
+            "stamps say, as between GPS time and UTC",
             f"`camera_offset_s = {offset_s + seconds:g}` in [clocks]",
             lambda x, t=seconds: shifted(x, t),  # type: ignore[misc]
         )

@@ -169,7 +169,7 @@ def forces(flight: Flight) -> Iterator[Finding]:
                 f"{words.number(before[1])} times what is usual: "
                 f"{' or '.join(one.mistake.said for one in named)}; then "
                 f"it is {words.number(after[0])} and {words.number(after[1])}",
-                "write " + "; or ".join(one.mistake.write for one in named) + ", and import again",
+                words.fixes([one.mistake.write for one in named]),
                 tuple(one.mistake.cause for one in named),
             )
         elif axes := against(given):

@@ -113,7 +113,7 @@ def motion(flight: Flight) -> Iterator[Finding]:
             f"displacement and velocity differ by {words.number(_apart(given))} m/s: "
             + " or ".join(one.mistake.said for one in named)
             + f"; then it is {words.number(_apart(named[0].undone))} m/s",
-            "write " + "; or ".join(one.mistake.write for one in named) + ", and import again",
+            words.fixes([one.mistake.write for one in named]),
             tuple(one.mistake.cause for one in named),
         )
 

@@ -107,7 +107,7 @@ def positions(flight: Flight) -> Iterator[Finding]:
                 "north_m",
                 f"{said}: {' or '.join(one.mistake.said for one in named)}; then they are "
                 f"{_apart(named[0].undone)} apart",
-                "write " + "; or ".join(one.mistake.write for one in named) + ", and import again",
+                words.fixes([one.mistake.write for one in named]),
                 tuple(one.mistake.cause for one in named),
             )
         elif now[1, 0] > 6.0:

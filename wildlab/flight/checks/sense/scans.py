@@ -126,7 +126,7 @@ def scans(flight: Flight) -> Iterator[Finding]:
             "",
             f"{share:.0f} % of the detections are where a target is: "
             f"{' or '.join(one.mistake.said for one in named)}; then it is {then:.0f} %",
-            "write " + "; or ".join(one.mistake.write for one in named) + ", and import again",
+            words.fixes([one.mistake.write for one in named]),
             tuple(one.mistake.cause for one in named),
         )
         return
@@ -141,7 +141,7 @@ def scans(flight: Flight) -> Iterator[Finding]:
             "north_m" if one.places is not None else "azimuth_rad",
             f"{share:.0f} % of the detections of {one.source} are where a target is: "
             f"{' or '.join(way.mistake.said for way in own)}; then it is {then:.0f} %",
-            "write " + "; or ".join(way.mistake.write for way in own) + ", and import again",
+            words.fixes([way.mistake.write for way in own]),
             tuple(way.mistake.cause for way in own),
         )
 

@@ -22,11 +22,12 @@ from wildlab.flight.checks.sense.sightings import (
     glance,
     left_over,
     metres,
+    metres_left,
     misfit,
     missed,
     sightings,
 )
-from wildlab.flight.checks.sense.trial import Mistake, Named, explain
+from wildlab.flight.checks.sense.trial import FAR_BETTER, Mistake, Named, explain
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 
@@ -121,22 +122,24 @@ def _points(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sigh
 
 
 def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
-    before = metres(given)
     first, *others = named
+    # Where other small errors hide what is gained, it is the distance without these that shows it.
+    plain = metres(first.undone) * FAR_BETTER <= metres(given)
+    far = metres if plain else metres_left
     said = (
-        f"{first.mistake.said}: that brings the distance by which rays pass known points from "
-        f"{words.number(before)} m to {words.number(metres(first.undone))} m (median)"
+        f"{first.mistake.said}: that brings the distance by which rays pass known points"
+        f"{'' if plain else ', small constant errors of mount and position taken off,'} from "
+        f"{words.number(far(given))} m to {words.number(far(first.undone))} m (median)"
     )
     if others:
-        alike = [f"{one.mistake.said} ({words.number(metres(one.undone))} m)" for one in others]
+        alike = [f"{one.mistake.said} ({words.number(far(one.undone))} m)" for one in others]
         said += f"; as well explained: {words.joined(alike)}"
-    fix = f"write {first.mistake.write}" + "".join(f"; or {one.mistake.write}" for one in others)
     return Finding(
         "problem",
         f"nav/{given.source}",
         "",
         said,
-        f"{fix}, and import again",
+        words.fixes([one.mistake.write for one in named]),
         tuple(one.mistake.cause for one in named),
     )
 

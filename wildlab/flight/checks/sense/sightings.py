@@ -369,8 +369,17 @@ def metres(s: Sightings) -> float:
     return float(np.median(past)) if good.any() else float("nan")
 
 
+def metres_left(s: Sightings) -> float:
+    """The same where small constant errors of mount and position are taken off."""
+    m = missed(s)
+    good = finite(m)
+    if not good.any():
+        return float("nan")
+    return float(np.median((m.distance * np.sin(np.minimum(left_over(m, good), np.pi / 2)))[good]))
+
+
 def degrees(s: Sightings) -> float:
-    """The same as an angle, in degrees."""
+    """The median angle by which the rays pass the known points, in degrees."""
     m = missed(s)
     good = finite(m)
     return float(np.degrees(np.median(np.linalg.norm(m.turn[good], axis=1)))) if good.any() else float("nan")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+#: With these a line begins that says what to do, and not what to write.
+VERBS = ("turn ", "exchange ")
+
 
 def negate(key: str, part: str) -> str:
     """What to write where a sign is wrong."""
@@ -16,6 +19,19 @@ def unit(key: str, part: str, name: str) -> str:
 def exchange(one: str, other: str, part: str) -> str:
     """What to write where two columns are exchanged."""
     return f"exchange the columns of {one} and {other} in [{part}]"
+
+
+def fixes(ways: list[str]) -> str:
+    """What to do about a mistake, each way with a verb of its own.
+
+    Examples
+    --------
+    >>> fixes([negate("roll", "poses.a.attitude"), '`looks = "down"` in [mount]'])
+    'turn `negate` of roll in [poses.a.attitude]; or write `looks = "down"` in [mount], and import again'
+    """
+    return (
+        "; or ".join(way if way.startswith(VERBS) else f"write {way}" for way in ways) + ", and import again"
+    )
 
 
 def number(value: float) -> str:
