@@ -107,13 +107,13 @@ def judge_ellipses(
         for _ in range(draws)
     ]
     ends = np.sqrt(np.quantile(drawn, [(1 - PROBABILITY) / 2, (1 + PROBABILITY) / 2]) / bound)
-    # No draw holds an error larger than the largest seen: of six honest ellipses half the time none is missed.
+    # No draw holds an error larger than was seen: six honest ellipses hold the truth all, half the time.
     factor = Interval(size, float(ends[0]), max(float(ends[1]), _largest_factor(squared, group)))
     return EllipseVerdict(_word(factor), coverage, factor, stated, len(e))
 
 
 def _largest_factor(squared: Array, group: NDArray[np.intp]) -> float:
-    """High end of the interval of the factor by the mean logarithm of all squared errors, were they normal."""
+    """High end of the factor's interval by the mean logarithm of all squared errors, were they normal."""
     mean = block_mean(np.log(np.maximum(squared, _LEAST)), group)
     return float(np.exp((mean.high - _MEAN_LOG) / 2))
 

@@ -55,9 +55,9 @@ guess) is not tried. Intervals of parameters: 95 %, from leaving out one block a
 Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks.
 
 Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
-its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end is
-at least that of the mean logarithm of all squared errors (Student's, by the number of blocks). Noise: most likely standard deviations, five images in a
-hundred taken to be ten times as far off.
+its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end
+is at least that of the mean logarithm of all squared errors (Student's, by the number of blocks). Noise: most
+likely standard deviations, five images in a hundred taken to be ten times as far off.
 
 Shares of the squared error: one-way analysis of variance with images as groups. Intervals of the figures at
 the top: as many blocks with replacement as there are, a thousand times, middle 90 %. They say how far these
