@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -129,3 +130,18 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
     (tmp_path / "g" / "calibration.toml").write_text(text)
     with pytest.raises(WildlabError, match=r"calibration\.toml: its SHA-256 is not the one"):
         load_flight(tmp_path / "g")
+
+
+@pytest.mark.parametrize(("low", "words"), [(0.1, "stands out"), (-0.1, "gains anything for certain")])
+def test_nothing_is_not_said_to_gain_nothing_where_something_does(
+    capsys, folder, tmp_path, monkeypatch, low, words
+):
+    """The best may be within one standard error of nothing while some model gains for certain."""
+    model = SimpleNamespace(causes=("height",), gain=SimpleNamespace(counts=low > 0))
+    learnt = SimpleNamespace(gain=None, parameter=())
+    monkeypatch.setattr(
+        "wildlab.pipeline.learn.learn_flight", lambda *_: (learnt, SimpleNamespace(models=[model]))
+    )
+    monkeypatch.setattr("wildlab.flight.learnt.write_learnt", lambda *_: None)
+    code, out, _ = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    assert code == 0 and f"No constant error {words} (1 models tried)" in out

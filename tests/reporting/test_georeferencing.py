@@ -70,7 +70,9 @@ def test_too_few_points_are_not_praised():
 def test_the_title_of_the_scatter_follows_the_bias():
     wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
     assert "centre on the truth" in georeferencing.scatter_title(wide)
-    assert "lie 5.0 m off" in georeferencing.scatter_title(summarise(np.tile([3.0, 4.0], (9, 1))))
+    assert "middle of the errors lies 5.0 m off" in georeferencing.scatter_title(
+        summarise(np.tile([3.0, 4.0], (9, 1)))
+    )
 
 
 def test_what_the_vertical_correction_is_worth():

@@ -156,6 +156,19 @@ def test_the_colour_of_the_verdict(lost, ellipses, found, level):
     assert cause.verdict_level(summarise(np.empty((0, 2))), 5, verdict(ellipses), None, 10) == "bad"
 
 
+def test_no_flight_is_good_whose_cause_nobody_could_look_for():
+    """Twelve points of one image: neither cause nor ellipses are judged."""
+    assert cause.verdict_level(MANY, 0, verdict("too few"), None, 10) == "neutral"
+
+
+def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
+    """Its held-out errors are zero here, those of the poses as logged are five metres."""
+    found = diagnosis(UNSURE, outliers=(FAR,))
+    found.models[0].held = np.tile([3.0, 4.0], (2, 4, 1))
+    assert found.held_summary().mean == found.held_summary(np.arange(4) < 2).mean == 5.0
+    assert diagnosis(PART).held_summary().mean == 0.0
+
+
 def test_what_cannot_be_told_apart_is_said_of_the_winner():
     rival = model(["height"], with_=2.0)
     said = cause.alike_sentences(
@@ -168,7 +181,7 @@ def test_what_cannot_be_told_apart_is_said_of_the_winner():
     lost = model(["boresight"], with_=2.0, undetermined={"pan": ("tilt",), "roll": ()})
     said = cause.alike_sentences(diagnosis(lost))
     assert "cannot tell the camera's pan from the camera's tilt" in said[0]
-    assert "camera's roll would not show" in said[1]
+    assert "camera's roll of 3 ° would not show" in said[1]
     # What a cause that did not win has lost says nothing.
     assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
 

@@ -7,6 +7,7 @@ from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.learnt import write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import save_flight
+from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.learn import learn_flight
 from wildlab.runner.evaluate import evaluate_flight
 
@@ -56,3 +57,14 @@ def test_what_does_not_fit_together_stands_first(tmp_path, shown):
     assert 'class="summary bad"' in text and "contradict each other" in text
     assert ("looks = &quot;forward&quot;" in text or 'looks = "forward"' in text) == (shown == "open")
     assert ("says which" in text) == (shown == "withheld")
+
+
+def test_views_that_nothing_was_judged_in_are_not_said_to_be_covered(tmp_path):
+    flight = simulate(Survey(images=12))
+    seen = observe(flight)
+    depression = np.degrees(np.arcsin(seen.poses.R_nc[:, 2, 2]))
+    flat = depression < 45
+    flight.detections.loc[flat, "target_id"] = ""
+    text = page(flight, tmp_path)
+    assert f"flatter views than {depression[~flat].min():.0f}°" in text
+    assert f"flatter views than {depression.min():.0f}°" not in text

@@ -40,9 +40,10 @@ def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: 
         return
     gain = learnt.gain
     if gain is None:
+        some = any(model.causes and model.gain.counts for model in diagnosis.models)
         click.echo(
-            f"No constant error gains anything for certain ({len(diagnosis.models)} models tried): "
-            "the file holds the noise of the poses alone."
+            f"No constant error {'stands out' if some else 'gains anything for certain'} "
+            f"({len(diagnosis.models)} models tried): the file holds the noise of the poses alone."
         )
     else:
         click.echo(

@@ -142,9 +142,14 @@ class Diagnosis:
         """Whether taking the winner off gained something for certain."""
         return bool(self.winner.causes) and self.winner.gain.counts
 
+    @property
+    def shown(self) -> Model:
+        """The winner where it gained something for certain, else the poses as logged."""
+        return self.winner if self.counts else self.models[0]
+
     def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
-        """Held-out errors of the winner, each figure the mean over the rounds; of some rows (N,) or all."""
-        held = self.winner.held if rows is None else self.winner.held[:, rows]
+        """Held-out errors of what is shown, each figure the mean over the rounds; of rows (N,) or all."""
+        held = self.shown.held if rows is None else self.shown.held[:, rows]
         return mean_summary(held)
 
 

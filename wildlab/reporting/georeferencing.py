@@ -125,7 +125,8 @@ def record_accuracy(
     diagnosis = found.diagnosis
     if diagnosis is not None:
         gain = diagnosis.winner.gain.gain
-        report.metric("gain", "winner", gain.estimate, "m", n=found.summary.n, low=gain.low, high=gain.high)
+        n = len(diagnosis.scored)
+        report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if np.isfinite(found.learnt):
@@ -168,7 +169,7 @@ def scatter_title(logged: ErrorSummary) -> str:
     bias = float(np.hypot(logged.bias_north, logged.bias_east))
     if bias < 0.25 * logged.mean:
         return "Errors centre on the truth"
-    return f"Errors lie {short_length(bias)} off on average"
+    return f"The middle of the errors lies {short_length(bias)} off"
 
 
 def vertical_words(correction: float, left_in: ErrorSummary | None = None, labelled: bool = False) -> str:
@@ -321,11 +322,12 @@ def limits_of(
         )
     if not timed:
         limits.append(
-            "The images carry no time of their own, so an error of the camera's clock cannot be seen."
+            "The images carry no time of their own, or each a pose of its own: an error of the camera's "
+            "clock cannot be seen."
         )
     if not enough:
         limits.append(
-            "Fewer than six images have a point with a position: no interval is given, and neither cause nor "
-            "noise was looked for."
+            "Fewer than six images have a point with a known error and an ellipse: no interval is given, and "
+            "neither cause nor noise was looked for."
         )
     return limits

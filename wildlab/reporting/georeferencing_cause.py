@@ -14,7 +14,7 @@ from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, Scatter
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.sightings import Averaged
-from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting.report import Report
 
@@ -72,14 +72,19 @@ def metres(value: float, low: float | None = None, high: float | None = None) ->
 def verdict_level(
     logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, few: int
 ) -> str:
-    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done."""
+    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done.
+
+    Never ``good`` where nobody could look for a cause.
+    """
     total = logged.n + lost
     if not logged.n or lost > MANY_LOST * total:
         return "bad"
     amiss = diagnosis is not None and (
         bool(diagnosis.outliers) or (diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL)
     )
-    return "warn" if amiss or ellipses.word == "too small" or logged.n < few else "good"
+    if amiss or ellipses.word == "too small" or logged.n < few:
+        return "warn"
+    return "good" if diagnosis is not None else "neutral"
 
 
 def amiss_sentence(amiss: Sequence[str]) -> str:
@@ -188,7 +193,8 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
         said.append(
             "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
-            else "The calibration that was applied does not hold for this flight: look for what changed."
+            else "The calibration that was applied leaves this in: it has no correction of it, or does not "
+            "hold for this flight. Look for what changed."
         )
     elif diagnosis.counts and not said:
         said.append("It hardly matters: other things limit this flight.")
@@ -217,7 +223,11 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
             others = listed([_PARAMETERS[p][0] for p in partners])
             said.append(f"These images cannot tell the {label} from the {others}; it was left as it is.")
         else:
-            said.append(f"An error of the {label} would not show in these images; it was left as it is.")
+            _, unit, scale = _PARAMETERS[name]
+            usual = f"{scale * PARAMETERS[name]:g} {unit.replace('deg', '°')}"
+            said.append(
+                f"An error of the {label} of {usual} would not show in these images; it was left as it is."
+            )
     return said
 
 

@@ -17,7 +17,8 @@ def summary_sentences(found: Repeats) -> list[str]:
     lost = lost_sentence(found.lost, len(found.points))
     if found.spread is None:
         return [
-            "Nothing was seen in two images or more, so nothing can be said of how good the positions are.",
+            "Nothing has a position from two images or more, so nothing can be said of how good the "
+            "positions are.",
             *([lost] if lost else []),
         ]
     s = found.spread
@@ -60,5 +61,8 @@ def limits(found: Repeats) -> list[str]:
     ]
     if (found.things["images"] < 2).any():
         alone = int((found.things["images"] < 2).sum())
-        said.append(f"Anything about {alone} of {len(found.things)} things that were seen in one image only.")
+        said.append(
+            f"Anything about {alone} of {len(found.things)} things that have a position from one image only, "
+            "or from none."
+        )
     return said
