@@ -73,6 +73,20 @@ def test_lost_points_and_things_seen_once_are_said():
     assert not any("one image only" in one for one in words.limits(table()))
 
 
+def test_a_flight_that_contradicts_itself_is_said_to_and_not_neutral():
+    amiss = ["problem: nav: your camera looks down. Write it."]
+    assert words.summary_sentences(table(), amiss)[0].startswith(
+        "The logs of this flight contradict each other"
+    )
+    assert words.level(table(), amiss) == "bad" and words.level(table(), ["warning: a: b. C."]) == "neutral"
+    assert words.summary_sentences(table(), ["warning: a: b. C."]) == words.summary_sentences(table())
+
+
+def test_that_things_may_have_moved_is_said():
+    """A boat that drifts is scatter to whoever does not know where it was."""
+    assert any("moved between its sightings" in one for one in words.limits(table()))
+
+
 def test_what_was_seen_often_and_lost_is_not_said_to_be_unseen():
     """All rays above the horizon: things are in many images, and have a position from none."""
     flight = simulate(Survey(images=8))

@@ -83,6 +83,19 @@ def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
         assert f"to {winner.gain.with_:.1f}" in said
 
 
+def test_a_cause_that_another_explains_as_well_is_not_named_alone():
+    """A tilt of a camera that looks down and a clock that is off move points alike."""
+    rival, both = model(["clock"], with_=2.1), model(["clock", "height"], with_=2.0)
+    found = diagnosis(MOST, rival, both, rivals=(rival, both))
+    said = cause.cause_sentence(found)
+    assert "of the boresight (how the camera sits on the airframe) or, explaining it as well, of the " in said
+    assert "camera's clock: with the first taken off" in said and "height" not in said
+    assert "which of these it is" in cause.advice(found, True) and "calibrate" not in cause.advice(
+        found, True
+    )
+    assert "with it taken off" in cause.cause_sentence(diagnosis(MOST))
+
+
 def test_what_was_tried_is_listed_where_nothing_was_found():
     said = cause.cause_sentence(diagnosis(NOTHING, model(["height"]), model(["clock"])))
     assert "camera's clock or height" in said and "lens" not in said

@@ -37,6 +37,18 @@ def test_without_truth_the_scatter_is_judged_and_no_error_claimed(tmp_path):
     assert "typically" not in text and "The cause" not in text
 
 
+def test_without_truth_too_a_flight_that_contradicts_itself_says_so_first(tmp_path):
+    """It says that it flies north where it goes south."""
+    flight = simulate(Survey(images=12))
+    del flight.tables["truth"]
+    nav = flight.nav["logged"]
+    for axis, sign in (("north", -1.0), ("east", 1.0), ("down", 1.0)):
+        nav[f"v_{axis}_m_s"] = sign * np.gradient(nav[f"{axis}_m"], nav["time_s"])
+    text = page(flight, tmp_path)
+    assert "contradict each other: one thing does not fit" in text and "What does not fit together" in text
+    assert 'class="summary bad"' in text
+
+
 def test_the_page_says_which_calibration_and_names_no_folder(tmp_path):
     first = simulate(Survey(tilt_deg=5.0, images=18))
     first.manifest = replace_in_manifest(first.manifest, {"name": "tuesday"})

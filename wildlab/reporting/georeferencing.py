@@ -298,9 +298,16 @@ def noise_table(noise: PoseNoise, stated: Mapping[str, float]) -> pd.DataFrame:
 
 
 def limits_of(
-    points: pd.DataFrame, depression_deg: Any, height_m: Any, *, labelled: bool, timed: bool, enough: bool
+    points: pd.DataFrame,
+    depression_deg: Any,
+    height_m: Any,
+    *,
+    labelled: bool,
+    timed: bool,
+    enough: bool,
+    certain: bool = False,
 ) -> list[str]:
-    """What a report on these points does not tell."""
+    """What a report on these points does not tell; ``certain``: a cause gained something for certain."""
     missed = int(points["north_m"].isna().sum())
     limits = [
         "Whoever or whatever marked the points is part of these errors; another observer or detector "
@@ -324,6 +331,11 @@ def limits_of(
         limits.append(
             "The images carry no time of their own, or each a pose of its own: an error of the camera's "
             "clock cannot be seen."
+        )
+    if certain:
+        limits.append(
+            "Whether the cause stays: an error that wanders over minutes (of a satellite fix, of a heading) "
+            "looks constant too, and images that a fit had not seen share it with their neighbours."
         )
     if not enough:
         limits.append(

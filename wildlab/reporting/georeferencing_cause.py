@@ -137,11 +137,15 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             "that it was not estimated from."
         )
     what = causes_in_words(winner.causes)
+    it = "it"
+    if others := simplest_rivals(diagnosis):
+        what += f" or, explaining it as well, of {listed([causes_in_words(one) for one in others], 'or')}"
+        it = "the first"
     digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
     low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
     figures = (
-        f"with it taken off, the mean error goes from {gain.without:.{digits}f} to {gain.with_:.{digits}f} m "
-        f"on images that it was not estimated from (gain {low} to {high} m)"
+        f"with {it} taken off, the mean error goes from {gain.without:.{digits}f} to "
+        f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m)"
     )
     if not diagnosis.counts and gained_share(gain) < SMALL:
         return f"No constant error explains it. The nearest is one of {what}: {figures}."
@@ -153,6 +157,13 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     if share >= SMALL:
         return f"Part of it is a constant error of {what}: {figures}."
     return f"A constant error of {what} is certain and small: {figures}."
+
+
+def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Causes of the rivals that hold no other rival, the two of the least held-out error at most."""
+    rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
+    simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
+    return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
 
 
 def size_sentence(calibration: Calibration, counts: bool) -> str:
@@ -191,7 +202,10 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
         said.append(f"Look at {what} first: it is {metres(first.off_m)} off where the others are not.")
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL:
         said.append(
-            "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
+            "Images from other heights, speeds and directions would tell which of these it is; there the "
+            "wrong one, taken off, does harm."
+            if learnt_here and simplest_rivals(diagnosis)
+            else "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
             else "The calibration that was applied leaves this in: it has no correction of it, or does not "
             "hold for this flight. Look for what changed."
