@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.evaluation.axes import AlongAxis
-from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.blocks import Halves, Neighbours
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import Scatter, summarise
@@ -197,6 +197,13 @@ def test_what_cannot_be_told_apart_is_said_of_the_winner():
     assert "camera's roll of 3 ° would not show" in said[1]
     # What a cause that did not win has lost says nothing.
     assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
+
+
+def test_images_that_stay_wrong_alike_are_said_to():
+    said = cause.neighbours_sentence(Neighbours(0.6, 40))
+    assert "correlation 0.60 of 40 images" in said and "this flight alone" in said
+    assert cause.neighbours_sentence(Neighbours(0.1, 40)) == ""
+    assert cause.neighbours_sentence(Neighbours(float("nan"), 3)) == ""
 
 
 def test_halves_are_mentioned_only_where_they_disagree():

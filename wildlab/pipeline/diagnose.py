@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.blocks import Labels
+from wildlab.evaluation.blocks import Labels, Neighbours, compare_neighbours
 from wildlab.evaluation.causes import (
     ROUNDS,
     Gain,
@@ -146,6 +146,12 @@ class Diagnosis:
     def shown(self) -> Model:
         """The winner where it gained something for certain, else the poses as logged."""
         return self.winner if self.counts else self.models[0]
+
+    def neighbours(self) -> Neighbours:
+        """How alike images that follow each other are once what is shown is taken off."""
+        whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(self.scored)))
+        left = np.einsum("nij,nj->ni", whiten, self.shown.held.mean(axis=0))
+        return compare_neighbours(left, self.scored["time_s"])
 
     def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
         """Held-out errors of what is shown, each figure the mean over the rounds; of rows (N,) or all."""

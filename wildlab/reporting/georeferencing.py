@@ -49,6 +49,7 @@ fitted to. Models are compared point by point, and the standard error of a diffe
 rounds share most of their data, and their spread would flatter. The simplest model within one standard error
 of the best wins. Its gain counts where its 90 % interval (Student's, by the number of blocks) is above zero;
 then it is tried once more with only those of its parameters that are told from zero.
+Where images that follow each other are correlated with it taken off, blocks are not independent; it is said.
 A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
 guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.axes import AlongAxis
-from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.blocks import Halves, Neighbours
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, Scatter
@@ -164,6 +164,17 @@ def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
     simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
     return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
+
+
+def neighbours_sentence(neighbours: Neighbours) -> str:
+    """That images which follow each other stay wrong alike with the cause taken off; nothing where not."""
+    if not neighbours.alike:
+        return ""
+    return (
+        "Images that follow each other are still wrong alike with it taken off (correlation "
+        f"{neighbours.correlation:.2f} of {neighbours.images} images): they are worth fewer than they are, "
+        "and the gain may be that of this flight alone."
+    )
 
 
 def size_sentence(calibration: Calibration, counts: bool) -> str:
