@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import pytest
 
 from tests.flight.conftest import make_flight
+from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.flight.store import Flight, save_flight
@@ -188,3 +190,15 @@ def test_check_says_what_a_flight_can_be_used_for(
     assert "navigation: no, it lacks inertial measurements" in out
     code, out, _ = call(capsys, "check", "--json", str(tmp_path / "flight"))
     assert {use["purpose"]: use["usable"] for use in json.loads(out)["usable_for"]}["navigation"] is False
+
+
+def test_check_does_not_call_a_flight_usable_that_contradicts_itself(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    flight = simulate(Survey(images=8))
+    nav = flight.nav["logged"]
+    for axis, sign in (("north", -1.0), ("east", 1.0), ("down", 1.0)):
+        nav[f"v_{axis}_m_s"] = sign * np.gradient(nav[f"{axis}_m"], nav["time_s"])
+    save_flight(flight, tmp_path / "flight")
+    code, out, _ = call(capsys, "check", str(tmp_path / "flight"))
+    assert code == 2 and "georeferencing accuracy: once what is above is mended" in out and ": yes" not in out

@@ -101,8 +101,10 @@ def check(flight: Path, as_json: bool, accept: bool) -> None:
             click.echo(f"{finding.level}: {stopped(finding.sentence)} {sentence(finding.fix)}".rstrip())
         warnings = sum(finding.level == "warning" for finding in findings)
         click.echo(sentence(f"{count(problems, 'problem')}, {count(warnings, 'warning')}"))
+        # What a purpose takes may be there and contradict itself.
+        yes = "once what is above is mended" if problems else "yes"
         for use in uses:
-            click.echo(f"{use.purpose}: {'yes' if use.usable else 'no'}, {stopped(use.why)}")
+            click.echo(f"{use.purpose}: {yes if use.usable else 'no'}, {stopped(use.why)}")
     if problems:
         sys.exit(2)
 

@@ -5,6 +5,7 @@ import pytest
 
 from wildlab.evaluation.ambiguity import ambiguous, largest_visible
 from wildlab.evaluation.axes import split_along
+from wildlab.evaluation.blocks import time_blocks
 from wildlab.evaluation.ellipses import judge_ellipses
 from wildlab.evaluation.sightings import spread_of_sightings, try_averaging
 
@@ -59,6 +60,32 @@ def test_the_interval_of_the_factor_holds_what_it_says():
         wrong += found.word in ("too small", "too large")
     assert 0.8 < inside / 150 < 0.97
     assert wrong <= 3
+
+
+@pytest.mark.parametrize(("images", "points"), [(6, 1), (12, 1), (20, 3)])
+def test_few_honest_ellipses_are_rarely_called_dishonest(images, points):
+    """No draw with replacement holds a larger error than was seen: few points look better than they are."""
+    image = np.repeat(np.arange(images), points)
+    P = np.tile(np.eye(2), (len(image), 1, 1))
+    words, inside = [], 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        errors = np.sqrt(0.5) * (rng.normal(size=(images, 2))[image] + rng.normal(size=(len(image), 2)))
+        found = judge_ellipses(errors, P, time_blocks(image, seconds=False), rng, draws=50)
+        words.append(found.word)
+        inside += found.factor.low <= 1.0 <= found.factor.high
+    assert words.count("too large") <= 10 and words.count("too small") <= 10
+    assert inside >= 85
+
+
+def test_a_few_ellipses_that_are_far_too_large_are_still_called_so():
+    P = np.tile(25.0 * np.eye(2), (24, 1, 1))
+    assert (
+        judge_ellipses(normal(1, 1.0, 24), P, np.arange(24) // 4, np.random.default_rng(0)).word
+        == "too large"
+    )
+    exact = judge_ellipses(np.zeros((24, 2)), P, np.arange(24) // 4, np.random.default_rng(0))
+    assert exact.word == "too large" and exact.factor.high < 1e-3
 
 
 def test_too_few_or_too_scattered_for_a_verdict_on_ellipses():

@@ -1,5 +1,6 @@
 """What was put wrong is named, its size recovered, and nothing else is blamed."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -34,6 +35,15 @@ def test_a_flight_that_is_well_has_no_cause():
     found = untouched()
     assert not found.counts
     assert found.outliers == () and found.inliers.all()
+
+
+def test_what_wanders_is_seen_once_the_cause_is_taken_off():
+    found = untouched()
+    assert not found.neighbours().alike and found.neighbours().images == 40
+    turn = found.scored["time_s"].to_numpy() / 30.0
+    slow = 3.0 * np.column_stack([np.sin(turn), np.cos(turn)])
+    models = tuple(replace(one, held=one.held + slow) for one in found.models)
+    assert replace(found, models=models).neighbours().alike
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
 from wildlab.evaluation.sightings import Spread
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.repeats import Repeats, judge_repeats
@@ -51,13 +52,13 @@ def table(lost=0, consistent=1.0, spread=True, images=3):
         (table(consistent=3.0), "too small: the scatter is 3.0 times"),
         (table(consistent=0.3), "too large"),
         (table(consistent=float("nan")), "cannot be said without known points"),
-        (table(spread=False), "Nothing was seen in two images"),
+        (table(spread=False), "Nothing has a position from two images"),
     ],
 )
 def test_sentences_follow_the_numbers(found, inside):
     said = " ".join(words.summary_sentences(found))
     assert inside in said
-    every = ("fits the ellipses", "too small", "too large", "Nothing was seen")
+    every = ("fits the ellipses", "too small", "too large", "Nothing has")
     assert sum(one in said for one in every) == (0 if "known points" in inside else 1)
     assert ("scatter by 2.0 m" in said) == (found.spread is not None)
     assert "have no position" not in said
@@ -70,3 +71,27 @@ def test_lost_points_and_things_seen_once_are_said():
     assert "2 of 40 points" in words.summary_sentences(table(lost=2))[-1]
     assert any("1 of 1 things" in one for one in words.limits(table(images=1)))
     assert not any("one image only" in one for one in words.limits(table()))
+
+
+def test_a_flight_that_contradicts_itself_is_said_to_and_not_neutral():
+    amiss = ["problem: nav: your camera looks down. Write it."]
+    assert words.summary_sentences(table(), amiss)[0].startswith(
+        "The logs of this flight contradict each other"
+    )
+    assert words.level(table(), amiss) == "bad" and words.level(table(), ["warning: a: b. C."]) == "neutral"
+    assert words.summary_sentences(table(), ["warning: a: b. C."]) == words.summary_sentences(table())
+
+
+def test_that_things_may_have_moved_is_said():
+    """A boat that drifts is scatter to whoever does not know where it was."""
+    assert any("moved between its sightings" in one for one in words.limits(table()))
+
+
+def test_what_was_seen_often_and_lost_is_not_said_to_be_unseen():
+    """All rays above the horizon: things are in many images, and have a position from none."""
+    flight = simulate(Survey(images=8))
+    flight.manifest = replace_in_manifest(flight.manifest, {"mount": {"tilt_deg": 120.0}})
+    found = judged(flight)
+    assert found.lost == len(found.points) and found.spread is None
+    said = " ".join([*words.summary_sentences(found), *words.limits(found)])
+    assert "seen in one" not in said and "was seen in two" not in said and "or from none" in said

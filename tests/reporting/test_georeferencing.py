@@ -70,7 +70,9 @@ def test_too_few_points_are_not_praised():
 def test_the_title_of_the_scatter_follows_the_bias():
     wide = summarise(np.random.default_rng(0).normal(size=(200, 2)))
     assert "centre on the truth" in georeferencing.scatter_title(wide)
-    assert "lie 5.0 m off" in georeferencing.scatter_title(summarise(np.tile([3.0, 4.0], (9, 1))))
+    assert "middle of the errors lies 5.0 m off" in georeferencing.scatter_title(
+        summarise(np.tile([3.0, 4.0], (9, 1)))
+    )
 
 
 def test_what_the_vertical_correction_is_worth():
@@ -86,6 +88,11 @@ def test_limits_speak_of_what_there_is():
     assert not any("flatter views" in one for one in nothing)
     assert any("1 of 2 points" in one for one in nothing)
     full = georeferencing.limits_of(points[:1], [30.0], [80.0], labelled=False, timed=False, enough=False)
+    assert not any("Whether the cause stays" in one for one in full)
+    sure = georeferencing.limits_of(
+        points, [30.0], [80.0], labelled=True, timed=True, enough=True, certain=True
+    )
+    assert any("wanders over minutes" in one for one in sure)
     assert "30°" in full[0] and "80 m" in full[0]
     assert any("no time of their own" in one for one in full) and any("no interval" in one for one in full)
 

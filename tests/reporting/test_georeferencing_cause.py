@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.evaluation.axes import AlongAxis
-from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.blocks import Halves, Neighbours
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import Scatter, summarise
@@ -83,6 +83,19 @@ def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
         assert f"to {winner.gain.with_:.1f}" in said
 
 
+def test_a_cause_that_another_explains_as_well_is_not_named_alone():
+    """A tilt of a camera that looks down and a clock that is off move points alike."""
+    rival, both = model(["clock"], with_=2.1), model(["clock", "height"], with_=2.0)
+    found = diagnosis(MOST, rival, both, rivals=(rival, both))
+    said = cause.cause_sentence(found)
+    assert "of the boresight (how the camera sits on the airframe) or, explaining it as well, of the " in said
+    assert "camera's clock: with the first taken off" in said and "height" not in said
+    assert "which of these it is" in cause.advice(found, True) and "calibrate" not in cause.advice(
+        found, True
+    )
+    assert "with it taken off" in cause.cause_sentence(diagnosis(MOST))
+
+
 def test_what_was_tried_is_listed_where_nothing_was_found():
     said = cause.cause_sentence(diagnosis(NOTHING, model(["height"]), model(["clock"])))
     assert "camera's clock or height" in said and "lens" not in said
@@ -156,6 +169,19 @@ def test_the_colour_of_the_verdict(lost, ellipses, found, level):
     assert cause.verdict_level(summarise(np.empty((0, 2))), 5, verdict(ellipses), None, 10) == "bad"
 
 
+def test_no_flight_is_good_whose_cause_nobody_could_look_for():
+    """Twelve points of one image: neither cause nor ellipses are judged."""
+    assert cause.verdict_level(MANY, 0, verdict("too few"), None, 10) == "neutral"
+
+
+def test_a_cause_that_is_not_certain_is_in_no_figure_of_what_is_far_out():
+    """Its held-out errors are zero here, those of the poses as logged are five metres."""
+    found = diagnosis(UNSURE, outliers=(FAR,))
+    found.models[0].held = np.tile([3.0, 4.0], (2, 4, 1))
+    assert found.held_summary().mean == found.held_summary(np.arange(4) < 2).mean == 5.0
+    assert diagnosis(PART).held_summary().mean == 0.0
+
+
 def test_what_cannot_be_told_apart_is_said_of_the_winner():
     rival = model(["height"], with_=2.0)
     said = cause.alike_sentences(
@@ -168,9 +194,16 @@ def test_what_cannot_be_told_apart_is_said_of_the_winner():
     lost = model(["boresight"], with_=2.0, undetermined={"pan": ("tilt",), "roll": ()})
     said = cause.alike_sentences(diagnosis(lost))
     assert "cannot tell the camera's pan from the camera's tilt" in said[0]
-    assert "camera's roll would not show" in said[1]
+    assert "camera's roll of 3 ° would not show" in said[1]
     # What a cause that did not win has lost says nothing.
     assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
+
+
+def test_images_that_stay_wrong_alike_are_said_to():
+    said = cause.neighbours_sentence(Neighbours(0.6, 40))
+    assert "correlation 0.60 of 40 images" in said and "this flight alone" in said
+    assert cause.neighbours_sentence(Neighbours(0.1, 40)) == ""
+    assert cause.neighbours_sentence(Neighbours(float("nan"), 3)) == ""
 
 
 def test_halves_are_mentioned_only_where_they_disagree():

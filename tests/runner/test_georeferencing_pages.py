@@ -7,6 +7,7 @@ from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.learnt import write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import save_flight
+from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.learn import learn_flight
 from wildlab.runner.evaluate import evaluate_flight
 
@@ -36,6 +37,18 @@ def test_without_truth_the_scatter_is_judged_and_no_error_claimed(tmp_path):
     assert "typically" not in text and "The cause" not in text
 
 
+def test_without_truth_too_a_flight_that_contradicts_itself_says_so_first(tmp_path):
+    """It says that it flies north where it goes south."""
+    flight = simulate(Survey(images=12))
+    del flight.tables["truth"]
+    nav = flight.nav["logged"]
+    for axis, sign in (("north", -1.0), ("east", 1.0), ("down", 1.0)):
+        nav[f"v_{axis}_m_s"] = sign * np.gradient(nav[f"{axis}_m"], nav["time_s"])
+    text = page(flight, tmp_path)
+    assert "contradict each other: one thing does not fit" in text and "What does not fit together" in text
+    assert 'class="summary bad"' in text
+
+
 def test_the_page_says_which_calibration_and_names_no_folder(tmp_path):
     first = simulate(Survey(tilt_deg=5.0, images=18))
     first.manifest = replace_in_manifest(first.manifest, {"name": "tuesday"})
@@ -56,3 +69,14 @@ def test_what_does_not_fit_together_stands_first(tmp_path, shown):
     assert 'class="summary bad"' in text and "contradict each other" in text
     assert ("looks = &quot;forward&quot;" in text or 'looks = "forward"' in text) == (shown == "open")
     assert ("says which" in text) == (shown == "withheld")
+
+
+def test_views_that_nothing_was_judged_in_are_not_said_to_be_covered(tmp_path):
+    flight = simulate(Survey(images=12))
+    seen = observe(flight)
+    depression = np.degrees(np.arcsin(seen.poses.R_nc[:, 2, 2]))
+    flat = depression < 45
+    flight.detections.loc[flat, "target_id"] = ""
+    text = page(flight, tmp_path)
+    assert f"flatter views than {depression[~flat].min():.0f}°" in text
+    assert f"flatter views than {depression.min():.0f}°" not in text

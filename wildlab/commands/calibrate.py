@@ -32,6 +32,7 @@ def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: 
     from wildlab.flight.learnt import write_learnt
     from wildlab.flight.store import load_flight
     from wildlab.pipeline.learn import learn_flight
+    from wildlab.reporting.georeferencing_cause import causes_in_words, simplest_rivals
 
     learnt, diagnosis = learn_flight(load_flight(flight), np.random.default_rng(seed), source)
     write_learnt(learnt, into)
@@ -40,9 +41,10 @@ def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: 
         return
     gain = learnt.gain
     if gain is None:
+        some = any(model.causes and model.gain.counts for model in diagnosis.models)
         click.echo(
-            f"No constant error gains anything for certain ({len(diagnosis.models)} models tried): "
-            "the file holds the noise of the poses alone."
+            f"No constant error {'stands out' if some else 'gains anything for certain'} "
+            f"({len(diagnosis.models)} models tried): the file holds the noise of the poses alone."
         )
     else:
         click.echo(
@@ -54,4 +56,9 @@ def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: 
             for one in learnt.parameter
         ]
         print_table(["to be added to", "estimate", "95 % interval", "unit"], rows)
+        if others := simplest_rivals(diagnosis):
+            click.echo(
+                f"These images do not decide that it is this: {causes_in_words(others[0])} explains it as "
+                "well. Keep it for flights of the same height and speed alone."
+            )
     click.echo(shown(into))

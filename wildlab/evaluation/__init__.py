@@ -18,7 +18,14 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 
 from wildlab.evaluation.ambiguity import ambiguous, largest_visible
 from wildlab.evaluation.axes import AlongAxis, split_along
-from wildlab.evaluation.blocks import Halves, block_mean, compare_halves, time_blocks
+from wildlab.evaluation.blocks import (
+    Halves,
+    Neighbours,
+    block_mean,
+    compare_halves,
+    compare_neighbours,
+    time_blocks,
+)
 from wildlab.evaluation.causes import Gain, Linear, Ranked, gain_of, held_out, rank_models
 from wildlab.evaluation.consistency import (
     ERROR_CONVENTION,
@@ -67,6 +74,7 @@ __all__ = [
     "Halves",
     "Interval",
     "Linear",
+    "Neighbours",
     "Ospa",
     "Outlier",
     "PoseNoise",
@@ -83,6 +91,7 @@ __all__ = [
     "bootstrap_interval",
     "chi_square_interval",
     "compare_halves",
+    "compare_neighbours",
     "effective_sample_size",
     "estimate_pose_noise",
     "find_outliers",

@@ -18,7 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.blocks import Labels
+from wildlab.evaluation.blocks import Labels, Neighbours, compare_neighbours
 from wildlab.evaluation.causes import (
     ROUNDS,
     Gain,
@@ -142,9 +142,20 @@ class Diagnosis:
         """Whether taking the winner off gained something for certain."""
         return bool(self.winner.causes) and self.winner.gain.counts
 
+    @property
+    def shown(self) -> Model:
+        """The winner where it gained something for certain, else the poses as logged."""
+        return self.winner if self.counts else self.models[0]
+
+    def neighbours(self) -> Neighbours:
+        """How alike images that follow each other are once what is shown is taken off."""
+        whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(self.scored)))
+        left = np.einsum("nij,nj->ni", whiten, self.shown.held.mean(axis=0))
+        return compare_neighbours(left, self.scored["time_s"])
+
     def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
-        """Held-out errors of the winner, each figure the mean over the rounds; of some rows (N,) or all."""
-        held = self.winner.held if rows is None else self.winner.held[:, rows]
+        """Held-out errors of what is shown, each figure the mean over the rounds; of rows (N,) or all."""
+        held = self.shown.held if rows is None else self.shown.held[:, rows]
         return mean_summary(held)
 
 

@@ -49,14 +49,16 @@ fitted to. Models are compared point by point, and the standard error of a diffe
 rounds share most of their data, and their spread would flatter. The simplest model within one standard error
 of the best wins. Its gain counts where its 90 % interval (Student's, by the number of blocks) is above zero;
 then it is tried once more with only those of its parameters that are told from zero.
+Where images that follow each other are correlated with it taken off, blocks are not independent; it is said.
 A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
 guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
 
 Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks.
 
 Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
-its interval from drawing blocks with replacement. Noise: most likely standard deviations, five images in a
-hundred taken to be ten times as far off.
+its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end
+is at least that of the mean logarithm of all squared errors (Student's, by the number of blocks). Noise: most
+likely standard deviations, five images in a hundred taken to be ten times as far off.
 
 Shares of the squared error: one-way analysis of variance with images as groups. Intervals of the figures at
 the top: as many blocks with replacement as there are, a thousand times, middle 90 %. They say how far these
@@ -124,7 +126,8 @@ def record_accuracy(
     diagnosis = found.diagnosis
     if diagnosis is not None:
         gain = diagnosis.winner.gain.gain
-        report.metric("gain", "winner", gain.estimate, "m", n=found.summary.n, low=gain.low, high=gain.high)
+        n = len(diagnosis.scored)
+        report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if np.isfinite(found.learnt):
@@ -167,7 +170,7 @@ def scatter_title(logged: ErrorSummary) -> str:
     bias = float(np.hypot(logged.bias_north, logged.bias_east))
     if bias < 0.25 * logged.mean:
         return "Errors centre on the truth"
-    return f"Errors lie {short_length(bias)} off on average"
+    return f"The middle of the errors lies {short_length(bias)} off"
 
 
 def vertical_words(correction: float, left_in: ErrorSummary | None = None, labelled: bool = False) -> str:
@@ -296,9 +299,16 @@ def noise_table(noise: PoseNoise, stated: Mapping[str, float]) -> pd.DataFrame:
 
 
 def limits_of(
-    points: pd.DataFrame, depression_deg: Any, height_m: Any, *, labelled: bool, timed: bool, enough: bool
+    points: pd.DataFrame,
+    depression_deg: Any,
+    height_m: Any,
+    *,
+    labelled: bool,
+    timed: bool,
+    enough: bool,
+    certain: bool = False,
 ) -> list[str]:
-    """What a report on these points does not tell."""
+    """What a report on these points does not tell; ``certain``: a cause gained something for certain."""
     missed = int(points["north_m"].isna().sum())
     limits = [
         "Whoever or whatever marked the points is part of these errors; another observer or detector "
@@ -320,11 +330,17 @@ def limits_of(
         )
     if not timed:
         limits.append(
-            "The images carry no time of their own, so an error of the camera's clock cannot be seen."
+            "The images carry no time of their own, or each a pose of its own: an error of the camera's "
+            "clock cannot be seen."
+        )
+    if certain:
+        limits.append(
+            "Whether the cause stays: an error that wanders over minutes (of a satellite fix, of a heading) "
+            "looks constant too, and images that a fit had not seen share it with their neighbours."
         )
     if not enough:
         limits.append(
-            "Fewer than six images have a point with a position: no interval is given, and neither cause nor "
-            "noise was looked for."
+            "Fewer than six images have a point with a known error and an ellipse: no interval is given, and "
+            "neither cause nor noise was looked for."
         )
     return limits

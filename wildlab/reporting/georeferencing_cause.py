@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.axes import AlongAxis
-from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.blocks import Halves, Neighbours
 from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, Scatter
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.sightings import Averaged
-from wildlab.geometry.calibration import BORESIGHT, Calibration
+from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting.report import Report
 
@@ -72,14 +72,19 @@ def metres(value: float, low: float | None = None, high: float | None = None) ->
 def verdict_level(
     logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None, few: int
 ) -> str:
-    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done."""
+    """Colour of the summary: ``bad`` where many points are lost, ``warn`` where something is to be done.
+
+    Never ``good`` where nobody could look for a cause.
+    """
     total = logged.n + lost
     if not logged.n or lost > MANY_LOST * total:
         return "bad"
     amiss = diagnosis is not None and (
         bool(diagnosis.outliers) or (diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL)
     )
-    return "warn" if amiss or ellipses.word == "too small" or logged.n < few else "good"
+    if amiss or ellipses.word == "too small" or logged.n < few:
+        return "warn"
+    return "good" if diagnosis is not None else "neutral"
 
 
 def amiss_sentence(amiss: Sequence[str]) -> str:
@@ -132,11 +137,15 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             "that it was not estimated from."
         )
     what = causes_in_words(winner.causes)
+    it = "it"
+    if others := simplest_rivals(diagnosis):
+        what += f" or, explaining it as well, of {listed([causes_in_words(one) for one in others], 'or')}"
+        it = "the first"
     digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
     low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
     figures = (
-        f"with it taken off, the mean error goes from {gain.without:.{digits}f} to {gain.with_:.{digits}f} m "
-        f"on images that it was not estimated from (gain {low} to {high} m)"
+        f"with {it} taken off, the mean error goes from {gain.without:.{digits}f} to "
+        f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m)"
     )
     if not diagnosis.counts and gained_share(gain) < SMALL:
         return f"No constant error explains it. The nearest is one of {what}: {figures}."
@@ -148,6 +157,24 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     if share >= SMALL:
         return f"Part of it is a constant error of {what}: {figures}."
     return f"A constant error of {what} is certain and small: {figures}."
+
+
+def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Causes of the rivals that hold no other rival, the two of the least held-out error at most."""
+    rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
+    simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
+    return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
+
+
+def neighbours_sentence(neighbours: Neighbours) -> str:
+    """That images which follow each other stay wrong alike with the cause taken off; nothing where not."""
+    if not neighbours.alike:
+        return ""
+    return (
+        "Images that follow each other are still wrong alike with it taken off (correlation "
+        f"{neighbours.correlation:.2f} of {neighbours.images} images): they are worth fewer than they are, "
+        "and the gain may be that of this flight alone."
+    )
 
 
 def size_sentence(calibration: Calibration, counts: bool) -> str:
@@ -186,9 +213,13 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
         said.append(f"Look at {what} first: it is {metres(first.off_m)} off where the others are not.")
     if diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL:
         said.append(
-            "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
+            "Images from other heights, speeds and directions would tell which of these it is; there the "
+            "wrong one, taken off, does harm."
+            if learnt_here and simplest_rivals(diagnosis)
+            else "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
-            else "The calibration that was applied does not hold for this flight: look for what changed."
+            else "The calibration that was applied leaves this in: it has no correction of it, or does not "
+            "hold for this flight. Look for what changed."
         )
     elif diagnosis.counts and not said:
         said.append("It hardly matters: other things limit this flight.")
@@ -217,7 +248,11 @@ def alike_sentences(diagnosis: Diagnosis) -> list[str]:
             others = listed([_PARAMETERS[p][0] for p in partners])
             said.append(f"These images cannot tell the {label} from the {others}; it was left as it is.")
         else:
-            said.append(f"An error of the {label} would not show in these images; it was left as it is.")
+            _, unit, scale = _PARAMETERS[name]
+            usual = f"{scale * PARAMETERS[name]:g} {unit.replace('deg', '°')}"
+            said.append(
+                f"An error of the {label} of {usual} would not show in these images; it was left as it is."
+            )
     return said
 
 

@@ -33,7 +33,10 @@ def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: S
     said = [lost, *said] if found.lost > cause.MANY_LOST * total else [*said, lost]
     if diagnosis is not None and logged.n >= words.FEW:
         unsure = cause.ambiguity_sentence(diagnosis, found.unambiguous)
-        said += [cause.cause_sentence(diagnosis), unsure or cause.advice(diagnosis, not applied)]
+        said.append(cause.cause_sentence(diagnosis))
+        if diagnosis.counts:
+            said.append(cause.neighbours_sentence(diagnosis.neighbours()))
+        said += [unsure or cause.advice(diagnosis, not applied)]
     level = cause.verdict_level(logged, found.lost, found.ellipses, diagnosis, words.FEW)
     first = cause.amiss_sentence(amiss)
     if first:

@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wildlab.pipeline.repeats import Repeats
 from wildlab.reporting.georeferencing import short_length
-from wildlab.reporting.georeferencing_cause import MANY_LOST, lost_sentence
+from wildlab.reporting.georeferencing_cause import MANY_LOST, amiss_sentence, lost_sentence
 
 #: Ellipses whose size is off by less than this factor fit the spread.
 CLOSE = 1.25
 
 
-def summary_sentences(found: Repeats) -> list[str]:
-    """How far apart sightings lie, whether the ellipses fit that, and what was lost."""
+def summary_sentences(found: Repeats, amiss: Sequence[str] = ()) -> list[str]:
+    """How far apart sightings lie, whether the ellipses fit that, and what was lost.
+
+    Parameters
+    ----------
+    found
+        From `judge_repeats`.
+    amiss
+        What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+
+    Returns
+    -------
+    list of str
+        What does not fit together first.
+    """
+    first = amiss_sentence(amiss)
+    said = _found_sentences(found)
+    return [first, *said] if first else said
+
+
+def _found_sentences(found: Repeats) -> list[str]:
     lost = lost_sentence(found.lost, len(found.points))
     if found.spread is None:
         return [
-            "Nothing was seen in two images or more, so nothing can be said of how good the positions are.",
+            "Nothing has a position from two images or more, so nothing can be said of how good the "
+            "positions are.",
             *([lost] if lost else []),
         ]
     s = found.spread
@@ -46,9 +68,12 @@ def consistency_sentence(ratio: float) -> str:
     return "The scatter fits the ellipses, as far as images differ."
 
 
-def level(found: Repeats) -> str:
-    """Colour of the summary: never good, for the errors themselves are not known."""
-    return "bad" if found.lost > MANY_LOST * len(found.points) else "neutral"
+def level(found: Repeats, amiss: Sequence[str] = ()) -> str:
+    """Colour of the summary: never good, for the errors themselves are not known.
+
+    Bad where many points are lost, or where the flight contradicts itself (``amiss``).
+    """
+    return "bad" if found.lost > MANY_LOST * len(found.points) or amiss_sentence(amiss) else "neutral"
 
 
 def limits(found: Repeats) -> list[str]:
@@ -57,8 +82,13 @@ def limits(found: Repeats) -> list[str]:
         "How far off the positions are: an error that all images share (height, clock, boresight seen from "
         "one side) moves all sightings together and does not show.",
         "Which cause is behind it: that takes points whose position is known.",
+        "How far a thing moved between its sightings: that counts as scatter, and makes the ellipses look "
+        "too small.",
     ]
     if (found.things["images"] < 2).any():
         alone = int((found.things["images"] < 2).sum())
-        said.append(f"Anything about {alone} of {len(found.things)} things that were seen in one image only.")
+        said.append(
+            f"Anything about {alone} of {len(found.things)} things that have a position from one image only, "
+            "or from none."
+        )
     return said

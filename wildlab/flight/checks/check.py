@@ -24,7 +24,7 @@ ASSUMED = ("pixel_px", "position_horizontal_m", "position_vertical_m", "roll_deg
 
 @dataclass(frozen=True)
 class Use:
-    """Whether a flight can serve a purpose, and why (not)."""
+    """Whether a flight has what a purpose takes, and why (not). `check_flight` says if it makes sense."""
 
     purpose: str
     usable: bool
