@@ -7,12 +7,13 @@ import pytest
 
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
-from wildlab.flight.learnt import learnt_toml, parse_learnt, read_learnt, write_learnt
+from wildlab.flight.checks.sense.sense import sense_sentences
+from wildlab.flight.learnt import LearntParameter, learnt_toml, parse_learnt, read_learnt, write_learnt
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.pipeline.diagnose import diagnose
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import georeference, observe, pose_errors
-from wildlab.pipeline.learn import apply_learnt, learn_flight
+from wildlab.pipeline.learn import apply_learnt, corrected_flight, learn_flight
 
 
 def tuesday(**more):
@@ -46,6 +47,26 @@ def test_it_comes_back_from_its_file_as_it_was(tmp_path):
     assert learnt().conditions.height_m[0] == pytest.approx(55.0, abs=3.0)
     # The place of a flight is in no calibration.
     assert "latitude" not in learnt_toml(learnt())
+
+
+def test_a_corrected_flight_says_what_the_applied_calibration_says():
+    flight = named(tuesday(seed=5), "wednesday")
+    applied = apply_learnt(flight, None, observe(flight), learnt())
+    corrected = corrected_flight(flight, None, learnt())
+    rng = np.random.default_rng(0)
+    np.testing.assert_allclose(
+        georeference(corrected, observe(corrected), rng)[["north_m", "east_m"]],
+        georeference(flight, applied.observations, rng)[["north_m", "east_m"]],
+        atol=1e-6,
+    )
+    # What the calibration takes off is no contradiction any more.
+    late = simulate(Survey(seed=5, clock_s=1.0))
+    assert any("taken 1.00 s later" in one for one in sense_sentences(late))
+    clock = LearntParameter(name="clock", value=1.0, low=0.9, high=1.1, unit="s")
+    of_clock = learnt().model_copy(update={"parameter": (clock,), "covariance": ((0.0025,),)})
+    assert sense_sentences(corrected_flight(late, None, of_clock)) == []
+    nothing = learnt().model_copy(update={"parameter": (), "covariance": ()})
+    assert corrected_flight(flight, None, nothing) is flight
 
 
 def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():

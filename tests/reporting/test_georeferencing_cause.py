@@ -1,5 +1,6 @@
 """Every sentence on the cause follows from its numbers: where it would be false it does not stand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,7 +42,9 @@ def diagnosis(winner, *others, outliers=(), alike=(), rivals=()):
         winner=place, rivals=tuple(models.index(one) for one in rivals),
         means=np.array([one.gain.with_ for one in models]),
     )  # fmt: skip
-    return Diagnosis(None, np.zeros(4, int), models, ranked, None, alike, outliers, np.ones(4, bool))
+    names = winner.fit.names
+    told = Calibration(names, np.ones(len(names)), 0.01 * np.eye(len(names)), {}, 4, 4, 10)
+    return Diagnosis(None, np.zeros(4, int), models, ranked, told, alike, outliers, np.ones(4, bool))
 
 
 def verdict(word, factor=1.0, low=0.9, high=1.1, coverage=0.9):
@@ -199,9 +202,18 @@ def test_what_cannot_be_told_apart_is_said_of_the_winner():
     assert cause.alike_sentences(diagnosis(MOST, model(["height"], undetermined={"down": ()}))) == []
 
 
+def test_a_gain_without_a_parameter_told_from_zero_is_not_certain():
+    sure = diagnosis(MOST)
+    assert sure.counts
+    unsure = replace(sure, calibration=replace(sure.calibration, covariance=np.eye(1)))
+    assert not unsure.counts and "is possible, not certain" in cause.cause_sentence(unsure)
+
+
 def test_images_that_stay_wrong_alike_are_said_to():
     said = cause.neighbours_sentence(Neighbours(0.6, 40))
+    # rho of 0.6 is short by (1 + 4 * 0.6) / 40: 40 images are worth 40 * 0.315 / 1.685.
     assert "correlation 0.60 of 40 images" in said and "this flight alone" in said
+    assert "they are worth about 7, which the intervals allow for" in said
     assert cause.neighbours_sentence(Neighbours(0.1, 40)) == ""
     assert cause.neighbours_sentence(Neighbours(float("nan"), 3)) == ""
 

@@ -107,6 +107,13 @@ class Gain(NamedTuple):
         """Whether the interval lies above zero."""
         return bool(self.gain.low > 0)
 
+    def widened(self, by: float) -> Gain:
+        """The same with an interval that is so many times as long."""
+        estimate, low, high = self.gain.estimate, self.gain.low, self.gain.high
+        return self._replace(
+            gain=Interval(estimate, estimate - by * (estimate - low), estimate + by * (high - estimate))
+        )
+
 
 class Ranked(NamedTuple):
     """Models by their held-out errors.

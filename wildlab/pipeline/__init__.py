@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         pose_errors,
         truth_of,
     )
-    from wildlab.pipeline.learn import Applied, apply_learnt, learn_flight
+    from wildlab.pipeline.learn import Applied, apply_learnt, corrected_flight, learn_flight
     from wildlab.pipeline.navigate import (
         PUBLISHED_LIKE,
         MekfTuning,
@@ -59,7 +59,7 @@ else:
             "evaluate": ("errors_of", "score_points", "recorded_answers", "unlabelled_programs"),
             "follow": ("FILTERS", "usual_tuning"),
             "georeference": ("Observations", "USUAL", "covariances_of", "observe", "pose_errors", "truth_of"),
-            "learn": ("Applied", "apply_learnt", "learn_flight"),
+            "learn": ("Applied", "apply_learnt", "corrected_flight", "learn_flight"),
             "navigate": ("Navigated", "PUBLISHED_LIKE", "MekfTuning", "navigate_mekf", "navigate_observer"),
             "navigation_errors": ("Errors", "errors_against"),
             "repeats": ("Repeats", "judge_repeats"),
@@ -95,6 +95,7 @@ __all__ = [
     "Sighting",
     "apply_learnt",
     "calibrate_flight",
+    "corrected_flight",
     "covariances_of",
     "errors_against",
     "errors_of",

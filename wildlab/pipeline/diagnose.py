@@ -139,8 +139,8 @@ class Diagnosis:
 
     @property
     def counts(self) -> bool:
-        """Whether taking the winner off gained something for certain."""
-        return bool(self.winner.causes) and self.winner.gain.counts
+        """Whether taking the winner off gained something for certain, and a parameter of it is not zero."""
+        return bool(self.winner.causes) and self.winner.gain.counts and bool(_nonzero(self.calibration))
 
     @property
     def shown(self) -> Model:
@@ -149,9 +149,7 @@ class Diagnosis:
 
     def neighbours(self) -> Neighbours:
         """How alike images that follow each other are once what is shown is taken off."""
-        whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(self.scored)))
-        left = np.einsum("nij,nj->ni", whiten, self.shown.held.mean(axis=0))
-        return compare_neighbours(left, self.scored["time_s"])
+        return _neighbours(self.shown, self.scored)
 
     def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
         """Held-out errors of what is shown, each figure the mean over the rounds; of rows (N,) or all."""
@@ -232,12 +230,18 @@ def diagnose(
         models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
     ranked = _rank(models, blocks)
     winner = models[ranked.winner]
+    calibration = with_covariance(winner.fit, scored["frame_id"].to_numpy(), blocks)
+    # Blocks whose images stay wrong alike are fewer than they are.
+    alike_images = _neighbours(winner, scored)
+    wider = alike_images.widening(len(np.unique(blocks)))
+    calibration = replace(calibration, covariance=wider**2 * calibration.covariance)
+    winner = replace(winner, gain=winner.gain.widened(wider))
+    models[ranked.winner] = winner
     # What is far out is looked for with the winner taken off, where that gained something for certain.
-    shown = winner if winner.gain.counts else models[0]
+    shown = winner if winner.gain.counts and _nonzero(calibration) else models[0]
     marks = scored["truth_id"].to_numpy(str)
     metres = place(shown.fit.names, shown.fit.values)
     outliers, inliers = find_outliers(shown.fit.r, metres, scored["frame_id"].to_numpy(str), marks)
-    calibration = with_covariance(winner.fit, scored["frame_id"].to_numpy(), blocks)
     return Diagnosis(scored, blocks, tuple(models), ranked, calibration, tuple(alike), outliers, inliers)
 
 
@@ -307,14 +311,23 @@ def _search(
     return models, alike
 
 
+def _nonzero(calibration: Calibration) -> tuple[str, ...]:
+    """The parameters whose 95 % interval leaves zero out."""
+    intervals = {name: calibration.interval(name) for name in calibration.names}
+    return tuple(name for name, (low, high) in intervals.items() if low > 0 or high < 0)
+
+
 def _told_from_zero(calibration: Calibration) -> tuple[str, ...]:
     """The parameters whose 95 % interval leaves zero out, where there are some and others do not."""
-    told = []
-    for name in calibration.names:
-        low, high = calibration.interval(name)
-        if low > 0 or high < 0:
-            told.append(name)
-    return tuple(told) if 0 < len(told) < len(calibration.names) else ()
+    told = _nonzero(calibration)
+    return told if 0 < len(told) < len(calibration.names) else ()
+
+
+def _neighbours(model: Model, scored: pd.DataFrame) -> Neighbours:
+    """How alike the held-out errors of images are that follow each other."""
+    whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))
+    left = np.einsum("nij,nj->ni", whiten, model.held.mean(axis=0))
+    return compare_neighbours(left, scored["time_s"])
 
 
 def _undetermined_alone(models: list[Model], causes: tuple[str, ...]) -> set[str]:

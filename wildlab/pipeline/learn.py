@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +20,18 @@ from wildlab.flight.learnt import (
     parse_learnt,
     refuse_other_camera,
 )
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
-from wildlab.geometry.corrections import Calibration
+from wildlab.geometry.corrections import Calibration, apply_calibration, calibrated_camera
 from wildlab.pipeline.accuracy import noise_without
 from wildlab.pipeline.diagnose import Diagnosis, diagnose
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import Observations, calibrated, georeference, observe
 from wildlab.pipeline.pose_noise import as_deviations
 
-__all__ = ["Applied", "apply_learnt", "learn_flight", "learn_from", "parse_learnt"]
+__all__ = ["Applied", "apply_learnt", "corrected_flight", "learn_flight", "learn_from", "parse_learnt"]
 
+_PLACE = ("north", "east", "down")
 _SCALES = {"deg": 180 / np.pi, "%": 100.0}
 
 
@@ -185,9 +188,54 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
         Where it was learnt with another camera or another mount.
     """
     refuse_other_camera(flight.manifest, learnt)
+    placed = calibrated(flight, source, observations, _calibration(learnt))
+    deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
+    return Applied(placed, deviations, _sentence(flight, observations, learnt))
+
+
+def corrected_flight(flight: Flight, source: str | None, learnt: Learnt) -> Flight:
+    """A flight whose manifest and poses say what the calibration says, for checks of whether it makes sense.
+
+    Parameters
+    ----------
+    flight
+        As logged; is not changed.
+    source
+        Name of the ``nav`` table that is corrected.
+    learnt
+        Of this camera and mount.
+
+    Returns
+    -------
+    Flight
+        With other clock, mount, camera and positions of that source.
+    """
+    calibration, m = _calibration(learnt), flight.manifest
+    name, nav = flight.pose_source(source)
+    if m.camera is None or not calibration.names:
+        return flight
+    camera = calibrated_camera(calibration, m.geometry_camera())
+    roll, tilt, pan = np.degrees(apply_calibration(calibration, m.geometry_mount()).misalignment)
+    changed = replace_in_manifest(
+        m,
+        {
+            "clocks": {"camera_offset_s": m.clocks.camera_offset_s + calibration.value("clock")},
+            "camera": {"fx_px": camera.fx, "fy_px": camera.fy, "cx_px": camera.cx, "cy_px": camera.cy},
+            "mount": {
+                "misalignment_roll_deg": float(roll),
+                "misalignment_tilt_deg": float(tilt),
+                "misalignment_pan_deg": float(pan),
+            },
+        },
+    )
+    moved = nav.assign(**{f"{axis}_m": nav[f"{axis}_m"] + calibration.value(axis) for axis in _PLACE})
+    return replace(flight, manifest=changed, nav={**flight.nav, name: moved})
+
+
+def _calibration(learnt: Learnt) -> Calibration:
     n = len(learnt.parameter)
     scales = np.array([1 / _SCALES.get(one.unit, 1.0) for one in learnt.parameter])
-    calibration = Calibration(
+    return Calibration(
         tuple(one.name for one in learnt.parameter),
         np.array([one.value for one in learnt.parameter]) * scales,
         np.array(learnt.covariance, float).reshape(n, n) * np.outer(scales, scales),
@@ -196,9 +244,6 @@ def apply_learnt(flight: Flight, source: str | None, observations: Observations,
         learnt.learnt_on.images,
         learnt.learnt_on.blocks,
     )
-    placed = calibrated(flight, source, observations, calibration)
-    deviations = {name: float(value) for name, value in learnt.noise.model_dump().items()}
-    return Applied(placed, deviations, _sentence(flight, observations, learnt))
 
 
 def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str:

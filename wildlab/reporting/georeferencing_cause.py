@@ -172,7 +172,8 @@ def neighbours_sentence(neighbours: Neighbours) -> str:
         return ""
     return (
         "Images that follow each other are still wrong alike with it taken off (correlation "
-        f"{neighbours.correlation:.2f} of {neighbours.images} images): they are worth fewer than they are, "
+        f"{neighbours.correlation:.2f} of {neighbours.images} images): they are worth about "
+        f"{neighbours.worth:.0f}, which the intervals allow for, "
         "and the gain may be that of this flight alone."
     )
 
