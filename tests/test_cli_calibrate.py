@@ -44,6 +44,9 @@ def test_what_is_learnt_is_printed_and_written(capsys, folder, tmp_path):
     assert out.startswith("boresight") and "mean error" in out and "tilt" in out and "95 % interval" in out
     kept = read_learnt(tmp_path / "c.toml")
     assert {"tilt"} <= {one.name for one in kept.parameter}
+    code, _, err = call(capsys, "calibrate", folder / "tilted", "--into", tmp_path / "c.toml")
+    assert code == 2 and "this file is there already. Name another, or add --overwrite" in err
+    assert read_learnt(tmp_path / "c.toml") == kept
     code, _, err = call(capsys, "evaluate", folder / "other", "--calibration", tmp_path / "c.toml",
                         "--out", tmp_path / "reports")  # fmt: skip
     assert code == 2 and "another camera: fx_px is 2400 there and 2600 here" in err

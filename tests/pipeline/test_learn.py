@@ -69,6 +69,14 @@ def test_a_corrected_flight_says_what_the_applied_calibration_says():
     assert corrected_flight(flight, None, nothing) is flight
 
 
+def test_another_height_than_that_of_the_calibration_is_said():
+    flight = named(tuesday(seed=5), "wednesday")
+    low = learnt().conditions.model_copy(update={"height_m": (10.0, 12.0)})
+    other = learnt().model_copy(update={"conditions": low})
+    assert "are from another height than there" in apply_learnt(flight, None, observe(flight), other).sentence
+    assert "another height" not in apply_learnt(flight, None, observe(flight), learnt()).sentence
+
+
 def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
     flight = named(tuesday(seed=5), "wednesday")
     logged = observe(flight)

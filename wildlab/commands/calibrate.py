@@ -7,16 +7,20 @@ from pathlib import Path
 import click
 
 from wildlab.commands.shared import FILE, FOLDER
+from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, print_table, shown
 
 
 @click.command(short_help="Learn on a flight's known points what the next one is to be corrected by.")
 @click.argument("flight", type=FOLDER)
 @click.option("--into", type=FILE, required=True, help="The file to write, calibration.toml for instance.")
+@click.option("--overwrite", is_flag=True, help="Replace the file that is there.")
 @click.option("--source", help="Which poses, where the flight has several (its nav/NAME.parquet).")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="What was learnt, as JSON.")
-def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: bool) -> None:
+def calibrate(
+    flight: Path, into: Path, overwrite: bool, source: str | None, seed: int, as_json: bool
+) -> None:
     """Learn on the known points of FLIGHT what is constantly wrong with position, boresight, clock or lens.
 
     Only what gained something for certain on images that it was not estimated from is written down, with its
@@ -34,6 +38,8 @@ def calibrate(flight: Path, into: Path, source: str | None, seed: int, as_json: 
     from wildlab.pipeline.learn import learn_flight
     from wildlab.reporting.georeferencing_cause import causes_in_words, simplest_rivals
 
+    if into.exists() and not overwrite:
+        raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
     learnt, diagnosis = learn_flight(load_flight(flight), np.random.default_rng(seed), source)
     write_learnt(learnt, into)
     if as_json:

@@ -163,6 +163,21 @@ class ImuPart(Strict):
     scale_error_percent: Annotated[float, Field(gt=0, le=50)] | None = None
     note: str = ""
 
+    def unstated_noise(self) -> list[str]:
+        """What a navigation filter has to know and is not stated."""
+        return [name for name in IMU_NOISE if getattr(self, name) is None]
+
+
+#: What a navigation filter has to know of how an inertial sensor errs.
+IMU_NOISE = (
+    "velocity_random_walk_m_s_sqrt_h",
+    "angle_random_walk_deg_sqrt_h",
+    "accelerometer_bias_m_s2",
+    "accelerometer_bias_time_s",
+    "gyro_bias_deg_h",
+    "gyro_bias_time_s",
+)
+
 
 class MagnetometerPart(Strict):
     """The magnetometer, and the Earth's field at the place and time of the flight, as a model of it says.

@@ -31,6 +31,8 @@ from wildlab.pipeline.pose_noise import as_deviations
 
 __all__ = ["Applied", "apply_learnt", "corrected_flight", "learn_flight", "learn_from", "parse_learnt"]
 
+#: Heights that differ by more than this factor weigh angles and positions otherwise.
+OTHER_HEIGHT = 1.25
 _PLACE = ("north", "east", "down")
 _SCALES = {"deg": 180 / np.pi, "%": 100.0}
 
@@ -269,6 +271,15 @@ def _sentence(flight: Flight, observations: Observations, learnt: Learnt) -> str
     outside = float(np.mean((depression < low - 5) | (depression > high + 5)))
     if outside > 0.1:
         said += f" {100 * outside:.0f} % of the views here are flatter or steeper than any there."
+    height = observations.plane_down - observations.poses.p_nc[:, 2]
+    low, high = learnt.conditions.height_m
+    outside = float(np.mean((height < low / OTHER_HEIGHT) | (height > high * OTHER_HEIGHT)))
+    if outside > 0.1:
+        said += (
+            f" {100 * outside:.0f} % of the views here are from another height than there "
+            f"({np.nanmin(height):.0f} to {np.nanmax(height):.0f} m, there {low:.0f} to {high:.0f} m): "
+            "errors of angle and of position, which one height tells apart badly, weigh otherwise here."
+        )
     return said
 
 

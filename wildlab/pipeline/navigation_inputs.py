@@ -64,7 +64,7 @@ def imu_noise(flight: Flight) -> ImuNoise:
         "gyro_bias_deg_h": np.radians(1.0) / hour,
         "gyro_bias_time_s": 1.0,
     }
-    missing = [name for name in figures if getattr(stated, name) is None]
+    missing = stated.unstated_noise()
     if missing:
         raise WildlabError(
             f"how the inertial sensor errs is not stated ({missing[0]} and {len(missing) - 1} more)"

@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 from wildlab.flight.checks.check import check_flight, usable_for
+from wildlab.flight.checks.inertial_data import FORCE, RATE
+from wildlab.flight.manifest import IMU_NOISE, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 
@@ -99,16 +101,22 @@ def test_the_right_flight_has_nothing_wrong(make_flight: Callable[..., Flight]) 
             "problem",
             "nav/autopilot",
             "time_s",
-            "not increasing: 0.000 s is followed by 0.000 s",
+            "not increasing in 1 of",
         ),
         (
             _set("nav/autopilot", "time_s", 5, 1.0),
             "problem",
             "nav/autopilot",
             "time_s",
-            "2.000 s is followed by 1.000 s",
+            "2.000 s in row 4 is followed by 1.000 s",
         ),
-        (_set("frames", "time_s", 2, 1.5), "problem", "frames", "time_s", "2.250 s is followed by 1.500 s"),
+        (
+            _set("frames", "time_s", 2, 1.5),
+            "problem",
+            "frames",
+            "time_s",
+            "2.250 s in row 1 is followed by 1.500 s",
+        ),
         (_set("frames", "time_s", 2, 2.25), "warning", "frames", "time_s", "1 frames have the same time"),
         (_set("frames", "time_s", 2, 11.0), "warning", "nav/autopilot", "time_s", "1 of 3 frames is outside"),
         (
@@ -390,3 +398,20 @@ def test_pixels_need_a_camera(make_flight: Callable[..., Flight]) -> None:
     (found,) = [one for one in check_flight(make_flight(camera=None)) if one.field == "camera"]
     assert found.level == "problem"
     assert "there are pixels, and no camera they could be of" in found.sentence
+
+
+def test_navigation_says_what_a_report_on_it_lacks(make_flight: Callable[..., Flight]) -> None:
+    flight = make_flight()
+    table = pd.DataFrame({name: np.zeros(3) for name in (*FORCE, *RATE)}).assign(
+        time_s=[0.0, 0.1, 0.2], f_z_m_s2=-9.8
+    )
+    flight.tables["imu"] = table
+    flight.tables["gnss"] = pd.DataFrame(
+        {"time_s": [0.0, 1.0], "north_m": [0.0, 0.0], "east_m": [0.0, 0.0], "down_m": [0.0, 0.0]}
+    )
+    use = {one.purpose: one for one in usable_for(flight)}["navigation"]
+    assert use.usable and "but no report on it, for imu.velocity_random_walk_m_s_sqrt_h" in use.why
+    figures = dict.fromkeys(IMU_NOISE, 1.0)
+    flight.manifest = replace_in_manifest(flight.manifest, {"imu": figures})
+    use = {one.purpose: one for one in usable_for(flight)}["navigation"]
+    assert use.usable and use.why == "imu and gnss are there"

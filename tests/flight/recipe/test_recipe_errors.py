@@ -154,7 +154,7 @@ def both(*changes: Change) -> Change:
             in_table("nav.csv", "09:30:03Z", "09:30:01Z"),
             "nav.csv",
             "time_s (from [poses.log])",
-            "the timestamps are not increasing: 2.000 s is followed by 1.000 s. Sort",
+            "2.000 s in row 2 is followed by 1.000 s. Look at those rows for a wrong stamp",
         ),
         (
             in_table("photos.csv", "09:30:03Z", "09:30:01Z"),

@@ -135,13 +135,19 @@ def usable_for(flight: Flight) -> list[Use]:
         *([] if imu else ["inertial measurements (imu)"]),
         *([] if gnss else ["satellite positions (gnss)"]),
     ]
+    unstated = ""
+    if flight.manifest.twin is None and (missing := flight.manifest.imu.unstated_noise()):
+        unstated = (
+            f"; but no report on it, for {_and([f'imu.{name}' for name in missing])} "
+            f"{'is' if len(missing) == 1 else 'are'} not stated in flight.toml"
+        )
     return [
         Use("georeferencing accuracy", not lacks, georeferencing),
         Use("tracking", tracks, tracking or "detections with times, and truth to judge by"),
         Use(
             "navigation",
             not navigation,
-            f"it lacks {_and(navigation)}" if navigation else "imu and gnss are there",
+            f"it lacks {_and(navigation)}" if navigation else f"imu and gnss are there{unstated}",
         ),
     ]
 

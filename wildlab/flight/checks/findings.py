@@ -165,9 +165,10 @@ def _increasing(name: str, times: pd.Series, whose: str) -> Iterator[Finding]:
             "problem",
             name,
             "time_s",
-            f"the timestamps{whose} are not increasing: {times.iloc[row - 1]:.3f} s is followed by "
-            f"{times.iloc[row]:.3f} s",
-            "sort the rows by time, take out repeated ones, and look for a clock that was set back",
+            f"the timestamps{whose} are not increasing in {int(bad.sum())} of {len(bad)} steps: "
+            f"{times.iloc[row - 1]:.3f} s in row {row - 1} is followed by {times.iloc[row]:.3f} s",
+            "look at those rows for a wrong stamp or a clock that was set back, and mend it; else sort the "
+            "rows by time and take out repeated ones",
         )
 
 
