@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import subprocess
 import sys
 import time
@@ -17,7 +19,7 @@ import pytest
 from tests.flight.conftest import make_flight
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
-from wildlab.errors import RunFailed, WildlabError
+from wildlab.errors import RunFailed, WildlabError, system_error
 from wildlab.flight.store import Flight, save_flight
 from wildlab.runner.run import Outcome
 
@@ -202,3 +204,40 @@ def test_check_does_not_call_a_flight_usable_that_contradicts_itself(
     save_flight(flight, tmp_path / "flight")
     code, out, _ = call(capsys, "check", str(tmp_path / "flight"))
     assert code == 2 and "georeferencing accuracy: once what is above is mended" in out and ": yes" not in out
+
+
+@pytest.mark.parametrize(
+    ("number", "fix"),
+    [
+        (errno.ENOSPC, "Free some space on the disk at "),
+        (errno.EDQUOT, "Free some space on the disk at "),
+        (errno.EROFS, "Choose a place that can be written to"),
+        (errno.EACCES, "Check its permissions"),
+        (errno.EPERM, "Check its permissions"),
+        (errno.ENOENT, "A folder above it is missing".lower()),
+        (errno.EEXIST, "A file is where a folder is wanted"),
+        (errno.ENOTDIR, "A file is where a folder is wanted"),
+        (errno.EISDIR, "A folder is where a file is wanted"),
+        (errno.ENAMETOOLONG, "Give it a shorter name"),
+        (errno.ELOOP, "Its links go in a circle"),
+        (errno.EIO, "Check the path, its permissions and its disk"),
+    ],
+)
+def test_what_the_system_says_is_a_sentence_with_the_file(
+    capsys: pytest.CaptureFixture[str], failing: Any, tmp_path: Path, number: int, fix: str
+) -> None:
+    failing(OSError(number, os.strerror(number), str(tmp_path / "not" / "there")))
+    code, _, err = call(capsys, "list")
+    assert code == 2 and err.count("\n") == 1
+    assert err.startswith(
+        f"wildlab: {tmp_path}/not/there: cannot be written or read ({os.strerror(number)})."
+    )
+    assert fix in err
+
+
+def test_a_full_disk_is_named_by_where_it_is_mounted(tmp_path: Path) -> None:
+    place = tmp_path
+    while not os.path.ismount(place):
+        place = place.parent
+    said = str(system_error(OSError(errno.ENOSPC, "full"), tmp_path / "deep" / "file"))
+    assert said.endswith(f"Free some space on the disk at {place}.")

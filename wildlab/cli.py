@@ -20,7 +20,7 @@ from wildlab import __version__
 from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
 from wildlab.commands.shared import FILE, FOLDER
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
 if TYPE_CHECKING:
@@ -255,6 +255,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except Exception as error:
         if os.environ.get("WILDLAB_DEBUG") == "1":
             raise
+        if isinstance(error, OSError) and error.errno and error.filename:
+            click.echo(f"wildlab: {system_error(error)}", err=True)
+            sys.exit(2)
         click.echo(
             f"wildlab: Something unexpected happened ({type(error).__name__}: {error}). "
             "Run it again with WILDLAB_DEBUG=1 to see where, and report that.",

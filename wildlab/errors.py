@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+from pathlib import Path
 
 
 class WildlabError(Exception):
@@ -44,3 +46,49 @@ class RunFailed(WildlabError):
     """The input was fine and the work was not: a notebook raised, a time limit passed."""
 
     exit_code = 1
+
+
+def system_error(error: OSError, file: str | os.PathLike[str] | None = None) -> WildlabError:
+    """What the system said of a file or folder, as a sentence with what to do.
+
+    Parameters
+    ----------
+    error
+        As it was raised.
+    file
+        What it is about; left out, the file that the error names.
+
+    Returns
+    -------
+    WildlabError
+        To be raised. A full disk is named by where it is mounted.
+
+    Examples
+    --------
+    >>> print(system_error(OSError(errno.EROFS, "Read-only file system"), "reports/x.html"))
+    reports/x.html: cannot be written or read (Read-only file system). Choose a place that can be written to.
+    """
+    about = file if file is not None else error.filename
+    said = error.strerror or type(error).__name__
+    fix = {
+        errno.EACCES: "check its permissions, or choose another place",
+        errno.EPERM: "check its permissions, or choose another place",
+        errno.EROFS: "choose a place that can be written to",
+        errno.ENOENT: "check the path: a folder above it is missing, or cannot be written to",
+        errno.EEXIST: "a file is where a folder is wanted: move it away, or choose another name",
+        errno.ENOTDIR: "a file is where a folder is wanted: move it away, or choose another name",
+        errno.EISDIR: "a folder is where a file is wanted: choose another name",
+        errno.ENAMETOOLONG: "give it a shorter name",
+        errno.ELOOP: "its links go in a circle: give the file itself",
+    }.get(error.errno or 0, "check the path, its permissions and its disk")
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        fix = f"free some space on the disk at {_disk(about)}"
+    return WildlabError(f"cannot be written or read ({said})", fix, file=about)
+
+
+def _disk(file: str | bytes | os.PathLike[str] | int | None) -> str:
+    """Where the disk of a file is mounted; the file may not exist."""
+    place = Path(os.fsdecode(file)).absolute() if isinstance(file, str | bytes | os.PathLike) else Path.cwd()
+    while not place.is_mount() and place != place.parent:
+        place = place.parent
+    return str(place)

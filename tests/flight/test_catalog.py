@@ -259,6 +259,6 @@ def test_a_full_disk_is_one_sentence(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(catalog._Limited, "write", full)
-    with pytest.raises(WildlabError, match=r"No space left on device.*Free some space on its disk"):
+    with pytest.raises(WildlabError, match=r"No space left on device.*Free some space on the disk at /"):
         fetch("small", tmp_path / "here")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["web"]

@@ -17,7 +17,7 @@ from typing import Annotated, BinaryIO
 import pooch
 from pydantic import Field, RootModel, field_validator
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, system_error
 from wildlab.files import sha256
 from wildlab.flight.files import (
     Strict,
@@ -201,7 +201,7 @@ def fetch(name: str, into: Path | None = None, progress: Progress | None = None)
                     place.parent.mkdir(parents=True, exist_ok=True)
                     (Path(temporary) / str(number)).replace(place)
         except OSError as error:
-            raise _unwritable(error, folder) from None
+            raise system_error(error, folder) from None
     return [folder / file.path for file in dataset.files]
 
 
@@ -287,13 +287,6 @@ class _Limited:
 
     def flush(self) -> None:
         self.file.flush()
-
-
-def _unwritable(error: OSError, folder: Path) -> WildlabError:
-    """What the system said of a folder to write into, as a sentence with what to do."""
-    said = error.strerror or type(error).__name__
-    fix = "free some space on its disk" if error.errno in _FULL else "check that it can be written to"
-    return WildlabError(f"the data set cannot be kept there ({said})", fix, file=folder)
 
 
 def _in_words(error: OSError) -> str:

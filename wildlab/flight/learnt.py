@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, system_error
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, read_toml
 from wildlab.flight.manifest import CameraPart, Manifest, MountPart, Spread
@@ -148,8 +148,7 @@ def write_learnt(learnt: Learnt, path: Path) -> None:
     try:
         write_atomic(path, learnt_toml(learnt))
     except OSError as error:
-        fix = "name a file in a folder that is there and may be written to"
-        raise WildlabError(f"cannot be written ({error.strerror})", fix, file=path) from None
+        raise system_error(error, path) from None
 
 
 def refuse_other_camera(manifest: Manifest, learnt: Learnt) -> None:
