@@ -47,6 +47,8 @@ class Receiver(NamedTuple):
         The one with the largest score; the first, where what is stated does.
     begin, end
         Part of the flight that it was found from, s.
+    scale
+        What is stated, of positions and of velocities.
     fixes
         How many positions that were.
     gross
@@ -57,6 +59,7 @@ class Receiver(NamedTuple):
     chosen: Candidate
     begin: float
     end: float
+    scale: Scale
     fixes: int
     gross: int
 
@@ -168,9 +171,10 @@ def receiver_noise(flight: Flight) -> Receiver:
         if one.gauss_markov is not None:
             stated[name] = np.hypot(stated[name], one.gauss_markov.sd[[0, 2]])
     interval = float(np.median(np.diff(aiding["position"].times[inside])))
-    candidates = choose(run, Scale(stated["position"], stated.get("velocity"), interval, end - begin))
+    scale = Scale(stated["position"], stated.get("velocity"), interval, end - begin)
+    candidates = choose(run, scale)
     chosen = max(candidates, key=lambda one: one.score)
-    return Receiver(candidates, chosen, begin, end, int(inside.sum()), gross)
+    return Receiver(candidates, chosen, begin, end, scale, int(inside.sum()), gross)
 
 
 def _filter_of(flight: Flight, given: Inputs) -> _Filter:

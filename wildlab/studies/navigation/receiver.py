@@ -1,0 +1,251 @@
+"""What a report says of a receiver's noise: what was found, what it changed, and what it leaves.
+
+Every sentence is chosen by the numbers that it states.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
+from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
+from wildlab.pipeline.navigation_errors import Errors, Studied, summarise_innovations
+from wildlab.pipeline.receiver_noise import Receiver
+from wildlab.reporting.report import Report
+
+#: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.
+LEVEL, COLOUR = (0.7, 1.4), 0.3
+_ORDERS = ("white", "and an error of first order", "and an error of second order")
+_PARTS = (
+    ("white noise, level", 0),
+    ("white noise, height", 1),
+    ("slow error, level", 0),
+    ("slow error, height", 1),
+    ("how long that keeps", None),
+    ("over what its change is smooth", None),
+)
+
+
+def parameters_table(receiver: Receiver) -> pd.DataFrame:
+    """Every number of the noise that was chosen, beside what is stated.
+
+    Returns
+    -------
+    DataFrame
+        ``source``, ``what``, ``unit``, ``stated``, ``found``, ``low`` and ``high`` (two standard deviations
+        by the information in the innovations; NaN at the limit of what was tried).
+    """
+    rows = []
+    scale, chosen = receiver.scale, receiver.chosen
+    for index, (name, noise, stated, unit) in enumerate(
+        (("position", chosen.noise.position, scale.position, "m"),
+         ("velocity", chosen.noise.velocity, scale.velocity, "m/s"))
+    ):  # fmt: skip
+        if stated is None:
+            continue
+        for place, (what, axis) in enumerate(_PARTS):
+            if place > 1 and (noise.order == 0 or (place == 5 and noise.order == 1)):
+                continue
+            value = noise[place] * (stated[axis] if place < 2 and axis is not None else 1.0)
+            spread = float(np.exp(2 * chosen.sd[SIZE * index + place]))
+            rows.append(
+                {
+                    "source": name,
+                    "what": what,
+                    "unit": "s" if axis is None else unit,
+                    "stated": stated[axis] if place < 2 and axis is not None else np.nan,
+                    "found": value,
+                    "low": value / spread,
+                    "high": value * spread,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def models_table(receiver: Receiver) -> pd.DataFrame:
+    """Models that were tried: ``model``, ``parameters``, ``gain`` of the log likelihood over what is stated,
+    ``score`` (that less what chance gains) and ``chosen``."""
+    first = receiver.candidates[0]
+    return pd.DataFrame(
+        [
+            {
+                "model": _model(one, receiver),
+                "parameters": one.parameters,
+                "gain": one.log_likelihood - first.log_likelihood,
+                "score": one.score - first.score,
+                "chosen": "chosen" if one is receiver.chosen else "",
+            }
+            for one in receiver.candidates
+        ]
+    )
+
+
+def _model(one: Candidate, receiver: Receiver) -> str:
+    if one.parameters == 0:
+        return "as stated"
+    moving = "" if receiver.scale.velocity is None else f"; velocities {_ORDERS[one.noise.velocity.order]}"
+    return f"positions {_ORDERS[one.noise.position.order]}{moving}"
+
+
+def words_on_estimate(receiver: Receiver) -> str:
+    """What was found from how much, and by what it was chosen."""
+    since = f"the {receiver.fixes} fixes from {receiver.begin:.0f} to {receiver.end:.0f} s"
+    left_out = f" {receiver.gross} fixes that no noise explains were left out." if receiver.gross else ""
+    if receiver.noise is None:
+        return (
+            f"From {since}, what is stated of the receiver is as likely as any of the "
+            f"{len(receiver.candidates) - 1} other models of its noise: nothing was changed.{left_out}"
+        )
+    scale = receiver.scale
+    sources = [f"Positions have {_noise(receiver.noise.position, scale.position, 'm', scale.duration)}."]
+    if scale.velocity is not None:
+        sources.append(
+            f"Velocities have {_noise(receiver.noise.velocity, scale.velocity, 'm/s', scale.duration)}."
+        )
+    return (
+        f"The likeliest noise by {since}, of {len(receiver.candidates)} models; no pose found on board has a "
+        f"part in it. {' '.join(sources)}{left_out}"
+    )
+
+
+def _noise(noise: SourceNoise, stated: np.ndarray, unit: str, longest: float) -> str:
+    white = _two(noise.white_level * stated[0]), _two(noise.white_vertical * stated[1])
+    words = f"white noise of {white[0]} {unit} level and {white[1]} {unit} in height"
+    if noise.order == 0:
+        return f"{words}, and no error that lasts"
+    words += (
+        f", and beside it an error of {_two(noise.sd_level)} and {_two(noise.sd_vertical)} {unit} that keeps "
+    )
+    # No flight tells how long an error keeps that outlasts it.
+    words += "for all of that time" if noise.time > 0.99 * longest else f"for {_two(noise.time)} s"
+    return words + (f" and whose change is smooth over {_two(noise.rate_time)} s" if noise.order == 2 else "")
+
+
+def _two(value: float) -> str:
+    """With two digits that count."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def left_over(ratio: float, lag1: float) -> tuple[str, ...]:
+    """What innovations still have that they should not: ``"level"``, ``"colour"``, both or nothing.
+
+    Parameters
+    ----------
+    ratio
+        Mean NIS over its ideal.
+    lag1
+        Largest correlation at lag 1.
+    """
+    level = () if LEVEL[0] <= ratio <= LEVEL[1] else ("level",)
+    return level if abs(lag1) < COLOUR else (*level, "colour")
+
+
+def words_on_innovations(before: pd.DataFrame, after: pd.DataFrame | None) -> list[str]:
+    """A sentence for each source: NIS and correlation with what is stated and with what was found, and which
+    of the two is left.
+
+    Parameters
+    ----------
+    before, after
+        As `summarise_innovations` gives them; ``after`` is None where nothing was changed.
+    """
+    now = {} if after is None else {row["source"]: row for row in after.to_dict(orient="records")}
+    sentences = []
+    for was in before.to_dict(orient="records"):
+        name = was["source"]
+        then = was["nis"] / was["dof"], was["lag1"]
+        words = f"GNSS {name}: with what is stated the mean NIS is {then[0]:.2f} of its ideal and the "
+        words += f"correlation at lag 1 {then[1]:.2f}"
+        last = then
+        if name in now:
+            last = now[name]["nis"] / now[name]["dof"], now[name]["lag1"]
+            words += f"; with what was found, {last[0]:.2f} and {last[1]:.2f}"
+        sentences.append(
+            f"{words}. {_LEFT[left_over(*last)].format(low=LEVEL[0], high=LEVEL[1], lag=COLOUR)}"
+        )
+    return sentences
+
+
+_LEFT = {
+    (): "Both are as they should be: {low} to {high}, and below {lag}.",
+    ("level",): "What is left is the level, which should be {low} to {high}; the colour is below {lag}.",
+    (
+        "colour",
+    ): "What is left is the colour, which should be below {lag}; the level is within {low} to {high}.",
+    ("level", "colour"): "Both are left: the level should be {low} to {high}, the colour below {lag}.",
+}
+
+
+def words_on_attitude(before: Errors, after: Errors, begin: float, end: float) -> str:
+    """Whether the attitude came nearer to the reference by the noise that was found, between two times, s."""
+    inside = (before.times >= begin) & (before.times < end)
+    squares = [np.degrees(one.error[inside, 6:]) ** 2 @ np.ones(3) for one in (before, after)]
+    known = np.isfinite(squares[0]) & np.isfinite(squares[1])
+    was, now = (float(np.sqrt(one[known].mean())) if known.any() else np.nan for one in squares)
+    change = squares[1] - squares[0]
+    span = block_mean(change[known], time_blocks(before.times[inside][known], seconds=True))
+    if span.low > 0:
+        verdict = "farther from it"
+    elif span.high < 0:
+        verdict = "nearer to it"
+    else:
+        verdict = "neither nearer nor farther"
+    said = "too short a time to say which is nearer."
+    if np.isfinite(span.low):
+        said = (
+            f"{verdict}, by the {100 * PROBABILITY:.0f} % interval of the difference of mean squares over "
+            f"blocks of the flight, {span.low:+.2f} to {span.high:+.2f} degrees squared."
+        )
+    return (
+        f"The attitude is {now:.2f} degrees from the reference with that noise, all three axes together, and "
+        f"{was:.2f} with what is stated: {said}"
+    )
+
+
+def show_receiver(report: Report, studied: Studied, begin: float, end: float) -> None:
+    """The section on the receiver's noise, for a logged flight, judged between two times, s."""
+    before = summarise_innovations(studied.found["mekf"], begin, end)
+    receiver = studied.receiver
+    if receiver is None:
+        report.section("How does the receiver err?", f"Not found out: {studied.refusal}.")
+        report.points(words_on_innovations(before, None))
+        return
+    report.section("How does the receiver err?", words_on_estimate(receiver))
+    after = None
+    if receiver.noise is not None:
+        after = summarise_innovations(studied.found["mekf-receiver"], begin, end)
+    points = words_on_innovations(before, after)
+    if after is not None:
+        points.append(words_on_attitude(studied.scored["mekf"], studied.scored["mekf-receiver"], begin, end))
+        points.append("The noise was found from the innovations that are judged here, of one flight.")
+    report.points(points)
+    report.table(
+        models_table(receiver),
+        columns={
+            "model": "noise of the receiver",
+            "parameters": "numbers found",
+            "gain": "log likelihood above the stated",
+            "score": "less what chance gains",
+            "chosen": "",
+        },
+        digits={"gain": 1, "score": 1},
+        caption="Models that were tried, each with its likeliest numbers. Chance gains half the logarithm of "
+        "the number of measurements for each number found (Schwarz).",
+    )
+    if receiver.noise is not None:
+        report.table(
+            parameters_table(receiver),
+            columns={
+                "source": "GNSS",
+                "what": "what",
+                "unit": "unit",
+                "stated": "stated SD",
+                "found": "found",
+                "low": "from",
+                "high": "to",
+            },
+            digits={"stated": 2, "found": 3, "low": 3, "high": 3},
+            caption="From and to: two standard deviations, by the information that the innovations have. "
+            "Where there is none, the number is at the limit of what was tried: the flight does not tell.",
+        )
