@@ -123,3 +123,20 @@ def test_the_attitude_is_nearer_only_where_the_flight_says_so(scale, verdict) ->
     assert (was, now) == (pytest.approx(np.sqrt(3), rel=0.03), pytest.approx(scale * np.sqrt(3), rel=0.03))
     short = words.words_on_attitude(errors(1.0), errors(scale), 0.0, 0.4)
     assert "too short a time" in short
+
+
+def test_parts_in_which_something_is_left_are_named() -> None:
+    rows = [
+        {"part": "calm", "source": "position", "ratio": 0.2, "left": "level"},
+        {"part": "loops", "source": "position", "ratio": 1.1, "left": ""},
+    ]
+    said = words.words_on_parts(pd.DataFrame(rows))
+    assert "0.20 to 1.10" in said and "calm, position: level." in said and "loops" not in said
+    assert "does not do" in said
+    good = words.words_on_parts(pd.DataFrame(rows[1:]))
+    assert "In no part" in good and "does not do" not in good
+
+
+def test_thirds_are_equal_and_leave_nothing_out() -> None:
+    found = words.thirds(10.0, 40.0)
+    assert [(begin, end) for _, begin, end in found] == [(10.0, 20.0), (20.0, 30.0), (30.0, 40.0)]

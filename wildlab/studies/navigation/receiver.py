@@ -5,12 +5,14 @@ Every sentence is chosen by the numbers that it states.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
 from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
-from wildlab.pipeline.navigation_errors import Errors, Studied, summarise_innovations
+from wildlab.pipeline.navigation_errors import AXES, Errors, Studied, summarise, summarise_innovations
 from wildlab.pipeline.receiver_noise import Receiver
 from wildlab.reporting.report import Report
 
@@ -203,23 +205,99 @@ def words_on_attitude(before: Errors, after: Errors, begin: float, end: float) -
     )
 
 
-def show_receiver(report: Report, studied: Studied, begin: float, end: float) -> None:
-    """The section on the receiver's noise, for a logged flight, judged between two times, s."""
-    before = summarise_innovations(studied.found["mekf"], begin, end)
+def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
+    """Innovations and attitude in parts of a flight (words, from, to, s), with what is stated and as found.
+
+    Returns
+    -------
+    DataFrame
+        A row for each part and source: ``part``, ``source``; NIS over its ideal and correlation at lag 1
+        (``ratio_before``, ``lag1_before``, ``ratio``, ``lag1``); RMS of the attitude's difference from the
+        reference (``off_before``, ``off``, degrees); and what is ``left``, in words. Where nothing was
+        changed, before is now.
+    """
+    rows = []
+    for words, begin, end in parts:
+        now = summarise_innovations(studied.found[studied.filter], begin, end)
+        was = summarise_innovations(studied.found["mekf"], begin, end)
+        off = {}
+        for who in ("mekf", studied.filter):
+            numbers = summarise(studied.scored[who], begin, end)
+            off[who] = float(np.linalg.norm([numbers[f"rms_{axis}"] for axis in AXES]))
+        for (_, before), (_, after) in zip(was.iterrows(), now.iterrows(), strict=True):
+            ratio, lag1 = after["nis"] / after["dof"], after["lag1"]
+            rows.append(
+                {
+                    "part": words,
+                    "source": after["source"],
+                    "ratio_before": before["nis"] / before["dof"],
+                    "lag1_before": before["lag1"],
+                    "ratio": ratio,
+                    "lag1": lag1,
+                    "off_before": off["mekf"],
+                    "off": off[studied.filter],
+                    "left": " and ".join(left_over(ratio, lag1)),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def words_on_parts(table: pd.DataFrame) -> str:
+    """Whether one noise does for all parts of the flight; ``table`` as `parts_table` gives it."""
+    amiss = table[table["left"] != ""]
+    if not len(amiss):
+        return "In no part of the flight that is listed below is either left."
+    ratios = table["ratio"]
+    of = "; ".join(f"{row['part']}, {row['source']}: {row['left']}" for _, row in amiss.iterrows())
+    return (
+        f"Part by part, the mean NIS is {ratios.min():.2f} to {ratios.max():.2f} of its ideal. What is left: "
+        f"{of}. One noise for the whole flight does not do for these parts."
+    )
+
+
+def thirds(begin: float, end: float) -> list[tuple[str, float, float]]:
+    """The thirds of a time, s, for a flight of which nobody named parts."""
+    edges = np.linspace(begin, end, 4)
+    names = ("first third", "second third", "last third")
+    return [(name, float(edges[i]), float(edges[i + 1])) for i, name in enumerate(names)]
+
+
+def show_receiver(report: Report, studied: Studied, parts: Sequence[tuple[str, float, float]]) -> None:
+    """The section on the receiver's noise of a logged flight, and on the parts of it that are named, s."""
     receiver = studied.receiver
     if receiver is None:
         report.section("How does the receiver err?", f"Not found out: {studied.refusal}.")
-        report.points(words_on_innovations(before, None))
+        _, begin, end = parts[0]
+        report.points(words_on_innovations(summarise_innovations(studied.found["mekf"], begin, end), None))
         return
+    begin, end = receiver.begin, receiver.end
     report.section("How does the receiver err?", words_on_estimate(receiver))
-    after = None
-    if receiver.noise is not None:
-        after = summarise_innovations(studied.found["mekf-receiver"], begin, end)
-    points = words_on_innovations(before, after)
-    if after is not None:
-        points.append(words_on_attitude(studied.scored["mekf"], studied.scored["mekf-receiver"], begin, end))
+    before = summarise_innovations(studied.found["mekf"], begin, end)
+    changed = receiver.noise is not None
+    after = summarise_innovations(studied.found["mekf-receiver"], begin, end) if changed else None
+    by_part = parts_table(studied, parts if len(parts) > 1 else thirds(begin, end))
+    points = [*words_on_innovations(before, after), words_on_parts(by_part)]
+    if changed:
+        both = studied.scored["mekf"], studied.scored["mekf-receiver"]
+        points.append(words_on_attitude(*both, begin, end))
         points.append("The noise was found from the innovations that are judged here, of one flight.")
     report.points(points)
+    report.table(
+        by_part,
+        columns={
+            "part": "part",
+            "source": "GNSS",
+            "ratio_before": "NIS over ideal, as stated",
+            "ratio": "as found",
+            "lag1_before": "lag 1, as stated",
+            "lag1": "lag 1, as found",
+            "left": "left",
+            "off_before": "attitude, as stated (°)",
+            "off": "attitude, as found (°)",
+        },
+        digits=2,
+        caption="Innovations by part of the flight, and the RMS rotation between estimate and reference.",
+    )
     report.table(
         models_table(receiver),
         columns={
@@ -233,7 +311,7 @@ def show_receiver(report: Report, studied: Studied, begin: float, end: float) ->
         caption="Models that were tried, each with its likeliest numbers. Chance gains half the logarithm of "
         "the number of measurements for each number found (Schwarz).",
     )
-    if receiver.noise is not None:
+    if changed:
         report.table(
             parameters_table(receiver),
             columns={
