@@ -8,7 +8,7 @@ import pytest
 
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise
 from wildlab.pipeline.navigation_errors import Errors
-from wildlab.pipeline.receiver_noise import Receiver
+from wildlab.pipeline.receiver import Placement, Receiver
 from wildlab.studies.navigation import receiver as words
 
 SCALE = Scale(np.array([2.0, 4.0]), np.array([0.2, 0.5]), 1.0, 300.0)
@@ -140,3 +140,20 @@ def test_parts_in_which_something_is_left_are_named() -> None:
 def test_thirds_are_equal_and_leave_nothing_out() -> None:
     found = words.thirds(10.0, 40.0)
     assert [(begin, end) for _, begin, end in found] == [(10.0, 20.0), (20.0, 30.0), (30.0, 40.0)]
+
+
+def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice() -> None:
+    sd = np.array([0.002, 0.05, 0.05, 0.05])
+    as_stated = Placement(0.223, np.array([0.1, 0.0, -0.1]), sd, 0.4)
+    said = words.words_on_placement(as_stated, [0.22, 0.0, 0.0, 0.0])
+    assert "0.223 s late" in said and "as stated, within 3 SD" in said and "write" not in said
+    late = words.words_on_placement(as_stated._replace(latency=0.25), [0.22, 0.0, 0.0, 0.0])
+    assert "write latency_s = 0.25 in [gnss]" in late and "lever_arm_m" not in late
+    moved = words.words_on_placement(
+        as_stated._replace(lever=np.array([0.1, 0.5, 0.0])), [0.22, 0.0, 0.0, 0.0]
+    )
+    assert "write lever_arm_m = [0.10, 0.50, 0.00] in [gnss]" in moved and "latency_s" not in moved
+    two = as_stated._replace(sd=np.array([0.002, np.nan, np.nan, np.nan]))
+    assert "antenna" not in words.words_on_placement(two, [0.22, 5.0, 0.0, 0.0])
+    nothing = words.words_on_placement(as_stated._replace(sd=np.full(4, np.nan)), [0.22, 0.0, 0.0, 0.0])
+    assert "cannot be told" in nothing

@@ -26,7 +26,7 @@ from wildlab.pipeline.navigation_inputs import (
     inputs_of,
     second_vector,
 )
-from wildlab.pipeline.receiver_noise import told, without_gross
+from wildlab.pipeline.receiver import told, without_gross
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,7 @@ from wildlab.pipeline.navigate import (
     navigate_observer,
 )
 from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY
-from wildlab.pipeline.receiver_noise import Receiver, receiver_noise
+from wildlab.pipeline.receiver import Receiver, receiver_noise
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.evaluation.blocks import PROBABILITY, block_mean, time_blocks
 from wildlab.navigation.receiver import SIZE, Candidate, SourceNoise
 from wildlab.pipeline.navigation_errors import AXES, Errors, Studied, summarise, summarise_innovations
-from wildlab.pipeline.receiver_noise import Receiver
+from wildlab.pipeline.receiver import Placement, Receiver, place_receiver
 from wildlab.reporting.report import Report
 
 #: Mean NIS over its ideal within this is of the right level; correlations at lag 1 below that are no colour.
 LEVEL, COLOUR = (0.7, 1.4), 0.3
+#: So many standard deviations from what is stated are said to be off: four numbers are looked at.
+FAR = 3.0
 _ORDERS = ("white", "and an error of first order", "and an error of second order")
 _PARTS = (
     ("white noise, level", 0),
@@ -205,6 +208,40 @@ def words_on_attitude(before: Errors, after: Errors, begin: float, end: float) -
     )
 
 
+def words_on_placement(found: Placement, stated: ArrayLike) -> str:
+    """How late the receiver is and where its antenna sits, and what of that is not as stated.
+
+    Parameters
+    ----------
+    found
+        As `place_receiver` gives it.
+    stated
+        (4,) latency, s, and lever arm, m.
+    """
+    given = np.asarray(stated, float)
+    likely = np.array([found.latency, *found.lever])
+    looked = np.isfinite(found.sd)
+    if not looked.any():
+        return "How late the receiver is cannot be told from this flight."
+    off = looked & (np.abs(likely - given) > FAR * found.sd)
+    words = (
+        f"With that noise the fixes are likeliest {likely[0]:.3f} s late (SD {found.sd[0]:.3f}; stated "
+        f"{given[0]:.3f})"
+    )
+    if looked[1:].all():
+        arms = [", ".join(f"{value:.2f}" for value in values[1:]) for values in (likely, found.sd, given)]
+        words += f" and the antenna at {arms[0]} m (SD {arms[1]}; stated {arms[2]})"
+    if not off.any():
+        return f"{words}: as stated, within {FAR:.0f} SD."
+    write = [f"latency_s = {likely[0]:.2f}"] if off[0] else []
+    if off[1:].any():
+        write.append(f"lever_arm_m = [{', '.join(f'{value:.2f}' for value in likely[1:])}]")
+    return (
+        f"{words}: more than {FAR:.0f} SD from what is stated. Unless you know better, write "
+        f"{' and '.join(write)} in [gnss]. No pose found on board has a part in it."
+    )
+
+
 def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> pd.DataFrame:
     """Innovations and attitude in parts of a flight (words, from, to, s), with what is stated and as found.
 
@@ -280,6 +317,9 @@ def show_receiver(report: Report, studied: Studied, parts: Sequence[tuple[str, f
     if changed:
         both = studied.scored["mekf"], studied.scored["mekf-receiver"]
         points.append(words_on_attitude(*both, begin, end))
+        gnss = studied.flight.manifest.gnss
+        placed = place_receiver(studied.flight, receiver.chosen.noise)
+        points.append(words_on_placement(placed, [gnss.latency_s, *gnss.lever_arm_m]))
         points.append("The noise was found from the innovations that are judged here, of one flight.")
     report.points(points)
     report.table(

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import make_manifest
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight
 from wildlab.navigation.aiding import headings, positions
 from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
@@ -22,7 +23,7 @@ from wildlab.pipeline.navigation_errors import (
     study_navigation,
 )
 from wildlab.pipeline.navigation_inputs import imu_noise, inputs_of
-from wildlab.pipeline.receiver_noise import receiver_noise, thinned, told, without_gross
+from wildlab.pipeline.receiver import place_receiver, receiver_noise, thinned, told, without_gross
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.navigation.receiver import left_over, words_on_attitude
 
@@ -109,8 +110,9 @@ def test_thinned_samples_are_means_of_neighbours() -> None:
     t = np.arange(0, 1.0, 0.004)
     imu = ImuSamples(t, np.stack([t, 2 * t, 3 * t], -1), np.stack([t, t, t], -1))
     few = thinned(imu, 50.0)
-    assert len(few.times) == 50
-    assert np.allclose(few.times, few.specific_force[:, 0]) and np.allclose(few.times[0], t[:5].mean())
+    assert len(few.times) == 50 + 2
+    assert np.allclose(few.times, few.specific_force[:, 0]) and np.allclose(few.times[1], t[:5].mean())
+    assert (few.times[0], few.times[-1]) == (t[0], t[-1])
     assert thinned(imu, 250.0) is imu
 
 
@@ -139,3 +141,36 @@ def test_innovations_of_logged_flights_are_of_the_right_level_and_white(
     print("attitude", off)
     said = words_on_attitude(studied.scored["mekf"], studied.scored[studied.filter], begin, end)
     assert "nearer" in said and "farther from" not in said
+
+
+@pytest.fixture(scope="module")
+def turning() -> Flight:
+    """Three minutes of a twin with one antenna, as if they had been logged."""
+    whole = simulate_twin("fast-vessel", 1)
+    tables = {
+        name: t[t["time_s"] < 180.0].reset_index(drop=True)
+        for name, t in whole.tables.items()
+        if name in ("imu", "gnss")
+    }
+    arm = tables["gnss"][list(LEVER_COLUMNS[:3])].iloc[0].tolist()
+    tables["gnss"] = tables["gnss"].drop(columns=[*SECOND_COLUMNS, *LEVER_COLUMNS])
+    manifest = replace_in_manifest(whole.manifest, {"gnss": {"lever_arm_m": arm}})
+    return Flight(manifest, whole.nav, tables)
+
+
+def test_a_late_receiver_and_a_misplaced_antenna_are_found(turning: Flight) -> None:
+    arm = np.array(turning.manifest.gnss.lever_arm_m)
+    right = place_receiver(turning, ReceiverNoise())
+    truth = np.array([0.0, *arm])
+    found = np.array([right.latency, *right.lever])
+    print(found, truth, right.sd, right.gain)
+    assert (np.abs(found - truth) < 4 * right.sd).all()
+    late = turning.table("gnss").assign(time_s=turning.table("gnss")["time_s"] + 0.12)
+    wrong = replace_in_manifest(
+        turning.manifest, {"gnss": {"lever_arm_m": (arm + np.array([0.4, -0.3, 0.2])).tolist()}}
+    )
+    spoilt = place_receiver(Flight(wrong, turning.nav, {**turning.tables, "gnss": late}), ReceiverNoise())
+    print(spoilt)
+    assert spoilt.latency - right.latency == pytest.approx(0.12, abs=0.01)
+    assert np.allclose(spoilt.lever, right.lever, atol=4 * right.sd[1:].max())
+    assert spoilt.gain > right.gain + 20

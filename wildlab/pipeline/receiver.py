@@ -1,4 +1,4 @@
-"""How the receiver of a flight errs, by the innovations of the filter that takes its fixes.
+"""How a flight's receiver errs, how late it is and where it sits, by the innovations of the filter.
 
 Only the flight's own inertial samples and satellites go into it, and no pose that was found on board: what is
 chosen by this may be judged by that.
@@ -19,6 +19,7 @@ from wildlab.navigation.aiding import Aiding
 from wildlab.navigation.mekf import InitialState, Navigation, run_mekf
 from wildlab.navigation.noise import AxisErrors, ImuNoise
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise, choose, tell
+from wildlab.navigation.scoring import gaussian_log_likelihood, maximise
 from wildlab.navigation.timeline import ImuSamples
 from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY, Inputs, axis_errors, imu_noise, inputs_of
 
@@ -32,6 +33,8 @@ LOST = 0.05
 LONGEST_S, SETTLING_S = 600.0, 60.0
 #: Fewer fixes than this say nothing of their correlation.
 FEWEST = 60
+#: So far from what is stated a latency, s, and a lever arm, m per axis, are looked for.
+LATEST_S, FARTHEST_M = 0.5, 5.0
 #: Inertial samples a second that are enough for what happens between two fixes.
 RATE_HZ = 50.0
 
@@ -67,6 +70,26 @@ class Receiver(NamedTuple):
     def noise(self) -> ReceiverNoise | None:
         """What to tell the filter in place of what is stated; None where what is stated is as good."""
         return None if self.chosen is self.candidates[0] else self.chosen.noise
+
+
+class Placement(NamedTuple):
+    """How late a receiver is and where its antenna sits, as its own fixes are likeliest.
+
+    Attributes
+    ----------
+    latency, lever
+        s, and (3,) m from the inertial sensor to the antenna, in b.
+    sd
+        (4,) of them, latency first, by the information in the innovations: right where the noise is. NaN
+        where it was not looked for.
+    gain
+        Of the log likelihood over what is stated.
+    """
+
+    latency: float
+    lever: Array
+    sd: Array
+    gain: float
 
 
 class _Filter(NamedTuple):
@@ -114,10 +137,7 @@ def without_gross(flight: Flight, given: Inputs) -> dict[str, Aiding]:
                 field="gnss",
             )
         keep = ~np.isin(source.times, found.times[bad])
-        kept[name] = source._replace(
-            times=source.times[keep], value=source.value[keep], variance=source.variance[keep],
-            lever=source.lever[keep],
-        )  # fmt: skip
+        kept[name] = _rows(source, keep)
     return kept
 
 
@@ -177,6 +197,65 @@ def receiver_noise(flight: Flight) -> Receiver:
     return Receiver(candidates, chosen, begin, end, scale, int(inside.sum()), gross)
 
 
+def place_receiver(flight: Flight, noise: ReceiverNoise) -> Placement:
+    """How late the receiver is and where its antenna sits, as the flight's fixes are likeliest.
+
+    Of a flight with two antennas, whose levers it knows, only how late it is.
+
+    Parameters
+    ----------
+    flight
+        With the tables ``imu`` and ``gnss``.
+    noise
+        Of the receiver, as `receiver_noise` finds it.
+
+    Returns
+    -------
+    Placement
+
+    Raises
+    ------
+    WildlabError
+        As `receiver_noise`.
+    """
+    given = inputs_of(flight, noise=imu_noise(flight))
+    aiding = told(without_gross(flight, given), noise)
+    begin, end = _part(flight, given)
+    short = _shortened(_filter_of(flight, given), aiding, begin, end)
+    # The same fixes whatever the latency: a few at either end are left out, and so are those of the settling.
+    low, high = max(begin, short.start.time) + LATEST_S, end - LATEST_S
+    aiding = {name: _rows(one, (one.times >= short.start.time + LATEST_S)) for name, one in aiding.items()}
+    aiding = {name: _rows(one, one.times <= high) for name, one in aiding.items()}
+    stated = np.array([flight.manifest.gnss.latency_s, *given.aiding["position"].lever[0]])
+
+    def run(p: Array) -> tuple[Array, Array]:
+        late = p[0] - stated[0]
+        moved = {
+            name: one._replace(times=one.times - late, lever=one.lever + (p[1:] - stated[1:]))
+            for name, one in aiding.items()
+        }
+        found = short.run(moved, short.imu.times[-1:], 1.0).innovations
+        counted = found.times + late >= low - 1e-9
+        return found.innovation[counted], found.S[counted]
+
+    free = [0] if "second position" in aiding else [0, 1, 2, 3]
+    reach = np.array([LATEST_S, *[FARTHEST_M] * 3])
+    # Far from where it is largest, the likelihood does not say which way: so a search over latencies first.
+    tried = [stated + [late, 0.0, 0.0, 0.0] for late in np.linspace(-LATEST_S, LATEST_S, 21)]
+    likely = [gaussian_log_likelihood(*run(one)) for one in tried]
+    start = tried[int(np.argmax(likely))]
+    found = maximise(run, start, free, stated - reach, stated + reach, enough=0.5, iterations=12)
+    gain = found.log_likelihood - likely[len(likely) // 2]  # the middle one is what is stated
+    return Placement(float(found.parameters[0]), found.parameters[1:], found.sd, gain)
+
+
+def _rows(source: Aiding, keep: NDArray[np.bool_]) -> Aiding:
+    return source._replace(
+        times=source.times[keep], value=source.value[keep], variance=source.variance[keep],
+        lever=source.lever[keep],
+    )  # fmt: skip
+
+
 def _filter_of(flight: Flight, given: Inputs) -> _Filter:
     latitude, _, height = flight.manifest.origin_tuple()
     return _Filter(
@@ -226,13 +305,18 @@ def _shortened(whole: _Filter, aiding: dict[str, Aiding], begin: float, end: flo
 
 
 def thinned(imu: ImuSamples, rate: float) -> ImuSamples:
-    """Means of so many samples that follow each other that about ``rate`` (Hz) are left."""
+    """Means of so many samples that follow each other that about ``rate`` (Hz) are left.
+
+    The first and the last one stay, so that the whole time is still there.
+    """
     step = float(np.median(np.diff(imu.times)))
     every = max(1, int(np.floor(1 / (rate * step) + 1e-6)))
     if every == 1:
         return imu
     n = len(imu.times) // every * every
+    times = imu.times[:n].reshape(-1, every).mean(axis=1)
+    values = [part[:n].reshape(-1, every, 3).mean(axis=1) for part in imu[1:]]
     return ImuSamples(
-        imu.times[:n].reshape(-1, every).mean(axis=1),
-        *(part[:n].reshape(-1, every, 3).mean(axis=1) for part in imu[1:]),
+        np.concatenate([imu.times[:1], times, imu.times[-1:]]),
+        *(np.concatenate([p[:1], v, p[-1:]]) for p, v in zip(imu[1:], values, strict=True)),
     )
