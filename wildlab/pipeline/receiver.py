@@ -241,7 +241,7 @@ def place_receiver(flight: Flight, noise: ReceiverNoise) -> Placement:
     free = [0] if "second position" in aiding else [0, 1, 2, 3]
     reach = np.array([LATEST_S, *[FARTHEST_M] * 3])
     # Far from where it is largest, the likelihood does not say which way: so a search over latencies first.
-    tried = [stated + [late, 0.0, 0.0, 0.0] for late in np.linspace(-LATEST_S, LATEST_S, 21)]
+    tried = [stated + np.array([late, 0.0, 0.0, 0.0]) for late in np.linspace(-LATEST_S, LATEST_S, 21)]
     likely = [gaussian_log_likelihood(*run(one)) for one in tried]
     start = tried[int(np.argmax(likely))]
     found = maximise(run, start, free, stated - reach, stated + reach, enough=0.5, iterations=12)
