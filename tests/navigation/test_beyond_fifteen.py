@@ -28,20 +28,26 @@ def flight():
     return fly()
 
 
-def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight):
+@pytest.mark.parametrize("rate_time", [0.0, 2.0])
+def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight, rate_time):
     """With every state beyond the fifteen, a gap, and one antenna of two with a Gauss-Markov error."""
     imu, start, antennas, _ = spoilt(flight, 0, every=50)
     keep = (imu.times < 30) & ~((imu.times > 20.0) & (imu.times < 21.3))
     imu = ImuSamples(*(part[keep] for part in imu))
     correlated = positions(
-        antennas[1].times, antennas[1].value, GNSS_SD, LEVERS[1], 0.0, [0.1, 0.2, 0.3], 15.0
+        antennas[1].times, antennas[1].value, GNSS_SD, LEVERS[1], 0.0, [0.1, 0.2, 0.3], 15.0, rate_time
     )
-    aiding = [antennas[0], correlated, velocities(np.arange(1.0, 29), moved(np.arange(1.0, 29))[0], 0.5)]
+    seconds = np.arange(1.0, 29)
+    moving = velocities(
+        seconds, moved(seconds)[0], 0.5, gauss_markov_sd=[0.2, 0.2, 0.4], gauss_markov_time=3.0
+    )
+    aiding = [antennas[0], correlated, moving]
     axes, earth = AxisErrors(0.01, 0.003, 0.005), local_earth(0.9, 100.0)
     wanted = np.arange(0.5, 29.5, 1.0)
     found = run_mekf(imu, start, NOISE, earth, aiding, wanted, axes=axes)
     ready = prepare(imu, start, NOISE, aiding, wanted, 0.9999, Outages(), axes)
-    assert ready.covariance.shape == (15 + 18 + 3, 15 + 18 + 3)
+    beyond = 18 + (6 if rate_time else 3) + 3
+    assert ready.covariance.shape == (15 + beyond, 15 + beyond)
     states, covariances, nis, verdicts = reference_mekf.mekf(ready, earth.as_array(), 5.0)
     known = np.isfinite(found.position).all(axis=1)
     ours = np.hstack(

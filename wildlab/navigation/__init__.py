@@ -52,6 +52,7 @@ from wildlab.navigation.observer import (
     field_reference,
     run_observer,
 )
+from wildlab.navigation.receiver import ReceiverNoise, SourceNoise
 from wildlab.navigation.strapdown import DeadReckoning, integrate_strapdown
 from wildlab.navigation.timeline import Gap, ImuSamples
 
@@ -72,7 +73,9 @@ __all__ = [
     "Navigation",
     "Observed",
     "Outages",
+    "ReceiverNoise",
     "Reference",
+    "SourceNoise",
     "align_at",
     "align_at_rest",
     "align_from_baseline",

@@ -28,18 +28,48 @@ from wildlab.navigation.timeline import (
 
 
 class GaussMarkov(NamedTuple):
-    """A first-order Gauss-Markov error that a source's measurements share.
+    """A Gauss-Markov error that a source's measurements share.
 
     Attributes
     ----------
     sd
-        (3,) stationary standard deviation per axis of n, m.
+        (3,) stationary standard deviation per axis of n, m or m/s.
     time
         Correlation time, s.
+    rate_time
+        Of first order where 0. Else what drives the error is not white, but of first order itself, with this
+        correlation time, s: the error of a receiver that smooths its fixes moves on for a while.
     """
 
     sd: Array
     time: float
+    rate_time: float = 0.0
+
+    @property
+    def order(self) -> int:
+        """1 or 2."""
+        return 2 if self.rate_time > 0 else 1
+
+    def covariance(self) -> Array:
+        """Stationary, of the errors and, behind them, of their rates: (3, 3) or (6, 6)."""
+        if self.order == 1:
+            return np.diag(self.sd**2)
+        both = self.sd**2 / self.time
+        rate = both * (1 / self.time + 1 / self.rate_time)
+        return np.block([[np.diag(self.sd**2), np.diag(both)], [np.diag(both), np.diag(rate)]])
+
+    def process(self) -> Array:
+        """Density and time of each of those states, and how far behind an error its rate is, (3 or 6, 3)."""
+        if self.order == 1:
+            density, driver = self.sd * np.sqrt(2 / self.time), np.zeros(3)
+            return np.stack([density, np.full(3, self.time), driver], axis=-1)
+        rate = np.sqrt(np.diagonal(self.covariance())[3:])
+        return np.vstack(
+            [
+                np.tile([0.0, self.time, 3.0], (3, 1)),
+                np.stack([rate * np.sqrt(2 / self.rate_time), np.full(3, self.rate_time), np.zeros(3)], -1),
+            ]
+        )
 
 
 class Aiding(NamedTuple):
@@ -89,6 +119,7 @@ def positions(
     latency: float = 0.0,
     gauss_markov_sd: ArrayLike = 0.0,
     gauss_markov_time: float = np.inf,
+    gauss_markov_rate_time: float = 0.0,
 ) -> Aiding:
     """Positions of a GNSS antenna, H (7.25).
 
@@ -108,6 +139,8 @@ def positions(
         Of a first-order Gauss-Markov error on top of ``sd``, which neighbouring fixes share (multipath, for
         instance): standard deviation, m, (3,) or one number, and correlation time, s. The filter estimates
         it.
+    gauss_markov_rate_time
+        Makes it one of second order; see `GaussMarkov`.
 
     Returns
     -------
@@ -122,8 +155,14 @@ def positions(
     """
     t = np.asarray(times, float) - latency
     found = _aiding(kernels.POSITION, t, p_n, sd, lever_arm, "GNSS positions")
-    slow = np.array(np.broadcast_to(np.asarray(gauss_markov_sd, float), 3))
-    return found._replace(gauss_markov=GaussMarkov(slow, float(gauss_markov_time)) if slow.any() else None)
+    return found._replace(
+        gauss_markov=_gauss_markov(gauss_markov_sd, gauss_markov_time, gauss_markov_rate_time)
+    )
+
+
+def _gauss_markov(sd: ArrayLike, time: float, rate_time: float) -> GaussMarkov | None:
+    slow = np.array(np.broadcast_to(np.asarray(sd, float), 3))
+    return GaussMarkov(slow, float(time), float(rate_time)) if slow.any() else None
 
 
 def velocities(
@@ -132,6 +171,8 @@ def velocities(
     sd: ArrayLike,
     lever_arm: ArrayLike = (0.0, 0.0, 0.0),
     latency: float = 0.0,
+    gauss_markov_sd: ArrayLike = 0.0,
+    gauss_markov_time: float = np.inf,
 ) -> Aiding:
     """Velocities of a GNSS antenna; beyond H.
 
@@ -147,6 +188,8 @@ def velocities(
         Of the antenna in b, (3,) m.
     latency
         How long before its stamp a velocity was valid, s.
+    gauss_markov_sd, gauss_markov_time
+        As for `positions`, of the velocities, m/s.
 
     Returns
     -------
@@ -156,9 +199,12 @@ def velocities(
     ------
     WildlabError
         For shapes that do not fit, or a standard deviation that is not positive.
+    ValueError
+        For a ``gauss_markov_sd`` that is neither (3,) nor one number.
     """
     t = np.asarray(times, float) - latency
-    return _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
+    found = _aiding(kernels.VELOCITY, t, v_n, sd, lever_arm, "GNSS velocities")
+    return found._replace(gauss_markov=_gauss_markov(gauss_markov_sd, gauss_markov_time, 0.0))
 
 
 def standstill(times: ArrayLike, sd: float) -> Aiding:
@@ -253,8 +299,8 @@ def gather(
 
     kind = joined([np.full(int(keep.sum()), a.kind, float) for a, keep in pairs], ()).astype(np.int64)
     source = joined([np.full(int(k.sum()), i, float) for i, (_, k) in enumerate(pairs)], ()).astype(np.int64)
-    correlated = np.array([a.gauss_markov is not None for a in aiding] + [False])
-    states = np.where(correlated, first + 3 * (np.cumsum(correlated) - 1), -1).astype(np.int64)
+    sizes = np.array([0 if a.gauss_markov is None else 3 * a.gauss_markov.order for a in aiding] + [0])
+    states = np.where(sizes > 0, first + np.cumsum(sizes) - sizes, -1).astype(np.int64)
     measured = Measurements(
         np.searchsorted(line.times, t[order]).astype(np.int64), kind, joined([a.value[k] for a, k in pairs]),
         joined([a.variance[k] for a, k in pairs]), joined([a.lever[k] for a, k in pairs]), states[source],

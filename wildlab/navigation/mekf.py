@@ -6,9 +6,9 @@ b (``q = q_hat * dq``, H 7.15-7.16), accelerometer bias, gyro bias. What may be 
 the filter.
 
 Behind the fifteen come, where asked for, what H leaves out and sensors have, and what looks like motion to a
-filter of fifteen states. Gauss-Markov errors of positions are estimated. Misaligned axes and scale factors
-are considered, as the pose is in the tracking of H 7.4: estimated, they come out surer than they are, since
-what little tells them from biases hangs on estimates that still move.
+filter of fifteen states. Gauss-Markov errors of positions and velocities are estimated. Misaligned
+axes and scale factors are considered, as the pose is in the tracking of H 7.4: estimated, they come out surer
+than they are, since what little tells them from biases hangs on estimates that still move.
 
 Everything is computed after the flight, so a latency needs no model: a fix belongs to the time at which it
 was valid.
@@ -129,7 +129,8 @@ class MekfInputs(NamedTuple):
     """What both the compiled filter and its reference take.
 
     ``state`` (n + 1,) and ``covariance`` (n, n) are those of the start, with the errors beyond the fifteen;
-    ``extra`` (n - 15, 2) is the density and the time of these, ``axes`` whether the axes' are among them.
+    ``extra`` (n - 15, 3) is the density and the time of these and where their rate is (see
+    `GaussMarkov.process`), ``axes`` whether the axes' are among them.
     """
 
     line: Timeline
@@ -176,15 +177,14 @@ def prepare(
 
 
 def _extra(aiding: Sequence[Aiding], axes: AxisErrors | None) -> tuple[Array, Array]:
-    """Covariance at the start (n, n), densities and times (n, 2) of the errors beyond the fifteen."""
-    covariances, processes = [np.empty((0, 0))], [np.empty((0, 2))]
+    """Covariance at the start (n, n) of the errors beyond the fifteen; densities, times, rates (n, 3)."""
+    covariances, processes = [np.empty((0, 0))], [np.empty((0, 3))]
     if axes is not None:
         covariances += [axes.covariance()] * 2
-        processes.append(np.tile([0.0, np.inf], (18, 1)))
+        processes.append(np.tile([0.0, np.inf, 0.0], (18, 1)))
     for process in (a.gauss_markov for a in aiding if a.gauss_markov is not None):
-        covariances.append(np.diag(process.sd**2))
-        density = process.sd * np.sqrt(2 / process.time)
-        processes.append(np.stack([density, np.full(3, process.time)], axis=-1))
+        covariances.append(process.covariance())
+        processes.append(process.process())
     return block_diag(*covariances), np.concatenate(processes)
 
 

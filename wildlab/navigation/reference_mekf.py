@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, expm
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, skew
@@ -58,6 +58,23 @@ def process_noise(dt: float, q_v: float, q_a: float, drive_a: float, drive_g: fl
     axis[:2, :2] = q_v * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     axis[2, 2], axis[3, 3], axis[4, 4] = q_a * dt, drive_a, drive_g
     return np.asarray(np.kron(axis, np.eye(3)), float)
+
+
+def carry_errors(extra: Array, dt: float) -> tuple[Array, Array]:
+    """Transition and noise of the errors beyond the fifteen, each (m, m), over dt: by the matrix exponential.
+
+    ``extra`` (m, 3) as `mekf.MekfInputs` has it. What the noise puts back is what stationary errors lose.
+    """
+    A, C = np.diag(-1 / extra[:, 1]), np.zeros((len(extra), len(extra)))
+    bounded = np.isfinite(extra[:, 1])
+    C[bounded, bounded] = extra[bounded, 0] ** 2 * extra[bounded, 1] / 2
+    for i in np.flatnonzero(extra[:, 2] > 0):
+        rate = i + int(extra[i, 2])
+        A[i, rate] = 1.0
+        C[i, rate] = C[rate, i] = C[rate, rate] / (1 / extra[i, 1] + 1 / extra[rate, 1])
+        C[i, i] = extra[i, 1] * C[i, rate]
+    Phi = expm(A * dt)
+    return Phi, C - Phi @ C @ Phi.T
 
 
 def predict_measurement(kind: int, x: Array, w: Array, value: Array, lever: Array) -> tuple[Array, Array]:
@@ -118,11 +135,7 @@ def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array
                 kept[i] = np.exp(-dt / time)
                 whole = dt if np.isinf(time) else time / 2 * (1 - kept[i] ** 2)
                 drive[i] = density**2 * whole
-            kept_extra, drive_extra = np.exp(-dt / extra[:, 1]), np.zeros(len(extra))
-            bounded = np.isfinite(extra[:, 1])
-            drive_extra[bounded] = (
-                extra[bounded, 0] ** 2 * extra[bounded, 1] / 2 * (1 - kept_extra[bounded] ** 2)
-            )
+            Phi_extra, Q_extra = carry_errors(extra, dt)
             if line.gap[k] > 0:
                 Phi = np.diag([1.0] * 9 + [kept[0]] * 3 + [kept[1]] * 3 + [1.0] * len(extra))
                 Phi[:3, 3:6] = dt * np.eye(3)
@@ -134,9 +147,9 @@ def mekf(ready: MekfInputs, earth: Array, patience: float) -> tuple[Array, Array
                 Phi = transition(x, f, w, dt, earth, (kept[0], kept[1]), axes)
                 Q = process_noise(dt, *(noise[:2] ** 2), *drive)
                 x = strapdown_step(x, f, w, dt, earth)[0]
-            x = x * np.concatenate([np.ones(10), np.repeat(kept, 3), kept_extra])
-            Phi[15:, 15:] = np.diag(kept_extra)
-            P = Phi @ P @ Phi.T + block_diag(Q, np.diag(drive_extra))
+            x = np.concatenate([x[:10], x[10:16] * np.repeat(kept, 3), Phi_extra @ x[16:]])
+            Phi[15:, 15:] = Phi_extra
+            P = Phi @ P @ Phi.T + block_diag(Q, Q_extra)
         while event < len(measured.node) and measured.node[event] == k:
             kind = measured.kind[event]
             y, H = predict_measurement(kind, x, line.w[k], measured.value[event], measured.lever[event])

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         navigate_observer,
     )
     from wildlab.pipeline.navigation_errors import Errors, errors_against
+    from wildlab.pipeline.receiver import Placement, Receiver, place_receiver, receiver_noise
     from wildlab.pipeline.repeats import Repeats, judge_repeats
     from wildlab.pipeline.track import (
         CvTuning,
@@ -62,6 +63,7 @@ else:
             "learn": ("Applied", "apply_learnt", "corrected_flight", "learn_flight"),
             "navigate": ("Navigated", "PUBLISHED_LIKE", "MekfTuning", "navigate_mekf", "navigate_observer"),
             "navigation_errors": ("Errors", "errors_against"),
+            "receiver": ("Placement", "Receiver", "place_receiver", "receiver_noise"),
             "repeats": ("Repeats", "judge_repeats"),
             "track": (
                 "CvTuning",
@@ -89,6 +91,8 @@ __all__ = [
     "MekfTuning",
     "Navigated",
     "Observations",
+    "Placement",
+    "Receiver",
     "Repeats",
     "Scored",
     "Series",
@@ -112,7 +116,9 @@ __all__ = [
     "navigate_observer",
     "navigation_series",
     "observe",
+    "place_receiver",
     "pose_errors",
+    "receiver_noise",
     "recorded_answers",
     "score_points",
     "sighting",

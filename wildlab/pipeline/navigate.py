@@ -15,6 +15,7 @@ from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.diagnostics import signs_of_trouble
 from wildlab.navigation.mekf import log_likelihood, pose_covariance, run_mekf
 from wildlab.navigation.observer import Gains, run_observer
+from wildlab.navigation.receiver import ReceiverNoise
 from wildlab.pipeline.navigation_inputs import (
     POSITION,
     VELOCITY,
@@ -25,6 +26,7 @@ from wildlab.pipeline.navigation_inputs import (
     inputs_of,
     second_vector,
 )
+from wildlab.pipeline.receiver import told, without_gross
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,8 @@ BIASES = ["accelerometer_x_m_s2", "accelerometer_y_m_s2", "accelerometer_z_m_s2"
 ]
 
 
+#: Probability that the filter lets a good measurement in.
+GATE = 0.9999
 #: Gain of the observer on a course that stands in for the heading, rad/s. It is off by the crab angle, which
 #: changes sides from one leg to the next: slow enough to see both, half a minute.
 COURSE_GAIN = 1 / 30
@@ -108,6 +112,7 @@ def navigate_mekf(
     velocity: bool = True,
     magnetometer: bool = False,
     tuning: MekfTuning | None = None,
+    receiver: ReceiverNoise | None = None,
 ) -> Navigated:
     """Poses with covariance by the error-state filter of H 7.3.
 
@@ -130,6 +135,9 @@ def navigate_mekf(
         Noise in place of what the manifest states, for a filter as H has it: fifteen states, white noise, and
         positions only. ``PUBLISHED_LIKE`` gives standard deviations like those of H 7.5.3 and is what the
         tracking of H 7.5.3 and 7.5.4 is to be repeated with.
+    receiver
+        How the receiver errs, in place of what is stated; `receiver_noise` finds it. All fixes are then used
+        but those that no noise explains (`without_gross`): a gate would leave out what this noise is of.
 
     Returns
     -------
@@ -152,6 +160,8 @@ def navigate_mekf(
         noise, axes = noise._replace(velocity_random_walk=walks[0], angle_random_walk=walks[1]), None
     position_sd = None if tuning is None else (tuning.horizontal, tuning.vertical)
     given = inputs_of(flight, velocity=velocity and tuning is None, noise=noise, position_sd=position_sd)
+    if receiver is not None:
+        given = given._replace(aiding=told(without_gross(flight, given), receiver))
     if magnetometer:
         given.aiding["heading"] = headings_of(flight)
     latitude, _, height = flight.manifest.origin_tuple()
@@ -163,6 +173,7 @@ def navigate_mekf(
         list(given.aiding.values()),
         _wanted(flight, times),
         axes=axes,
+        gate_probability=GATE if receiver is None else 1.0,
     )
     nav = _nav_table(found.times, found.position, found.velocity, found.quaternion)
     nav = nav.join(covariance_columns(pose_covariance(found.covariance)))

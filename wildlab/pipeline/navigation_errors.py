@@ -31,6 +31,7 @@ from wildlab.pipeline.navigate import (
     navigate_observer,
 )
 from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY
+from wildlab.pipeline.receiver import Receiver, receiver_noise
 
 Array = NDArray[np.float64]
 
@@ -68,13 +69,23 @@ class Errors(NamedTuple):
 
 
 class Studied(NamedTuple):
-    """A flight, navigated and scored at certain times (K,) against one of its nav sources."""
+    """A flight, navigated and scored at certain times (K,) against one of its nav sources.
+
+    ``receiver`` is how the receiver of a logged flight errs, or None where ``refusal`` says why not.
+    """
 
     flight: Flight
     reference: str
     times: Array
     found: dict[str, Navigated]
     scored: dict[str, Errors]
+    receiver: Receiver | None = None
+    refusal: str = ""
+
+    @property
+    def filter(self) -> str:
+        """Subject of the filter that is to be believed: with the receiver's noise as found, where it was."""
+        return "mekf-receiver" if "mekf-receiver" in self.found else "mekf"
 
 
 def reference_of(flight: Flight) -> str:
@@ -278,6 +289,8 @@ def evaluate_all(
 def study_navigation(flight: Flight) -> Studied:
     """A flight navigated in every way that is compared, and scored by the best reference it has.
 
+    Of a logged flight, whose receiver nobody knows, that one's noise is found as well; a twin states its own.
+
     Raises
     ------
     WildlabError
@@ -285,13 +298,22 @@ def study_navigation(flight: Flight) -> Studied:
     """
     reference = reference_of(flight)
     times = comparison_times(flight, reference)
-    found = navigate_all(flight, times)
-    return Studied(flight, reference, times, found, evaluate_all(flight, found, times, reference))
+    found, receiver, refusal = navigate_all(flight, times), None, ""
+    if flight.manifest.kind == "logged":
+        try:
+            receiver = receiver_noise(flight)
+        except WildlabError as refused:
+            refusal = refused.problem
+        if receiver is not None and receiver.noise is not None:
+            found["mekf-receiver"] = navigate_mekf(flight, times, receiver=receiver.noise)
+    scored = evaluate_all(flight, found, times, reference)
+    return Studied(flight, reference, times, found, scored, receiver, refusal)
 
 
 def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tuple[str, str], float]:
-    """What is compared over flights, by (subject, name): `summarise`; of the filter ``nis_<source>``; on
-    twins of the tuned filters how often they have the autopilot within their bounds (`shares_within`).
+    """What is compared over flights, by (subject, name): `summarise`; of the filter ``nis_<source>``, and of
+    logged flights ``lag1_<source>``; on twins of the tuned filters how often they have the autopilot within
+    their bounds (`shares_within`).
 
     There is no NEES without a truth, and no error of position where the reference has no velocity: its
     positions are then those of the receiver, which the estimate is made from.
@@ -305,8 +327,12 @@ def numbers_of(studied: Studied, begin: float, end: float = np.inf) -> dict[tupl
         for name, value in summarise(errors, begin, end).items()
         if np.isfinite(value) and not name.startswith(tuple(hidden))
     }
-    for row in summarise_innovations(studied.found["mekf"], begin, end).to_dict(orient="records"):
-        numbers["mekf", f"nis_{row['source']}".replace(" ", "_")] = row["nis"]
+    for subject in dict.fromkeys(["mekf", studied.filter]):
+        for row in summarise_innovations(studied.found[subject], begin, end).to_dict(orient="records"):
+            source = row["source"].replace(" ", "_")
+            numbers[subject, f"nis_{source}"] = row["nis"]
+            if studied.flight.manifest.kind == "logged":
+                numbers[subject, f"lag1_{source}"] = row["lag1"]
     if "autopilot" in studied.scored:
         for subject in [name for name in TUNINGS if name in studied.found]:
             shares = shares_within(against_autopilot(studied, subject), begin)
@@ -349,6 +375,6 @@ def corrections(flight: Flight, found: Navigated) -> Array:
 
 def unit_of(name: str) -> str:
     """The unit of one of those numbers."""
-    if name.startswith(("nees", "nis", "inside")):
+    if name.startswith(("nees", "nis", "lag1", "inside")):
         return "1"
     return "deg" if name.endswith(AXES) else "m/s" if name.endswith("velocity") else "m"

@@ -37,6 +37,7 @@ from wildlab.reporting.report import Report
 
 WORDS = {
     "mekf": "MEKF, noise as stated",
+    "mekf-receiver": "MEKF, receiver's noise as found",
     "observer": "Nonlinear observer",
     "autopilot": "Autopilot",
     "mekf-published-like": "MEKF, tuned like H 7.5.3",
@@ -93,7 +94,7 @@ def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]
         [
             {"who": WORDS[who], "part": part, **summarise(studied.scored[who], begin, end)}
             for part, begin, end in parts
-            for who in ("mekf", "observer", "autopilot")
+            for who in ("mekf-receiver", "mekf", "observer", "autopilot")
             if who in studied.scored
         ]
     )
@@ -101,7 +102,7 @@ def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]
 
 def show_flight(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
     """Attitude, velocity and speed by each source between two times, s; counterpart of H 7.<figures>."""
-    nav = {name: studied.found[name].nav for name in ("mekf", "observer")}
+    nav = {"mekf": studied.found[studied.filter].nav, "observer": studied.found["observer"].nav}
     reference = studied.flight.nav[studied.reference]
     nav["truth" if has_truth(studied) else "onboard"] = reference.iloc[:: max(1, len(reference) // 3000)]
     if has_truth(studied):
@@ -137,7 +138,7 @@ def show_flight(report: Report, studied: Studied, window: tuple[float, float], f
 def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
     """Attitude and velocity against the reference, with the bounds that the filter states of itself."""
     late = (studied.times >= window[0]) & (studied.times < window[1])
-    of = {who: studied.scored[who] for who in ("mekf", "observer")}
+    of = {"mekf": studied.scored[studied.filter], "observer": studied.scored["observer"]}
     whom = "the truth" if has_truth(studied) else "the one found on board"
     turns = {who: np.degrees(e.error[late, 6:]) for who, e in of.items()}
     report.figure(
@@ -195,7 +196,7 @@ def show_against_autopilot(report: Report, studied: Studied, tuned: str, begin: 
 
 def show_states(report: Report, studied: Studied, printed: Sequence[float] | None) -> None:
     """Deviations and biases that the filter states; ``printed`` are six published means, m and degrees."""
-    sd = studied.scored["mekf"].sd
+    sd = studied.scored[studied.filter].sd
     both = np.hstack([sd[:, :3], np.degrees(sd[:, 6:])])
     report.figure(
         deviation_chart(studied.times, both, printed, ("m", "°"), "What the filter states of itself"),
@@ -204,7 +205,7 @@ def show_states(report: Report, studied: Studied, printed: Sequence[float] | Non
         caption="Standard deviations over time"
         + ("; broken: the means that H prints of its own." if printed is not None else "."),
     )
-    biases = studied.found["mekf"].biases
+    biases = studied.found[studied.filter].biases
     columns = [str(name) for name in biases if not str(name).startswith("sd_") and name != "time_s"]
     report.figure(
         bias_chart(
@@ -221,7 +222,7 @@ def show_states(report: Report, studied: Studied, printed: Sequence[float] | Non
 
 def show_innovations(report: Report, studied: Studied, window: tuple[float, float]) -> None:
     """NIS and autocorrelation of the filter's innovations, in figures and in a table."""
-    found = studied.found["mekf"]
+    found = studied.found[studied.filter]
     raw = found.innovations[found.innovations["time_s"].between(*window)]
     split = {str(name): part for name, part in raw.groupby("source", sort=False)}
     report.figure(
@@ -261,11 +262,14 @@ def show_innovations(report: Report, studied: Studied, window: tuple[float, floa
             "bound": "white below",
         },
         digits={"nis": 2, "inside": 1, "left_out": 1, "lag1": 3, "bound": 3},
-        caption="Innovations of the filter.",
+        caption=f"Innovations of the filter ({WORDS[studied.filter]}).",
     )
-    if found.signs:
+    signs = list(found.signs)
+    if studied.filter != "mekf":  # what was wrong with the other may only be hidden by the noise
+        signs += [f"{WORDS['mekf']}: {sign}" for sign in studied.found["mekf"].signs]
+    if signs:
         report.subsection("What should make you doubt it")
-        report.points(list(found.signs))
+        report.points(signs)
 
 
 def show_nees(report: Report, studied: Studied, begin: float) -> None:
