@@ -13,13 +13,13 @@ from wildlab.geometry.board_views import (
     project_board,
 )
 from wildlab.geometry.camera import Camera, project
+from wildlab.geometry.directions import direction_sd
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.geometry.intrinsics import (
     LENSES,
     PINHOLE,
     calibrate_camera,
     confused,
-    direction_sd,
     view_errors,
 )
 from wildlab.geometry.lens_choice import choose_lens

@@ -63,6 +63,7 @@ from wildlab.geometry.camera import (
     undistort_approximately,
 )
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
 from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
 from wildlab.geometry.frames import (
     Array,
@@ -105,7 +106,7 @@ from wildlab.geometry.intrinsics import (
     Intrinsics,
     calibrate_camera,
     confused,
-    direction_sd,
+    free_columns,
     view_errors,
 )
 from wildlab.geometry.lens_choice import LensChoice, choose_lens
@@ -116,6 +117,7 @@ from wildlab.geometry.mount import (
     helgesen_misalignment,
     mount_rotation,
 )
+from wildlab.geometry.mounting import Mounting, mounting_from_points
 from wildlab.geometry.robust import (
     RobustFit,
     fit_linear,
@@ -155,6 +157,7 @@ __all__ = [
     "Intrinsics",
     "LensChoice",
     "Mount",
+    "Mounting",
     "Origin",
     "PoseErrors",
     "PosesAt",
@@ -174,6 +177,7 @@ __all__ = [
     "camera_rotation",
     "choose_lens",
     "confused",
+    "direction_differences",
     "direction_sd",
     "distort",
     "distortion_jacobian",
@@ -185,6 +189,7 @@ __all__ = [
     "fit_linear",
     "fit_points",
     "flat_earth",
+    "free_columns",
     "geodetic_to_ecef",
     "geodetic_to_enu_linear",
     "geodetic_to_ned",
@@ -195,6 +200,7 @@ __all__ = [
     "ground_to_pixel",
     "helgesen_misalignment",
     "homography",
+    "image_raster",
     "in_image",
     "inside_ellipse",
     "intersect_plane",
@@ -205,6 +211,7 @@ __all__ = [
     "matrix_to_rotation_vector",
     "metres_per_degree",
     "mount_rotation",
+    "mounting_from_points",
     "ned_to_enu",
     "ned_to_geodetic",
     "normal_gravity",

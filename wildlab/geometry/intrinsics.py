@@ -25,7 +25,7 @@ from wildlab.geometry.board_views import (
     start_camera,
     start_views,
 )
-from wildlab.geometry.camera import Camera, normalise
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix
 
 #: What may be estimated: each intrinsic parameter, or "f", one focal length for columns and rows.
@@ -44,7 +44,7 @@ LENSES: dict[str, tuple[str, ...]] = {
 FEWEST = 4
 #: Steps of an estimate, at most; of one that begins near its end; and which gain is too small to go on, as a
 #: share of the summed squares.
-ROUNDS, AGAIN, SETTLED = 200, 20, 1e-12
+ROUNDS, AGAIN, SETTLED = 200, 20, 1e-10
 #: Smallest singular value of the normalised derivatives of parameters that views tell apart: 0.1 is two
 #: parameters with a correlation of 0.99.
 PARALLEL = 0.1
@@ -95,7 +95,7 @@ class Intrinsics:
 
     def camera_with(self, values: ArrayLike) -> Camera:
         """The camera with other values (P,) of what was estimated."""
-        free = _free(self.names)
+        free = free_columns(self.names)
         theta = np.where(free.any(axis=1), free @ np.asarray(values, float), parameters_of(self.camera))
         return camera_of(theta, self.camera.width, self.camera.height)
 
@@ -169,7 +169,7 @@ def calibrate_camera(
     board, uv = np.asarray(board, float), np.asarray(uv, float)
     names = _checked(board, uv, estimate)
     first = start_camera(board, uv, width, height)
-    free = _free(names)
+    free = free_columns(names)
     begin = parameters_of(first)
     if held is not None:
         kept = [i for i in range(len(INTRINSICS)) if not free[i].any()]
@@ -249,40 +249,6 @@ def confused(found: Intrinsics) -> list[tuple[str, ...]]:
     return groups
 
 
-def direction_sd(found: Intrinsics, uv: ArrayLike) -> Array:
-    """How far off the estimate puts what is seen in a fixed direction, apart from a turn of the whole camera.
-
-    The turn is the one that takes up most over the image: a calibration of the mount does the same.
-
-    Parameters
-    ----------
-    found
-        From `calibrate_camera`.
-    uv
-        (N, 2) pixels.
-
-    Returns
-    -------
-    (N,) root of the summed variances of both axes, pixels; NaN where the lens sees nothing.
-    """
-    camera = found.camera
-    raster = np.stack(np.meshgrid(np.linspace(0, camera.width, 9), np.linspace(0, camera.height, 7)), -1)
-    J, K = _by_direction(found, raster.reshape(-1, 2))
-    seen = np.isfinite(J).all(axis=(1, 2))
-    turn = np.linalg.lstsq(K[seen].reshape(-1, 3), J[seen].reshape(-1, J.shape[-1]), rcond=None)[0]
-    J, K = _by_direction(found, np.asarray(uv, float))
-    left = J - K @ turn
-    return np.asarray(np.sqrt(np.einsum("nip,pq,niq->n", left, found.covariance, left)))
-
-
-def _by_direction(found: Intrinsics, uv: Array) -> tuple[Array, Array]:
-    """How pixels (N, 2) of fixed directions move with the estimate, (N, 2, P), and a turn, (N, 2, 3)."""
-    xy = normalise(found.camera, uv)
-    rays = np.column_stack([xy, np.ones(len(xy))])
-    at = project_board(parameters_of(found.camera), Views(np.eye(3)[None], np.zeros((1, 3))), rays)
-    return at.by_intrinsics[0] @ _free(found.names), at.by_pose[0, ..., :3]
-
-
 def _checked(board: Array, uv: Array, estimate: Sequence[str]) -> tuple[str, ...]:
     if board.ndim != 2 or board.shape[1] != 3 or uv.ndim != 3 or uv.shape[1:] != (len(board), 2):
         raise WildlabError(
@@ -309,8 +275,18 @@ def _checked(board: Array, uv: Array, estimate: Sequence[str]) -> tuple[str, ...
     return tuple(name for name in ESTIMATED if name in estimate)
 
 
-def _free(names: Sequence[str]) -> Array:
-    """(10, P) from the estimated parameters to all intrinsic ones."""
+def free_columns(names: Sequence[str]) -> Array:
+    """From estimated parameters to all intrinsic ones: "f" goes into both focal lengths.
+
+    Parameters
+    ----------
+    names
+        The P parameters, some of `ESTIMATED`.
+
+    Returns
+    -------
+    (10, P) zeros and ones.
+    """
     free = np.zeros((len(INTRINSICS), len(names)))
     for column, name in enumerate(names):
         for one in ("fx", "fy") if name == "f" else (name,):

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.geometry.directions import direction_sd
 from wildlab.geometry.frames import Array
-from wildlab.geometry.intrinsics import Intrinsics, confused, direction_sd
+from wildlab.geometry.intrinsics import Intrinsics, confused
 from wildlab.pipeline.camera import CameraCalibration, coverage
 
 #: A mean gap between boards that is larger than this share of the raster leaves the lens to guesswork.
