@@ -53,6 +53,10 @@ def test_the_camera_comes_out_and_is_written(capsys, boards, tmp_path):
     assert f"{views} views make wide intervals" in out and "95 % interval" in out
     assert kept.camera.name == "Tau2" and kept.board.spacing_m == 0.03
     assert kept.evidence.lens == "k1" and kept.evidence.rms_px < 0.2
+    before = (tmp_path / "camera.toml").read_bytes()
+    code, _, err = run(capsys, boards, "--into", tmp_path / "camera.toml", "--lens", "none")
+    assert code == 2 and "this file is there already" in err and "add --overwrite" in err
+    assert (tmp_path / "camera.toml").read_bytes() == before
     truth = {"fx": 420.0, "fy": 424.0, "cx": 156.0, "cy": 131.0, "k1": -0.15}
     for one in kept.parameter:
         assert abs(one.value - truth[one.name]) < 4 * one.sd
@@ -174,3 +178,20 @@ def test_opencv_s_own_images(capsys, shared_data, tmp_path):
     assert kept.evidence.views == 13 and kept.evidence.rms_px <= 0.393
     fx = next(one for one in kept.parameter if one.name == "fx")
     assert abs(fx.value - 535.916) < 6
+
+
+@pytest.mark.slow
+def test_a_thermal_board_light_on_dark(capsys, shared_data, tmp_path):
+    """Two minutes: 43 images without a licence, so only the test looks at them. Some show half a board, or
+    shadows across it."""
+    folder = shared_data("calibration", "thermal_chessboard")
+    code, out, err = run(capsys, folder, "--into", tmp_path / "c.toml", board="8x7", square="50mm")
+    assert code == 0, err
+    kept = read_camera(tmp_path / "c.toml")
+    assert kept.evidence.images == 43 and kept.evidence.views >= 22
+    assert kept.evidence.rms_px < 0.6
+    assert f"The board is in {kept.evidence.views} of 43 images" in out
+    assert err.count("the whole board is not to be seen in it.") == 43 - kept.evidence.views
+    # Pixels are square, and the two focal lengths are found apart.
+    fx, fy = ((one.value, one.high - one.low) for one in kept.parameter[:2])
+    assert abs(fx[0] - fy[0]) < fx[1] + fy[1]

@@ -81,7 +81,9 @@ def test_aspect_and_offset_turn():
 
 
 def test_distortion_turns():
-    assert "k1 = 0.1 may be taken for straight" in text.distortion_words({0.1: (0.1, 0.4), -0.3: (1.0, 9.0)})
+    assert "k1 of 0.1 either way may be" in text.distortion_words({0.1: (0.1, 0.4), -0.3: (1.0, 9.0)})
+    both = {-0.1: (0.1, 0.4), 0.1: (0.1, 1.4), 0.01: (0.0, 0.1)}
+    assert "k1 of 0.01 either way may be" in text.distortion_words(both)
     assert text.distortion_words({0.1: (0.1, 4.0), -0.3: (1.0, 9.0)}).startswith("Even k1 = 0.1 moves")
 
 

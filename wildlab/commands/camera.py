@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from wildlab.commands.shared import FILE, terminal_console
+from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, print_table, shown, stopped
 
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -52,6 +53,7 @@ class Size(click.ParamType[float]):
     help="Side of a square, or from circle to circle in a row (staggered: half of that): 25mm.",
 )
 @click.option("--into", type=FILE, help="The file to write, camera.toml for instance; a recipe may name it.")
+@click.option("--overwrite", is_flag=True, help="Replace the file that is there.")
 @click.option("--name", default="camera", show_default=True, help="What the camera is called.")
 @click.option(
     "--lens",
@@ -70,6 +72,7 @@ def camera(
     staggered: bool,
     square: float,
     into: Path | None,
+    overwrite: bool,
     name: str,
     lens: str,
     square_pixels: bool,
@@ -92,6 +95,8 @@ def camera(
         raise click.UsageError("Give either --board or --circles.")
     if staggered and circles is None:
         raise click.UsageError("--staggered is for --circles.")
+    if into is not None and into.exists() and not overwrite:
+        raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
     from rich.progress import track
 
     from wildlab.detection.boards import Board

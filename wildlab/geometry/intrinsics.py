@@ -45,6 +45,8 @@ FEWEST = 4
 #: Steps of an estimate, at most; of one that begins near its end; and which gain is too small to go on, as a
 #: share of the summed squares.
 ROUNDS, AGAIN, SETTLED = 200, 20, 1e-10
+#: How much an estimate is damped at first, far from its end and near it.
+FAR, NEAR = 1e-3, 1e-9
 #: Smallest singular value of the normalised derivatives of parameters that views tell apart: 0.1 is two
 #: parameters with a correlation of 0.99.
 PARALLEL = 0.1
@@ -319,7 +321,7 @@ def _solve(
     theta: Array, views: Views, board: Array, uv: Array, free: Array, rounds: int = ROUNDS
 ) -> tuple[Array, Views]:
     """Camera and views of least squared distance, by Levenberg and Marquardt; the poses are eliminated."""
-    damping = 1e-3
+    damping = FAR if rounds == ROUNDS else NEAR
     r, J, K = _linear(theta, views, board, uv, free)
     cost = float((r**2).sum())
     for _ in range(rounds):

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from wildlab.geometry.board_views import Views, parameters_of, project_board
-from wildlab.geometry.camera import Camera, in_image, normalise, normalise_jacobian
+from wildlab.geometry.board_views import Views
+from wildlab.geometry.camera import Camera, in_image, normalise, normalise_jacobian, project
 from wildlab.geometry.frames import Array, euler_to_matrix
 
 #: How far the margin reaches beyond the outermost squares or circles, in spacings.
@@ -52,7 +52,7 @@ def board_views(
         place = rng.uniform([0, 0], [camera.width, camera.height])
         xy = normalise(camera, place[None])[0]
         t = distance * np.array([*xy, 1.0]) - R @ middle
-        uv = project_board(parameters_of(camera), Views(R[None], t[None]), points).uv[0]
+        uv = project(camera, points @ R.T + t)
         if in_image(camera, uv, border=0.02 * camera.width).all():
             rotations.append(R)
             translations.append(t)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_rotation_vector
+from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.mount import Mount, helgesen_misalignment, mount_rotation
+from wildlab.geometry.mount import Mount, camera_rotation, helgesen_misalignment
 from wildlab.geometry.mounting import Mounting, mounting_from_points
 from wildlab.studies.camera_calibration.intrinsics import HEIGHT, TAU2
 
@@ -48,7 +48,7 @@ class Cause(NamedTuple):
     left
         Mean error left by it in the calibration, metres.
     angle
-        Root mean squared angle by which the mount is then wrong, radians.
+        Root mean squared angle by which the lens then points elsewhere, radians.
     ground
         What that makes on the ground from the height of the flight, metres.
     """
@@ -81,7 +81,8 @@ def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[M
     Returns
     -------
     tuple
-        What was found, and by which angle its mount is wrong, radians.
+        What was found, and by which angle the lens then points elsewhere (a turn about its own axis does not
+        count), radians.
     """
     side = np.linspace(-HALF_SIDE, HALF_SIDE, 3)
     board = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
@@ -111,8 +112,8 @@ def calibrate_once(rng: np.random.Generator, cause: str, size: float) -> tuple[M
         share = 1 + rng.choice([-1, 1]) * size / 100
         camera = type(TAU2)(640, 512, TAU2.fx * share, TAU2.fy * share, TAU2.cx, TAU2.cy)
     found = mounting_from_points(CameraPoses(camera, told, told_p[image], told_R[image]), uv, points, image)
-    turn = mount_rotation(found.mount) @ mount_rotation(mount).T
-    return found, float(np.linalg.norm(matrix_to_rotation_vector(turn)))
+    axes = camera_rotation(found.mount)[:, 2], camera_rotation(mount)[:, 2]
+    return found, float(np.linalg.norm(np.cross(*axes)))
 
 
 def _direction(rng: np.random.Generator) -> Array:

@@ -67,7 +67,8 @@ def offset_words(printed: Camera, sheet: Camera, found: pd.DataFrame, middle: fl
 
 def distortion_words(cost: Mapping[float, tuple[float, float]]) -> str:
     """How strongly a lens may bend before neglecting it shows; ``cost`` is by k1."""
-    harmless = [k1 for k1, (_, largest) in cost.items() if largest < ALIKE_PX]
+    shown = [abs(k1) for k1, (_, largest) in cost.items() if largest >= ALIKE_PX]
+    harmless = [k1 for k1 in cost if abs(k1) < min(shown, default=np.inf)]
     strongest = max(cost, key=abs)
     if not harmless:
         least = min(cost, key=lambda k1: abs(k1))
@@ -78,8 +79,9 @@ def distortion_words(cost: Mapping[float, tuple[float, float]]) -> str:
         )
     most = max(harmless, key=abs)
     return (
-        f"A lens with k1 = {most:g} may be taken for straight: no direction moves by a whole pixel. With "
-        f"{strongest:g} it is {cost[strongest][1]:.1f} px. The thesis does not print its distortion."
+        f"A lens with k1 of {abs(most):g} either way may be taken for straight: no direction moves by a "
+        f"whole pixel. "
+        f"With {strongest:g} it is {cost[strongest][1]:.1f} px. The thesis does not print its distortion."
     )
 
 
@@ -123,7 +125,7 @@ def offset_trap_words(size: float, left: float, angle_deg: float, ground: float,
     said = (
         f"A lens that sits {1000 * size:.0f} mm from where it is believed to be leaves {1000 * left:.1f} mm "
         f"in the "
-        f"calibration and turns the mount by {angle_deg:.2f} degrees, {ground:.1f} m from 350 m"
+        f"calibration and turns the lens by {angle_deg:.2f} degrees, {ground:.1f} m from 350 m"
     )
     if left < 0.5 * printed and angle_deg > 0.1:
         return (
