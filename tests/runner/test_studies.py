@@ -67,6 +67,17 @@ def test_consistency_bounds_meet_the_print(reports: Path, faults: Faults) -> Non
     assert faults(folder / "report.html") == []
 
 
+@pytest.mark.parametrize("study", ["camera-calibration", "wildlife-camera"])
+def test_cameras_come_back_as_printed(study: str, reports: Path, faults: Faults) -> None:
+    folder = run(study, reports)
+    found = values(folder)
+    for name in ("fx", "fy", "cx", "cy"):
+        one = found[name, "tau2"]
+        assert one["published"] is not None
+        assert one["value"] == pytest.approx(one["published"], rel=0.005), name
+    assert faults(folder / "report.html") == []
+
+
 def test_printed_numbers_stand_beside_each_other(reports: Path, faults: Faults) -> None:
     folder = run("printed-numbers", reports)
     found = values(folder)

@@ -22,6 +22,17 @@ takes a vector from b to n; ``p_nc`` is the position of c relative to n, in n.
  [173.2   0.    0. ]]
 """
 
+from wildlab.geometry.board_views import (
+    INTRINSICS,
+    Projected,
+    Views,
+    camera_of,
+    homography,
+    parameters_of,
+    project_board,
+    start_camera,
+    start_views,
+)
 from wildlab.geometry.calibration import (
     BORESIGHT,
     PARAMETERS,
@@ -52,6 +63,7 @@ from wildlab.geometry.camera import (
     undistort_approximately,
 )
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
 from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
 from wildlab.geometry.frames import (
     Array,
@@ -87,6 +99,17 @@ from wildlab.geometry.gravity import (
     local_earth,
     normal_gravity,
 )
+from wildlab.geometry.intrinsics import (
+    ESTIMATED,
+    LENSES,
+    PINHOLE,
+    Intrinsics,
+    calibrate_camera,
+    confused,
+    free_columns,
+    view_errors,
+)
+from wildlab.geometry.lens_choice import LensChoice, choose_lens
 from wildlab.geometry.mount import (
     Mount,
     camera_pose,
@@ -94,6 +117,7 @@ from wildlab.geometry.mount import (
     helgesen_misalignment,
     mount_rotation,
 )
+from wildlab.geometry.mounting import Mounting, mounting_from_points
 from wildlab.geometry.robust import (
     RobustFit,
     fit_linear,
@@ -116,8 +140,12 @@ from wildlab.geometry.uncertainty import (
 __all__ = [
     "BORESIGHT",
     "EARTH_RATE",
+    "ESTIMATED",
+    "INTRINSICS",
+    "LENSES",
     "NO_DISTORTION",
     "PARAMETERS",
+    "PINHOLE",
     "Array",
     "Calibration",
     "Camera",
@@ -126,20 +154,31 @@ __all__ = [
     "Fit",
     "GroundCovariance",
     "GroundJacobians",
+    "Intrinsics",
+    "LensChoice",
     "Mount",
+    "Mounting",
     "Origin",
     "PoseErrors",
     "PosesAt",
+    "Projected",
     "RobustFit",
+    "Views",
     "apply_calibration",
     "attraction",
     "calibrate",
+    "calibrate_camera",
     "calibrated_camera",
     "calibrated_poses",
     "camera_from_data_sheet",
     "camera_from_matrix",
+    "camera_of",
     "camera_pose",
     "camera_rotation",
+    "choose_lens",
+    "confused",
+    "direction_differences",
+    "direction_sd",
     "distort",
     "distortion_jacobian",
     "ecef_to_geodetic",
@@ -150,6 +189,7 @@ __all__ = [
     "fit_linear",
     "fit_points",
     "flat_earth",
+    "free_columns",
     "geodetic_to_ecef",
     "geodetic_to_enu_linear",
     "geodetic_to_ned",
@@ -159,6 +199,8 @@ __all__ = [
     "ground_jacobians",
     "ground_to_pixel",
     "helgesen_misalignment",
+    "homography",
+    "image_raster",
     "in_image",
     "inside_ellipse",
     "intersect_plane",
@@ -169,25 +211,31 @@ __all__ = [
     "matrix_to_rotation_vector",
     "metres_per_degree",
     "mount_rotation",
+    "mounting_from_points",
     "ned_to_enu",
     "ned_to_geodetic",
     "normal_gravity",
     "normalise",
     "normalise_jacobian",
+    "parameters_of",
     "pixel_rays",
     "pixel_to_plane",
     "project",
+    "project_board",
     "quaternion_to_matrix",
     "ray_flatness",
     "rotation_vector_to_matrix",
     "sample_ground",
     "skew",
     "split_images",
+    "start_camera",
+    "start_views",
     "student_cost",
     "student_scale",
     "student_weights",
     "undistort",
     "undistort_approximately",
+    "view_errors",
     "with_covariance",
     "wrap",
 ]

@@ -14,9 +14,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.camera_file import parse_camera
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.files import check_model
+from wildlab.flight.files import TOML_LIMIT, check_model
 from wildlab.flight.learnt import read_learnt, refuse_other_camera
 from wildlab.flight.manifest import (
     CameraPart,
@@ -152,8 +153,12 @@ def _camera(recipe: Recipe, raw: RawFiles) -> CameraPart | None:
     Raises
     ------
     WildlabError
-        Where a column is missing or does not hold one constant, or a number makes no camera.
+        Where a column is missing or does not hold one constant, or a number makes no camera; or the camera's
+        own file is missing or wrong.
     """
+    if recipe.camera_file is not None:
+        text = raw.read(recipe.camera_file, "camera", TOML_LIMIT).decode("utf-8", errors="replace")
+        return parse_camera(text, raw.folder / recipe.camera_file).camera
     block = recipe.camera
     if block is None:
         return None

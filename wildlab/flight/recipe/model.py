@@ -7,7 +7,7 @@ signs, constants, and the few operations named here. `data/recipes/README.md` ex
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
@@ -136,7 +136,11 @@ class RecipeVertical(Strict):
 
 
 class Recipe(Strict):
-    """The whole of a recipe."""
+    """The whole of a recipe.
+
+    ``camera = "camera.toml"`` in place of the part names a file of `wildlab camera`, and is kept as
+    `camera_file`.
+    """
 
     name: str
     description: str = ""
@@ -144,6 +148,7 @@ class Recipe(Strict):
     origin: OriginPart | None = None
     platform: PlatformPart
     camera: RecipeCamera | None = None
+    camera_file: str | None = None
     mount: MountPart = MountPart()
     time: RecipeTime
     clocks: ClocksPart = ClocksPart()
@@ -167,6 +172,21 @@ class Recipe(Strict):
         """Those on board, by the names of their tables."""
         every = {"imu": self.imu, "gnss": self.gnss, "magnetometer": self.magnetometer, "gimbal": self.gimbal}
         return {name: one for name, one in every.items() if one is not None}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _camera_by_name(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "camera_file" in data:
+            raise ValueError('there is no key camera_file; write camera = "camera.toml"')
+        if isinstance(data, dict) and isinstance(data.get("camera"), str):
+            rest = {key: value for key, value in data.items() if key != "camera"}
+            return {**rest, "camera_file": data["camera"]}
+        return data
+
+    @property
+    def has_camera(self) -> bool:
+        """Whether there is a camera, here or in a file of its own."""
+        return self.camera is not None or self.camera_file is not None
 
     @field_validator("name")
     @classmethod
@@ -205,7 +225,7 @@ class Recipe(Strict):
         if not self.poses and self.gnss is None:
             raise ValueError("there are no poses; add a part such as [poses.autopilot], or at least [gnss]")
         images = self.frames is not None and self.frames.sensor is None
-        if self.camera is None and (images or any(one.pixel for one in self.detections)):
+        if not self.has_camera and (images or any(one.pixel for one in self.detections)):
             raise ValueError("there are images, and no camera; add the part [camera]")
         return self
 

@@ -84,8 +84,8 @@ class RawFiles:
     _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
     _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
 
-    def read(self, name: str, part: str) -> bytes:
-        """The bytes of a file.
+    def read(self, name: str, part: str, limit: int = RAW_LIMIT) -> bytes:
+        """The bytes of a file, of at most so many.
 
         Raises
         ------
@@ -94,7 +94,7 @@ class RawFiles:
         """
         path = inside(self.folder, name, file=self.recipe, field=f"{part}.file")
         try:
-            data = read_regular(path, RAW_LIMIT, f"{part}.file")
+            data = read_regular(path, limit, f"{part}.file")
         except FileNotFoundError:
             raise WildlabError(
                 f"there is no such file, and [{part}] of {self.recipe.name} asks for it",

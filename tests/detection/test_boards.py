@@ -1,0 +1,111 @@
+"""Boards are found where they are, warm on cold or cold on warm, and coded ones are told apart."""
+
+import cv2
+import numpy as np
+import pytest
+
+from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
+from wildlab.errors import WildlabError
+from wildlab.geometry.board_views import Views, parameters_of, project_board
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.simulation.boards import board_image
+
+CAMERA = Camera(320, 256, 420.0, 424.0, 156.0, 131.0, 0.0, (-0.15, 0.1, 0.0, 0.0, 0.0))
+BOARDS = (
+    Board("chessboard", 7, 5, 0.03),
+    Board("circles", 6, 5, 0.03),
+    Board("staggered circles", 4, 7, 0.02),
+)
+
+
+def pose(board, tilt=(15.0, -20.0, 12.0), distance=0.5):
+    R = euler_to_matrix(*np.radians(tilt))
+    return R, np.array([0.01, -0.01, distance]) - R @ board.points.mean(axis=0)
+
+
+def image(board, rng, warm, cold):
+    R, t = pose(board)
+    wide = board.spacing * (2 if board.pattern == "staggered circles" else 1)
+    clean = board_image(
+        CAMERA, R, t, board.points, wide, circles=board.pattern != "chessboard", warm=warm, cold=cold
+    )
+    return cv2.GaussianBlur(clean, (0, 0), 0.6) + rng.normal(0, 2, clean.shape)
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.pattern)
+@pytest.mark.parametrize(("warm", "cold"), [(200.0, 50.0), (50.0, 200.0)])
+def test_points_lie_where_they_are_whichever_side_is_warm(board, warm, cold):
+    seen = find_board(grey8(image(board, np.random.default_rng(1), warm, cold)), board)
+    R, t = pose(board)
+    true = project_board(parameters_of(CAMERA), Views(R[None], t[None]), board.points).uv[0]
+    # Which corner is the first is not to be told on a symmetric board.
+    error = min(np.abs(seen.uv - order).max() for order in (true, true[::-1]))
+    assert error < 0.35
+    if board.pattern != "chessboard":
+        assert seen.inverted == (cold > warm)
+
+
+def test_counts_and_kelvin_are_as_good_as_grey():
+    board = BOARDS[0]
+    grey = image(board, np.random.default_rng(2), 200.0, 50.0)
+    reference = find_board(grey8(grey), board).uv
+    for other in (
+        (7000 + 4 * grey).astype(np.uint16),
+        (280 + grey / 20).astype(np.float32),
+        np.dstack([grey] * 3),
+    ):
+        np.testing.assert_allclose(find_board(grey8(other), board).uv, reference, atol=0.1)
+
+
+def test_a_few_hot_pixels_and_lost_ones_do_not_make_the_rest_dark():
+    scene = np.tile(np.linspace(280.0, 290.0, 100), (100, 1))
+    plain = grey8(scene)
+    scene[0, :5] = 2000.0
+    scene[1, :5] = np.nan
+    assert abs(int(grey8(scene)[50, 50]) - int(plain[50, 50])) <= 3
+    valid = np.ones(scene.shape, bool)
+    valid[0] = False
+    assert grey8(scene, valid)[50, 99] > 250
+    assert not grey8(np.full((4, 4), 7)).any() and not grey8(np.full((4, 4), np.nan)).any()
+
+
+def test_what_is_not_there_is_not_found():
+    noise = np.random.default_rng(3).normal(100, 30, (128, 160))
+    assert all(find_board(grey8(noise), board) is None for board in BOARDS)
+    assert (
+        find_board(grey8(image(BOARDS[0], np.random.default_rng(1), 200, 50)), Board("chessboard", 9, 8))
+        is None
+    )
+
+
+def test_codes_are_counted_either_way_round_and_not_in_plain_boards():
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_250)
+    coded = cv2.aruco.CharucoBoard((7, 5), 0.03, 0.022, family).generateImage((420, 300), marginSize=20)
+    assert count_codes(coded) >= FEWEST_CODES
+    assert count_codes(255 - coded) >= FEWEST_CODES
+    assert count_codes(grey8(image(BOARDS[0], np.random.default_rng(1), 200, 50))) < FEWEST_CODES
+
+
+def test_points_of_a_staggered_grid_are_half_a_step_apart():
+    points = Board("staggered circles", 4, 3, 0.01).points
+    np.testing.assert_allclose(points[0], [0, 0, 0])
+    np.testing.assert_allclose(points[1], [0.02, 0, 0])
+    np.testing.assert_allclose(points[4], [0.01, 0.01, 0])
+    np.testing.assert_allclose(points[8], [0, 0.02, 0])
+
+
+@pytest.mark.parametrize("wrong", [(2, 6, 0.025), (9, 101, 0.025), (9, 6, 0.0), (9, 6, float("nan"))])
+def test_a_board_that_is_none_is_refused(wrong):
+    with pytest.raises(WildlabError, match="3 to 100 inner corners"):
+        Board("chessboard", *wrong)
+
+
+@pytest.mark.slow
+def test_of_43_thermal_images_at_least_22_boards_are_found(shared_data):
+    """About a minute: light on dark, some cut off, some in the shade of a person."""
+    files = sorted(shared_data("calibration", "thermal_chessboard").glob("*.png"))
+    assert len(files) == 43
+    board = Board("chessboard", 8, 7, 0.05)
+    greys = [grey8(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) for path in files]
+    assert sum(find_board(grey, board) is not None for grey in greys) >= 22

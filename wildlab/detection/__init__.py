@@ -1,0 +1,1 @@
+"""Finding things in frames: arrays in, detections with their own uncertainty out."""

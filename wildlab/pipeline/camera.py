@@ -1,0 +1,359 @@
+"""A camera out of images of a board: boards found, lens chosen, camera estimated, views compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
+from wildlab.errors import WildlabError
+from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
+from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.stills import read_still
+from wildlab.geometry.board_views import parameters_of
+from wildlab.geometry.frames import Array
+from wildlab.geometry.intrinsics import FEWEST, LENSES, PINHOLE, Intrinsics, calibrate_camera, view_errors
+from wildlab.geometry.lens_choice import LensChoice, choose_lens
+
+#: In how many images codes are looked for where boards are found without them.
+LOOKED_AT = 2
+#: A view disagrees where its held-out error is this many times the median, and this many robust standard
+#: deviations above it.
+TIMES, DEVIATIONS = 3.0, 4.0
+#: No more than this share of the views may be called odd: the rest would not know either.
+ODD = 0.25
+#: Columns and rows of the raster that coverage is counted in.
+RASTER = (8, 6)
+
+
+@dataclass(frozen=True)
+class BoardImage:
+    """One image, and what became of it.
+
+    Attributes
+    ----------
+    name
+        Of the file.
+    problem
+        Why it is not used, as a clause; empty where it is.
+    uv
+        (M, 2) pixels of the board's points; None where there is none.
+    inverted
+        Whether the board was found only once the image was inverted.
+    """
+
+    name: str
+    problem: str
+    uv: Array | None = None
+    inverted: bool = False
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """A camera and what it rests on.
+
+    Attributes
+    ----------
+    board, width, height
+        What was photographed, and the size of the images.
+    images
+        All that were given, in their order.
+    choice
+        Which lens model, and how the others did on views held out.
+    found
+        The estimate.
+    held_out
+        (V,) error of each view under the estimate without it, pixels.
+    odd
+        Names of views that disagree with the rest.
+    without_odd
+        The estimate without these; None where there are none.
+    """
+
+    board: Board
+    width: int
+    height: int
+    images: tuple[BoardImage, ...]
+    choice: LensChoice
+    found: Intrinsics
+    held_out: Array
+    odd: tuple[str, ...]
+    without_odd: Intrinsics | None
+
+    @property
+    def views(self) -> tuple[BoardImage, ...]:
+        """The images with a board that is used, in the order of the estimate's views."""
+        return tuple(one for one in self.images if one.uv is not None and not one.problem)
+
+    @property
+    def uv(self) -> Array:
+        """(V, M, 2) pixels of the boards."""
+        return np.array([one.uv for one in self.views])
+
+
+def calibrate_images(
+    paths: Sequence[Path],
+    board: Board,
+    lens: str = "auto",
+    square_pixels: bool = False,
+    leave_out: Sequence[str] = (),
+    progress: Callable[[Iterable[Path]], Iterable[Path]] = iter,
+) -> CameraCalibration:
+    """A camera from image files of a board.
+
+    Parameters
+    ----------
+    paths
+        Of the images. One that cannot be read, or shows no board, is said and left out.
+    board
+        What to look for.
+    lens
+        One of `wildlab.geometry.intrinsics.LENSES`, or "auto": chosen on views held out.
+    square_pixels
+        Whether columns and rows have one focal length.
+    leave_out
+        Names of images not to use.
+    progress
+        Wraps the paths, to show how far it is.
+
+    Returns
+    -------
+    CameraCalibration
+
+    Raises
+    ------
+    WildlabError
+        Where the images have several sizes, show a coded board, too few show the board, or no camera fits.
+    """
+    unknown = sorted(set(leave_out) - {path.name for path in paths})
+    if unknown:
+        raise WildlabError(
+            f"{unknown[0]!r} is to be left out, and is not among the images",
+            "give the name of a file, without its folder",
+            field="--without",
+        )
+    images: list[BoardImage] = []
+    sizes: dict[str, tuple[int, int]] = {}
+    coded: dict[str, int] = {}
+    for path in progress([one for one in paths if one.name not in leave_out]):
+        try:
+            pixels = read_still(path)
+        except WildlabError as error:
+            images.append(BoardImage(path.name, error.problem))
+            continue
+        sizes[path.name] = (pixels.shape[1], pixels.shape[0])
+        images.append(_look(path.name, pixels, board))
+        if len(sizes) <= LOOKED_AT or images[-1].uv is None:
+            coded[path.name] = count_codes(grey8(pixels))
+            if coded[path.name] >= FEWEST_CODES:
+                raise WildlabError(
+                    f"shows a coded board ({coded[path.name]} codes were read), and such boards are not read",
+                    "photograph a plain chessboard or a grid of circles",
+                    file=path,
+                )
+    width, height = _one_size(sizes)
+    used = [one for one in images if one.uv is not None]
+    if len(used) < FEWEST:
+        _refuse_few(images, len(used), board)
+    return solve_boards(tuple(images), board, width, height, lens, square_pixels)
+
+
+def solve_boards(
+    images: tuple[BoardImage, ...],
+    board: Board,
+    width: int,
+    height: int,
+    lens: str = "auto",
+    square_pixels: bool = False,
+) -> CameraCalibration:
+    """The same from boards that are found already.
+
+    Parameters
+    ----------
+    images
+        With the pixels of their boards.
+    board, lens, square_pixels
+        As for `calibrate_images`.
+    width, height
+        Of the images, pixels.
+
+    Returns
+    -------
+    CameraCalibration
+
+    Raises
+    ------
+    WildlabError
+        Where no camera fits.
+    """
+    used = [one for one in images if one.uv is not None and not one.problem]
+    points, uv = board.points / board.spacing, np.array([one.uv for one in used])
+    choice = choose_lens(points, uv, width, height) if lens == "auto" else LensChoice(lens, {})
+    pinhole = ("f", "cx", "cy") if square_pixels else PINHOLE
+    estimate = (*pinhole, *LENSES[choice.lens])
+
+    found = calibrate_camera(points, uv, width, height, estimate)
+    held_out = held_out_errors(found, points, uv)
+    odd = odd_views(held_out)
+    rest = calibrate_camera(points, uv[~odd], width, height, estimate) if odd.any() else None
+    names = tuple(one.name for one, is_odd in zip(used, odd, strict=True) if is_odd)
+    return CameraCalibration(board, width, height, images, choice, found, held_out, names, rest)
+
+
+def held_out_errors(found: Intrinsics, points: Array, uv: Array) -> Array:
+    """Error (V,) of each view under the camera that the others give, pixels.
+
+    Parameters
+    ----------
+    found
+        The estimate.
+    points, uv
+        It was made of, (M, 3) and (V, M, 2).
+
+    Returns
+    -------
+    (V,) root mean squared distances, pixels.
+    """
+    cameras = [found.camera_with(values) for values in found.without]
+    return np.array([view_errors(c, points, one[None])[0] for c, one in zip(cameras, uv, strict=True)])
+
+
+def odd_views(errors: Array) -> NDArray[np.bool_]:
+    """Which views disagree with the rest, by their held-out errors.
+
+    Parameters
+    ----------
+    errors
+        (V,) pixels.
+
+    Returns
+    -------
+    (V,) bool; at most a quarter of them, the worst.
+    """
+    middle = np.median(errors)
+    spread = 1.4826 * np.median(np.abs(errors - middle))
+    odd = (errors > TIMES * middle) & (errors > middle + DEVIATIONS * spread)
+    most = min(int(ODD * len(errors)), len(errors) - FEWEST)
+    if odd.sum() > most:
+        odd &= errors >= (np.sort(errors)[-most] if most > 0 else np.inf)
+    return np.asarray(odd)
+
+
+def coverage(uv: Array, width: int, height: int) -> NDArray[np.bool_]:
+    """Which cells of a raster of 8 x 6 over the image hold a point of a board: (6, 8) bool.
+
+    Parameters
+    ----------
+    uv
+        (..., 2) pixels.
+    width, height
+        Of the image.
+
+    Returns
+    -------
+    (6, 8) bool, row by row.
+    """
+    columns, rows = RASTER
+    u, v = uv.reshape(-1, 2).T
+    held = np.zeros((rows, columns), bool)
+    column = np.clip((u / width * columns).astype(int), 0, columns - 1)
+    row = np.clip((v / height * rows).astype(int), 0, rows - 1)
+    held[row, column] = True
+    return held
+
+
+def camera_file(found: CameraCalibration, name: str) -> CameraFile:
+    """What is written to ``camera.toml``.
+
+    Parameters
+    ----------
+    found
+        The calibration.
+    name
+        Of the camera.
+
+    Returns
+    -------
+    CameraFile
+    """
+    k = found.found
+    theta = dict(zip(("fx", "fy", "cx", "cy", "skew"), parameters_of(k.camera)[:5].tolist(), strict=True))
+    bends = dict(zip(("k1", "k2", "p1", "p2", "k3"), k.camera.distortion, strict=True))
+    parameters = []
+    for one in k.names:
+        low, high = k.interval(one)
+        parameters.append(ParameterPart(name=one, value=k.value(one), sd=k.sd(one), low=low, high=high))
+    return CameraFile(
+        camera=CameraPart(
+            name=name,
+            width_px=found.width,
+            height_px=found.height,
+            **{f"{key}_px": value for key, value in theta.items()},
+            **bends,
+        ),
+        board=BoardPart(
+            pattern=found.board.pattern,
+            columns=found.board.columns,
+            rows=found.board.rows,
+            spacing_m=found.board.spacing,
+        ),
+        evidence=EvidencePart(
+            images=len(found.images),
+            views=len(found.views),
+            points=int(np.isfinite(found.uv).all(axis=-1).sum()),
+            lens=found.choice.lens,
+            rms_px=k.rms,
+            covered=float(coverage(found.uv, found.width, found.height).mean()),
+        ),
+        covariance=tuple(tuple(row) for row in k.covariance.tolist()),
+        parameter=tuple(parameters),
+        view=tuple(
+            ViewPart(name=one.name, rms_px=float(rms), inverted=one.inverted)
+            for one, rms in zip(found.views, k.view_rms, strict=True)
+        ),
+    )
+
+
+def _look(name: str, pixels: NDArray[Any], board: Board) -> BoardImage:
+    grey = grey8(pixels)
+    if not grey.any():
+        return BoardImage(name, "nothing differs in it")
+    seen = find_board(grey, board)
+    if seen is None:
+        return BoardImage(name, "the whole board is not to be seen in it")
+    return BoardImage(name, "", seen.uv, seen.inverted)
+
+
+def _one_size(sizes: dict[str, tuple[int, int]]) -> tuple[int, int]:
+    if not sizes:
+        raise WildlabError("none of the images can be read", "name images of the board")
+    counts = {size: list(sizes.values()).count(size) for size in sizes.values()}
+    if len(counts) > 1:
+        usual = max(counts, key=lambda size: counts[size])
+        name, (width, height) = next((n, size) for n, size in sizes.items() if size != usual)
+        raise WildlabError(
+            f"has {width} x {height} pixels, and {counts[usual]} other images have {usual[0]} x {usual[1]}",
+            "calibrate the images of each size by themselves, or leave it out with --without",
+            file=name,
+        )
+    return next(iter(counts))
+
+
+def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
+    kind = "inner corners" if board.pattern == "chessboard" else "circles"
+    what = f"{board.columns} x {board.rows} {kind}"
+    if n == 0:
+        raise WildlabError(
+            f"a board of {what} is in none of the {len(images)} images",
+            f"count the {kind}, columns times rows; the whole board must be in view, and in focus",
+            field="--board" if board.pattern == "chessboard" else "--circles",
+        )
+    raise WildlabError(
+        f"a board of {what} is in {n} of {len(images)} images, and at least {FEWEST} are needed",
+        "take 20 or more, from all sides, tilted by up to 45 degrees, all over the image",
+    )
