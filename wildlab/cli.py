@@ -19,6 +19,7 @@ import click
 from wildlab import __version__
 from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
+from wildlab.commands.detect import detect
 from wildlab.commands.shared import FILE, FOLDER
 from wildlab.errors import WildlabError
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
@@ -59,7 +60,7 @@ def wildlab() -> None:
     """
 
 
-for _command in (studies.list_, studies.run, studies.vary, studies.evaluate, calibrate):
+for _command in (studies.list_, studies.run, studies.vary, studies.evaluate, calibrate, detect):
     wildlab.add_command(_command)
 
 

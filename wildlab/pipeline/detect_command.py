@@ -1,0 +1,296 @@
+"""What `wildlab detect` does: fit where that is asked for, detect, judge, and leave tables and pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from wildlab.errors import WildlabError
+from wildlab.files import write_json
+from wildlab.flight.files import read_regular
+from wildlab.flight.readers.frames import Frames, Polarity, open_frames
+from wildlab.flight.readers.labels import Labels, read_labels
+from wildlab.pipeline.detect import METHODS, Detected, run_detection, thresholds_from
+from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
+from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
+from wildlab.pipeline.detection_pictures import write_pictures
+
+#: The most bytes of a file with thresholds.
+MOST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for.
+
+    Attributes
+    ----------
+    images, into
+        Where frames are, and where what comes out goes.
+    method
+        One of `wildlab.pipeline.detect.METHODS`.
+    labels
+        By which the detections are judged.
+    fit
+        By which the thresholds are chosen.
+    thresholds
+        A file that an earlier run wrote.
+    classes, group
+        As for `wildlab.flight.readers.labels.read_labels`.
+    polarity
+        Of the camera.
+    overlays
+        How many pictures.
+    """
+
+    images: Path
+    into: Path
+    method: str = "contrast"
+    labels: Path | None = None
+    fit: Path | None = None
+    thresholds: Path | None = None
+    classes: tuple[str, ...] = ()
+    group: str | None = None
+    polarity: Polarity = "unknown"
+    overlays: int = 40
+
+
+def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
+    """Detect in images, and write tables and pictures.
+
+    Parameters
+    ----------
+    wanted
+        What was asked for.
+    console
+        Where progress is shown.
+
+    Returns
+    -------
+    dict
+        For JSON: numbers, problems of frames, and sentences to be printed.
+
+    Raises
+    ------
+    WildlabError
+        Where images, labels or thresholds cannot be used.
+    """
+    if wanted.fit and wanted.thresholds:
+        raise WildlabError("thresholds are both named and to be fitted", "leave --fit or --thresholds out")
+    frames = open_frames(wanted.images, polarity=wanted.polarity)
+    labels = _labels(wanted.labels, wanted)
+    to_fit = _labels(wanted.fit, wanted)
+    thresholds = METHODS[wanted.method].thresholds()
+    if wanted.thresholds:
+        thresholds = read_thresholds(wanted.thresholds, wanted.method)
+    wanted.into.mkdir(parents=True, exist_ok=True)
+    fitted = None
+    if to_fit is not None:
+        with _progress(console, "choosing thresholds", None) as tell:
+            fitted = fit_thresholds(wanted.method, samples_of(frames, to_fit), tell=tell)
+        thresholds = fitted.thresholds
+    write_thresholds(wanted.into / "thresholds.json", wanted.method, thresholds)
+    with _progress(console, "detecting", frames.count) as tell:
+        detected = run_detection(
+            frames, wanted.into, wanted.method, thresholds, lambda done: tell(done, None)
+        )
+    judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
+    things = _as_found(detected.detections) if judged is None else judged.things
+    with _progress(console, "drawing", len(detected.frames)) as tell:
+        pictures = write_pictures(
+            frames,
+            things,
+            wanted.into,
+            most=wanted.overlays,
+            total=len(detected.frames),
+            tell=lambda done: tell(done, None),
+        )
+    result = _result(wanted, thresholds, detected, judged, fitted, pictures)
+    write_json(wanted.into / "result.json", result)
+    return result
+
+
+def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
+    """Labelled frames that can be used, at most `MOST_FRAMES` of them, evenly taken.
+
+    Parameters
+    ----------
+    frames, labels
+        Of the same folder or clip. Frames of one clip go together in ten stretches: neighbours are alike.
+
+    Returns
+    -------
+    list of Sample
+    """
+    step = max(1, -(-len(labels.boxes) // MOST_FRAMES))
+    found = []
+    seen = 0
+    for frame in frames:
+        name = labels.name_of(frame.name)
+        if name is None or not frame.usable:
+            continue
+        seen += 1
+        if (seen - 1) % step:
+            continue
+        group = labels.group[name]
+        if labels.by_number and group == name:
+            group = f"stretch {10 * seen // max(len(labels.boxes) + 1, 1)}"
+        found.append(Sample(frame, labels.boxes[name], labels.ignore[name], group))
+    return found
+
+
+def write_thresholds(path: Path, method: str, thresholds: Any) -> None:
+    """Write thresholds as JSON; infinity is null.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    method, thresholds
+        Which detector's.
+    """
+    plain = {name: None if value == math.inf else value for name, value in asdict(thresholds).items()}
+    write_json(path, {"method": method, "thresholds": plain})
+
+
+def read_thresholds(path: Path, method: str) -> Any:
+    """Thresholds that `write_thresholds` wrote.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    method
+        Whose they have to be.
+
+    Returns
+    -------
+    object
+        Of ``METHODS[method].thresholds``.
+
+    Raises
+    ------
+    WildlabError
+        Where it is no such file, or another method's.
+    """
+    try:
+        given = json.loads(read_regular(path, MOST_BYTES))
+        named, values = given["method"], dict(given["thresholds"])
+    except FileNotFoundError:
+        raise WildlabError("there is no such file", "check the path", file=path) from None
+    except (ValueError, TypeError, KeyError):
+        raise WildlabError(
+            "holds no thresholds", "name the thresholds.json of an earlier run", file=path
+        ) from None
+    if named != method:
+        raise WildlabError(
+            f"holds thresholds of {named!r}", f"say --method {named}, or leave it out", file=path
+        )
+    kinds = {one.name: one.default for one in dataclasses.fields(METHODS[method].thresholds)}
+    plain = {
+        name: math.inf if value is None and kinds.get(name) == math.inf else value
+        for name, value in values.items()
+    }
+    return thresholds_from(method, {n: tuple(v) if isinstance(v, list) else v for n, v in plain.items()})
+
+
+def _labels(path: Path | None, wanted: Wanted) -> Labels | None:
+    return None if path is None else read_labels(path, classes=wanted.classes, group=wanted.group)
+
+
+def _as_found(detections: pd.DataFrame) -> pd.DataFrame:
+    columns = ["frame_id", "left_px", "top_px", "width_px", "height_px", "score"]
+    return detections[columns].assign(verdict="detected")
+
+
+def _result(
+    wanted: Wanted,
+    thresholds: Any,
+    detected: Detected,
+    judged: Judged | None,
+    fitted: Fitted | None,
+    pictures: dict[str, int],
+) -> dict[str, Any]:
+    problems = detected.frames[detected.frames["problem"].fillna("") != ""]
+    result: dict[str, Any] = {
+        "method": wanted.method,
+        "frames": {
+            "all": len(detected.frames),
+            "usable": len(detected.frames) - len(problems),
+            "kept": detected.kept,
+        },
+        "detections": len(detected.detections),
+        "problems": [
+            [str(a), str(b)] for a, b in zip(problems["frame_id"], problems["problem"], strict=True)
+        ],
+        "pictures": pictures,
+        "sentences": [],
+    }
+    say = result["sentences"]
+    if detected.kept:
+        say.append(f"{detected.kept} frames were there from a run that was broken off.")
+    if fitted is not None:
+        result["fit"] = {
+            "sets_tried": fitted.tried,
+            "held_out": plain_rates(fitted.held_out),
+            "where_chosen": plain_rates(fitted.inside),
+            "defaults": plain_rates(fitted.defaults),
+        }
+        say.append(
+            f"On frames that thresholds were not chosen from: {_rates_sentence(result['fit']['held_out'])}"
+        )
+        say.append(f"Where they were chosen: {_rates_sentence(result['fit']['where_chosen'])}")
+        say.append(f"With the defaults: {_rates_sentence(result['fit']['defaults'])}")
+    if judged is not None:
+        result["judged"] = judged.as_plain()
+        chosen_here = fitted is not None and wanted.labels == wanted.fit
+        where = (
+            "Beside the labels that the thresholds were chosen by (too good)"
+            if chosen_here
+            else "Beside the labels"
+        )
+        say.append(f"{where}: {_rates_sentence(result['judged'])}")
+        if judged.without_labels or judged.unusable or judged.absent:
+            say.append(
+                f"Frames that the labels do not name: {judged.without_labels}; labelled and unusable: "
+                f"{judged.unusable}; labelled and not here: {len(judged.absent)}."
+            )
+    return result
+
+
+def _rates_sentence(rates: dict[str, Any]) -> str:
+    def shown(name: str) -> str:
+        one = rates[name]
+        if one["estimate"] is None:
+            return f"{name} not defined"
+        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
+        return f"{name} {one['estimate']:.2f}{span}"
+
+    counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
+    return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")
+
+
+@contextmanager
+def _progress(console: Console, what: str, total: int | None) -> Iterator[Callable[[int, int | None], None]]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=20),
+        TextColumn(
+            "{task.completed:.0f} of {task.total:.0f} frames" if total else "{task.completed:.0f} frames"
+        ),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done, of: progress.update(task, completed=done, total=of or total)
