@@ -8,7 +8,7 @@ together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import cv2
@@ -47,8 +47,11 @@ class Contrast:
         Standard deviations that all pixels have at least.
     of_peak
         Share of its own strongest pixel that a region's pixels have at least; 0 for none.
+    of_image
+        Share of the image's own strong contrast (its 99.9 per cent) that the strongest pixel has at least; 0
+        for none. Where automatic gain stretches the image this says more than its noise.
     smallest_px, largest_px
-        Limits of the area, px^2; they are counted before and after holes are none.
+        Limits of the area, px^2.
     longest
         The largest ratio of major to minor axis.
     hottest
@@ -63,6 +66,7 @@ class Contrast:
     peak: float = 9.0
     edge: float = 3.0
     of_peak: float = 0.5
+    of_image: float = 0.0
     smallest_px: float = 12.0
     largest_px: float = 1500.0
     longest: float = 6.0
@@ -169,7 +173,11 @@ def propose(
         else np.float32(noise)
     )
     # Beside a border smoothing has mixed in what was filled in.
-    ratio[~valid] = 0
+    if not valid.all():
+        ratio[~valid] = 0
+    if t.of_image > 0:
+        strong = float(np.percentile(ratio[::2, ::2][valid[::2, ::2]], 99.9))
+        t = replace(t, peak=max(t.peak, t.of_image * strong))
     labels, peaks = _regions(ratio, t)
     if not len(peaks):
         return Proposals(no_detections(), np.zeros((0, len(FEATURES) if with_features else 0)))
@@ -183,37 +191,46 @@ def propose(
 
 def _regions(ratio: Image, t: Contrast) -> tuple[NDArray[np.int32], Array]:
     """Labels (H, W) of regions that pass all but the gates of shape, and the largest ratio in each."""
-    count, labels, stats = _components(ratio > min(t.edge, t.peak))
-    peaks = _largest(ratio, labels, count, t.peak)
-    good = (peaks >= t.peak) & (stats[:, cv2.CC_STAT_AREA] >= t.smallest_px)
+    above = ratio > min(t.edge, t.peak)
+    count, labels = _components(above)
+    where = np.flatnonzero(above.ravel())
+    values, of = ratio.ravel()[where], labels.ravel()[where]
+    peaks = _largest(values, of, count, t.peak)
+    area = np.bincount(of, minlength=count)
+    good = (peaks >= t.peak) & (area >= t.smallest_px)
     good[0] = False
-    if not good.any():
-        return labels, np.zeros(0)
-    if t.of_peak > 0:
+    if good.any() and t.of_peak > 0:
         limit = np.where(good, t.of_peak * peaks, np.inf).astype(np.float32)
-        count, labels, stats = _components(ratio >= limit[labels])
-        peaks = _largest(ratio, labels, count, t.peak)
-        good = peaks >= t.peak
-    area = stats[:, cv2.CC_STAT_AREA]
+        keep = values >= limit[of]
+        where, values = where[keep], values[keep]
+        inner = np.zeros(ratio.size, bool)
+        inner[where] = True
+        count, labels = _components(inner.reshape(ratio.shape))
+        of = labels.ravel()[where]
+        peaks = _largest(values, of, count, t.peak)
+        good, area = peaks >= t.peak, np.bincount(of, minlength=count)
     good &= (area >= t.smallest_px) & (area <= t.largest_px)
     good[0] = False
     if good.sum() > MOST_REGIONS:
         good &= peaks >= np.sort(peaks[good])[-MOST_REGIONS]
     number = np.zeros(count, np.int32)
     number[good] = np.arange(1, good.sum() + 1)
-    return number[labels], peaks[good]
+    # Few pixels are above a threshold: the others stay as they are.
+    result = np.zeros(ratio.size, np.int32)
+    result[where] = number[of]
+    return result.reshape(ratio.shape), peaks[good]
 
 
-def _components(mask: Mask) -> tuple[int, NDArray[np.int32], NDArray[np.int32]]:
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    return count, np.asarray(labels, np.int32), np.asarray(stats, np.int32)
+def _components(mask: Mask) -> tuple[int, NDArray[np.int32]]:
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    return count, np.asarray(labels, np.int32)
 
 
-def _largest(values: Image, labels: NDArray[np.int32], count: int, least: float) -> Array:
-    """(count,) largest value in each region; -inf where none is at least as large as ``least``."""
-    where = np.flatnonzero(values.ravel() >= least)
+def _largest(values: Image, of: NDArray[np.int32], count: int, least: float) -> Array:
+    """(count,) largest of values (P,) in each region; -inf where none is at least as large as ``least``."""
+    high = values >= least
     found = np.full(count, -np.inf)
-    np.maximum.at(found, labels.ravel()[where], values.ravel()[where].astype(float))
+    np.maximum.at(found, of[high], values[high].astype(float))
     return found
 
 

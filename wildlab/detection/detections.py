@@ -197,11 +197,12 @@ def describe(
 
 def _outline(labels: NDArray[np.int32], rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Mask:
     """(P,) which pixels have a neighbour that does not belong to their region, or lie at the border."""
-    padded = np.pad(labels, 1)
-    own = padded[rows + 1, columns + 1]
-    found = np.zeros(len(rows), bool)
-    for down, right in ((0, 1), (1, 0), (1, 2), (2, 1)):
-        found |= padded[rows + down, columns + right] != own
+    height, width = labels.shape
+    own = labels[rows, columns]
+    found = (rows == 0) | (columns == 0) | (rows == height - 1) | (columns == width - 1)
+    for by in (-1, 1):
+        found |= labels[np.clip(rows + by, 0, height - 1), columns] != own
+        found |= labels[rows, np.clip(columns + by, 0, width - 1)] != own
     return found
 
 

@@ -318,6 +318,6 @@ def _contours(above: Grey, grey: Grey, t: Warm) -> tuple[NDArray[np.int32], NDAr
 
 def _noise(grey: Grey, valid: Mask) -> float:
     """Standard deviation of neighbouring pixels' differences over root two, by the median."""
-    across = np.abs(np.diff(grey[::4].astype(np.int16), axis=1))
-    pairs = across[valid[::4, 1:] & valid[::4, :-1]]
+    across = np.abs(np.diff(grey[::16].astype(np.int16), axis=1))
+    pairs = across[valid[::16, 1:] & valid[::16, :-1]]
     return max(1.4826 * float(np.median(pairs)) / np.sqrt(2), 0.5) if pairs.size else 0.5
