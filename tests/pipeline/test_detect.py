@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from wildlab.detection.contrast import Contrast
+from wildlab.detection.shape import Shape, fit_shape
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
@@ -18,6 +19,7 @@ from wildlab.pipeline.detect import detect_frame, run_detection, thresholds_from
 from wildlab.pipeline.detect_command import read_thresholds, samples_of, write_thresholds
 from wildlab.pipeline.detection_fit import Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import judge_detections
+from wildlab.pipeline.detection_shape_fit import fit_shapes
 
 
 def picture(places: list[tuple[int, int]], seed: int, size: int = 5, warmer: int = 60) -> np.ndarray:
@@ -145,12 +147,41 @@ def test_thresholds_come_back_from_their_file(tmp_path: Path) -> None:
     assert read_thresholds(tmp_path / "t.json", "contrast") == Contrast(peak=7)
     with pytest.raises(WildlabError, match="holds thresholds of 'contrast'"):
         read_thresholds(tmp_path / "t.json", "warm")
-    with pytest.raises(WildlabError, match="has no threshold 'peek'"):
-        thresholds_from("contrast", {"peek": 3})
+    with pytest.raises(WildlabError, match="There is no threshold 'peek'"):
+        thresholds_from(Contrast, {"peek": 3})
     with pytest.raises(WildlabError, match=r"Give one like 9\.0"):
-        thresholds_from("contrast", {"peak": "high"})
+        thresholds_from(Contrast, {"peak": "high"})
     (tmp_path / "t.json").write_text("[]")
     with pytest.raises(WildlabError, match="holds no thresholds"):
         read_thresholds(tmp_path / "t.json", "contrast")
     with pytest.raises(WildlabError, match="no method 'magic'"):
         detect_frame(read_image(tmp_path / "none.png"), "magic", Contrast())
+
+
+def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -> None:
+    """Animals and fence posts of the same area and warmth: the one is round, the other long."""
+    samples = []
+    for number in range(10):
+        rng = np.random.default_rng(number)
+        image = rng.normal(100, 2, (160, 200))
+        places = [(30 + 40 * k, 40 + int(rng.integers(0, 80))) for k in range(4)]
+        for row, (u, v) in enumerate(places):
+            h, w = (7, 7) if row % 2 else (3, 16)
+            image[v - h // 2 : v - h // 2 + h, u - w // 2 : u - w // 2 + w] += 60
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.clip(image, 0, 255).astype(np.uint8))
+        boxes = np.array([[u - 3.5, v - 3.5, 7, 7] for u, v in places[1::2]], float)
+        frame = read_image(tmp_path / f"{number}.png")
+        samples.append(Sample(frame, boxes, np.zeros((0, 4)), f"clip {number // 2}"))
+    fitted = fit_shapes(samples)
+    assert fitted.held_out.f1.estimate > 0.95 > 0.8 > fitted.defaults.f1.estimate
+    again = detect_frame(samples[0].frame, "shape", fitted.thresholds)
+    assert len(again) == 2 and (again.score >= fitted.thresholds.least).all()
+    write_thresholds(tmp_path / "t.json", "shape", fitted.thresholds)
+    assert read_thresholds(tmp_path / "t.json", "shape") == fitted.thresholds
+    with pytest.raises(WildlabError, match="has 0 weights, and 18 are needed"):
+        detect_frame(samples[0].frame, "shape", Shape())
+
+
+def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
+    with pytest.raises(WildlabError, match="0 of 5 warm regions belong to a label"):
+        fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)

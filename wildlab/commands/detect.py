@@ -16,7 +16,9 @@ ANY = click.Path(path_type=Path)
 @click.command(short_help="Find warm things in a folder of images or a video.")
 @click.argument("images", type=ANY)
 @click.option("--into", type=FOLDER, required=True, help="Folder for tables and pictures.")
-@click.option("--method", type=click.Choice(["contrast", "warm"]), default="contrast", show_default=True)
+@click.option(
+    "--method", type=click.Choice(["contrast", "warm", "shape"]), default="contrast", show_default=True
+)
 @click.option(
     "--labels", type=FILE, help="CSV of boxes or points in these images: what was missed, what invented?"
 )
@@ -47,6 +49,9 @@ def detect(
     as_json: bool,
 ) -> None:
     """Find warm things in IMAGES: a folder of images, one image, or a video.
+
+    contrast takes what stands out from what lies about it, warm is the chain of F 3.2, and shape a classifier
+    that has to be learnt with --fit first.
 
     Leaves detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and with labels
     what was missed and invented. A run that was broken off goes on where it stopped.

@@ -16,18 +16,23 @@ and Thermal Imagery, master's thesis, Linköping University 2016.
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, describe, join, no_detections
 from wildlab.detection.near import merge_near, remove_near
+from wildlab.detection.shape import Shape, find_by_shape, fit_shape, log_odds
 from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
 
 __all__ = [
     "Contrast",
     "Detections",
+    "Shape",
     "Warm",
     "block_from_distance",
     "describe",
     "find_by_contrast",
+    "find_by_shape",
     "find_warm",
+    "fit_shape",
     "gate_from_distance",
     "join",
+    "log_odds",
     "merge_near",
     "no_detections",
     "remove_near",

@@ -203,7 +203,7 @@ def _outline(labels: NDArray[np.int32], rows: NDArray[np.intp], columns: NDArray
     for by in (-1, 1):
         found |= labels[np.clip(rows + by, 0, height - 1), columns] != own
         found |= labels[rows, np.clip(columns + by, 0, width - 1)] != own
-    return found
+    return np.asarray(found)
 
 
 def _beside(valid: Mask, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Mask:

@@ -15,6 +15,7 @@ import pandas as pd
 
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, no_detections
+from wildlab.detection.shape import Shape, find_by_shape
 from wildlab.detection.warm import Warm, find_warm, to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
@@ -40,6 +41,7 @@ class Method(NamedTuple):
 METHODS: dict[str, Method] = {
     "contrast": Method(Contrast, find_by_contrast),
     "warm": Method(Warm, find_warm),
+    "shape": Method(Shape, find_by_shape),
 }
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25
@@ -310,31 +312,36 @@ def _joined(tables: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFram
     return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=list(columns))
 
 
-def thresholds_from(method: str, given: dict[str, Any]) -> Any:
+def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:
     """Thresholds of a method from plain values, as they were written to a file.
 
     Parameters
     ----------
-    method
-        One of `METHODS`.
+    kind
+        Of thresholds: ``METHODS[method].thresholds``, or one inside it.
     given
         By the name of the field; what is not there keeps its default.
 
     Returns
     -------
     object
-        Of ``METHODS[method].thresholds``.
+        Of that kind.
 
     Raises
     ------
     WildlabError
         Where a name is not known, or a value is not of the kind of the default.
     """
-    kind = METHODS[method].thresholds
     known = {one.name: one.default for one in fields(kind)}
     for name, value in given.items():
         if name not in known:
-            raise WildlabError(f"{method} has no threshold {name!r}", f"it has {', '.join(known)}")
-        if isinstance(known[name], str) is not isinstance(value, str):
-            raise WildlabError(f"the threshold {name!r} is {value!r}", f"give one like {known[name]!r}")
+            raise WildlabError(f"there is no threshold {name!r}", f"there are {', '.join(known)}")
+        default = known[name]
+        numbers = isinstance(default, int | float) and not isinstance(default, bool)
+        plain = isinstance(value, int | float) and not isinstance(value, bool)
+        good = plain if numbers else default is None or isinstance(value, type(default))
+        if isinstance(default, tuple):
+            good = isinstance(value, tuple) and all(isinstance(one, int | float) for one in value)
+        if not good:
+            raise WildlabError(f"the threshold {name!r} is {value!r}", f"give one like {default!r}")
     return kind(**given)

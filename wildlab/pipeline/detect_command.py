@@ -24,6 +24,7 @@ from wildlab.pipeline.detect import METHODS, Detected, run_detection, thresholds
 from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
 from wildlab.pipeline.detection_pictures import write_pictures
+from wildlab.pipeline.detection_shape_fit import fit_shapes
 
 #: The most bytes of a file with thresholds.
 MOST_BYTES = 1_000_000
@@ -87,6 +88,11 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     """
     if wanted.fit and wanted.thresholds:
         raise WildlabError("thresholds are both named and to be fitted", "leave --fit or --thresholds out")
+    if wanted.method == "shape" and not (wanted.fit or wanted.thresholds):
+        raise WildlabError(
+            "a classifier of shapes has to be learnt first",
+            "give --fit with labels, or --thresholds of such a run",
+        )
     frames = open_frames(wanted.images, polarity=wanted.polarity)
     labels = _labels(wanted.labels, wanted)
     to_fit = _labels(wanted.fit, wanted)
@@ -97,7 +103,13 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     fitted = None
     if to_fit is not None:
         with _progress(console, "choosing thresholds", None) as tell:
-            fitted = fit_thresholds(wanted.method, samples_of(frames, to_fit), tell=tell)
+            samples = samples_of(frames, to_fit)
+            by_shape = wanted.method == "shape"
+            fitted = (
+                fit_shapes(samples, tell=tell)
+                if by_shape
+                else fit_thresholds(wanted.method, samples, tell=tell)
+            )
         thresholds = fitted.thresholds
     write_thresholds(wanted.into / "thresholds.json", wanted.method, thresholds)
     with _progress(console, "detecting", frames.count) as tell:
@@ -159,8 +171,14 @@ def write_thresholds(path: Path, method: str, thresholds: Any) -> None:
     method, thresholds
         Which detector's.
     """
-    plain = {name: None if value == math.inf else value for name, value in asdict(thresholds).items()}
-    write_json(path, {"method": method, "thresholds": plain})
+    write_json(path, {"method": method, "thresholds": _plain(asdict(thresholds))})
+
+
+def _plain(value: Any) -> Any:
+    """Without infinity, for which JSON has no word."""
+    if isinstance(value, dict):
+        return {name: _plain(one) for name, one in value.items()}
+    return None if value == math.inf else value
 
 
 def read_thresholds(path: Path, method: str) -> Any:
@@ -196,12 +214,22 @@ def read_thresholds(path: Path, method: str) -> Any:
         raise WildlabError(
             f"holds thresholds of {named!r}", f"say --method {named}, or leave it out", file=path
         )
-    kinds = {one.name: one.default for one in dataclasses.fields(METHODS[method].thresholds)}
-    plain = {
-        name: math.inf if value is None and kinds.get(name) == math.inf else value
-        for name, value in values.items()
-    }
-    return thresholds_from(method, {n: tuple(v) if isinstance(v, list) else v for n, v in plain.items()})
+    return _thresholds(METHODS[method].thresholds, method, values)
+
+
+def _thresholds(kind: type[Any], method: str, values: dict[str, Any]) -> Any:
+    """Plain values as a dataclass: null is infinity where the default is, a list a tuple."""
+    defaults = {one.name: one.default for one in dataclasses.fields(kind)}
+    made: dict[str, Any] = {}
+    for name, value in values.items():
+        default = defaults.get(name)
+        if dataclasses.is_dataclass(default) and isinstance(value, dict):
+            made[name] = _thresholds(type(default), method, value)
+        elif value is None and default == math.inf:
+            made[name] = math.inf
+        else:
+            made[name] = tuple(value) if isinstance(value, list) else value
+    return thresholds_from(kind, made)
 
 
 def _labels(path: Path | None, wanted: Wanted) -> Labels | None:

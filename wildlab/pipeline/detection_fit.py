@@ -168,15 +168,8 @@ def fit_thresholds(
     WildlabError
         Where there are fewer than two groups, or no label at all.
     """
-    groups = np.array([one.group for one in samples])
+    groups = checked_groups(samples, 2)
     names = list(dict.fromkeys(groups.tolist()))
-    if len(names) < 2:
-        raise WildlabError(
-            f"the labelled frames that can be used are of {len(names)} group",
-            "give labels of two frames or clips at least: thresholds are judged where they were not chosen",
-        )
-    if not sum(len(one.boxes) for one in samples):
-        raise WildlabError("the labels mark nothing", "give frames with boxes in them")
     sets = list(tried) if tried is not None else candidates(method)
     counts = np.zeros((len(sets), len(samples), 3), np.intp)
     for at, sample in enumerate(samples):
@@ -203,6 +196,37 @@ def fit_thresholds(
         chosen,
         len(sets),
     )
+
+
+def checked_groups(samples: Sequence[Sample], fewest: int) -> NDArray[np.str_]:
+    """The group of each sample, where there are enough of them and something is labelled.
+
+    Parameters
+    ----------
+    samples
+        Labelled frames.
+    fewest
+        How many groups there have to be.
+
+    Returns
+    -------
+    (F,) of str
+
+    Raises
+    ------
+    WildlabError
+        Where there are fewer groups, or no label at all.
+    """
+    groups = np.array([one.group for one in samples], dtype=np.str_)
+    count = len(set(groups.tolist()))
+    if count < fewest:
+        raise WildlabError(
+            f"the labelled frames that can be used are of {count} group{'' if count == 1 else 's'}",
+            f"give labels of {fewest} frames or clips at least: what is chosen is judged on others",
+        )
+    if not sum(len(one.boxes) for one in samples):
+        raise WildlabError("the labels mark nothing", "give frames with boxes in them")
+    return groups
 
 
 def _best(counts: NDArray[np.intp]) -> int:
