@@ -178,9 +178,10 @@ def test_a_letterbox_and_a_curved_border_are_masked_and_a_dark_wood_is_not() -> 
     curved = (columns - 64) ** 2 + (rows - 48) ** 2 * 0.2 > 60**2
     image[curved] = 0
     image[40:60, 50:80] = 0
+    image[90:, 60:70] = 0
     found = find_no_data(image)
     assert found[:12].all() and found[curved].all()
-    assert not found[40:60, 50:80].any()
+    assert not found[40:60, 50:80].any() and not found[91:, 62:68].all()
     empty = (curved | (rows < 12)).astype(np.uint8)
     assert not found[cv2.dilate(empty, np.ones((11, 11), np.uint8)) == 0].any()
 
@@ -238,3 +239,10 @@ def test_what_is_no_folder_of_images_is_refused(tmp_path: Path, name: str, word:
     (tmp_path / "a.txt").write_text("a")
     with pytest.raises(WildlabError, match=word):
         open_frames(tmp_path / name)
+
+
+def test_a_strip_along_one_side_is_masked_though_it_reaches_no_corner() -> None:
+    image = scene()
+    image[20:80, :6] = 0
+    found = find_no_data(image)
+    assert found[20:80, :6].all() and not found[:15].any() and not found[:, 12:].any()

@@ -17,13 +17,15 @@ JPEG_UNEVEN = 4
 BESIDE = 3
 #: Smallest share of the image that is a border, and that is a clipped area: a warm animal may be clipped too.
 SMALLEST_BORDER, SMALLEST_CLIPPED = 0.002, 0.02
+#: Share of a side of the image that a border lies along, unless it reaches into a corner.
+ALONG = 0.2
 #: Overlays: how much a pixel may change from frame to frame, what the median pixel must change by at least,
 #: both as shares of the range of the numbers, and the most of the image that text covers.
 STILL, MOVED, MOST_TEXT = 0.012, 0.03, 0.25
 
 
 def find_no_data(image: NDArray[Any]) -> Mask:
-    """Where an image is empty: a flat region that reaches into a corner, or numbers that are none.
+    """Where an image is empty: a flat black region along its sides or in a corner, or numbers that are none.
 
     Parameters
     ----------
@@ -53,10 +55,12 @@ def find_no_data(image: NDArray[Any]) -> Mask:
     flat |= none
     opened = cv2.morphologyEx(flat.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     count, labels, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=4)
-    corners = {int(labels[row, column]) for row in (0, -1) for column in (0, -1)} - {0}
     large = stats[:, cv2.CC_STAT_AREA] >= SMALLEST_BORDER * grey.size
     chosen = np.zeros(count, bool)
-    chosen[list(corners)] = True
+    for side in (labels[0], labels[-1], labels[:, 0], labels[:, -1]):
+        chosen |= np.bincount(side, minlength=count) >= ALONG * len(side)
+        chosen[[side[0], side[-1]]] = True
+    chosen[0] = False
     return none | _wider((chosen & large)[labels], BESIDE)
 
 
