@@ -65,6 +65,48 @@ def test_a_second_run_computes_nothing_again(capsys, tmp_path, monkeypatch):
     assert code == 0 and "6 frames were there" in out
 
 
+def test_lengths_come_from_the_distance(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    thresholds = {}
+    for distance in (50, 100):
+        code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", distance,
+                            "--focal", 1000)  # fmt: skip
+        assert code == 0, err
+        found = json.loads((tmp_path / "out" / "thresholds.json").read_text())
+        thresholds[distance] = found["thresholds"]
+    assert thresholds[50]["largest_px"] == 4 * thresholds[100]["largest_px"] == 900
+    assert thresholds[50]["window_px"] > thresholds[100]["window_px"]
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50)
+    assert code == 2 and "of use together" in err
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50, "--focal", 900,
+                        "--fit", path / "labels.csv")  # fmt: skip
+    assert code == 2 and "from a distance and from a fit" in err
+
+
+def test_a_flight_gives_its_images_and_their_times(capsys, tmp_path):
+    from wildlab.flight.store import save_flight
+    from wildlab.simulation.twins import simulate_twin
+
+    twin = simulate_twin("large-ship", 1)
+    save_flight(twin, tmp_path / "flight")
+    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
+    assert code == 2 and "no folder 'images'" in err
+    (tmp_path / "flight" / "images").mkdir()
+    name = str(twin.frames["frame_id"].iloc[3])
+    cv2.imwrite(str(tmp_path / "flight" / "images" / f"{name}.png"), picture([(30, 60)], 0))
+    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
+    assert code == 0, err
+    time = pd.read_csv(tmp_path / "out" / "frames.csv")["time_s"].iloc[0]
+    assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
+
+
+def test_shapes_without_a_fit_are_refused(capsys, tmp_path):
+    code, _, err = call(
+        capsys, "detect", folder(tmp_path / "in"), "--into", tmp_path / "out", "--method", "shape"
+    )
+    assert code == 2 and "has to be learnt first" in err
+
+
 def test_wrong_use_is_a_sentence(capsys, tmp_path):
     path = folder(tmp_path / "in")
     code, _, err = call(capsys, "detect", tmp_path / "none", "--into", tmp_path / "out")

@@ -16,7 +16,7 @@ import pandas as pd
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.shape import Shape, find_by_shape
-from wildlab.detection.warm import Warm, find_warm, to_grey
+from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.readers.frames import Frame, Frames
@@ -310,6 +310,52 @@ def _parquet(table: pd.DataFrame) -> bytes:
 def _joined(tables: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
     some = [one for one in tables if len(one)]
     return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=list(columns))
+
+
+#: Of the square of an animal's length, what is seen of it at least and at most, and how many lengths the
+#: window of a background is wide. Chosen, not fitted: a thin leg to a stout body seen from above.
+SMALLEST_PART, LARGEST_PART, WINDOW_LENGTHS = 0.03, 1.0, 4.0
+
+
+def for_distance(thresholds: Any, distance_m: float, focal_px: float, animal_m: float) -> Any:
+    """Thresholds whose lengths and areas are those of an animal at that distance (F 3.2, 8.1.1, 8.4).
+
+    Parameters
+    ----------
+    thresholds
+        `Warm`, `Contrast`, or another, which stays as it is.
+    distance_m
+        From the camera to the ground along the middle of the image, m.
+    focal_px
+        Focal length, px.
+    animal_m
+        Length of what is looked for, m.
+
+    Returns
+    -------
+    object
+        Of the same kind.
+
+    Raises
+    ------
+    WildlabError
+        Where a length is not above zero.
+
+    Examples
+    --------
+    >>> near, far = (for_distance(Contrast(), distance, 1000.0, 1.5) for distance in (50.0, 100.0))
+    >>> near.window_px, far.window_px, near.largest_px, far.largest_px
+    (121, 61, 900.0, 225.0)
+    """
+    seen = animal_m**2
+    smallest, largest = gate_from_distance(distance_m, focal_px, SMALLEST_PART * seen, LARGEST_PART * seen)
+    if isinstance(thresholds, Warm):
+        block = block_from_distance(distance_m, focal_px, animal_m)
+        return replace(thresholds, smallest_px=smallest, largest_px=largest, block_px=block)
+    if isinstance(thresholds, Contrast):
+        window = block_from_distance(distance_m, focal_px, animal_m, WINDOW_LENGTHS)
+        return replace(thresholds, smallest_px=smallest, largest_px=largest, window_px=window)
+    return thresholds
 
 
 def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:

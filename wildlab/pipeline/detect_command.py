@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
+from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
 from wildlab.flight.readers.labels import Labels, read_labels
-from wildlab.pipeline.detect import METHODS, Detected, run_detection, thresholds_from
+from wildlab.flight.store import load_flight
+from wildlab.pipeline.detect import METHODS, Detected, for_distance, run_detection, thresholds_from
 from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
 from wildlab.pipeline.detection_pictures import write_pictures
@@ -52,6 +54,9 @@ class Wanted:
         Of the camera.
     overlays
         How many pictures.
+    distance_m, focal_px, animal_m
+        From the camera to the ground, focal length, and length of what is looked for: they give the
+        thresholds their lengths. None where that is not known.
     """
 
     images: Path
@@ -64,6 +69,9 @@ class Wanted:
     group: str | None = None
     polarity: Polarity = "unknown"
     overlays: int = 40
+    distance_m: float | None = None
+    focal_px: float | None = None
+    animal_m: float = 1.5
 
 
 def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
@@ -93,10 +101,20 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             "a classifier of shapes has to be learnt first",
             "give --fit with labels, or --thresholds of such a run",
         )
-    frames = open_frames(wanted.images, polarity=wanted.polarity)
+    if (wanted.distance_m is None) is not (wanted.focal_px is None):
+        raise WildlabError(
+            "the distance to the ground and the focal length are of use together", "give both, or neither"
+        )
+    frames = _open(wanted)
     labels = _labels(wanted.labels, wanted)
     to_fit = _labels(wanted.fit, wanted)
     thresholds = METHODS[wanted.method].thresholds()
+    if wanted.distance_m is not None and wanted.focal_px is not None:
+        if wanted.fit or wanted.thresholds:
+            raise WildlabError(
+                "lengths come from a distance and from a fit", "leave --distance or the other out"
+            )
+        thresholds = for_distance(thresholds, wanted.distance_m, wanted.focal_px, wanted.animal_m)
     if wanted.thresholds:
         thresholds = read_thresholds(wanted.thresholds, wanted.method)
     wanted.into.mkdir(parents=True, exist_ok=True)
@@ -130,6 +148,27 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     result = _result(wanted, thresholds, detected, judged, fitted, pictures)
     write_json(wanted.into / "result.json", result)
     return result
+
+
+def _open(wanted: Wanted) -> Frames:
+    """Frames; with flight times where they are those of a flight folder, whose images lie in ``images``."""
+    if not (wanted.images / "flight.toml").is_file():
+        return open_frames(wanted.images, polarity=wanted.polarity)
+    inside = wanted.images / "images"
+    if not inside.is_dir():
+        raise WildlabError(
+            "this flight has no folder 'images'",
+            "put its images there, or name their own folder",
+            file=inside,
+        )
+    flight = load_flight(wanted.images)
+    frames = open_frames(inside, polarity=wanted.polarity)
+    if flight.frames is None:
+        return frames
+    known = dict(zip(flight.frames["frame_id"].astype(str), frame_times(flight), strict=True))
+    # Images may be named with or without their ending.
+    times = {one.name: known.get(one.name, known.get(one.stem)) for one in frames.files}
+    return replace(frames, times={name: float(time) for name, time in times.items() if time is not None})
 
 
 def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
@@ -278,7 +317,8 @@ def _result(
             f"On frames that thresholds were not chosen from: {_rates_sentence(result['fit']['held_out'])}"
         )
         say.append(f"Where they were chosen: {_rates_sentence(result['fit']['where_chosen'])}")
-        say.append(f"With the defaults: {_rates_sentence(result['fit']['defaults'])}")
+        without = "Without a classifier" if wanted.method == "shape" else "With the defaults"
+        say.append(f"{without}: {_rates_sentence(result['fit']['defaults'])}")
     if judged is not None:
         result["judged"] = judged.as_plain()
         chosen_here = fitted is not None and wanted.labels == wanted.fit

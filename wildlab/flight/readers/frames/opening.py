@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -38,12 +38,15 @@ class Frames:
         How many frames there are; of a video what it claims, None where it claims nothing.
     polarity
         What the caller said of the camera.
+    times
+        s, by the name of the frame, where the caller knows when it was taken.
     """
 
     path: Path
     files: tuple[Path, ...]
     count: int | None
     polarity: Polarity = "unknown"
+    times: Mapping[str, float] = field(default_factory=dict)
     _overlay: list[NDArray[np.bool_] | None] = field(default_factory=list, repr=False)
     _size: list[tuple[int, ...]] = field(default_factory=list, repr=False)
 
@@ -75,7 +78,8 @@ class Frames:
             else read_video(self.path, first, polarity=self.polarity)
         )
         overlay, size = self.overlay, self.size
-        for frame in found:
+        for one in found:
+            frame = replace(one, time=self.times[one.name]) if one.name in self.times else one
             if frame.usable and len(size) and frame.image.shape[:2] != size:
                 wanted, got = ("{1} x {0}".format(*shape) for shape in (size, frame.image.shape))
                 said = f"it has {got} pixels, and most of these frames have {wanted}"
