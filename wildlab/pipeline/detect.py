@@ -87,10 +87,16 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
         raise WildlabError(f"there is no method {method!r}", f"take one of {', '.join(METHODS)}")
     if not frame.usable:
         return no_detections()
-    if frame.polarity == "black-hot" and hasattr(thresholds, "warm_is_bright"):
-        thresholds = replace(thresholds, warm_is_bright=False)
+    if frame.polarity == "black-hot":
+        thresholds = _for_black_hot(thresholds)
     image = frame.image if frame.image.ndim == 2 else to_grey(frame.image)
     return METHODS[method].find(image, frame.valid, thresholds)
+
+
+def _for_black_hot(thresholds: Any) -> Any:
+    if isinstance(thresholds, Shape):
+        return replace(thresholds, regions=replace(thresholds.regions, warm_is_bright=False))
+    return replace(thresholds, warm_is_bright=False)
 
 
 def detections_table(frame: Frame, found: Detections, source: str) -> pd.DataFrame:

@@ -136,14 +136,10 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         )
     judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
     things = _as_found(detected.detections) if judged is None else judged.things
-    with _progress(console, "drawing", len(detected.frames)) as tell:
+    names = [str(one) for one in detected.frames["frame_id"]]
+    with _progress(console, "drawing", None) as tell:
         pictures = write_pictures(
-            frames,
-            things,
-            wanted.into,
-            most=wanted.overlays,
-            total=len(detected.frames),
-            tell=lambda done: tell(done, None),
+            frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
         )
     result = _result(wanted, thresholds, detected, judged, fitted, pictures)
     write_json(wanted.into / "result.json", result)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.warm import to_grey
 from wildlab.files import write_atomic
-from wildlab.flight.readers.frames import Frame
+from wildlab.flight.readers.frames import Frame, Frames
 
 Picture = NDArray[np.uint8]
 
@@ -29,6 +29,7 @@ COLOURS = {
 AROUND, TILE, IN_A_ROW = 64, 160, 8
 #: Tiles on one sheet at most.
 MOST_TILES = 80
+_BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
 def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
@@ -49,7 +50,7 @@ def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
     picture = _picture(frame)
     hatched = ~frame.valid & (np.add.outer(*(np.arange(n) for n in frame.valid.shape)) % 8 < 2)
     picture[hatched] = (90, 60, 60)
-    boxes = things[["left_px", "top_px", "width_px", "height_px"]].to_numpy(float)
+    boxes = things[_BOX].to_numpy(float)
     for box, verdict in zip(boxes, things["verdict"], strict=True):
         near, far = np.rint(box[:2] - 2).astype(int), np.rint(box[:2] + box[2:] + 2).astype(int)
         cv2.rectangle(picture, near.tolist(), far.tolist(), COLOURS[str(verdict)], 1, cv2.LINE_AA)
@@ -114,12 +115,11 @@ def cut_tile(frame: Frame, box: NDArray[np.float64], colour: tuple[int, int, int
 
 
 def write_pictures(
-    frames: Iterable[Frame],
+    frames: Frames,
+    names: Sequence[str],
     things: pd.DataFrame,
     into: Path,
-    *,
     most: int,
-    total: int | None,
     tell: Callable[[int], None] | None = None,
 ) -> dict[str, int]:
     """Overlay pictures of some frames, evenly over the flight, and sheets of what was missed and invented.
@@ -127,7 +127,9 @@ def write_pictures(
     Parameters
     ----------
     frames
-        All of them, in order.
+        Where they come from; only those that are drawn are read.
+    names
+        Of all frames, in order.
     things
         ``frame_id``, ``verdict``, the box and ``score``; from `wildlab.pipeline.detection_judged.Judged`, or
         all ``detected``.
@@ -135,10 +137,8 @@ def write_pictures(
         Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``.
     most
         How many overlays.
-    total
-        How many frames there are, where that is known.
     tell
-        Called with the number of frames that were looked at.
+        Called with the number of frames that were drawn.
 
     Returns
     -------
@@ -147,36 +147,40 @@ def write_pictures(
     """
     folder = into / "overlays"
     folder.mkdir(parents=True, exist_ok=True)
-    step = max(1, -(-(total or most) // max(most, 1)))
-    by_frame = dict(tuple(things.groupby("frame_id", sort=False))) if len(things) else {}
+    for name in names:
+        # Of an earlier run: only what has a frame's name is taken away.
+        (folder / f"{safe_stem(name)}.jpg").unlink(missing_ok=True)
+    step = max(1, -(-len(names) // max(most, 1)))
+    drawn = set(names[::step][:most])
     chosen = {word: _most_telling(things, word) for word in ("missed", "invented")}
+    on_sheets = {str(one) for rows in chosen.values() for one in things.loc[rows, "frame_id"]}
+    wanted = [number for number, name in enumerate(names) if name in drawn or name in on_sheets]
+    by_frame = dict(tuple(things.groupby("frame_id", sort=False))) if len(things) else {}
     tiles: dict[str, list[tuple[float, Picture, str]]] = {word: [] for word in chosen}
     overlays = 0
-    for number, frame in enumerate(frames):
-        own = by_frame.get(frame.name, things.iloc[:0])
+    for done, frame in enumerate(frames.some(wanted), start=1):
         if tell:
-            tell(number + 1)
+            tell(done)
         if not frame.usable:
             continue
-        if most > overlays and number % step == 0:
+        own = by_frame.get(frame.name, things.iloc[:0])
+        if frame.name in drawn:
             write_atomic(folder / f"{safe_stem(frame.name)}.jpg", _jpeg(overlay_picture(frame, own)))
             overlays += 1
         for word, rows in chosen.items():
             some = own.loc[own.index.intersection(rows)]
-            boxes = some[["left_px", "top_px", "width_px", "height_px"]].to_numpy(float)
             ranks = np.nan_to_num(some["score"].to_numpy(float))
-            for box, rank in zip(boxes, ranks, strict=True):
+            for box, rank in zip(some[_BOX].to_numpy(float), ranks, strict=True):
                 tiles[word].append((float(rank), cut_tile(frame, box, COLOURS[word]), frame.name))
-    done = {"overlays": overlays}
+    counts = {"overlays": overlays}
     for word, cut in tiles.items():
+        (into / f"{word}.jpg").unlink(missing_ok=True)
         if cut:
             ranked = sorted(cut, key=lambda one: -one[0])
             sheet = contact_sheet([(picture, name, word) for _, picture, name in ranked])
             write_atomic(into / f"{word}.jpg", _jpeg(sheet))
-            done[word] = len(cut)
-        else:
-            (into / f"{word}.jpg").unlink(missing_ok=True)
-    return done
+            counts[word] = len(cut)
+    return counts
 
 
 def _most_telling(things: pd.DataFrame, word: str) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -72,11 +72,36 @@ class Frames:
             With burnt-in overlays taken out of what is valid, and a problem where it is of another size than
             most.
         """
-        found = (
-            (read_image(path, polarity=self.polarity) for path in self.files[first:])
-            if self.files
-            else read_video(self.path, first, polarity=self.polarity)
-        )
+        found: Iterator[Frame]
+        if self.files:
+            found = (read_image(path, polarity=self.polarity) for path in self.files[first:])
+        else:
+            found = read_video(self.path, lambda number: number >= first, polarity=self.polarity)
+        yield from self._checked(found)
+
+    def some(self, numbers: Collection[int]) -> Iterator[Frame]:
+        """Some of the frames; the others are not decoded.
+
+        Parameters
+        ----------
+        numbers
+            From 0.
+
+        Yields
+        ------
+        Frame
+            As of `starting_at`, in their order.
+        """
+        wanted = set(numbers)
+        found: Iterator[Frame]
+        if self.files:
+            files = (path for number, path in enumerate(self.files) if number in wanted)
+            found = (read_image(path, polarity=self.polarity) for path in files)
+        else:
+            found = read_video(self.path, wanted.__contains__, polarity=self.polarity)
+        yield from self._checked(found)
+
+    def _checked(self, found: Iterator[Frame]) -> Iterator[Frame]:
         overlay, size = self.overlay, self.size
         for one in found:
             frame = replace(one, time=self.times[one.name]) if one.name in self.times else one

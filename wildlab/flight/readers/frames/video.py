@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -63,16 +63,18 @@ def open_video(path: Path) -> Any:
     return capture
 
 
-def read_video(path: Path, first: int = 0, *, polarity: Polarity = "unknown") -> Iterator[Frame]:
+def read_video(
+    path: Path, wanted: Callable[[int], bool] = lambda number: True, *, polarity: Polarity = "unknown"
+) -> Iterator[Frame]:
     """Frames of a video, one after another.
 
     Parameters
     ----------
     path
         Of the video.
-    first
-        Number of the first frame that is wanted, from 0. Those before are decoded and dropped: seeking is
-        not exact in compressed video.
+    wanted
+        Of the number of a frame, from 0: whether it is wanted. Others are gone over: seeking is not exact in
+        compressed video.
     polarity
         Of the camera.
 
@@ -90,7 +92,7 @@ def read_video(path: Path, first: int = 0, *, polarity: Polarity = "unknown") ->
     try:
         rate = capture.get(cv2.CAP_PROP_FPS)
         for number in range(MOST_FRAMES):
-            if number < first:
+            if not wanted(number):
                 if not capture.grab():
                     return
                 continue
