@@ -66,6 +66,10 @@ def test_intervals_hold_what_they_should() -> None:
     assert 0.90 <= held / 200 <= 0.99
 
 
+def test_few_clips_have_no_interval() -> None:
+    assert np.isnan(rates([[3, 1, 0]] * 4).f1.low) and np.isfinite(rates([[3, 1, 0]] * 5).f1.low)
+
+
 def test_nothing_at_all_is_no_number() -> None:
     nothing = rates([[0, 0, 0]])
     assert np.isnan(nothing.f1.estimate) and np.isnan(nothing.f1.low)

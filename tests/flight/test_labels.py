@@ -39,6 +39,19 @@ def test_points_empty_frames_classes_and_groups(tmp_path: Path) -> None:
     assert len(deer.boxes["a.png"]) == 1 and len(deer.ignore["a.png"]) == 2 and deer.group["b.png"] == "y"
 
 
+def test_a_clip_is_ten_stretches_unless_a_column_says_otherwise(tmp_path: Path) -> None:
+    rows = "".join(f"{number},1,2,3,4,{number % 2}\n" for number in range(7, 47))
+    path = table(tmp_path / "l.csv", f"frame0,x,y,w,h,clip\n{rows}")
+    group = read_labels(path).group
+    assert [group[str(one)] for one in (7, 10, 11, 46)] == [
+        "stretch 0",
+        "stretch 0",
+        "stretch 1",
+        "stretch 9",
+    ]
+    assert read_labels(path, group="clip").group["8"] == "0"
+
+
 def test_numbers_of_a_clip_and_names_without_ending(tmp_path: Path) -> None:
     clip = read_labels(table(tmp_path / "l.csv", "frame0,x,y,w,h\n12,1,2,3,4\n"))
     assert clip.name_of("a#000012") == "12" and clip.name_of("a#000013") is None

@@ -21,8 +21,8 @@ from wildlab.evaluation.runs import Interval
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-#: Draws of a bootstrap.
-DRAWS = 2000
+#: Draws of a bootstrap, and the fewest clips that it can draw from: of fewer it is far too narrow.
+DRAWS, FEWEST = 2000, 5
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Rates(NamedTuple):
     found, invented, missed
         How many, over all frames.
     groups
-        How many clips or frames the intervals draw from; below two there are none.
+        How many clips or frames the intervals draw from; below `FEWEST` there are none.
     """
 
     precision: Interval
@@ -184,7 +184,7 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
     sums = np.zeros((len(place), 3))
     np.add.at(sums, [place[name] for name in names], table)
     of_all = _shares(sums.sum(axis=0))
-    if len(sums) > 1:
+    if len(sums) >= FEWEST:
         rng = np.random.default_rng(seed)
         weights = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), DRAWS)
         drawn = _shares(weights @ sums)

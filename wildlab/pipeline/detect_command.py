@@ -173,7 +173,7 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
     Parameters
     ----------
     frames, labels
-        Of the same folder or clip. Frames of one clip go together in ten stretches: neighbours are alike.
+        Of the same folder or clip.
 
     Returns
     -------
@@ -189,10 +189,7 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
         seen += 1
         if (seen - 1) % step:
             continue
-        group = labels.group[name]
-        if labels.by_number and group == name:
-            group = f"stretch {10 * seen // max(len(labels.boxes) + 1, 1)}"
-        found.append(Sample(frame, labels.boxes[name], labels.ignore[name], group))
+        found.append(Sample(frame, labels.boxes[name], labels.ignore[name], labels.group[name]))
     return found
 
 

@@ -27,6 +27,8 @@ SIZES, CORNERS, POINTS = (
     (("u_px", "v_px"), ("u", "v")),
 )
 CLASS_COLUMNS = ("class", "label", "category")
+#: Into how many parts a clip is divided whose frames belong together.
+STRETCHES = 10
 #: Classes that mark what is not to be judged, without regard to capitals.
 IGNORED = frozenset({"dontcare", "ignore", "crowd"})
 
@@ -43,7 +45,8 @@ class Labels:
     ignore
         By the name of the frame: (I, 4) regions that are not judged.
     group
-        By the name of the frame: to what it belongs, where the table says it; else its own name.
+        By the name of the frame: to what it belongs, where the table says it; else its own name, or which
+        tenth of its clip it lies in.
     by_number
         Whether names are numbers of a clip's frames, as text.
     """
@@ -131,7 +134,10 @@ def read_labels(path: Path, *, classes: tuple[str, ...] = (), group: str | None 
     judged = np.zeros(len(kinds), bool)
     for row, kind in enumerate(kinds):
         judged[row] = kind.lower() not in IGNORED and (not classes or kind in classes)
-    groups = names if group is None else [str(one) for one in table[group]]
+    if group is not None:
+        groups = [str(one) for one in table[group]]
+    else:
+        groups = _stretches(names) if by_number else names
     place = pd.Series(names)
     chosen: dict[str, Array] = {}
     ignored: dict[str, Array] = {}
@@ -140,6 +146,13 @@ def read_labels(path: Path, *, classes: tuple[str, ...] = (), group: str | None 
         chosen[str(frame)] = boxes[of[there_is[of] & judged[of]]]
         ignored[str(frame)] = boxes[of[there_is[of] & ~judged[of]]]
     return Labels(chosen, ignored, dict(zip(names, groups, strict=True)), by_number)
+
+
+def _stretches(numbers: list[str]) -> list[str]:
+    """To which of ten stretches of a clip each frame belongs: its neighbours show the same."""
+    known = sorted({int(one) for one in numbers})
+    place = {number: STRETCHES * at // len(known) for at, number in enumerate(known)}
+    return [f"stretch {place[int(one)]}" for one in numbers]
 
 
 def _read_table(path: Path) -> pd.DataFrame:
