@@ -96,7 +96,9 @@ def test_a_flight_gives_its_images_and_their_times(capsys, tmp_path):
     cv2.imwrite(str(tmp_path / "flight" / "images" / f"{name}.png"), picture([(30, 60)], 0))
     code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
     assert code == 0, err
-    time = pd.read_csv(tmp_path / "out" / "frames.csv")["time_s"].iloc[0]
+    frame = pd.read_csv(tmp_path / "out" / "frames.csv").iloc[0]
+    assert str(frame["frame_id"]) == name
+    time = frame["time_s"]
     assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
 
 

@@ -57,6 +57,10 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path: Path) -> None:
     assert clip.name_of("a#000012") == "12" and clip.name_of("a#000013") is None
     stems = read_labels(table(tmp_path / "m.csv", "image,x,y,w,h\na,1,2,3,4\n"))
     assert stems.name_of("a.png") == "a" and stems.name_of("b.png") is None
+    files = read_labels(
+        table(tmp_path / "n.csv", "image,x,y,w,h\na.png,1,2,3,4\nb.png,1,2,3,4\nb.jpg,1,2,3,4\n")
+    )
+    assert files.name_of("a") == "a.png" and files.name_of("b") is None
 
 
 @pytest.mark.parametrize(

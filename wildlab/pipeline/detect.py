@@ -192,8 +192,8 @@ def run_detection(
     frames
         From `wildlab.flight.readers.frames.open_frames`.
     into
-        Folder for ``detections.parquet``, ``detections.csv``, ``frames.csv``, and until they are written
-        ``parts``.
+        Folder for ``detections.parquet``, ``detections.csv``, ``frames.csv``, and ``parts``, which a run that
+        goes on reads.
     method, thresholds
         As for `detect_frame`.
     tell

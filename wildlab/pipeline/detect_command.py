@@ -163,8 +163,9 @@ def _open(wanted: Wanted) -> Frames:
         return frames
     known = dict(zip(flight.frames["frame_id"].astype(str), frame_times(flight), strict=True))
     # Images may be named with or without their ending.
-    times = {one.name: known.get(one.name, known.get(one.stem)) for one in frames.files}
-    return replace(frames, times={name: float(time) for name, time in times.items() if time is not None})
+    names = {one.name: one.name if one.name in known else one.stem for one in frames.files}
+    own = {file: (name, float(known[name])) for file, name in names.items() if name in known}
+    return replace(frames, known=own)
 
 
 def samples_of(frames: Frames, labels: Labels) -> list[Sample]:

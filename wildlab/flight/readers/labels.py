@@ -72,8 +72,9 @@ class Labels:
         name = str(int(number)) if self.by_number and number.isdigit() else frame
         if name in self.boxes:
             return name
-        stem = Path(frame).stem
-        return stem if stem in self.boxes else None
+        # A flight may name its frames without the ending of their files, and so may the labels.
+        same = [one for one in self.boxes if Path(one).stem == Path(frame).stem]
+        return same[0] if len(same) == 1 and not self.by_number else None
 
 
 def read_labels(path: Path, *, classes: tuple[str, ...] = (), group: str | None = None) -> Labels:

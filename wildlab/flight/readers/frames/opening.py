@@ -38,15 +38,15 @@ class Frames:
         How many frames there are; of a video what it claims, None where it claims nothing.
     polarity
         What the caller said of the camera.
-    times
-        s, by the name of the frame, where the caller knows when it was taken.
+    known
+        By the name of the file: name and time (s) that the frame has in a flight.
     """
 
     path: Path
     files: tuple[Path, ...]
     count: int | None
     polarity: Polarity = "unknown"
-    times: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     _overlay: list[NDArray[np.bool_] | None] = field(default_factory=list, repr=False)
     _size: list[tuple[int, ...]] = field(default_factory=list, repr=False)
 
@@ -104,7 +104,8 @@ class Frames:
     def _checked(self, found: Iterator[Frame]) -> Iterator[Frame]:
         overlay, size = self.overlay, self.size
         for one in found:
-            frame = replace(one, time=self.times[one.name]) if one.name in self.times else one
+            name, time = self.known.get(one.name, (one.name, one.time))
+            frame = replace(one, name=name, time=time)
             if frame.usable and len(size) and frame.image.shape[:2] != size:
                 wanted, got = ("{1} x {0}".format(*shape) for shape in (size, frame.image.shape))
                 said = f"it has {got} pixels, and most of these frames have {wanted}"
