@@ -161,6 +161,24 @@ def test_bad_images_are_sentences_and_the_rest_goes_on(tmp_path: Path) -> None:
     assert [name for name, problem in found.items() if not problem] == ["good0.png", "good1.png", "good2.png"]
 
 
+def test_damage_is_a_sentence_and_nothing_on_the_terminal(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(1)
+    data = {ending: cv2.imencode(ending, scene())[1].tobytes() for ending in (".png", ".tiff")}
+    for number in range(60):
+        ending = (".png", ".tiff")[number % 2]
+        broken = bytearray(data[ending])
+        at = int(rng.integers(30, 120 if number % 3 else len(broken) - 20))
+        broken[at] ^= 0x55
+        (tmp_path / f"{number}{ending}").write_bytes(bytes(broken))
+    frames = list(open_frames(tmp_path))
+    assert len(frames) == 60
+    assert all(one.problem for one in frames if one.name.endswith(".png"))
+    assert any("is damaged" in one.problem for one in frames)
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize("cut", range(0, 400, 7))
 def test_headers_cut_anywhere_are_clauses(cut: int) -> None:
     for ending in (".jpg", ".png", ".tiff"):

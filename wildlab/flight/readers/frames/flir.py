@@ -11,10 +11,10 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.flight.readers.frames.decoding import decode_image
 from wildlab.flight.readers.frames.headers import MOST_PIXELS, Header, read_header
 
 _PIECE = b"FLIR\0"
@@ -122,9 +122,10 @@ def _raw_image(record: bytes) -> NDArray[np.uint16] | str:
     body = record[32:]
     if body.startswith(b"\x89PNG"):
         claim = read_header(body)
-        if not isinstance(claim, Header):
-            return f"its raw image: {claim}"
-        found = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_UNCHANGED)
+        problem = claim.problem if isinstance(claim, Header) else claim
+        if problem:
+            return f"its raw image: {problem}"
+        found = decode_image(body)
         if found is None or found.ndim != 2 or found.dtype != np.uint16:
             return "its raw image is no 16-bit PNG that can be decoded"
         return smoother_order(np.asarray(found, np.uint16))

@@ -7,6 +7,7 @@ header, and held against `MOST_PIXELS`.
 from __future__ import annotations
 
 import struct
+import zlib
 from typing import Literal, NamedTuple
 
 Kind = Literal["png", "jpeg", "tiff"]
@@ -69,7 +70,7 @@ def read_header(data: bytes) -> Header | str:
             return "the file is empty" if not data else "it is no PNG, JPEG or TIFF file"
     except struct.error:
         return "the file is cut off inside its header"
-    if isinstance(found, str) or found.problem:
+    if isinstance(found, str):
         return found
     if found.width < 1 or found.height < 1:
         return f"it claims a size of {found.width} x {found.height} pixels"
@@ -81,8 +82,24 @@ def read_header(data: bytes) -> Header | str:
 
 def _png(data: bytes) -> Header:
     width, height = struct.unpack_from(">II", data, 16)
-    whole = b"IEND" in data[-64:]
-    return Header("png", width, height, "" if whole else "the file is cut off before its end")
+    problem, at = "", len(_PNG)
+    while True:
+        if at + 12 > len(data):
+            problem = "the file is cut off before its end"
+            break
+        (length,) = struct.unpack_from(">I", data, at)
+        body = data[at + 4 : at + 8 + length]
+        if len(body) < 4 + length or at + 12 + length > len(data):
+            problem = "the file is cut off before its end"
+            break
+        # Damage is found here, where it can be said; the decoder would write to the terminal.
+        if zlib.crc32(body) != struct.unpack_from(">I", data, at + 8 + length)[0]:
+            problem = f"its part at byte {at:,} is damaged"
+            break
+        if body[:4] == b"IEND":
+            break
+        at += 12 + length
+    return Header("png", width, height, problem)
 
 
 def _jpeg(data: bytes) -> Header | str:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
+from wildlab.flight.readers.frames.decoding import decode_image
 from wildlab.flight.readers.frames.flir import gather_pieces, read_records, to_kelvin
 from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, spoilt
 from wildlab.flight.readers.frames.headers import Header, read_header
@@ -96,10 +96,7 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit] | str:
         if not isinstance(found, str):
             return found
         # Records without a raw image: the picture is still a picture.
-    try:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        image = None
+    image = decode_image(data)
     if image is None:
         return f"its content cannot be decoded as {header.kind.upper()}"
     if image.shape[:2] != (header.height, header.width):

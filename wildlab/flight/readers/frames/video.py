@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,8 @@ def open_video(path: Path) -> Any:
     known = start[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free") or start[:4] == b"\x1aE\xdf\xa3"
     if not known and not (start[:4] == b"RIFF" and start[8:12] == b"AVI "):
         raise WildlabError("does not begin as a video does", fix, file=path)
+    # FFmpeg would write to the terminal what is said below; OpenCV looks for this once, at the first video.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     # OpenCV's other readers would take a name with a per cent sign for a series of images.
     capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
