@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import cv2
@@ -27,12 +29,20 @@ def decode_image(data: bytes) -> NDArray[Any] | None:
     >>> decode_image(b"no image") is None
     True
     """
+    with quiet():
+        try:
+            found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        except cv2.error:
+            return None
+    return None if found is None else np.asarray(found)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """While this lasts, OpenCV writes nothing to the terminal."""
     before = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
-        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        return None
+        yield
     finally:
         cv2.utils.logging.setLogLevel(before)
-    return None if found is None else np.asarray(found)

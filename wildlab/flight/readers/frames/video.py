@@ -12,6 +12,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import regular_size
+from wildlab.flight.readers.frames.decoding import quiet
 from wildlab.flight.readers.frames.frame import Frame, Polarity, spoilt
 from wildlab.flight.readers.frames.headers import MOST_PIXELS
 from wildlab.flight.readers.frames.image import as_grey_or_colour
@@ -23,6 +24,8 @@ SUFFIXES = frozenset({".mp4", ".mov", ".m4v", ".avi", ".mkv"})
 MOST_BYTES = 200_000_000_000
 #: Frames after which a video that claims more is taken for broken.
 MOST_FRAMES = 10_000_000
+#: By how many frames a sound video may have fewer than it claims.
+UNSURE = 2
 
 
 def open_video(path: Path) -> Any:
@@ -56,7 +59,8 @@ def open_video(path: Path) -> Any:
     # FFmpeg would write to the terminal what is said below; OpenCV looks for this once, at the first video.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     # OpenCV's other readers would take a name with a per cent sign for a series of images.
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    with quiet():
+        capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
         raise WildlabError("cannot be decoded as a video", fix, file=path)
     width, height = capture.get(cv2.CAP_PROP_FRAME_WIDTH), capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
@@ -84,7 +88,8 @@ def read_video(
     Yields
     ------
     Frame
-        Named ``clip#000012``; its time is that of the container, or by the frame rate where it has none.
+        Named ``clip#000012``; its time is by the frame rate. Where the video breaks off, a last one has the
+        problem.
 
     Raises
     ------
@@ -94,14 +99,17 @@ def read_video(
     capture = open_video(path)
     try:
         rate = capture.get(cv2.CAP_PROP_FPS)
+        claimed = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         for number in range(MOST_FRAMES):
-            if not wanted(number):
-                if not capture.grab():
-                    return
-                continue
-            done, picture = capture.read()
+            done, picture = capture.read() if wanted(number) else (capture.grab(), None)
+            if not done and number < claimed - UNSURE and wanted(number):
+                yield spoilt(
+                    frame_name(path, number), f"the video breaks off: it claims {claimed:.0f} frames"
+                )
             if not done:
                 return
+            if picture is None:
+                continue
             name = frame_name(path, number)
             time = number / rate if np.isfinite(rate) and rate > 0 else None
             yield as_frame(name, time, picture, polarity)
