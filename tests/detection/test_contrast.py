@@ -61,24 +61,45 @@ def test_hu_moments_of_a_lopsided_shape_are_those_of_opencv() -> None:
     assert np.allclose(found.hu[0], truth, rtol=1e-6, atol=1e-15)
 
 
-def test_covariance_holds_the_error_of_the_centre_and_grows_where_it_is_cut_off() -> None:
-    """Ellipses at sub-pixel places in noise: their 90 % regions hold the true centre about as often."""
+def drawn(u: float, v: float, a: float, b: float, angle: float) -> np.ndarray:
+    """An ellipse at a place between pixels: its share of each pixel."""
+    left, top = int(u) - 24, int(v) - 24
+    steps = np.arange(0, 48, 0.125) - 0.4375
+    x, y = (steps + left - u)[None], (steps + top - v)[:, None]
+    along, across = x * np.cos(angle) + y * np.sin(angle), -x * np.sin(angle) + y * np.cos(angle)
+    fine = ((along / a) ** 2 + (across / b) ** 2 <= 1).astype(np.float32)
+    image = np.zeros((160, 200), np.float32)
+    image[top : top + 48, left : left + 48] = fine.reshape(48, 8, 48, 8).mean(axis=(1, 3))
+    return image
+
+
+@pytest.mark.parametrize(("a", "b", "warmer"), [(9, 5, 60), (9, 5, 20), (4, 3, 40), (18, 9, 60)])
+def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, warmer: float) -> None:
+    """Things that are seen whole, at places between pixels, blurred and in noise."""
     rng = np.random.default_rng(4)
-    inside = []
-    for _ in range(150):
+    squared = []
+    for _ in range(60):
         u, v, angle = rng.uniform(60, 140), rng.uniform(60, 100), rng.uniform(0, 3)
-        shown = 60.0 * cv2.GaussianBlur(ellipse(u, v, 9, 5, angle).astype(np.float32), (0, 0), 1.0)
-        found = find_by_contrast(ground(int(rng.integers(1e6))) + shown, EVERYWHERE)
+        shown = warmer * cv2.GaussianBlur(drawn(u, v, a, b, angle), (0, 0), 1.0)
+        image = ground(int(rng.integers(1e6))) + shown
+        found = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0, largest_px=3000))
         assert len(found) == 1
         off = found.uv[0] - [u, v]
-        inside.append(off @ np.linalg.solve(found.covariance[0], off) < 4.605)
-    # The part of an animal that is not seen is not simulated here: the ellipse may be too large, not small.
-    assert np.mean(inside) > 0.85
+        squared.append(off @ np.linalg.solve(found.covariance[0], off))
+    assert 0.8 <= np.mean(np.array(squared) < 4.605) <= 1.0
+    assert 0.5 < np.mean(squared) < 3.0
+
+
+def test_what_is_not_seen_and_what_is_cut_off_widens_the_ellipse() -> None:
     image = ground()
     image[:5, 90:110] += 60
     image[100:105, 90:110] += 60
-    cut, whole = (found := find_by_contrast(image, EVERYWHERE)).covariance[np.argsort(found.uv[:, 1])]
-    assert cut[1, 1] > whole[1, 1] + 1.5 and cut[0, 0] == pytest.approx(whole[0, 0], rel=0.2)
+    whole, part = (find_by_contrast(image, EVERYWHERE, Contrast(part=one)) for one in (0.0, 0.2))
+    assert np.allclose(
+        part.covariance - whole.covariance, (0.2 * whole.axes[:, :1, None]) ** 2 * np.eye(2), rtol=1e-6
+    )
+    cut, inner = whole.covariance[np.argsort(whole.uv[:, 1])]
+    assert cut[1, 1] > inner[1, 1] + 1.5 and cut[0, 0] == pytest.approx(inner[0, 0], rel=0.5)
 
 
 def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is_not() -> None:

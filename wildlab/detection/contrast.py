@@ -23,7 +23,7 @@ from wildlab.detection.background import (
     median_background,
     robust_deviation,
 )
-from wildlab.detection.detections import Array, Detections, describe, no_detections
+from wildlab.detection.detections import PART, Array, Detections, describe, no_detections
 
 #: The most regions of one image that are looked at further: an image of noise has tens of thousands.
 MOST_REGIONS = 5000
@@ -58,6 +58,8 @@ class Contrast:
         What the mean of a region is at most, in the unit of the image (F 8.4).
     warm_is_bright
         False for black-hot images.
+    part
+        How far the middle of an animal is from that of what is warm of it (`wildlab.detection.describe`).
     """
 
     window_px: int = 61
@@ -72,6 +74,7 @@ class Contrast:
     longest: float = 6.0
     hottest: float = float("inf")
     warm_is_bright: bool = True
+    part: float = PART
 
 
 class Proposals(NamedTuple):
@@ -182,7 +185,9 @@ def propose(
     if not len(peaks):
         return Proposals(no_detections(), np.zeros((0, len(FEATURES) if with_features else 0)))
     blur = float(np.hypot(1.0, t.smooth_px))
-    found = describe(labels, image, valid, contrast=contrast, noise=noise, blur_px=blur, score=peaks)
+    found = describe(
+        labels, image, valid, contrast=contrast, noise=noise, blur_px=blur, part=t.part, score=peaks
+    )
     keep = found.axes[:, 0] <= t.longest * found.axes[:, 1]
     keep &= found.intensity <= t.hottest
     features = _features(labels, ratio, smooth, valid, found) if with_features else np.zeros((len(found), 0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.detection.background import Mask, fill_invalid
-from wildlab.detection.detections import Detections, describe, no_detections
+from wildlab.detection.detections import PART, Detections, describe, no_detections
 from wildlab.detection.near import merge_near, remove_near
 from wildlab.errors import WildlabError
 
@@ -54,6 +54,8 @@ class Warm:
         the 0.1 and 99.9 per cent of an image that is not 8-bit.
     warm_is_bright
         False for black-hot images.
+    part
+        How far the middle of an animal is from that of what is warm of it (`wildlab.detection.describe`).
     """
 
     background: Literal["none", "enhance", "mean", "median"] = "median"
@@ -68,6 +70,7 @@ class Warm:
     hottest: float = float("inf")
     window: tuple[float, float] | None = None
     warm_is_bright: bool = True
+    part: float = PART
 
     def __post_init__(self) -> None:
         if self.block_px < 3 or self.block_px % 2 == 0:
@@ -271,7 +274,8 @@ def find_warm(image: NDArray[Any], valid: Mask, thresholds: Warm | None = None) 
     labels, excess = _contours(above, grey, t)
     if not labels.any():
         return no_detections()
-    found = describe(labels, measured, valid, contrast=grey, noise=_noise(grey, valid), score=excess)
+    noise = _noise(grey, valid)
+    found = describe(labels, measured, valid, contrast=grey, noise=noise, part=t.part, score=excess)
     found = found.select(found.intensity <= t.hottest)
     return merge_near(found, t.apart_px) if t.merge else remove_near(found, t.apart_px)
 
