@@ -20,6 +20,7 @@ from wildlab import __version__
 from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
+from wildlab.commands.detect import detect
 from wildlab.commands.shared import FILE, FOLDER
 from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
@@ -60,7 +61,7 @@ def wildlab() -> None:
     """
 
 
-for _command in (studies.list_, studies.run, studies.vary, studies.evaluate, camera, calibrate):
+for _command in (studies.list_, studies.run, studies.vary, studies.evaluate, camera, detect, calibrate):
     wildlab.add_command(_command)
 
 

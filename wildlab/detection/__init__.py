@@ -1,1 +1,40 @@
-"""Finding things in frames: arrays in, detections with their own uncertainty out."""
+"""Detection: an image as an array in, pixels with their uncertainty out. Files are read elsewhere.
+
+An image is (H, W) grey levels, counts or kelvin, and ``valid`` (H, W) says where it shows the scene. What is
+found is a `Detections` with a row for each thing; (0, 0) is the middle of the upper left pixel. Thresholds
+are frozen dataclasses with defaults. F is A. Flodell and C. Christensson, Wildlife Surveillance Using a UAV
+and Thermal Imagery, master's thesis, Linköping University 2016.
+
+>>> import numpy as np
+>>> from wildlab.detection import find_by_contrast
+>>> image = np.random.default_rng(1).normal(100, 2, (120, 160))
+>>> image[60:66, 40:50] += 40
+>>> print(len(find_by_contrast(image, np.ones((120, 160), bool))))
+1
+"""
+
+from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.detections import Detections, describe, join, no_detections
+from wildlab.detection.near import merge_near, remove_near
+from wildlab.detection.shape import Shape, find_by_shape, fit_shape, log_odds
+from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
+
+__all__ = [
+    "Contrast",
+    "Detections",
+    "Shape",
+    "Warm",
+    "block_from_distance",
+    "describe",
+    "find_by_contrast",
+    "find_by_shape",
+    "find_warm",
+    "fit_shape",
+    "gate_from_distance",
+    "join",
+    "log_odds",
+    "merge_near",
+    "no_detections",
+    "remove_near",
+    "to_grey",
+]

@@ -1,0 +1,261 @@
+"""The local-contrast chain and F's chain on pictures whose content is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+
+from wildlab.detection.background import fill_invalid, median_background, robust_deviation
+from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.detections import Detections, describe, join, no_detections
+from wildlab.detection.near import merge_near, remove_near
+from wildlab.detection.warm import (
+    Warm,
+    block_from_distance,
+    enhance,
+    find_warm,
+    gate_from_distance,
+    subtract_background,
+    to_grey,
+)
+from wildlab.errors import WildlabError
+
+EVERYWHERE = np.ones((160, 200), bool)
+
+
+def ground(seed: int = 1, noise: float = 2.0) -> np.ndarray:
+    """Uneven warm ground, brighter to the right."""
+    rng = np.random.default_rng(seed)
+    return 90 + np.linspace(0, 30, 200)[None] + rng.normal(0, noise, (160, 200))
+
+
+def ellipse(u: float, v: float, a: float, b: float, angle: float = 0.0) -> np.ndarray:
+    y, x = np.mgrid[:160, :200]
+    along = (x - u) * np.cos(angle) + (y - v) * np.sin(angle)
+    across = -(x - u) * np.sin(angle) + (y - v) * np.cos(angle)
+    return (along / a) ** 2 + (across / b) ** 2 <= 1
+
+
+def test_shape_of_an_ellipse_comes_out() -> None:
+    inside = ellipse(100, 80, 24, 9, 0.6)
+    found = describe(inside.astype(np.int32), 5.0 + 10.0 * inside, EVERYWHERE)
+    assert np.allclose(found.uv, [[100, 80]], atol=0.1)
+    assert np.allclose(found.axes, [[48, 18]], rtol=0.03)
+    assert found.orientation[0] == pytest.approx(0.6, abs=0.02)
+    assert found.area[0] == inside.sum() and found.intensity[0] == pytest.approx(15.0)
+    rows, columns = np.nonzero(inside)
+    assert found.box[0].tolist() == [
+        columns.min() - 0.5, rows.min() - 0.5, np.ptp(columns) + 1, np.ptp(rows) + 1
+    ]  # fmt: skip
+    truth = cv2.HuMoments(cv2.moments(inside.astype(np.uint8), binaryImage=True)).ravel()
+    assert np.allclose(found.hu[0], truth, rtol=1e-6, atol=1e-12)
+
+
+def test_hu_moments_of_a_lopsided_shape_are_those_of_opencv() -> None:
+    inside = ellipse(60, 60, 20, 7, 0.4) | ellipse(75, 75, 9, 9)
+    found = describe(inside.astype(np.int32), 1.0 * inside, EVERYWHERE)
+    truth = cv2.HuMoments(cv2.moments(inside.astype(np.uint8), binaryImage=True)).ravel()
+    assert np.allclose(found.hu[0], truth, rtol=1e-6, atol=1e-15)
+
+
+def drawn(u: float, v: float, a: float, b: float, angle: float) -> np.ndarray:
+    """An ellipse at a place between pixels: its share of each pixel."""
+    left, top = int(u) - 24, int(v) - 24
+    steps = np.arange(0, 48, 0.125) - 0.4375
+    x, y = (steps + left - u)[None], (steps + top - v)[:, None]
+    along, across = x * np.cos(angle) + y * np.sin(angle), -x * np.sin(angle) + y * np.cos(angle)
+    fine = ((along / a) ** 2 + (across / b) ** 2 <= 1).astype(np.float32)
+    image = np.zeros((160, 200), np.float32)
+    image[top : top + 48, left : left + 48] = fine.reshape(48, 8, 48, 8).mean(axis=(1, 3))
+    return image
+
+
+@pytest.mark.parametrize(("a", "b", "warmer"), [(9, 5, 60), (9, 5, 20), (4, 3, 40), (18, 9, 60)])
+def test_ellipses_hold_the_true_centre_as_often_as_they_say(a: float, b: float, warmer: float) -> None:
+    """Things that are seen whole, at places between pixels, blurred and in noise."""
+    rng = np.random.default_rng(4)
+    squared = []
+    for _ in range(60):
+        u, v, angle = rng.uniform(60, 140), rng.uniform(60, 100), rng.uniform(0, 3)
+        shown = warmer * cv2.GaussianBlur(drawn(u, v, a, b, angle), (0, 0), 1.0)
+        image = ground(int(rng.integers(1e6))) + shown
+        found = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0, largest_px=3000))
+        assert len(found) == 1
+        off = found.uv[0] - [u, v]
+        squared.append(off @ np.linalg.solve(found.covariance[0], off))
+    assert 0.8 <= np.mean(np.array(squared) < 4.605) <= 1.0
+    assert 0.5 < np.mean(squared) < 3.0
+
+
+def test_what_is_not_seen_and_what_is_cut_off_widens_the_ellipse() -> None:
+    image = ground()
+    image[:5, 90:110] += 60
+    image[100:105, 90:110] += 60
+    whole, part = (find_by_contrast(image, EVERYWHERE, Contrast(part=one)) for one in (0.0, 0.2))
+    assert np.allclose(
+        part.covariance - whole.covariance, (0.2 * whole.axes[:, :1, None]) ** 2 * np.eye(2), rtol=1e-6
+    )
+    cut, inner = whole.covariance[np.argsort(whole.uv[:, 1])]
+    assert cut[1, 1] > inner[1, 1] + 1.5 and cut[0, 0] == pytest.approx(inner[0, 0], rel=0.5)
+
+
+def test_what_stands_out_is_found_and_what_is_too_small_too_large_or_too_long_is_not() -> None:
+    image = ground()
+    image[ellipse(50, 40, 9, 5)] += 40
+    image[ellipse(120, 40, 1.2, 1.2)] += 60
+    image[100:150, 20:80] += 40
+    image[20:22, 60:150] += 60
+    found = find_by_contrast(image, EVERYWHERE, Contrast(window_px=101, smallest_px=30, largest_px=1000))
+    assert np.allclose(found.uv, [[50, 40]], atol=0.5)
+
+
+def test_two_animals_that_touch_are_two_with_a_share_of_the_peak() -> None:
+    image = ground(noise=1.0)
+    for u in (80, 96):
+        image += 80 * np.exp(
+            -((np.arange(200)[None] - u) ** 2 + (np.arange(160)[:, None] - 80) ** 2) / (2 * 5**2)
+        )
+    assert len(find_by_contrast(image, EVERYWHERE, Contrast(of_peak=0.0))) == 1
+    assert len(find_by_contrast(image, EVERYWHERE, Contrast(of_peak=0.85))) == 2
+
+
+def test_cold_things_are_found_in_a_black_hot_image_only() -> None:
+    image = ground()
+    image[ellipse(50, 40, 9, 5)] -= 40
+    assert len(find_by_contrast(image, EVERYWHERE)) == 0
+    found = find_by_contrast(image, EVERYWHERE, Contrast(warm_is_bright=False))
+    assert np.allclose(found.uv, [[50, 40]], atol=0.5)
+
+
+def test_an_empty_border_gives_nothing_and_hides_nothing() -> None:
+    image, valid = ground(), EVERYWHERE.copy()
+    valid[:30] = False
+    image[~valid] = 0
+    image[ellipse(100, 45, 8, 5)] += 40
+    found = find_by_contrast(image, valid)
+    assert np.allclose(found.uv, [[100, 45]], atol=0.5)
+
+
+def test_kelvin_and_counts_give_the_same_pixels() -> None:
+    image = ground()
+    image[ellipse(50, 40, 9, 5)] += 40
+    grey = find_by_contrast(image, EVERYWHERE)
+    kelvin = find_by_contrast((280 + image / 10).astype(np.float32), EVERYWHERE)
+    assert np.allclose(grey.uv, kelvin.uv, atol=0.05)
+    too_hot = float(kelvin.intensity[0]) - 0.1
+    assert (
+        len(find_by_contrast((280 + image / 10).astype(np.float32), EVERYWHERE, Contrast(hottest=too_hot)))
+        == 0
+    )
+
+
+def test_background_is_a_median_and_noise_is_robust() -> None:
+    image = ground(noise=3.0).astype(np.float32)
+    image[ellipse(100, 80, 8, 8)] += 100
+    assert abs(median_background(image, 61)[80, 100] - (90 + 15)) < 3
+    assert robust_deviation(image - median_background(image, 61), EVERYWHERE) == pytest.approx(3, rel=0.25)
+    with pytest.raises(WildlabError, match="No pixel of the image is valid"):
+        fill_invalid(image, ~EVERYWHERE)
+    with pytest.raises(WildlabError, match="make grey of a colour image first"):
+        fill_invalid(np.zeros((4, 4, 3)), np.ones((4, 4), bool))
+
+
+# -- F's chain
+
+
+def test_grey_enhancement_and_background_are_those_of_f() -> None:
+    colour = np.random.default_rng(1).integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    exact = colour @ np.array([0.299, 0.587, 0.114])
+    assert np.abs(to_grey(colour) - exact).max() <= 0.51
+    grey = to_grey(colour)
+    assert (enhance(grey) == np.clip(2 * grey.astype(int) - grey.max(), 0, 255)).all()
+    everywhere = np.ones(grey.shape, bool)
+    for by, level in (("mean", grey.mean()), ("median", np.median(grey))):
+        left = subtract_background(grey, everywhere, by)  # type: ignore[arg-type]
+        assert np.abs(left - np.clip(grey - level, 0, 255)).max() <= 1
+
+
+def herd(animals: int) -> np.ndarray:
+    image = np.full((160, 200), 100.0)
+    for number in range(animals):
+        image[ellipse(12 + 22 * (number % 9), 12 + 22 * (number // 9), 8, 8)] = 185
+    return image.astype(np.uint8)
+
+
+def test_many_animals_bias_the_mean_and_not_the_median() -> None:
+    by_mean, by_median = (Warm(background=one, level=70, largest_px=5000) for one in ("mean", "median"))  # type: ignore[arg-type]
+    assert len(find_warm(herd(2), EVERYWHERE, by_mean)) == len(find_warm(herd(2), EVERYWHERE, by_median)) == 2
+    assert len(find_warm(herd(54), EVERYWHERE, by_median)) == 54
+    assert len(find_warm(herd(54), EVERYWHERE, by_mean)) == 0
+
+
+def test_a_constant_threshold_fails_where_the_background_changes_and_an_adaptive_one_copes() -> None:
+    image = np.linspace(60, 180, 200)[None] + np.zeros((160, 1))
+    for u in (30, 170):
+        image[ellipse(u, 80, 9, 6)] += 45
+    grey = image.astype(np.uint8)
+    constant = Warm(background="none", level=150)
+    adaptive = Warm(background="none", threshold="adaptive", level=25, level_is="offset", block_px=51)
+    assert len(find_warm(grey, EVERYWHERE, constant)) != 2
+    found = find_warm(grey, EVERYWHERE, adaptive)
+    assert sorted(np.round(found.uv[:, 0]).astype(int).tolist()) == pytest.approx([30, 170], abs=1)
+
+
+def test_a_small_block_keeps_the_outline_alone() -> None:
+    """F figures 7.7 and 7.8: inside a large animal the threshold of a small block is too high."""
+    image = np.full((160, 200), 90, np.uint8)
+    image[ellipse(100, 80, 50, 40)] = 200
+    from wildlab.detection.warm import grey_above
+
+    small, large = (
+        grey_above(image, Warm(background="none", threshold="adaptive", level=120, block_px=block))
+        for block in (21, 251)
+    )
+    assert large[80, 100] == 1 and small[80, 100] == 0 and small[80, 145] == 1
+
+
+def test_block_and_gate_shrink_with_the_distance() -> None:
+    assert block_from_distance(30, 800) > block_from_distance(60, 800) > block_from_distance(120, 800)
+    assert block_from_distance(1e6, 800) == 3
+    near, far = gate_from_distance(50, 800), gate_from_distance(100, 800)
+    assert np.allclose(np.array(near) / 4, far)
+    with pytest.raises(WildlabError, match="not above zero"):
+        block_from_distance(0, 800)
+    with pytest.raises(WildlabError, match="no pixel in its middle"):
+        Warm(block_px=50)
+
+
+def at(uv: list[list[float]], score: list[float]) -> Detections:
+    labels = np.zeros((160, 200), np.int32)
+    for number, (u, v) in enumerate(uv):
+        labels[int(v) - 1 : int(v) + 2, int(u) - 1 : int(u) + 2] = number + 1
+    return describe(labels, 1.0 * (labels > 0), EVERYWHERE, score=score)
+
+
+def test_of_those_too_near_the_surest_stays_or_all_become_one() -> None:
+    found = at([[20, 20], [28, 20], [36, 20], [100, 20]], [1.0, 3.0, 2.0, 0.5])
+    left = remove_near(found, 10)
+    assert left.uv[:, 0].tolist() == [28, 100] and left.score.tolist() == [3.0, 0.5]
+    assert len(remove_near(found, 0)) == 4
+    merged = merge_near(found, 10)
+    assert np.allclose(sorted(merged.uv[:, 0]), [28, 100]) and merged.area.max() == 27
+    row = int(np.argmax(merged.area))
+    assert merged.box[row].tolist() == [18.5, 18.5, 19, 3] and merged.orientation[row] == pytest.approx(0)
+    whole = np.zeros((160, 200), np.int32)
+    for u in (20, 28, 36):
+        whole[19:22, u - 1 : u + 2] = 1
+    assert np.allclose(merged.axes[row], describe(whole, whole, EVERYWHERE).axes[0])
+
+
+def test_removing_does_not_go_on_from_what_was_removed() -> None:
+    found = at([[20, 20], [28, 20], [36, 20]], [3.0, 2.0, 1.0])
+    assert remove_near(found, 10).uv[:, 0].tolist() == [20, 36]
+
+
+@pytest.mark.parametrize("find", [find_warm, find_by_contrast])
+def test_an_even_image_has_nothing(find: Callable[..., Detections]) -> None:
+    assert len(find(np.full((160, 200), 100, np.uint8), EVERYWHERE)) == 0
+    assert len(join([no_detections(), no_detections()])) == 0

@@ -1,0 +1,85 @@
+"""Detections beside labels: who belongs to whom, and what the shares are worth."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.matching import Rule, match, rates
+
+
+def test_as_many_as_possible_belong_together_and_then_the_nearest() -> None:
+    """Against all assignments of small sets, tried one by one."""
+    rng = np.random.default_rng(2)
+    rule = Rule(tolerance_px=8, half_diagonal=False)
+    for _ in range(60):
+        found, labels = rng.uniform(0, 25, (4, 2)), rng.uniform(0, 25, (4, 2))
+        apart = np.linalg.norm(found[:, None] - labels[None], axis=2)
+        tried = []
+        for order in permutations(range(4)):
+            near = [apart[row, column] for row, column in enumerate(order) if apart[row, column] <= 8]
+            tried.append((-len(near), sum(near)))
+        best = min(tried)
+        pairs = match(found, labels, rule).pairs
+        assert len(pairs) == -best[0]
+        assert sum(apart[a, b] for a, b in pairs) == pytest.approx(best[1])
+
+
+def test_a_large_label_reaches_further_and_a_region_is_not_judged() -> None:
+    large = [[100, 100, 60, 80]]
+    assert len(match([[110, 120]], large).pairs) == 1
+    assert len(match([[110, 120]], large, Rule(half_diagonal=False)).pairs) == 0
+    found = match([[5, 5], [50, 50]], [[5, 5]], ignore=[[40, 40, 20, 20]])
+    assert found.counts.tolist() == [1, 0, 0] and found.ignored.tolist() == [1]
+    # A label inside a region is judged all the same.
+    assert len(match([[50, 50]], [[50, 50]], ignore=[[40, 40, 20, 20]]).pairs) == 1
+
+
+def test_overlap_of_boxes() -> None:
+    rule = Rule(by="iou", overlap=0.5)
+    assert len(match([[0, 0, 10, 10]], [[0, 0, 10, 19]], rule).pairs) == 1
+    assert len(match([[0, 0, 10, 10]], [[0, 0, 10, 21]], rule).pairs) == 0
+
+
+def test_shares_are_those_of_the_sums_and_clips_widen_the_intervals() -> None:
+    rng = np.random.default_rng(1)
+    clip = np.repeat(np.arange(8), 25)
+    good = np.repeat(rng.integers(2, 10, 8), 25)
+    counts = np.stack([good, 10 - good, 10 - good], axis=1)
+    alone, together = rates(counts), rates(counts, clip.tolist())
+    assert alone.f1.estimate == together.f1.estimate == pytest.approx(good.sum() / (10 * len(good)))
+    assert together.f1.high - together.f1.low > 3 * (alone.f1.high - alone.f1.low)
+    assert (together.groups, alone.groups) == (8, 200)
+    assert alone.precision.low < alone.precision.estimate < alone.precision.high
+
+
+def test_intervals_hold_what_they_should() -> None:
+    rng = np.random.default_rng(3)
+    held = 0
+    for _ in range(200):
+        found = rng.binomial(10, 0.7, 40)
+        one = rates(np.stack([found, 0 * found, 10 - found], axis=1), seed=int(rng.integers(1e6))).recall
+        held += one.low <= 0.7 <= one.high
+    assert 0.90 <= held / 200 <= 0.99
+
+
+def test_few_clips_have_no_interval() -> None:
+    assert np.isnan(rates([[3, 1, 0]] * 4).f1.low) and np.isfinite(rates([[3, 1, 0]] * 5).f1.low)
+
+
+def test_nothing_at_all_is_no_number() -> None:
+    nothing = rates([[0, 0, 0]])
+    assert np.isnan(nothing.f1.estimate) and np.isnan(nothing.f1.low)
+    assert match([], []).counts.tolist() == [0, 0, 0] and match([], [[1, 1]]).missed.tolist() == [0]
+
+
+def test_what_cannot_be_boxes_is_refused() -> None:
+    with pytest.raises(WildlabError, match=r"detections have the shape \(1, 3\)"):
+        match([[1, 2, 3]], [])
+    with pytest.raises(WildlabError, match="numbers that are none"):
+        match([], [[np.nan, 1]])
+    with pytest.raises(WildlabError, match="2 frames have counts and 1 have a clip"):
+        rates([[1, 0, 0], [1, 0, 0]], ["a"])

@@ -1,0 +1,276 @@
+"""Frames out of folders and files: what they measure, where they are valid, what bad ones say."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.frames import open_frames, read_image
+from wildlab.flight.readers.frames.flir import Planck, gather_pieces, read_records, to_kelvin
+from wildlab.flight.readers.frames.headers import Header, read_header
+from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, find_overlay
+
+
+def scene(seed: int = 1, shape: tuple[int, int] = (96, 128)) -> np.ndarray:
+    """Uneven ground."""
+    rng = np.random.default_rng(seed)
+    rough = cv2.GaussianBlur(rng.normal(0, 1, shape), (0, 0), 6)
+    return np.clip(120 + 400 * rough + rng.normal(0, 3, shape), 20, 230).astype(np.uint8)
+
+
+def write(path: Path, image: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), image)
+    return path
+
+
+def fff(counts: np.ndarray, planck: Planck, *, as_png: bool = False, swapped: bool = False) -> bytes:
+    """Records of FLIR as a camera would write them."""
+    height, width = counts.shape
+    if as_png:
+        stored = counts.byteswap() if swapped else counts
+        body = cv2.imencode(".png", stored)[1].tobytes()
+    else:
+        body = counts.astype("<u2").tobytes()
+    raw = struct.pack("<HHH", 2, width, height).ljust(32, b"\0") + body
+    camera = bytearray(0x400)
+    struct.pack_into("<H", camera, 0, 2)
+    struct.pack_into("<fff", camera, 0x58, planck.R1, planck.B, planck.F)
+    struct.pack_into("<if", camera, 0x308, int(planck.O), planck.R2)
+    head = b"FFF\0" + b"made".ljust(16, b"\0") + struct.pack(">III", 100, 64, 2)
+    head = head.ljust(64, b"\0")
+    at = 64 + 2 * 32
+    for kind, data in ((1, raw), (32, bytes(camera))):
+        head += struct.pack(">HHIIII", kind, 0, 0, 0, at, len(data)).ljust(32, b"\0")
+        at += len(data)
+    return head + raw + bytes(camera)
+
+
+def as_jpeg(records: bytes, piece: int = 60_000) -> bytes:
+    """A JPEG that carries records in pieces."""
+    picture = cv2.imencode(".jpg", np.full((8, 8), 90, np.uint8))[1].tobytes()
+    parts = [records[at : at + piece] for at in range(0, len(records), piece)]
+    segments = b"".join(
+        b"\xff\xe1"
+        + struct.pack(">H", len(part) + 10)
+        + b"FLIR\0\x01"
+        + bytes([number, len(parts) - 1])
+        + part
+        for number, part in enumerate(parts)
+    )
+    return picture[:2] + segments + picture[2:]
+
+
+PLANCK = Planck(17096.453125, 0.0480848, 1428.0, 1.0, -370.0)
+
+
+def test_temperatures_are_those_of_plancks_law(tmp_path: Path) -> None:
+    kelvin = np.linspace(280, 320, 64 * 48).reshape(48, 64)
+    counts = PLANCK.R1 / (PLANCK.R2 * (np.exp(PLANCK.B / kelvin) - PLANCK.F)) - PLANCK.O
+    assert np.abs(to_kelvin(np.rint(counts).astype(np.uint16), PLANCK) - kelvin).max() < 0.02
+    records = fff(np.rint(counts).astype(np.uint16), PLANCK)
+    (tmp_path / "a.fff").write_bytes(records)
+    (tmp_path / "b.jpg").write_bytes(as_jpeg(records, piece=1000))
+    for frame in open_frames(tmp_path):
+        assert frame.unit == "kelvin" and frame.polarity == "white-hot"
+        assert np.abs(frame.image - kelvin).max() < 0.02
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_png_of_either_order_of_bytes_gives_the_same_counts(swapped: bool) -> None:
+    counts = (3000 + np.add.outer(np.arange(40), np.arange(50))).astype(np.uint16)
+    found = read_records(fff(counts, PLANCK, as_png=True, swapped=swapped))
+    assert not isinstance(found, str)
+    assert (found.counts == counts).all()
+
+
+def test_records_that_lie_or_lack_a_piece_are_sentences() -> None:
+    counts = np.full((20, 30), 3000, np.uint16)
+    whole = fff(counts, PLANCK)
+    assert "cut off" in str(read_records(whole[:700]))
+    lying = whole.replace(struct.pack("<HHH", 2, 30, 20), struct.pack("<HHH", 2, 60000, 60000))
+    assert "claims 60000 x 60000 pixels" in str(read_records(lying))
+    jpeg = as_jpeg(whole, piece=500)
+    assert gather_pieces(jpeg) == whole
+    first = jpeg.index(b"FLIR\0\x01\x01")
+    assert gather_pieces(jpeg[:first] + b"NONE\0" + jpeg[first + 5 :]) == b""
+
+
+@pytest.mark.parametrize(
+    ("name", "celsius"), [("FLIR_AX8.jpg", 24.75), ("FLIR.jpg", 26.21), ("DJI_XTR.jpg", 26.32)]
+)
+def test_medians_of_real_files_are_those_of_exiftools_constants(
+    shared_data: Callable[..., Path], name: str, celsius: float
+) -> None:
+    frame = read_image(shared_data("imagery", "rjpeg_samples", name))
+    assert frame.unit == "kelvin" and frame.valid.all()
+    assert round(float(np.median(frame.image)) - 273.15, 2) == celsius
+
+
+def test_real_files_of_other_kinds(shared_data: Callable[..., Path]) -> None:
+    fff_frame = read_image(shared_data("imagery", "flirpy", "frame_000000.fff"))
+    assert fff_frame.unit == "kelvin" and fff_frame.image.shape == (512, 640)
+    tiff = read_image(shared_data("imagery", "flirpy", "example_radiometric.tiff"))
+    assert tiff.unit == "counts" and tiff.image.dtype == np.uint16 and np.median(tiff.image) == 6994
+    bordered = read_image(shared_data("imagery", "bambi_gatter", "thermal", "17_19345.jpg"))
+    assert 0.75 < bordered.valid.mean() < 0.85 and not bordered.valid[:70].any() and bordered.valid[512, 512]
+
+
+def claims(width: int, height: int) -> bytes:
+    """A PNG whose header claims a size."""
+    body = b"IHDR" + struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0)
+    chunk = struct.pack(">I", 13) + body + struct.pack(">I", zlib.crc32(body))
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk + struct.pack(">I", 0) + b"IEND" + struct.pack(">I", zlib.crc32(b"IEND"))
+    )
+
+
+def test_bad_images_are_sentences_and_the_rest_goes_on(tmp_path: Path) -> None:
+    for number in range(3):
+        write(tmp_path / f"good{number}.png", scene(number))
+    jpeg = cv2.imencode(".jpg", scene(7))[1].tobytes()
+    png = cv2.imencode(".png", scene(7))[1].tobytes()
+    tiff = cv2.imencode(".tiff", scene(7))[1].tobytes()
+    (tmp_path / "cut.jpg").write_bytes(jpeg[: len(jpeg) // 2])
+    (tmp_path / "cut.png").write_bytes(png[: len(png) // 2])
+    (tmp_path / "cut.tiff").write_bytes(tiff[: len(tiff) // 2])
+    (tmp_path / "empty.jpg").write_bytes(b"")
+    (tmp_path / "huge.png").write_bytes(claims(32768, 16384))
+    (tmp_path / "text.jpg").write_text("no image")
+    write(tmp_path / "black.png", np.zeros((96, 128), np.uint8))
+    write(tmp_path / "small.png", scene(5, (50, 60)))
+    write(tmp_path / "white.png", np.where(scene(6) > 60, 255, scene(6)).astype(np.uint8))
+    os.mkfifo(tmp_path / "pipe.png")
+    found = {frame.name: frame.problem for frame in open_frames(tmp_path)}
+    assert len(found) == 13
+    for name, word in {
+        "cut.jpg": "cut off", "cut.png": "cut off", "cut.tiff": "cut off", "empty.jpg": "is empty",
+        "huge.png": "32,768 x 16,384 pixels", "text.jpg": "no PNG, JPEG or TIFF", "black.png": "value 0",
+        "small.png": "it has 60 x 50 pixels, and most of these frames have 128 x 96",
+        "white.png": "saturated", "pipe.png": "named pipe",
+    }.items():  # fmt: skip
+        assert word.lower() in found[name].lower(), (name, found[name])
+        assert found[name].endswith(".") and not found[name][0].islower()
+    assert [name for name, problem in found.items() if not problem] == ["good0.png", "good1.png", "good2.png"]
+
+
+def test_damage_is_a_sentence_and_nothing_on_the_terminal(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(1)
+    data = {ending: cv2.imencode(ending, scene())[1].tobytes() for ending in (".png", ".tiff")}
+    for number in range(60):
+        ending = (".png", ".tiff")[number % 2]
+        broken = bytearray(data[ending])
+        at = int(rng.integers(30, 120 if number % 3 else len(broken) - 20))
+        broken[at] ^= 0x55
+        (tmp_path / f"{number}{ending}").write_bytes(bytes(broken))
+    frames = list(open_frames(tmp_path))
+    assert len(frames) == 60
+    assert all(one.problem for one in frames if one.name.endswith(".png"))
+    assert any("is damaged" in one.problem for one in frames)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("cut", range(0, 400, 7))
+def test_headers_cut_anywhere_are_clauses(cut: int) -> None:
+    for ending in (".jpg", ".png", ".tiff"):
+        data = cv2.imencode(ending, scene())[1].tobytes()
+        whole = read_header(data)
+        assert isinstance(whole, Header) and not whole.problem and (whole.width, whole.height) == (128, 96)
+        short = read_header(data[:cut])
+        assert isinstance(short, str) or short.problem or len(data) <= cut
+
+
+def test_a_letterbox_and_a_curved_border_are_masked_and_a_dark_wood_is_not() -> None:
+    image = scene()
+    image[:12] = 0
+    rows, columns = np.ogrid[:96, :128]
+    curved = (columns - 64) ** 2 + (rows - 48) ** 2 * 0.2 > 60**2
+    image[curved] = 0
+    image[40:60, 50:80] = 0
+    image[90:, 60:70] = 0
+    found = find_no_data(image)
+    assert found[:12].all() and found[curved].all()
+    assert not found[40:60, 50:80].any() and not found[91:, 62:68].all()
+    empty = (curved | (rows < 12)).astype(np.uint8)
+    assert not found[cv2.dilate(empty, np.ones((11, 11), np.uint8)) == 0].any()
+
+
+def test_clipped_sky_is_masked_and_a_clipped_animal_is_not() -> None:
+    image = scene()
+    image[80:] = 255
+    image[20:26, 30:40] = 255
+    found = find_clipped(image)
+    assert found[84:].all() and not found[20:26, 30:40].any()
+
+
+def test_burnt_in_text_is_masked_where_the_scene_moves() -> None:
+    frames = []
+    for number in range(8):
+        image = scene(number)
+        cv2.putText(image, "25 C", (5, 90), cv2.FONT_HERSHEY_SIMPLEX, 0.5, 255, 1)
+        frames.append(image)
+    written = np.zeros((96, 128), np.uint8)
+    cv2.putText(written, "25 C", (5, 90), cv2.FONT_HERSHEY_SIMPLEX, 0.5, 255, 1)
+    found = find_overlay(frames)
+    assert found is not None and found[written > 0].mean() > 0.9
+    assert found[:70].mean() < 0.01
+    assert find_overlay([frames[0]] * 8) is None and find_overlay(frames[:4]) is None
+
+
+def test_a_video_gives_its_frames_with_times_and_can_be_entered_anywhere(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (128, 96))
+    for number in range(12):
+        writer.write(cv2.cvtColor(scene(number), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    clip = open_frames(path)
+    frames = list(clip)
+    assert len(clip) == len(frames) == 12 and frames[3].name == "clip#000003"
+    assert frames[3].time == pytest.approx(0.3) and frames[3].unit == "grey"
+    assert [one.name for one in clip.some([11, 2])] == [frames[2].name, frames[11].name]
+    later = list(clip.starting_at(9))
+    assert [one.name for one in later] == [one.name for one in frames[9:]]
+    assert (later[0].image == frames[9].image).all()
+
+
+def test_a_video_that_breaks_off_says_so(tmp_path: Path, shared_data: Callable[..., Path]) -> None:
+    data = bytearray(shared_data("imagery", "ir_tracks", "IR_BIRD_070.mp4").read_bytes())
+    data[8000:8500] = bytes(500)
+    (tmp_path / "a.mp4").write_bytes(bytes(data))
+    frames = list(open_frames(tmp_path / "a.mp4"))
+    assert 10 < len(frames) < 300 and all(one.usable for one in frames[:-1])
+    assert frames[-1].problem == "The video breaks off: it claims 322 frames."
+
+
+def test_a_playlist_that_calls_itself_a_video_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "list.mp4"
+    path.write_text("#EXTM3U\n/etc/passwd\n")
+    with pytest.raises(WildlabError, match="does not begin as a video does"):
+        open_frames(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("none", "no such file or folder"), ("a.txt", r"ends in '\.txt'"), ("empty", "no images")],
+)
+def test_what_is_no_folder_of_images_is_refused(tmp_path: Path, name: str, word: str) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "a.txt").write_text("a")
+    with pytest.raises(WildlabError, match=word):
+        open_frames(tmp_path / name)
+
+
+def test_a_strip_along_one_side_is_masked_though_it_reaches_no_corner() -> None:
+    image = scene()
+    image[20:80, :6] = 0
+    found = find_no_data(image)
+    assert found[20:80, :6].all() and not found[:15].any() and not found[:, 12:].any()

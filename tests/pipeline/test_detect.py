@@ -1,0 +1,187 @@
+"""Detection over folders: what is written, what is kept when it is broken off, what it is worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.detection.contrast import Contrast
+from wildlab.detection.shape import Shape, fit_shape
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.frames import open_frames, read_image
+from wildlab.flight.readers.labels import read_labels
+from wildlab.pipeline import detect as subject
+from wildlab.pipeline.detect import detect_frame, run_detection, thresholds_from
+from wildlab.pipeline.detect_command import read_thresholds, samples_of, write_thresholds
+from wildlab.pipeline.detection_fit import Sample, fit_thresholds
+from wildlab.pipeline.detection_judged import judge_detections
+from wildlab.pipeline.detection_shape_fit import fit_shapes
+
+
+def picture(places: list[tuple[int, int]], seed: int, size: int = 5, warmer: int = 60) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    image = rng.normal(100, 2, (96, 128))
+    for u, v in places:
+        image[v - size // 2 : v + size // 2 + 1, u - size // 2 : u + size // 2 + 1] += warmer
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def folder(path: Path, count: int = 6) -> Path:
+    """Frames with two animals each, one of them moving; and their labels."""
+    path.mkdir()
+    rows = []
+    for number in range(count):
+        places = [(20 + 10 * (number % 9), 30), (100, 70)]
+        cv2.imwrite(str(path / f"{number:03d}.png"), picture(places, number))
+        rows += [(f"{number:03d}.png", u - 2.5, v - 2.5, 5, 5, f"scene {number // 2}") for u, v in places]
+    pd.DataFrame(rows, columns=["image", "x", "y", "w", "h", "scene"]).to_csv(
+        path / "labels.csv", index=False
+    )
+    return path
+
+
+def test_tables_hold_what_was_put_in(tmp_path: Path) -> None:
+    frames = open_frames(folder(tmp_path / "in"))
+    done = run_detection(frames, tmp_path / "out", "contrast", Contrast())
+    assert len(done.detections) == 12 and len(done.frames) == 6 and done.kept == 0
+    read = pd.read_csv(tmp_path / "out" / "detections.csv")
+    assert np.allclose(read["u_px"], pd.read_parquet(tmp_path / "out" / "detections.parquet")["u_px"])
+    moving = read[read["v_px"] < 50].sort_values("frame_id")
+    assert np.allclose(moving["u_px"], 20 + 10 * np.arange(6), atol=0.3)
+    assert (read["kind"] == "pixel").all() and (read["touches_border"] == 0).all()
+    assert (read["cov_uu_px2"] * read["cov_vv_px2"] > read["cov_uv_px2"] ** 2).all()
+
+
+def test_a_run_that_was_broken_off_goes_on_and_gives_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(subject, "PART", 4)
+    frames = open_frames(folder(tmp_path / "in", 11))
+    whole = run_detection(frames, tmp_path / "whole", "contrast", Contrast())
+    seen = []
+
+    def stop(done: int) -> None:
+        seen.append(done)
+        if done == 6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_detection(frames, tmp_path / "out", "contrast", Contrast(), stop)
+    assert not (tmp_path / "out" / "detections.csv").exists()
+    looked = []
+    true = subject.detect_frame
+    monkeypatch.setattr(subject, "detect_frame", lambda f, *rest: looked.append(f.name) or true(f, *rest))
+    done = run_detection(frames, tmp_path / "out", "contrast", Contrast(), seen.append)
+    assert done.kept == 4 and looked[0] == "004.png" and len(looked) == 7 and seen[-1] == 11
+    pd.testing.assert_frame_equal(done.detections, whole.detections)
+    pd.testing.assert_frame_equal(done.frames, whole.frames)
+    # Other thresholds, or a damaged part: computed again.
+    assert run_detection(frames, tmp_path / "out", "contrast", Contrast(peak=10)).kept == 0
+    (tmp_path / "out" / "parts" / "000000.parquet").write_bytes(b"broken")
+    assert run_detection(frames, tmp_path / "out", "contrast", Contrast(peak=10)).kept == 0
+
+
+def test_frames_that_cannot_be_used_stay_in_the_denominator(tmp_path: Path) -> None:
+    path = folder(tmp_path / "in")
+    (path / "002.png").write_bytes((path / "002.png").read_bytes()[:300])
+    (path / "005.png").unlink()
+    cv2.imwrite(str(path / "009.png"), picture([(50, 50)], 9))
+    done = run_detection(open_frames(path), tmp_path / "out", "contrast", Contrast())
+    judged = judge_detections(done.detections, done.frames, read_labels(path / "labels.csv"))
+    assert (judged.rates.found, judged.rates.invented, judged.rates.missed) == (8, 0, 2)
+    assert (judged.frames, judged.without_labels, judged.unusable, judged.absent) == (5, 1, 1, ("005.png",))
+    assert sorted(judged.things["verdict"].unique()) == ["found", "missed"]
+
+
+def test_labels_of_other_frames_are_refused(tmp_path: Path) -> None:
+    path = folder(tmp_path / "in")
+    done = run_detection(open_frames(path), tmp_path / "out", "contrast", Contrast())
+    (path / "other.csv").write_text("image,x,y,w,h\nnone.png,1,1,2,2\n")
+    with pytest.raises(WildlabError, match="name 1 frames, and none of them is here"):
+        judge_detections(done.detections, done.frames, read_labels(path / "other.csv"))
+
+
+def test_thresholds_are_judged_where_they_were_not_chosen(tmp_path: Path) -> None:
+    """Two clips whose animals differ in size: what suits one misses the other, and the fit has to say so."""
+    rng = np.random.default_rng(1)
+    samples = []
+    for number in range(8):
+        size = 3 if number % 2 else 13
+        u, v = rng.integers(20, 100), rng.integers(20, 70)
+        path = tmp_path / f"{number}.png"
+        cv2.imwrite(str(path), picture([(int(u), int(v))], number, size))
+        box = np.array([[u - size / 2, v - size / 2, size, size]], float)
+        samples.append(Sample(read_image(path), box, np.zeros((0, 4)), f"clip {number % 2}"))
+    small, large = Contrast(smallest_px=5, largest_px=40), Contrast(smallest_px=60, largest_px=900)
+    fitted = fit_thresholds("contrast", samples, tried=[small, large])
+    assert fitted.held_out.f1.estimate == 0 and fitted.inside.f1.estimate > 0.5
+    assert fitted.chosen == {"clip 0": small, "clip 1": large}
+    both = fit_thresholds("contrast", samples, tried=[Contrast(smallest_px=5, largest_px=900), small, large])
+    assert both.held_out.f1.estimate == 1.0 and both.thresholds.largest_px == 900
+    with pytest.raises(WildlabError, match="of 1 group"):
+        fit_thresholds("contrast", samples[::2], tried=[small])
+
+
+def test_samples_keep_groups_and_stretches_of_a_clip_together(tmp_path: Path) -> None:
+    path = folder(tmp_path / "in", 8)
+    frames = open_frames(path)
+    grouped = samples_of(frames, read_labels(path / "labels.csv", group="scene"))
+    assert [one.group for one in grouped] == [f"scene {n // 2}" for n in range(8)]
+    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (128, 96))
+    for number in range(40):
+        writer.write(cv2.cvtColor(picture([(50, 50)], number), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    pd.DataFrame({"frame0": range(40), "x": 48, "y": 48, "w": 5, "h": 5}).to_csv(tmp_path / "l.csv")
+    stretches = [
+        one.group for one in samples_of(open_frames(tmp_path / "a.avi"), read_labels(tmp_path / "l.csv"))
+    ]
+    assert len(set(stretches)) == 10 and stretches == sorted(stretches, key=stretches.index)
+
+
+def test_thresholds_come_back_from_their_file(tmp_path: Path) -> None:
+    write_thresholds(tmp_path / "t.json", "contrast", Contrast(peak=7))
+    assert read_thresholds(tmp_path / "t.json", "contrast") == Contrast(peak=7)
+    with pytest.raises(WildlabError, match="holds thresholds of 'contrast'"):
+        read_thresholds(tmp_path / "t.json", "warm")
+    with pytest.raises(WildlabError, match="There is no threshold 'peek'"):
+        thresholds_from(Contrast, {"peek": 3})
+    with pytest.raises(WildlabError, match=r"Give one like 9\.0"):
+        thresholds_from(Contrast, {"peak": "high"})
+    (tmp_path / "t.json").write_text("[]")
+    with pytest.raises(WildlabError, match="holds no thresholds"):
+        read_thresholds(tmp_path / "t.json", "contrast")
+    with pytest.raises(WildlabError, match="no method 'magic'"):
+        detect_frame(read_image(tmp_path / "none.png"), "magic", Contrast())
+
+
+def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -> None:
+    """Animals and fence posts of the same area and warmth: the one is round, the other long."""
+    samples = []
+    for number in range(10):
+        rng = np.random.default_rng(number)
+        image = rng.normal(100, 2, (160, 200))
+        places = [(30 + 40 * k, 40 + int(rng.integers(0, 80))) for k in range(4)]
+        for row, (u, v) in enumerate(places):
+            h, w = (7, 7) if row % 2 else (3, 16)
+            image[v - h // 2 : v - h // 2 + h, u - w // 2 : u - w // 2 + w] += 60
+        cv2.imwrite(str(tmp_path / f"{number}.png"), np.clip(image, 0, 255).astype(np.uint8))
+        boxes = np.array([[u - 3.5, v - 3.5, 7, 7] for u, v in places[1::2]], float)
+        frame = read_image(tmp_path / f"{number}.png")
+        samples.append(Sample(frame, boxes, np.zeros((0, 4)), f"clip {number // 2}"))
+    fitted = fit_shapes(samples)
+    assert fitted.held_out.f1.estimate > 0.95 > 0.8 > fitted.defaults.f1.estimate
+    again = detect_frame(samples[0].frame, "shape", fitted.thresholds)
+    assert len(again) == 2 and (again.score >= fitted.thresholds.least).all()
+    write_thresholds(tmp_path / "t.json", "shape", fitted.thresholds)
+    assert read_thresholds(tmp_path / "t.json", "shape") == fitted.thresholds
+    with pytest.raises(WildlabError, match="has 0 weights, and 18 are needed"):
+        detect_frame(samples[0].frame, "shape", Shape())
+
+
+def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
+    with pytest.raises(WildlabError, match="0 of 5 warm regions belong to a label"):
+        fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)

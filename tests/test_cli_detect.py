@@ -1,0 +1,120 @@
+"""`wildlab detect`, through the real command: folders, bad images, labels, fits, and going on."""
+
+import json
+import os
+
+import cv2
+import pandas as pd
+import pytest
+
+from tests.pipeline.test_detect import folder, picture
+from wildlab import cli
+
+
+def call(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([str(one) for one in arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def test_a_folder_with_bad_images_leaves_tables_pictures_and_sentences(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    (path / "cut.png").write_bytes((path / "000.png").read_bytes()[:200])
+    os.mkfifo(path / "pipe.jpg")
+    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv")
+    assert code == 0, err
+    assert out.startswith("12 detections in 6 frames of 8.") and "F1 1.00" in out
+    assert "cut.png: The file is cut off" in err and "pipe.jpg: It is a named pipe" in err
+    assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 6
+    assert cv2.imread(str(tmp_path / "out" / "overlays" / "000.jpg")).shape == (96, 128, 3)
+    assert len(pd.read_csv(tmp_path / "out" / "detections.csv")) == 12
+
+
+def test_what_was_missed_and_invented_is_on_sheets(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    cv2.imwrite(str(path / "000.png"), picture([(30, 60), (100, 70)], 0))
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv",
+                        "--json", "--overlays", 2)  # fmt: skip
+    assert code == 0
+    result = json.loads(out)
+    assert result["pictures"] == {"overlays": 2, "missed": 1, "invented": 1}
+    assert (result["judged"]["found"], result["judged"]["f1"]["estimate"]) == (11, round(22 / 24, 4))
+    assert (tmp_path / "out" / "missed.jpg").is_file() and (tmp_path / "out" / "invented.jpg").is_file()
+
+
+@pytest.mark.slow
+def test_a_fit_says_what_it_is_worth_and_its_thresholds_can_be_used_again(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--fit", path / "labels.csv",
+                          "--group", "scene")  # fmt: skip
+    assert code == 0, err
+    assert "On frames that thresholds were not chosen from: F1 1.00" in out and "With the defaults" in out
+    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "again", "--thresholds",
+                          tmp_path / "out" / "thresholds.json", "--labels", path / "labels.csv")  # fmt: skip
+    assert code == 0 and "F1 1.00" in out
+
+
+def test_a_second_run_computes_nothing_again(capsys, tmp_path, monkeypatch):
+    from wildlab.pipeline import detect as subject
+
+    monkeypatch.setattr(subject, "PART", 2)
+    path = folder(tmp_path / "in")
+    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
+    assert code == 0 and "6 frames were there" in out
+
+
+def test_lengths_come_from_the_distance(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    thresholds = {}
+    for distance in (50, 100):
+        code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", distance,
+                            "--focal", 1000)  # fmt: skip
+        assert code == 0, err
+        found = json.loads((tmp_path / "out" / "thresholds.json").read_text())
+        thresholds[distance] = found["thresholds"]
+    assert thresholds[50]["largest_px"] == 4 * thresholds[100]["largest_px"] == 900
+    assert thresholds[50]["window_px"] > thresholds[100]["window_px"]
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50)
+    assert code == 2 and "of use together" in err
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--distance", 50, "--focal", 900,
+                        "--fit", path / "labels.csv")  # fmt: skip
+    assert code == 2 and "from a distance and from a fit" in err
+
+
+def test_a_flight_gives_its_images_and_their_times(capsys, tmp_path):
+    from wildlab.flight.store import save_flight
+    from wildlab.simulation.twins import simulate_twin
+
+    twin = simulate_twin("large-ship", 1)
+    save_flight(twin, tmp_path / "flight")
+    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
+    assert code == 2 and "no folder 'images'" in err
+    (tmp_path / "flight" / "images").mkdir()
+    name = str(twin.frames["frame_id"].iloc[3])
+    cv2.imwrite(str(tmp_path / "flight" / "images" / f"{name}.png"), picture([(30, 60)], 0))
+    code, _, err = call(capsys, "detect", tmp_path / "flight", "--into", tmp_path / "out")
+    assert code == 0, err
+    frame = pd.read_csv(tmp_path / "out" / "frames.csv").iloc[0]
+    assert str(frame["frame_id"]) == name
+    time = frame["time_s"]
+    assert time == pytest.approx(twin.frames["time_s"].iloc[3] + twin.manifest.clocks.camera_offset_s)
+
+
+def test_shapes_without_a_fit_are_refused(capsys, tmp_path):
+    code, _, err = call(
+        capsys, "detect", folder(tmp_path / "in"), "--into", tmp_path / "out", "--method", "shape"
+    )
+    assert code == 2 and "has to be learnt first" in err
+
+
+def test_wrong_use_is_a_sentence(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    code, _, err = call(capsys, "detect", tmp_path / "none", "--into", tmp_path / "out")
+    assert code == 2 and "no such file or folder" in err
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--fit", path / "labels.csv",
+                        "--thresholds", path / "labels.csv")  # fmt: skip
+    assert code == 2 and "leave --fit or --thresholds out" in err.lower()
+    code, out, _ = call(capsys, "detect", "--help")
+    assert code == 0 and "wildlab detect images --fit labels.csv" in out

@@ -1,0 +1,103 @@
+"""What is in the images of a flight: detections, pictures of them, and what they are worth beside labels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from wildlab.commands.shared import FILE, FOLDER, terminal_console
+from wildlab.terminal import count, print_json, sentence, shown
+
+ANY = click.Path(path_type=Path)
+ABOVE_ZERO = click.FloatRange(0, min_open=True)
+
+
+@click.command(short_help="Find warm things in a folder of images or a video.")
+@click.argument("images", type=ANY, metavar="IMAGES")
+@click.option("--into", type=FOLDER, required=True, help="Folder for tables and pictures.")
+@click.option(
+    "--method", type=click.Choice(["contrast", "warm", "shape"]), default="contrast", show_default=True
+)
+@click.option(
+    "--labels", type=FILE, help="CSV of boxes or points in these images: what was missed, what invented?"
+)
+@click.option(
+    "--fit", type=FILE, help="CSV likewise: choose the thresholds by it, and judge them where not chosen."
+)
+@click.option("--thresholds", type=FILE, help="thresholds.json of another run, in place of the defaults.")
+@click.option(
+    "--class", "classes", multiple=True, help="Class of labels that is looked for; others are not judged."
+)
+@click.option("--group", help="Column of the labels that says which frames belong together.")
+@click.option("--polarity", type=click.Choice(["white-hot", "black-hot", "unknown"]), default="unknown")
+@click.option(
+    "--overlays", type=click.IntRange(0, 100_000), default=40, show_default=True, help="How many pictures."
+)
+@click.option("--distance", type=ABOVE_ZERO, help="From the camera to the ground, m: sizes follow from it.")
+@click.option("--focal", type=ABOVE_ZERO, help="Focal length, px; with --distance.")
+@click.option(
+    "--animal", type=ABOVE_ZERO, default=1.5, show_default=True, help="Length of what is looked for, m."
+)
+@click.option("--json", "as_json", is_flag=True, help="What came out, as JSON.")
+def detect(
+    images: Path,
+    into: Path,
+    method: str,
+    labels: Path | None,
+    fit: Path | None,
+    thresholds: Path | None,
+    classes: tuple[str, ...],
+    group: str | None,
+    polarity: Any,
+    overlays: int,
+    distance: float | None,
+    focal: float | None,
+    animal: float,
+    as_json: bool,
+) -> None:
+    """Find warm things in IMAGES: a folder of images, one image, a video, or a flight with a folder images.
+
+    contrast takes what stands out from what lies about it, warm is the chain of F 3.2, and shape a classifier
+    that has to be learnt with --fit first.
+
+    Leaves detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and with labels
+    what was missed and invented. A run that was broken off goes on where it stopped.
+
+    \b
+    Examples:
+      wildlab detect flights/tuesday/images --into found
+      wildlab detect clip.mp4 --method warm --into found
+      wildlab detect images --distance 60 --focal 765 --animal 1.5 --into found
+      wildlab detect images --fit labels.csv --class Person --into found
+    """
+    from wildlab.pipeline.detect_command import Wanted, detect_images
+
+    wanted = Wanted(
+        images,
+        into,
+        method,
+        labels,
+        fit,
+        thresholds,
+        classes,
+        group,
+        polarity,
+        overlays,
+        distance,
+        focal,
+        animal,
+    )
+    result = detect_images(wanted, terminal_console())
+    if as_json:
+        print_json(result)
+        return
+    of = result["frames"]
+    said = f"{count(result['detections'], 'detection')} in {count(of['usable'], 'frame')} of {of['all']}"
+    click.echo(sentence(said))
+    for name, problem in result["problems"][:10]:
+        click.echo(f"{name}: {problem}", err=True)
+    for line in result["sentences"]:
+        click.echo(line)
+    click.echo(shown(into))

@@ -1,0 +1,277 @@
+"""Warm things by how far they stand out from what lies about them.
+
+A median over a window wider than an animal is the background; what is left is divided by its own robust
+standard deviation. A region begins where that is above a limit and holds a pixel that is above a higher
+one; it ends where its contrast has fallen to a share of its largest, which takes animals apart that stand
+together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.detection.background import (
+    Image,
+    Mask,
+    fill_invalid,
+    local_deviation,
+    median_background,
+    robust_deviation,
+)
+from wildlab.detection.detections import PART, Array, Detections, describe, no_detections
+
+#: The most regions of one image that are looked at further: an image of noise has tens of thousands.
+MOST_REGIONS = 5000
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """Thresholds of the local-contrast chain.
+
+    Attributes
+    ----------
+    window_px
+        Side of the window of the median, px: at least twice as long as what is looked for.
+    smooth_px
+        Standard deviation of the Gaussian that the image is smoothed with first; 0 for none.
+    deviation
+        Whether contrast is measured in standard deviations of the whole image, or of the window.
+    peak
+        Standard deviations that the strongest pixel has at least.
+    edge
+        Standard deviations that all pixels have at least.
+    of_peak
+        Share of its own strongest pixel that a region's pixels have at least; 0 for none.
+    of_image
+        Share of the image's own strong contrast (its 99.9 per cent) that the strongest pixel has at least; 0
+        for none. Where automatic gain stretches the image this says more than its noise.
+    smallest_px, largest_px
+        Limits of the area, px^2.
+    longest
+        The largest ratio of major to minor axis.
+    hottest
+        What the mean of a region is at most, in the unit of the image (F 8.4).
+    warm_is_bright
+        False for black-hot images.
+    part
+        How far the middle of an animal is from that of what is warm of it (`wildlab.detection.describe`).
+    """
+
+    window_px: int = 61
+    smooth_px: float = 1.0
+    deviation: Literal["image", "window"] = "image"
+    peak: float = 9.0
+    edge: float = 3.0
+    of_peak: float = 0.5
+    of_image: float = 0.0
+    smallest_px: float = 12.0
+    largest_px: float = 1500.0
+    longest: float = 6.0
+    hottest: float = float("inf")
+    warm_is_bright: bool = True
+    part: float = PART
+
+
+class Proposals(NamedTuple):
+    """Regions with what tells animals from other things.
+
+    Attributes
+    ----------
+    detections
+        N of them; their score is the contrast of the strongest pixel in standard deviations.
+    features
+        (N, len(FEATURES)), without unit, near 1 in size.
+    """
+
+    detections: Detections
+    features: Array
+
+
+#: Names of the columns of `Proposals.features`.
+FEATURES = (
+    "log contrast of the strongest pixel, standard deviations",
+    "log area, px^2",
+    "log ratio of the axes",
+    "area over that of the ellipse with the same axes",
+    "mean contrast over that of the strongest pixel",
+    "largest contrast in the ring about it, over that of the strongest pixel",
+    "mean contrast in that ring, over that of the strongest pixel",
+    "contrast of the strongest pixel over the image's 99.9 per cent",
+    "brightness of the strongest pixel between the image's 1 and 99.9 per cent",
+)
+
+
+def find_by_contrast(image: NDArray[Any], valid: Mask, thresholds: Contrast | None = None) -> Detections:
+    """Things that stand out from what lies about them.
+
+    Parameters
+    ----------
+    image
+        (H, W) grey levels, counts or K.
+    valid
+        (H, W) bool: where there is a scene.
+    thresholds
+        None takes the defaults.
+
+    Returns
+    -------
+    Detections
+        The score is the contrast of the strongest pixel in standard deviations.
+
+    Raises
+    ------
+    WildlabError
+        Where nothing is valid, or the shapes are not alike.
+
+    Examples
+    --------
+    >>> image = np.random.default_rng(1).normal(100, 2, (120, 160))
+    >>> image[60:66, 40:50] += 40
+    >>> found = find_by_contrast(image, np.ones((120, 160), bool))
+    >>> len(found), np.round(found.uv[0]).tolist()
+    (1, [44.0, 62.0])
+    """
+    return propose(image, valid, thresholds or Contrast(), with_features=False).detections
+
+
+def propose(
+    image: NDArray[Any], valid: Mask, thresholds: Contrast, *, with_features: bool = True
+) -> Proposals:
+    """The same, with features for a classifier.
+
+    Parameters
+    ----------
+    image, valid, thresholds
+        As for `find_by_contrast`.
+    with_features
+        Whether they are computed; they take as long again.
+
+    Returns
+    -------
+    Proposals
+        Features of shape (N, 0) where they were not asked for.
+
+    Raises
+    ------
+    WildlabError
+        As `find_by_contrast`.
+    """
+    t = thresholds
+    filled = fill_invalid(image, valid)
+    if not t.warm_is_bright:
+        filled = -filled
+    smooth: Image = filled
+    if t.smooth_px > 0:
+        smooth = np.asarray(cv2.GaussianBlur(filled, (0, 0), t.smooth_px), np.float32)
+    contrast = smooth - median_background(filled, t.window_px)
+    noise = robust_deviation(contrast, valid)
+    ratio: Image = contrast / (
+        local_deviation(contrast, valid, 2 * t.window_px + 1)
+        if t.deviation == "window"
+        else np.float32(noise)
+    )
+    # Beside a border smoothing has mixed in what was filled in.
+    if not valid.all():
+        ratio[~valid] = 0
+    if t.of_image > 0:
+        strong = float(np.percentile(ratio[::2, ::2][valid[::2, ::2]], 99.9))
+        t = replace(t, peak=max(t.peak, t.of_image * strong))
+    labels, peaks = _regions(ratio, t)
+    if not len(peaks):
+        return Proposals(no_detections(), np.zeros((0, len(FEATURES) if with_features else 0)))
+    blur = float(np.hypot(1.0, t.smooth_px))
+    found = describe(
+        labels, image, valid, contrast=contrast, noise=noise, blur_px=blur, part=t.part, score=peaks
+    )
+    keep = found.axes[:, 0] <= t.longest * found.axes[:, 1]
+    keep &= found.intensity <= t.hottest
+    features = _features(labels, ratio, smooth, valid, found) if with_features else np.zeros((len(found), 0))
+    return Proposals(found.select(keep), features[keep])
+
+
+def _regions(ratio: Image, t: Contrast) -> tuple[NDArray[np.int32], Array]:
+    """Labels (H, W) of regions that pass all but the gates of shape, and the largest ratio in each."""
+    above = ratio > min(t.edge, t.peak)
+    count, labels = _components(above)
+    where = np.flatnonzero(above.ravel())
+    values, of = ratio.ravel()[where], labels.ravel()[where]
+    peaks = _largest(values, of, count, t.peak)
+    area = np.bincount(of, minlength=count)
+    good = (peaks >= t.peak) & (area >= t.smallest_px)
+    good[0] = False
+    if good.any() and t.of_peak > 0:
+        limit = np.where(good, t.of_peak * peaks, np.inf).astype(np.float32)
+        keep = values >= limit[of]
+        where, values = where[keep], values[keep]
+        inner = np.zeros(ratio.size, bool)
+        inner[where] = True
+        count, labels = _components(inner.reshape(ratio.shape))
+        of = labels.ravel()[where]
+        peaks = _largest(values, of, count, t.peak)
+        good, area = peaks >= t.peak, np.bincount(of, minlength=count)
+    good &= (area >= t.smallest_px) & (area <= t.largest_px)
+    good[0] = False
+    if good.sum() > MOST_REGIONS:
+        good &= peaks >= np.sort(peaks[good])[-MOST_REGIONS]
+    number = np.zeros(count, np.int32)
+    number[good] = np.arange(1, good.sum() + 1)
+    # Few pixels are above a threshold: the others stay as they are.
+    result = np.zeros(ratio.size, np.int32)
+    result[where] = number[of]
+    return result.reshape(ratio.shape), peaks[good]
+
+
+def _components(mask: Mask) -> tuple[int, NDArray[np.int32]]:
+    count, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=8)
+    return count, np.asarray(labels, np.int32)
+
+
+def _largest(values: Image, of: NDArray[np.int32], count: int, least: float) -> Array:
+    """(count,) largest of values (P,) in each region; -inf where none is at least as large as ``least``."""
+    high = values >= least
+    found = np.full(count, -np.inf)
+    np.maximum.at(found, of[high], values[high].astype(float))
+    return found
+
+
+def _features(
+    labels: NDArray[np.int32], ratio: Image, smooth: Image, valid: Mask, found: Detections
+) -> Array:
+    count, peak = len(found), found.score
+    inside = np.flatnonzero(labels)
+    of = labels.ravel()[inside].astype(np.intp) - 1
+    mean = np.bincount(of, ratio.ravel()[inside], count) / found.area
+    bright = np.full(count, -np.inf)
+    np.maximum.at(bright, of, smooth.ravel()[inside].astype(float))
+    ring_largest, ring_mean = np.zeros(count), np.zeros(count)
+    for row, (left, top, width, height) in enumerate(np.rint(found.box + 0.1).astype(int)):
+        by = 4 + max(width, height) // 4
+        part = np.s_[max(0, top - by) : top + height + by, max(0, left - by) : left + width + by]
+        own = (labels[part] == row + 1).astype(np.uint8)
+        near = cv2.dilate(own, np.ones((5, 5), np.uint8))
+        far = cv2.dilate(near, np.ones((2 * (by - 2) + 1,) * 2, np.uint8))
+        ring = ratio[part][(far > 0) & (near == 0)]
+        if ring.size:
+            ring_largest[row], ring_mean[row] = np.percentile(ring, 90), ring.mean()
+    some = valid[::4, ::4]
+    top_ratio = max(float(np.percentile(ratio[::4, ::4][some], 99.9)), 1.0)
+    low, high = np.percentile(smooth[::4, ::4][some], [1, 99.9])
+    return np.stack(
+        [
+            np.log(peak),
+            np.log(found.area) / 2,
+            np.log(found.axes[:, 0] / found.axes[:, 1]),
+            found.area / (np.pi / 4 * found.axes.prod(axis=1)),
+            mean / peak,
+            ring_largest / peak,
+            ring_mean / peak,
+            np.log(peak / top_ratio),
+            (bright - low) / max(float(high - low), 1e-9),
+        ],
+        axis=1,
+    )

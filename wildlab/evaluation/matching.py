@@ -1,0 +1,245 @@
+"""Detections against labels: which belong together, and what share was found, with intervals.
+
+A label is a box; a point is a box without extent. A detection and a label belong together where their centres
+are near, or their boxes overlap enough, one to one, so that the sum of the distances is smallest. Frames of a
+clip are alike: intervals draw clips, or frames where each is a clip of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.runs import Interval
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Draws of a bootstrap, and the fewest clips that it can draw from: of fewer it is far too narrow.
+DRAWS, FEWEST = 2000, 5
+
+
+@dataclass(frozen=True)
+class Rule:
+    """When a detection and a label can belong together.
+
+    Attributes
+    ----------
+    by
+        ``centre`` by the distance of the centres, ``iou`` by the overlap of the boxes.
+    tolerance_px
+        How far apart centres are at most.
+    half_diagonal
+        Whether half the label's diagonal is enough, where that is more: the detection then lies within the
+        circle about the box.
+    overlap
+        Intersection over union of the boxes at least.
+    """
+
+    by: Literal["centre", "iou"] = "centre"
+    tolerance_px: float = 10.0
+    half_diagonal: bool = True
+    overlap: float = 0.3
+
+
+class Matches(NamedTuple):
+    """One frame.
+
+    Attributes
+    ----------
+    pairs
+        (K, 2) rows of detections and of labels that belong together.
+    invented
+        Rows of detections that belong to no label.
+    missed
+        Rows of labels that belong to no detection.
+    ignored
+        Rows of detections that belong to no label and lie in a region that is not judged.
+    """
+
+    pairs: Index
+    invented: Index
+    missed: Index
+    ignored: Index
+
+    @property
+    def counts(self) -> Index:
+        """(3,) found, invented and missed."""
+        return np.array([len(self.pairs), len(self.invented), len(self.missed)])
+
+
+def match(
+    found: ArrayLike, labels: ArrayLike, rule: Rule | None = None, ignore: ArrayLike | None = None
+) -> Matches:
+    """Detections and labels of one frame that belong together.
+
+    Parameters
+    ----------
+    found
+        (N, 4) boxes: left, top, width, height, px; or (N, 2) points.
+    labels
+        (M, 4) or (M, 2), likewise.
+    rule
+        None takes the defaults of `Rule`.
+    ignore
+        (I, 4) boxes whose content is not judged: a detection with its centre inside one is neither right nor
+        wrong, unless it belongs to a label.
+
+    Returns
+    -------
+    Matches
+
+    Raises
+    ------
+    WildlabError
+        Where boxes are neither (N, 4) nor (N, 2), or not finite.
+
+    Examples
+    --------
+    >>> match([[0, 0, 10, 10], [80, 80, 4, 4]], [[2, 0, 10, 10]]).counts.tolist()
+    [1, 1, 0]
+    """
+    rule = rule or Rule()
+    a, b = _boxes(found, "detections"), _boxes(labels, "labels")
+    if rule.by == "centre":
+        apart = np.linalg.norm(_centres(a)[:, None] - _centres(b)[None], axis=2)
+        reach = np.full(len(b), rule.tolerance_px)
+        if rule.half_diagonal:
+            reach = np.maximum(reach, np.hypot(b[:, 2], b[:, 3]) / 2)
+        cost, allowed = apart / reach, apart <= reach
+    else:
+        shared = _iou(a, b)
+        cost, allowed = 1 - shared, shared >= rule.overlap
+    # A pair that is not allowed costs as much as all that are, so that as many as possible belong together.
+    rows, columns = linear_sum_assignment(np.where(allowed, cost, 1.0 + min(len(a), len(b)) * 2.0))
+    fits = allowed[rows, columns]
+    pairs = np.stack([rows[fits], columns[fits]], axis=1).astype(np.intp)
+    alone = np.setdiff1d(np.arange(len(a)), pairs[:, 0])
+    inside = _inside(_centres(a[alone]), _boxes([] if ignore is None else ignore, "regions"))
+    missed = np.setdiff1d(np.arange(len(b)), pairs[:, 1])
+    return Matches(pairs, alone[~inside], missed, alone[inside])
+
+
+class Rates(NamedTuple):
+    """What was found, with 95 % intervals.
+
+    Attributes
+    ----------
+    precision, recall, f1
+        Shares from 0 to 1; NaN where there is nothing to divide by.
+    found, invented, missed
+        How many, over all frames.
+    groups
+        How many clips or frames the intervals draw from; below `FEWEST` there are none.
+    """
+
+    precision: Interval
+    recall: Interval
+    f1: Interval
+    found: int
+    invented: int
+    missed: int
+    groups: int
+
+
+def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int = 1) -> Rates:
+    """Precision, recall and F1 over frames, with intervals by drawing clips with replacement.
+
+    Parameters
+    ----------
+    counts
+        (F, 3) found, invented and missed of each frame, as of `Matches.counts`.
+    groups
+        (F,) to which clip a frame belongs; None takes each for its own.
+    seed
+        Of the draws.
+
+    Returns
+    -------
+    Rates
+
+    Raises
+    ------
+    WildlabError
+        Where counts are not (F, 3), or there is not one group for each frame.
+
+    Examples
+    --------
+    >>> round(rates([[8, 2, 2], [8, 2, 2]]).f1.estimate, 2)
+    0.8
+    """
+    table = np.asarray(counts, float).reshape(-1, 3)
+    names = list(range(len(table))) if groups is None else list(groups)
+    if len(names) != len(table):
+        raise WildlabError(
+            f"{len(table)} frames have counts and {len(names)} have a clip", "give one clip for each frame"
+        )
+    place = {name: row for row, name in enumerate(dict.fromkeys(names))}
+    sums = np.zeros((len(place), 3))
+    np.add.at(sums, [place[name] for name in names], table)
+    of_all = _shares(sums.sum(axis=0))
+    if len(sums) >= FEWEST:
+        rng = np.random.default_rng(seed)
+        weights = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), DRAWS)
+        drawn = _shares(weights @ sums)
+        with np.errstate(invalid="ignore"):
+            low, high = (np.array([_percentile(column, at) for column in drawn.T]) for at in (2.5, 97.5))
+    else:
+        low = high = np.full(3, np.nan)
+    one = [Interval(float(e), float(a), float(b)) for e, a, b in zip(of_all, low, high, strict=True)]
+    found, invented, missed = (int(one) for one in sums.sum(axis=0))
+    return Rates(one[0], one[1], one[2], found, invented, missed, len(sums))
+
+
+def _percentile(values: Array, at: float) -> float:
+    some = values[np.isfinite(values)]
+    return float(np.percentile(some, at)) if len(some) else float("nan")
+
+
+def _shares(sums: Array) -> Array:
+    """(..., 3) precision, recall and F1 of (..., 3) found, invented and missed."""
+    found, invented, missed = np.moveaxis(np.asarray(sums, float), -1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.stack(
+            [
+                found / (found + invented),
+                found / (found + missed),
+                2 * found / (2 * found + invented + missed),
+            ],
+            axis=-1,
+        )
+
+
+def _boxes(given: ArrayLike, what: str) -> Array:
+    boxes = np.asarray(given, float)
+    if not boxes.size:
+        return np.zeros((0, 4))
+    if boxes.ndim != 2 or boxes.shape[1] not in (2, 4):
+        raise WildlabError(f"the {what} have the shape {boxes.shape}", "give (N, 4) boxes or (N, 2) points")
+    if not np.isfinite(boxes).all():
+        raise WildlabError(f"the {what} hold numbers that are none", "leave such rows out")
+    return boxes if boxes.shape[1] == 4 else np.concatenate([boxes, np.zeros_like(boxes)], axis=1)
+
+
+def _centres(boxes: Array) -> Array:
+    return np.asarray(boxes[:, :2] + boxes[:, 2:] / 2)
+
+
+def _iou(a: Array, b: Array) -> Array:
+    low = np.maximum(a[:, None, :2], b[None, :, :2])
+    high = np.minimum((a[:, :2] + a[:, 2:])[:, None], (b[:, :2] + b[:, 2:])[None])
+    shared = np.clip(high - low, 0, None).prod(axis=2)
+    both = a[:, 2:].prod(axis=1)[:, None] + b[:, 2:].prod(axis=1)[None] - shared
+    return np.asarray(np.divide(shared, both, out=np.zeros_like(shared), where=both > 0))
+
+
+def _inside(points: Array, boxes: Array) -> NDArray[np.bool_]:
+    beyond = points[:, None] - boxes[None, :, :2]
+    within = np.all((beyond >= 0) & (beyond <= boxes[None, :, 2:]), axis=2)
+    return np.asarray(np.any(within, axis=1))

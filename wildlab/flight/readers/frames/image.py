@@ -1,0 +1,157 @@
+"""One image file as a frame: read as a regular file, its header believed before its content is decoded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import read_regular
+from wildlab.flight.readers.frames.decoding import decode_image
+from wildlab.flight.readers.frames.flir import gather_pieces, read_records, to_kelvin
+from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, spoilt
+from wildlab.flight.readers.frames.headers import Header, read_header
+from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, problem_of
+
+#: What is taken for an image in a folder.
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".fff"})
+#: The most bytes of an image file that are read.
+MOST_BYTES = 300_000_000
+#: Grey levels by which the colours of a grey JPEG differ.
+GREY = 6
+#: The most that a pixel may be read as, K: hotter than what a thermal camera measures is a broken constant.
+HOTTEST = 3000.0
+
+
+def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
+    """An image file as a frame; what cannot be used is a frame with a problem, never an error.
+
+    Parameters
+    ----------
+    path
+        A PNG, JPEG or TIFF of 8 or 16 bits, a TIFF of floats, a radiometric JPEG of FLIR, or an ``.fff``.
+    polarity
+        Of the camera, where the file does not say it.
+
+    Returns
+    -------
+    Frame
+        In K where the file has Planck constants, in counts where it has 16 bits, else grey or colour.
+        ``time`` is None.
+
+    Examples
+    --------
+    >>> read_image(Path("none.png")).problem
+    'There is no such file.'
+    """
+    name = path.name
+    try:
+        data = read_regular(path, MOST_BYTES)
+    except FileNotFoundError:
+        return spoilt(name, "there is no such file")
+    except WildlabError as error:
+        return spoilt(name, f"it {error.problem}")
+    found = decode(data)
+    if isinstance(found, str):
+        return spoilt(name, found)
+    image, unit = found
+    valid = ~find_no_data(image) & ~find_clipped(image)
+    problem = problem_of(image, valid)
+    if problem:
+        return spoilt(name, problem)
+    return Frame(name, None, image, unit, "white-hot" if unit == "kelvin" else polarity, valid)
+
+
+def decode(data: bytes) -> tuple[NDArray[Any], Unit] | str:
+    """Bytes of an image file as numbers with their unit, or a clause that says why not.
+
+    Parameters
+    ----------
+    data
+        All bytes of the file.
+
+    Returns
+    -------
+    (image, unit) or str
+        As `Frame` has them.
+
+    Examples
+    --------
+    >>> decode(b"")
+    'the file is empty'
+    """
+    if data[:4] in (b"FFF\0", b"AFF\0"):
+        return _radiometric(data)
+    header = read_header(data)
+    if not isinstance(header, Header):
+        return header
+    if header.problem:
+        return header.problem
+    if header.kind == "jpeg":
+        records = gather_pieces(data)
+        found = _radiometric(records) if records else ""
+        if not isinstance(found, str):
+            return found
+        # Records without a raw image: the picture is still a picture.
+    image = decode_image(data)
+    if image is None:
+        return f"its content cannot be decoded as {header.kind.upper()}"
+    if image.shape[:2] != (header.height, header.width):
+        return f"its header claims {header.width} x {header.height} pixels and it holds other ones"
+    return as_grey_or_colour(image)
+
+
+def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:
+    """What OpenCV decoded, with its unit: three alike colours are one.
+
+    Parameters
+    ----------
+    image
+        (H, W), or (H, W, 3 or 4) blue first.
+
+    Returns
+    -------
+    (image, unit) or str
+        A clause where the kind of numbers is not known.
+
+    Examples
+    --------
+    >>> as_grey_or_colour(np.full((2, 2, 3), 7, np.uint8))[1]
+    'grey'
+    """
+    if image.ndim == 3 and image.shape[2] in (3, 4):
+        image = image[..., :3]
+        # A sample tells: whole pictures take as long as the detection.
+        sample = image[:: max(1, image.shape[0] // 64), :: max(1, image.shape[1] // 64)].astype(np.int32)
+        if np.ptp(sample, axis=2).max() > GREY:
+            if image.dtype != np.uint8:
+                return f"it is a colour image of {8 * image.dtype.itemsize} bits, and 8 are read"
+            return np.ascontiguousarray(image[..., ::-1]), "colour"
+        image = np.ascontiguousarray(image[..., 1])
+    if image.ndim != 2:
+        return f"it has {image.shape[2]} channels, and 1, 3 or 4 are read"
+    if image.dtype == np.uint8:
+        return image, "grey"
+    if image.dtype == np.uint16:
+        return image, "counts"
+    if image.dtype.kind == "f":
+        kelvin = image.astype(np.float32)
+        plausible = np.isfinite(kelvin) & (kelvin > 100) & (kelvin < HOTTEST)
+        if plausible.mean() < 0.5:
+            return "it holds floating-point numbers that are no temperatures in kelvin"
+        return np.where(plausible, kelvin, np.float32(np.nan)), "kelvin"
+    return f"its numbers are of the kind {image.dtype}, and 8 or 16 bits without sign are read"
+
+
+def _radiometric(records: bytes) -> tuple[NDArray[Any], Unit] | str:
+    found = read_records(records)
+    if isinstance(found, str):
+        return found
+    if found.planck is None:
+        return found.counts, "counts"
+    kelvin = to_kelvin(found.counts, found.planck)
+    kelvin[kelvin > HOTTEST] = np.nan
+    return (kelvin, "kelvin") if np.isfinite(kelvin).mean() > 0.5 else (found.counts, "counts")

@@ -1,0 +1,358 @@
+"""What `wildlab detect` does: fit where that is asked for, detect, judge, and leave tables and pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from wildlab.errors import WildlabError
+from wildlab.files import write_json
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.files import read_regular
+from wildlab.flight.readers.frames import Frames, Polarity, open_frames
+from wildlab.flight.readers.labels import Labels, read_labels
+from wildlab.flight.store import load_flight
+from wildlab.pipeline.detect import METHODS, Detected, for_distance, run_detection, thresholds_from
+from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
+from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
+from wildlab.pipeline.detection_pictures import write_pictures
+from wildlab.pipeline.detection_shape_fit import fit_shapes
+
+#: The most bytes of a file with thresholds.
+MOST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for.
+
+    Attributes
+    ----------
+    images, into
+        Where frames are, and where what comes out goes.
+    method
+        One of `wildlab.pipeline.detect.METHODS`.
+    labels
+        By which the detections are judged.
+    fit
+        By which the thresholds are chosen.
+    thresholds
+        A file that an earlier run wrote.
+    classes, group
+        As for `wildlab.flight.readers.labels.read_labels`.
+    polarity
+        Of the camera.
+    overlays
+        How many pictures.
+    distance_m, focal_px, animal_m
+        From the camera to the ground, focal length, and length of what is looked for: they give the
+        thresholds their lengths. None where that is not known.
+    """
+
+    images: Path
+    into: Path
+    method: str = "contrast"
+    labels: Path | None = None
+    fit: Path | None = None
+    thresholds: Path | None = None
+    classes: tuple[str, ...] = ()
+    group: str | None = None
+    polarity: Polarity = "unknown"
+    overlays: int = 40
+    distance_m: float | None = None
+    focal_px: float | None = None
+    animal_m: float = 1.5
+
+
+def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
+    """Detect in images, and write tables and pictures.
+
+    Parameters
+    ----------
+    wanted
+        What was asked for.
+    console
+        Where progress is shown.
+
+    Returns
+    -------
+    dict
+        For JSON: numbers, problems of frames, and sentences to be printed.
+
+    Raises
+    ------
+    WildlabError
+        Where images, labels or thresholds cannot be used.
+    """
+    if wanted.fit and wanted.thresholds:
+        raise WildlabError("thresholds are both named and to be fitted", "leave --fit or --thresholds out")
+    if wanted.method == "shape" and not (wanted.fit or wanted.thresholds):
+        raise WildlabError(
+            "a classifier of shapes has to be learnt first",
+            "give --fit with labels, or --thresholds of such a run",
+        )
+    if (wanted.distance_m is None) is not (wanted.focal_px is None):
+        raise WildlabError(
+            "the distance to the ground and the focal length are of use together", "give both, or neither"
+        )
+    frames = _open(wanted)
+    labels = _labels(wanted.labels, wanted)
+    to_fit = _labels(wanted.fit, wanted)
+    thresholds = METHODS[wanted.method].thresholds()
+    if wanted.distance_m is not None and wanted.focal_px is not None:
+        if wanted.fit or wanted.thresholds:
+            raise WildlabError(
+                "lengths come from a distance and from a fit", "leave --distance or the other out"
+            )
+        thresholds = for_distance(thresholds, wanted.distance_m, wanted.focal_px, wanted.animal_m)
+    if wanted.thresholds:
+        thresholds = read_thresholds(wanted.thresholds, wanted.method)
+    wanted.into.mkdir(parents=True, exist_ok=True)
+    fitted = None
+    if to_fit is not None:
+        with _progress(console, "choosing thresholds", None) as tell:
+            samples = samples_of(frames, to_fit)
+            by_shape = wanted.method == "shape"
+            fitted = (
+                fit_shapes(samples, tell=tell)
+                if by_shape
+                else fit_thresholds(wanted.method, samples, tell=tell)
+            )
+        thresholds = fitted.thresholds
+    write_thresholds(wanted.into / "thresholds.json", wanted.method, thresholds)
+    with _progress(console, "detecting", frames.count) as tell:
+        detected = run_detection(
+            frames, wanted.into, wanted.method, thresholds, lambda done: tell(done, None)
+        )
+    judged = judge_detections(detected.detections, detected.frames, labels) if labels is not None else None
+    things = _as_found(detected.detections) if judged is None else judged.things
+    names = [str(one) for one in detected.frames["frame_id"]]
+    with _progress(console, "drawing", None) as tell:
+        pictures = write_pictures(
+            frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
+        )
+    result = _result(wanted, thresholds, detected, judged, fitted, pictures)
+    write_json(wanted.into / "result.json", result)
+    return result
+
+
+def _open(wanted: Wanted) -> Frames:
+    """Frames; with flight times where they are those of a flight folder, whose images lie in ``images``."""
+    if not (wanted.images / "flight.toml").is_file():
+        return open_frames(wanted.images, polarity=wanted.polarity)
+    inside = wanted.images / "images"
+    if not inside.is_dir():
+        raise WildlabError(
+            "this flight has no folder 'images'",
+            "put its images there, or name their own folder",
+            file=inside,
+        )
+    flight = load_flight(wanted.images)
+    frames = open_frames(inside, polarity=wanted.polarity)
+    if flight.frames is None:
+        return frames
+    known = dict(zip(flight.frames["frame_id"].astype(str), frame_times(flight), strict=True))
+    # Images may be named with or without their ending.
+    names = {one.name: one.name if one.name in known else one.stem for one in frames.files}
+    own = {file: (name, float(known[name])) for file, name in names.items() if name in known}
+    return replace(frames, known=own)
+
+
+def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
+    """Labelled frames that can be used, at most `MOST_FRAMES` of them, evenly taken.
+
+    Parameters
+    ----------
+    frames, labels
+        Of the same folder or clip.
+
+    Returns
+    -------
+    list of Sample
+    """
+    step = max(1, -(-len(labels.boxes) // MOST_FRAMES))
+    found = []
+    seen = 0
+    for frame in frames:
+        name = labels.name_of(frame.name)
+        if name is None or not frame.usable:
+            continue
+        seen += 1
+        if (seen - 1) % step:
+            continue
+        found.append(Sample(frame, labels.boxes[name], labels.ignore[name], labels.group[name]))
+    return found
+
+
+def write_thresholds(path: Path, method: str, thresholds: Any) -> None:
+    """Write thresholds as JSON; infinity is null.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    method, thresholds
+        Which detector's.
+    """
+    write_json(path, {"method": method, "thresholds": _plain(asdict(thresholds))})
+
+
+def _plain(value: Any) -> Any:
+    """Without infinity, for which JSON has no word."""
+    if isinstance(value, dict):
+        return {name: _plain(one) for name, one in value.items()}
+    return None if value == math.inf else value
+
+
+def read_thresholds(path: Path, method: str) -> Any:
+    """Thresholds that `write_thresholds` wrote.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    method
+        Whose they have to be.
+
+    Returns
+    -------
+    object
+        Of ``METHODS[method].thresholds``.
+
+    Raises
+    ------
+    WildlabError
+        Where it is no such file, or another method's.
+    """
+    try:
+        given = json.loads(read_regular(path, MOST_BYTES))
+        named, values = given["method"], dict(given["thresholds"])
+    except FileNotFoundError:
+        raise WildlabError("there is no such file", "check the path", file=path) from None
+    except (ValueError, TypeError, KeyError):
+        raise WildlabError(
+            "holds no thresholds", "name the thresholds.json of an earlier run", file=path
+        ) from None
+    if named != method:
+        raise WildlabError(
+            f"holds thresholds of {named!r}", f"say --method {named}, or leave it out", file=path
+        )
+    return _thresholds(METHODS[method].thresholds, method, values)
+
+
+def _thresholds(kind: type[Any], method: str, values: dict[str, Any]) -> Any:
+    """Plain values as a dataclass: null is infinity where the default is, a list a tuple."""
+    defaults = {one.name: one.default for one in dataclasses.fields(kind)}
+    made: dict[str, Any] = {}
+    for name, value in values.items():
+        default = defaults.get(name)
+        if dataclasses.is_dataclass(default) and isinstance(value, dict):
+            made[name] = _thresholds(type(default), method, value)
+        elif value is None and default == math.inf:
+            made[name] = math.inf
+        else:
+            made[name] = tuple(value) if isinstance(value, list) else value
+    return thresholds_from(kind, made)
+
+
+def _labels(path: Path | None, wanted: Wanted) -> Labels | None:
+    return None if path is None else read_labels(path, classes=wanted.classes, group=wanted.group)
+
+
+def _as_found(detections: pd.DataFrame) -> pd.DataFrame:
+    columns = ["frame_id", "left_px", "top_px", "width_px", "height_px", "score"]
+    return detections[columns].assign(verdict="detected")
+
+
+def _result(
+    wanted: Wanted,
+    thresholds: Any,
+    detected: Detected,
+    judged: Judged | None,
+    fitted: Fitted | None,
+    pictures: dict[str, int],
+) -> dict[str, Any]:
+    problems = detected.frames[detected.frames["problem"].fillna("") != ""]
+    result: dict[str, Any] = {
+        "method": wanted.method,
+        "frames": {
+            "all": len(detected.frames),
+            "usable": len(detected.frames) - len(problems),
+            "kept": detected.kept,
+        },
+        "detections": len(detected.detections),
+        "problems": [
+            [str(a), str(b)] for a, b in zip(problems["frame_id"], problems["problem"], strict=True)
+        ],
+        "pictures": pictures,
+        "sentences": [],
+    }
+    say = result["sentences"]
+    if detected.kept:
+        say.append(f"{detected.kept} frames were there from a run that was broken off.")
+    if fitted is not None:
+        result["fit"] = {
+            "sets_tried": fitted.tried,
+            "held_out": plain_rates(fitted.held_out),
+            "where_chosen": plain_rates(fitted.inside),
+            "defaults": plain_rates(fitted.defaults),
+        }
+        say.append(
+            f"On frames that thresholds were not chosen from: {_rates_sentence(result['fit']['held_out'])}"
+        )
+        say.append(f"Where they were chosen: {_rates_sentence(result['fit']['where_chosen'])}")
+        without = "Without a classifier" if wanted.method == "shape" else "With the defaults"
+        say.append(f"{without}: {_rates_sentence(result['fit']['defaults'])}")
+    if judged is not None:
+        result["judged"] = judged.as_plain()
+        chosen_here = fitted is not None and wanted.labels == wanted.fit
+        where = (
+            "Beside the labels that the thresholds were chosen by (too good)"
+            if chosen_here
+            else "Beside the labels"
+        )
+        say.append(f"{where}: {_rates_sentence(result['judged'])}")
+        if judged.without_labels or judged.unusable or judged.absent:
+            say.append(
+                f"Frames that the labels do not name: {judged.without_labels}; labelled and unusable: "
+                f"{judged.unusable}; labelled and not here: {len(judged.absent)}."
+            )
+    return result
+
+
+def _rates_sentence(rates: dict[str, Any]) -> str:
+    def shown(name: str) -> str:
+        one = rates[name]
+        if one["estimate"] is None:
+            return f"{name} not defined"
+        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
+        return f"{name} {one['estimate']:.2f}{span}"
+
+    counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
+    return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")
+
+
+@contextmanager
+def _progress(console: Console, what: str, total: int | None) -> Iterator[Callable[[int, int | None], None]]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=20),
+        TextColumn(
+            "{task.completed:.0f} of {task.total:.0f} frames" if total else "{task.completed:.0f} frames"
+        ),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done, of: progress.update(task, completed=done, total=of or total)
