@@ -164,14 +164,25 @@ def test_an_image_of_grey_levels_is_taken_as_it_is_and_counts_as_kelvin_by_their
 
 
 def test_a_narrow_range_is_not_stretched_to_black_and_white():
-    thresholds = FloatingThresholds()
+    thresholds = FloatingThresholds(scaling="stretched")
     image = sea(noise=0.1)
-    assert np.ptp(to_grey(image, None, thresholds).astype(float)) < 60
+    assert np.ptp(to_grey(image, None, thresholds).astype(float)) < 90
     image[:45] += 30
     grey = to_grey(image, None, thresholds)
     assert grey.min() == 0 and grey.max() == 255
     fixed = to_grey(image, None, FloatingThresholds(scaling="fixed"))
-    assert 0.4 < (fixed == 255).mean() < 0.6 or 0.4 < (fixed == 0).mean() < 0.6
+    assert 0.4 < (fixed == 255).mean() < 0.6
+    assert 3 < fixed[45:].std() < 9  # 0.1 K at 255 levels over 4 K
+
+
+def test_a_gradient_of_counts_is_that_of_their_kelvin():
+    """A step of s counts has a Prewitt gradient of 3 s where nothing smooths it."""
+    thresholds = FloatingThresholds(scaling="counts", smoothing_size=1, smoothing_sd=0.01)
+    image = sea()
+    image[:, 60:] += 4.0  # 100 counts
+    assert find_edges(image, None, thresholds).gradient.max() == 300
+    counts = np.round((image - 273.15) * 25 + 100).astype(np.uint16)
+    assert find_edges(counts, None, thresholds).gradient.max() == 300
 
 
 def test_gradients_divided_by_their_largest_find_steep_pixels_in_every_image():
@@ -307,7 +318,7 @@ def test_a_height_below_the_sea_is_refused(height):
         ("smallest_range_k", 0.0, "kelvin"),
         ("counts_per_kelvin", -1.0, "above 0"),
         ("gradient_gain", 0.0, "above 0"),
-        ("scaling", "squeezed", "'stretched' or 'fixed'"),
+        ("scaling", "squeezed", "'fixed', 'stretched' or 'counts'"),
         ("clipping", "none", "'saturated' or 'normalised'"),
         ("area_of", "box", "'edges' or 'filled'"),
         ("nested", "no", "'boxes' or 'contours'"),

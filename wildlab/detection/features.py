@@ -117,7 +117,7 @@ def shape_of(mask: NDArray[Any], left: int = 0, top: int = 0) -> Shape:
     second = np.array([[found["mu20"], found["mu11"]], [found["mu11"], found["mu02"]]]) / area
     covariance = second + WITHIN_PIXEL * np.eye(2)
     axes, orientation = axes_of(covariance)
-    hu = cv2.HuMoments(found).ravel()
+    hu = np.asarray(cv2.HuMoments(found), float).ravel()
     return Shape(area, centre + np.array([left, top]), covariance, axes, orientation, hu)
 
 

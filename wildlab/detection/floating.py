@@ -27,6 +27,8 @@ from wildlab.geometry.frames import Array
 AT_BORDER = 2
 #: Of how many pixels along each side one is looked at to find an image's range.
 SPARSE = 8
+#: Count of 14 bits for 0 deg C, where kelvin are taken to counts; a gradient does not depend on it.
+COUNTS_AT_ZERO = 7000.0
 _PREWITT = np.array([-1.0, 0.0, 1.0]), np.ones(3)
 _AROUND = np.ones((3, 3), np.uint8)
 
@@ -37,7 +39,7 @@ class Steps(NamedTuple):
     Attributes
     ----------
     grey
-        0 to 255.
+        0 to 255; counts, where the scaling is that.
     smoothed
         Step 1.
     gradient
@@ -46,9 +48,9 @@ class Steps(NamedTuple):
         Step 3: 255 where the gradient is at or above the threshold, 0 elsewhere.
     """
 
-    grey: NDArray[np.uint8]
-    smoothed: NDArray[np.uint8]
-    gradient: NDArray[np.float32]
+    grey: NDArray[Any]
+    smoothed: NDArray[Any]
+    gradient: NDArray[Any]
     steep: NDArray[np.uint8]
 
 
@@ -129,10 +131,10 @@ class _Region(NamedTuple):
     box: tuple[int, int, int, int]
     here: tuple[slice, slice]
     mask: NDArray[np.uint8]
-    outline: NDArray[np.int32]
+    outline: NDArray[Any]
 
 
-def _within(outline: NDArray[np.int32]) -> _Region:
+def _within(outline: Any) -> _Region:
     left, top, width, height = cv2.boundingRect(outline)
     mask = np.zeros((height, width), np.uint8)
     cv2.drawContours(mask, [outline], 0, 1, cv2.FILLED, offset=(-left, -top))
@@ -142,24 +144,25 @@ def _within(outline: NDArray[np.int32]) -> _Region:
 
 def to_grey(
     image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds
-) -> NDArray[np.uint8]:
-    """An image as 256 grey levels (H, W); see ``scaling`` of `FloatingThresholds`."""
+) -> NDArray[Any]:
+    """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`."""
     if image.dtype == np.uint8:
         return np.ascontiguousarray(image)
+    unit = thresholds.counts_per_kelvin if image.dtype.kind in "ui" else 1.0
+    plain = image if image.dtype in (np.uint16, np.float32, np.float64) else image.astype(np.float32)
+    if thresholds.scaling == "counts":
+        counts = plain if unit != 1.0 else (plain - 273.15) * thresholds.counts_per_kelvin + COUNTS_AT_ZERO
+        return np.asarray(np.clip(np.rint(np.nan_to_num(counts)), 0, 2**14 - 1), np.uint16)
     sparse = image[::SPARSE, ::SPARSE]
     seen = sparse.ravel() if valid is None else sparse[valid[::SPARSE, ::SPARSE]]
     if seen.dtype.kind == "f":
         seen = seen[np.isfinite(seen)]
     if not len(seen):
         return np.zeros(image.shape, np.uint8)
-    unit = thresholds.counts_per_kelvin if image.dtype.kind in "ui" else 1.0
     smallest = thresholds.smallest_range_k * unit
-    low, middle, high = np.quantile(seen, [thresholds.stretched_share, 0.5, 1 - thresholds.stretched_share])
+    low, high = np.quantile(seen, [thresholds.stretched_share, 1 - thresholds.stretched_share])
     span = max(high - low, smallest) if thresholds.scaling == "stretched" else smallest
-    if span == smallest:  # the middle of a narrow range stays in the middle
-        low = middle - smallest / 2
     gain = 255.0 / span
-    plain = image if image.dtype in (np.uint16, np.float32, np.float64) else image.astype(np.float32)
     return np.asarray(cv2.addWeighted(plain, gain, plain, 0.0, -low * gain, dtype=cv2.CV_8U))
 
 
@@ -199,18 +202,19 @@ def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds:
     along, across = _PREWITT
     du = cv2.sepFilter2D(smoothed, cv2.CV_32F, along, across, borderType=cv2.BORDER_REPLICATE)
     dv = cv2.sepFilter2D(smoothed, cv2.CV_32F, across, along, borderType=cv2.BORDER_REPLICATE)
-    gradient = np.asarray(cv2.magnitude(du, dv))
+    gradient: NDArray[Any] = np.asarray(cv2.magnitude(du, dv))
     if thresholds.gradient_gain != 1.0:
-        gradient *= thresholds.gradient_gain
+        gradient = gradient * np.float32(thresholds.gradient_gain)
     if valid is not None and not valid.all():
         reach = size + 2  # what the two kernels see of a pixel that shows nothing
         shows = cv2.erode(valid.astype(np.uint8), np.ones((reach, reach), np.uint8), borderValue=1)
-        gradient *= shows
+        gradient = gradient * np.asarray(shows)
     if thresholds.clipping == "normalised" and (largest := float(gradient.max())) > 0:
-        gradient *= np.float32(255.0 / largest)
+        gradient = gradient * np.float32(255.0 / largest)
     # The gradient image has 8 bits: rounded, and whatever lies above 255 is at or above any threshold.
-    steep = cv2.compare(gradient, thresholds.gradient - 0.5, cv2.CMP_GE)
-    return Steps(grey, smoothed, gradient, np.asarray(steep))
+    limit: Any = thresholds.gradient - 0.5
+    steep = cv2.compare(gradient, limit, cv2.CMP_GE)
+    return Steps(grey, smoothed, gradient, np.asarray(steep, np.uint8))
 
 
 def nested_in_boxes(boxes: NDArray[Any]) -> NDArray[np.bool_]:
@@ -266,7 +270,7 @@ def _filled(steps: Steps, thresholds: FloatingThresholds) -> tuple[NDArray[np.ui
 
 
 def _close_at_border(
-    filled: NDArray[np.uint8], edges: NDArray[np.uint8], smoothed: NDArray[np.uint8], *, warm: bool
+    filled: NDArray[np.uint8], edges: NDArray[np.uint8], smoothed: NDArray[Any], *, warm: bool
 ) -> None:
     """Fill, in place, what open contours cut off at the border of the image, where it is on the warm side.
 
@@ -288,7 +292,7 @@ def _close_at_border(
             slice(max(left - 1, 0), min(left + width + 1, columns)),
         )
         region = (regions[here] == number).astype(np.uint8)
-        contour = cv2.dilate(region, _AROUND) & edges[here]
+        contour = np.asarray(cv2.dilate(region, _AROUND), np.uint8) & edges[here]
         if not contour.any():
             continue
         inside = cv2.mean(smoothed[here], region)[0] - cv2.mean(smoothed[here], contour)[0]

@@ -18,9 +18,9 @@ PUBLISHED = {
 CHOSEN = {
     "smoothing_size": "n of (4.1) is not printed; five pixels keep what is ten pixels wide",
     "smoothing_sd": "sigma_g of (4.1) is not printed; OpenCV's for a kernel of five pixels",
-    "scaling": "how 14 bits become 8 is not printed; cameras stretch what an image holds",
-    "stretched_share": "one pixel in a hundred at either end may saturate, as cameras do",
-    "smallest_range_k": "an image of nothing but sea must not have its noise stretched to black and white",
+    "scaling": "how 14 bits become 8 is not printed; a fixed range shows an object alike beside any other",
+    "stretched_share": "one pixel in a hundred may saturate at the dark end, as cameras do",
+    "smallest_range_k": "an even sea must not become black and white; 50 mK of noise are three levels",
     "counts_per_kelvin": "the Tau 2's in its high gain; matters for images in counts only",
     "gradient_gain": "(4.3) has no factor before it",
     "clipping": "a gradient beyond 255 is 255; that an image's largest becomes 255 is the other reading",
@@ -45,9 +45,10 @@ class FloatingThresholds:
     smoothing_size, smoothing_sd
         Of the Gaussian kernel (4.1), px; the size is odd.
     scaling
-        How kelvin or counts become 256 grey levels: ``"stretched"`` from the ``stretched_share`` of an
-        image's darkest pixels to that of its brightest, over ``smallest_range_k`` at least; ``"fixed"``,
-        always over that range, about the image's median. Grey levels stay as they are.
+        How 14 bits become 8: ``"fixed"``, 256 grey levels over ``smallest_range_k``, from the
+        ``stretched_share`` of an image's darkest pixels on; ``"stretched"``, from there to that share of its
+        brightest, over ``smallest_range_k`` at least; ``"counts"``, not at all: only the gradient of counts
+        has 8 bits. Grey levels stay as they are.
     gradient_gain
         Factor before (4.3).
     clipping
@@ -70,9 +71,9 @@ class FloatingThresholds:
     largest_area: float | None = None
     smoothing_size: int = 5
     smoothing_sd: float = 1.1
-    scaling: Literal["stretched", "fixed"] = "stretched"
+    scaling: Literal["fixed", "stretched", "counts"] = "fixed"
     stretched_share: float = 0.01
-    smallest_range_k: float = 6.4
+    smallest_range_k: float = 4.0
     counts_per_kelvin: float = 25.0
     gradient_gain: float = 1.0
     clipping: Literal["saturated", "normalised"] = "saturated"
@@ -100,7 +101,11 @@ class FloatingThresholds:
             ("smallest_range_k", self.smallest_range_k > 0, "give a range above 0, in kelvin"),
             ("counts_per_kelvin", self.counts_per_kelvin > 0, "give a number above 0"),
             ("gradient_gain", self.gradient_gain > 0, "give a factor above 0"),
-            ("scaling", self.scaling in ("stretched", "fixed"), "use 'stretched' or 'fixed'"),
+            (
+                "scaling",
+                self.scaling in ("fixed", "stretched", "counts"),
+                "use 'fixed', 'stretched' or 'counts'",
+            ),
             ("clipping", self.clipping in ("saturated", "normalised"), "use 'saturated' or 'normalised'"),
             ("area_of", self.area_of in ("edges", "filled"), "use 'edges' or 'filled'"),
             ("nested", self.nested in ("boxes", "contours"), "use 'boxes' or 'contours'"),
