@@ -82,8 +82,8 @@ def adjust_at_border(
         # The hidden part is known but for the length; how far the blob reaches behind its centre is not read
         # off the image but from its second moments, which for other shapes than an ellipse are some way off.
         without = covariance[row] - hidden_part(region, cut_sides(detections.box[row], shape), given)
-        along_too = (length_sd / 2) ** 2 + (given.adjusted * detections.axes[row, 0]) ** 2
-        covariance[row] = without + along_too * np.outer(along, along)
+        left = (4 * given.adjusted) ** 2 * region + (length_sd / 2) ** 2 * np.outer(along, along)
+        covariance[row] = without + left
     return replace(detections, uv=uv, covariance=covariance)
 
 

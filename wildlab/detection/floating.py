@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.detections import Detections
 from wildlab.detection.features import axes_of, boundary_spread, shape_of
-from wildlab.detection.thresholds import CentreErrors, FloatingThresholds
+from wildlab.detection.thresholds import FILLED, CentreErrors, FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
@@ -354,9 +354,9 @@ def centre_covariance(
 ) -> Array:
     """Covariance (2, 2) of an object's centre, px^2: from its shape, the blur, and the border of the image.
 
-    Each piece of the contour, as long as the blur is wide, lies somewhere within the blur; parts of the
-    object that are not found move the centre by a share of its own spread; at the border of the image an
-    unknown part is hidden beyond it.
+    Each piece of the contour, as long as the blur is wide, lies somewhere within the blur; parts that look
+    different move the centre by a share of the object's own spread; where the contour is broken only a line of
+    it was found; at the border of the image an unknown part is hidden beyond it.
 
     Parameters
     ----------
@@ -377,9 +377,11 @@ def centre_covariance(
     """
     blur = float(np.hypot(smoothing_sd, 1.0))
     pieces = 2 * np.sqrt(np.pi) * blur  # over which a Gaussian blur makes the contour lie alike
-    variance = (errors.edge * blur) ** 2 + 1 / 12
-    result: Array = variance * pieces / area**2 * boundary + errors.shape**2 * region
-    return result + hidden_part(region, cut, errors)
+    contour = (errors.edge * blur) ** 2 * pieces / area**2 * boundary
+    ellipse = 4 * np.pi * np.sqrt(max(float(np.linalg.det(region)), 1e-12))
+    line = errors.broken * max(FILLED - area / ellipse, 0.0) * float(axes_of(region)[0][0])
+    even = (errors.floor**2 + line**2) * np.eye(2)
+    return np.asarray(contour + errors.shape**2 * region + even + hidden_part(region, cut, errors))
 
 
 def hidden_part(region: Array, cut: NDArray[np.bool_], errors: CentreErrors) -> Array:
@@ -400,6 +402,7 @@ def hidden_part(region: Array, cut: NDArray[np.bool_], errors: CentreErrors) -> 
     """
     if not cut.any():
         return np.zeros((2, 2))
+    across = np.diag(np.array([cut[0] or cut[2], cut[1] or cut[3]], float))
+    # Along its own axes, and across the border: a ship of which a corner shows lies any way.
     major = float(axes_of(region)[0][0])
-    across = np.array([cut[0] or cut[2], cut[1] or cut[3]], float)
-    return np.asarray((errors.cut * major) ** 2 * np.diag(across))
+    return np.asarray(errors.cut**2 * (16 * region + 0.25 * major**2 * across))

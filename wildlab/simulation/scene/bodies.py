@@ -190,7 +190,7 @@ def vessel(
     outline = hull(length, beam)
     house = rectangle(0.22 * length, 0.75 * beam, 1.0).layers[0].outline
     back = tuple((x - 0.2 * length, y) for x, y in house)
-    texture = 0.18 * abs(excess)
+    texture = 0.3 * abs(excess)
     width = max(0.12 * length, 0.5)
     levels = tuple(
         Layer(outline, height, 0.7 * excess, texture, 0.2 * length)

@@ -46,8 +46,10 @@ class Seen(NamedTuple):
         Its `Body.kind`.
     uv
         (2,) where its centre on the water is, px; maybe outside of the image.
+    centre
+        (2,) centre of its whole outline, px; maybe outside too.
     middle
-        (2,) centre of the visible part of its outline, px; NaN where nothing shows.
+        (2,) centre of the visible part of its outline, px.
     outline
         (K, 2) convex hull of the projected corners of all layers, px.
     area
@@ -61,6 +63,7 @@ class Seen(NamedTuple):
     number: int
     kind: str
     uv: Array
+    centre: Array
     middle: Array
     outline: Array
     area: float
@@ -164,8 +167,11 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
         whole = visible_part(found - found.min(axis=0), np.inf, np.inf)
         uv = ground_to_pixel(camera, body.centre(time)[None], p, R)[0]
         seen.append(
-            Seen(k + 1, body.kind, uv, size.centre - 0.5, found, size.area, size.area / whole.area, covered)
-        )
+            Seen(
+                k + 1, body.kind, uv, whole.centre + found.min(axis=0), size.centre - 0.5, found, size.area,
+                size.area / whole.area, covered,
+            )
+        )  # fmt: skip
     return View(kelvin, labels, water, tuple(seen))
 
 
