@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.detection.detections import Detections
 from wildlab.detection.floating import cut_sides, hidden_part
-from wildlab.detection.thresholds import CentreErrors
+from wildlab.detection.thresholds import FILLED, CentreErrors
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
@@ -37,9 +37,9 @@ def adjust_at_border(
 ) -> Detections:
     """Move the centres of what the border of the image cuts, H (4.7), where the length is known.
 
-    Only blobs whose major axis differs from the minor one by ``axis_ratio``, and meets the border where it
-    cuts the blob, are moved; never those that two opposite borders cut, of which the hidden parts are
-    unknown. The centre may come to lie outside of the image.
+    Only filled blobs whose major axis differs from the minor one by ``axis_ratio``, and meets the border
+    where it cuts the blob, are moved; never those that two opposite borders cut, of which the hidden parts
+    are unknown. The centre may come to lie outside of the image.
 
     Parameters
     ----------
@@ -110,11 +110,19 @@ def border_moves(
     """
     rows, columns = shape
     moves = np.full((len(detections), 2), np.nan)
+    # Of a broken contour only a line was found, and its axis says little.
+    filled = detections.area >= FILLED * np.pi / 4 * detections.axes.prod(axis=1)
     for row, box in enumerate(detections.box):
         sides = cut_sides(box, shape)
         major, minor = detections.axes[row]
         opposite = (sides[0] and sides[2]) or (sides[1] and sides[3])
-        if not sides.any() or opposite or major < axis_ratio * minor or not np.isfinite(lengths[row]):
+        if (
+            not sides.any()
+            or opposite
+            or not filled[row]
+            or major < axis_ratio * minor
+            or not np.isfinite(lengths[row])
+        ):
             continue
         along = direction(detections.orientation[row])
         near = to_border(detections.uv[row], along, columns, rows)

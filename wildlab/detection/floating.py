@@ -355,8 +355,8 @@ def centre_covariance(
     """Covariance (2, 2) of an object's centre, px^2: from its shape, the blur, and the border of the image.
 
     Each piece of the contour, as long as the blur is wide, lies somewhere within the blur; parts that look
-    different move the centre by a share of the object's own spread; where the contour is broken only a line of
-    it was found; at the border of the image an unknown part is hidden beyond it.
+    different move the centre by a share of the object's own spread; where the contour is broken only a line
+    of it was found; at the border of the image an unknown part is hidden beyond it.
 
     Parameters
     ----------

@@ -18,8 +18,8 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
-#: Standard deviation of the height of a visible centre above the water, as a share of the object's length: half
-#: of a freeboard of a tenth. Chosen.
+#: Standard deviation of the height of a visible centre above the water, as a share of the object's length:
+#: half of a freeboard of a tenth. Chosen.
 RISE = 0.05
 
 

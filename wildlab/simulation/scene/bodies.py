@@ -13,6 +13,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.simulation.clipped_outlines import moments
 
 
 @dataclass(frozen=True)
@@ -139,17 +140,21 @@ def rectangle(length: float, beam: float, excess: float, height: float = 0.0) ->
 
 
 def hull(length: float, beam: float, bow: float = 0.25) -> tuple[tuple[float, float], ...]:
-    """Outline of a hull: straight sides, a blunt stern, and a bow of that share of the length."""
+    """Outline of a hull about the centre of its area: straight sides, a blunt stern, a bow of that share."""
     x, y, shoulder = length / 2, beam / 2, length * (0.5 - bow)
-    return (
-        (x, 0.0),
-        (x - 0.35 * bow * length, 0.62 * y),
-        (shoulder, y),
-        (-x, 0.9 * y),
-        (-x, -0.9 * y),
-        (shoulder, -y),
-        (x - 0.35 * bow * length, -0.62 * y),
+    corners = np.array(
+        [
+            (x, 0.0),
+            (x - 0.35 * bow * length, 0.62 * y),
+            (shoulder, y),
+            (-x, 0.9 * y),
+            (-x, -0.9 * y),
+            (shoulder, -y),
+            (x - 0.35 * bow * length, -0.62 * y),
+        ]
     )
+    ahead = moments(corners)[1][0]
+    return tuple((float(a - ahead), float(b)) for a, b in corners)
 
 
 def _disc(radius: float, corners: int = 12, stretch: float = 1.0) -> tuple[tuple[float, float], ...]:

@@ -169,7 +169,7 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
         seen.append(
             Seen(
                 k + 1, body.kind, uv, whole.centre + found.min(axis=0), size.centre - 0.5, found, size.area,
-                size.area / whole.area, covered,
+                min(size.area / whole.area, 1.0), covered,
             )
         )  # fmt: skip
     return View(kelvin, labels, water, tuple(seen))
