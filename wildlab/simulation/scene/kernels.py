@@ -1,7 +1,7 @@
 """What each pixel sees, compiled: the sea, the sky, and the layers of bodies.
 
-The readable twin in numpy is in the tests. All of it stands in one file, for the compiler's cache looks at
-one file only.
+The tests hold it against closed forms: projected outlines, areas, layers, horizon, mirrored sun. All of it
+stands in one file, for the compiler's cache looks at one file only.
 """
 
 from __future__ import annotations

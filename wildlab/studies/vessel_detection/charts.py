@@ -113,14 +113,33 @@ def contrast_shown(contrast: pd.DataFrame, height: float) -> Shown:
     return fig, "contrast", said, f"From {height:.0f} m, without hot engines. {said}"
 
 
+def weather_shown(weather: pd.DataFrame) -> Shown:
+    """False alarms on an empty sea against the wind, with and without glint."""
+    fig, ax = new_figure(5.6, 3.0)
+    for sun, own in weather.groupby("sun"):
+        label, colour = ("sun mirrored in view", ORANGE) if sun else ("no sun", BLUE)
+        ax.plot(own["wind"], own["false"], "o-", color=colour, label=label)
+    ax.set(xlabel="wind (m/s)", ylabel="false alarms an image")
+    ax.set_ylim(bottom=-0.03 * max(1.0, float(weather["false"].max())))
+    calm = float(weather["false"].max()) == 0
+    ax.set_title(
+        "No weather makes a false alarm"
+        if calm
+        else f"Up to {weather['false'].max():.2g} false alarms an image"
+    )
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    said = words.weather_words(weather)
+    return fig, "weather", said, f"From 100 m, the camera halfway to the horizon. {said}"
+
+
 def seen_shares(objects: pd.DataFrame) -> Shown:
     """Of cut objects, what showed and whether it was found."""
     fig, ax = new_figure(5.6, 2.6)
     cut = objects[objects["share"] < 1]
     for row, (found, label, colour) in enumerate(((True, "found", BLUE), (False, "missed", VERMILLION))):
         share = 100 * cut[cut["found"].astype(bool) == found]["share"].to_numpy(float)
-        spread = np.linspace(-0.25, 0.25, len(share)) if len(share) else []
-        ax.plot(share, row + np.array(spread), "o", color=colour, ms=5, label=label)
+        aside = np.linspace(-0.25, 0.25, len(share))
+        ax.plot(share, row + aside, "o", color=colour, ms=5, label=label)
     ax.set_yticks([0, 1], ["found", "missed"])
     ax.set(xlabel="visible part of the outline (%)", ylim=(1.6, -0.6), xlim=(-2, 102))
     missed = cut[~cut["found"].astype(bool)]

@@ -11,10 +11,14 @@ import pandas as pd
 from wildlab.detection.floating import find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.mount import Mount
 from wildlab.simulation.scene.bodies import KINDS
 from wildlab.simulation.scene.drawn import Draw, Drawn, draw_scene
-from wildlab.simulation.scene.render import render
+from wildlab.simulation.scene.render import Scene, render
 from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+from wildlab.simulation.scene.sea import Sea
 from wildlab.studies.vessel_detection.trial import SHIP, WHOLE, Image, judge, numbers_of, tally
 
 #: Heights of the sweep over kinds, m, and for which of them the smallest area of 50 px is.
@@ -23,6 +27,9 @@ REFERENCE = 100.0
 #: Lengths of vessels, m, and what their decks have over the sea, K.
 LENGTHS = (5.0, 10.0, 20.0, 40.0)
 EXCESSES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+#: Winds of the sweep over weather, m/s, and how far its camera is tilted from straight down, rad.
+WINDS = (2.0, 5.0, 8.0, 12.0, 16.0)
+TILT = float(np.radians(45.0))
 #: How long a side of a small image is at least, and over the length of what it shows, px.
 _SIDE, _AROUND = 96, 2.5
 _LARGEST = {"person": 0.5, "buoy": 1.6, "boat": 5.0, "mammal": 6.0}
@@ -94,6 +101,36 @@ def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) 
             scenes = [(draw_scene(rng, window, draw), window) for _ in range(draws)]
             (found,) = found_share(scenes, (FloatingThresholds(),), seed)
             rows.append({"length_m": length, "excess_k": excess, "found": found})
+    return pd.DataFrame(rows)
+
+
+def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
+    """False alarms on an empty sea, by wind and sun, the camera tilted half way to the horizon.
+
+    Returns
+    -------
+    DataFrame
+        ``wind`` m/s, ``sun`` (whether it is out, and mirrored in view), ``false`` alarms per image.
+    """
+    response = CameraResponse()
+    sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
+    R_nb = euler_to_matrix(0.0, TILT, 0.0)
+    poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -REFERENCE]), R_nb)
+    rows = []
+    for wind in WINDS:
+        for sun in (False, True):
+            alarms = 0
+            for number in range(draws):
+                rng = np.random.default_rng([seed, int(10 * wind), sun, number])
+                sea = Sea(
+                    wind_speed=wind, wind_from=float(rng.uniform(-np.pi, np.pi)),
+                    seed=int(rng.integers(2**31)),
+                    # Ahead, as far above the horizon as the camera looks below it: mirrored in its middle.
+                    sun_azimuth=0.0, sun_elevation=float(np.pi / 2 - TILT) if sun else None,
+                )  # fmt: skip
+                view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
+                alarms += len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
+            rows.append({"wind": wind, "sun": sun, "false": alarms / draws})
     return pd.DataFrame(rows)
 
 

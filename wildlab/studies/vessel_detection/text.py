@@ -153,6 +153,23 @@ def contrast_words(contrast: pd.DataFrame) -> str:
     return "What a deck must have over the sea for nine of ten to be found: " + ", ".join(parts) + "."
 
 
+def weather_words(weather: pd.DataFrame) -> str:
+    """From which wind on an empty sea gives false alarms, with and without the sun in view."""
+    parts = []
+    for sun, own in weather.groupby("sun"):
+        loud = own[own["false"] > 0].sort_values("wind")
+        where = "with the sun's glint in view" if sun else "without sun"
+        if len(loud):
+            worst = own.loc[own["false"].idxmax()]
+            parts.append(
+                f"{where} from {loud['wind'].iloc[0]:g} m/s of wind on, "
+                f"and up to {worst['false']:.2g} an image"
+            )
+        else:
+            parts.append(f"{where} not at any wind up to {own['wind'].max():g} m/s")
+    return f"On an empty sea there are false alarms {'; '.join(parts)}."
+
+
 def scaled_words(heights: pd.DataFrame) -> str:
     """What scaling the smallest area with the height does to the heights from which things are found."""
     gained = [
