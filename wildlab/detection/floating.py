@@ -108,7 +108,22 @@ def find_objects(
     thresholds: FloatingThresholds | None = None,
     errors: CentreErrors | None = None,
 ) -> FloatingObjects:
-    """As :func:`detect_floating`, with the pixels of each object."""
+    """As :func:`detect_floating`, with the pixels of each object.
+
+    Parameters
+    ----------
+    image, valid, thresholds, errors
+        As there.
+
+    Returns
+    -------
+    FloatingObjects
+
+    Raises
+    ------
+    WildlabError
+        As there.
+    """
     given = thresholds or FloatingThresholds()
     steps = find_edges(image, valid, given)
     filled, edges = _filled(steps, given)
@@ -145,7 +160,21 @@ def _within(outline: Any) -> _Region:
 def to_grey(
     image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds
 ) -> NDArray[Any]:
-    """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`."""
+    """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`.
+
+    Parameters
+    ----------
+    image
+        (H, W): uint8 grey levels, uint16 counts or floating kelvin.
+    valid
+        (H, W): which pixels the range of an image is taken from; None is all of them.
+    thresholds
+        With the scaling.
+
+    Returns
+    -------
+    (H, W) uint8; uint16 counts where the scaling is that.
+    """
     if image.dtype == np.uint8:
         return np.ascontiguousarray(image)
     unit = thresholds.counts_per_kelvin if image.dtype.kind in "ui" else 1.0
@@ -218,7 +247,22 @@ def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds:
 
 
 def nested_in_boxes(boxes: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which boxes (N, 4), left, top, width, height, lie completely in a larger one, H 4.3."""
+    """Which boxes (N, 4), left, top, width, height, lie completely in a larger one, H 4.3.
+
+    Parameters
+    ----------
+    boxes
+        (N, 4) px.
+
+    Returns
+    -------
+    (N,) bool; of two alike both stay.
+
+    Examples
+    --------
+    >>> nested_in_boxes(np.array([[0, 0, 9, 9], [2, 2, 5, 5], [6, 6, 5, 5]])).tolist()
+    [False, True, False]
+    """
     left, top, width, height = np.asarray(boxes, float).T
     area = width * height
     inside = np.zeros(len(left), bool)
@@ -332,7 +376,19 @@ def _described(
 
 
 def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which borders of an image of that shape (rows, columns) a box touches: left, top, right, bottom."""
+    """Which borders of an image of that shape (rows, columns) a box touches: left, top, right, bottom.
+
+    Parameters
+    ----------
+    box
+        (4,) left, top, width, height, px.
+    shape
+        Rows and columns of the image.
+
+    Returns
+    -------
+    (4,) bool.
+    """
     left, top, width, height = box
     return np.array(
         [

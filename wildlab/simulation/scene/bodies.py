@@ -133,7 +133,22 @@ class Body:
 
 
 def rectangle(length: float, beam: float, excess: float, height: float = 0.0) -> Body:
-    """An even rectangle on the water: what it looks like is known in closed form."""
+    """An even rectangle on the water: what it looks like is known in closed form.
+
+    Parameters
+    ----------
+    length, beam
+        m.
+    excess
+        Over the sea, K.
+    height
+        Above the water, m.
+
+    Returns
+    -------
+    Body
+        About the origin, its length to the north.
+    """
     x, y = length / 2, beam / 2
     outline = ((x, -y), (x, y), (-x, y), (-x, -y))
     return Body("rectangle", (Layer(outline, height, excess),))

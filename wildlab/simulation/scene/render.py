@@ -176,7 +176,23 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
 
 
 def outline_of(body: Body, camera: Camera, p: Array, R: Array, time: float = 0.0) -> Array | None:
-    """Convex hull (K, 2) px of a body's projected corners, exact; None where one is behind the camera."""
+    """Convex hull (K, 2) px of a body's projected corners, exact; None where one is behind the camera.
+
+    Parameters
+    ----------
+    body
+        With one layer or more.
+    camera
+        Intrinsic parameters.
+    p, R
+        Pose of the camera, (3,) m and (3, 3).
+    time
+        s.
+
+    Returns
+    -------
+    (K, 2) px in order, or None.
+    """
     corners = np.concatenate([body.corners(layer, time) for layer in body.layers])
     pixels = ground_to_pixel(camera, corners, p, R)
     return _hull(pixels) if np.isfinite(pixels).all() else None
