@@ -279,6 +279,7 @@ def test_pixels_that_show_nothing_have_no_edges():
     found = detect_floating(image, valid)
     assert len(found) == 1
     assert np.allclose(found.uv[0], [74.5, 49.5], atol=0.1)
+    assert np.allclose(detect_floating(image).uv, found.uv)
     assert len(detect_floating(image, np.zeros_like(valid))) == 0
 
 

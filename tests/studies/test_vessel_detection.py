@@ -178,12 +178,12 @@ def test_contrasts_are_said_by_length():
 
 
 def test_weather_is_blamed_only_where_it_alarms():
-    rows = [(2.0, False, 0.0), (12.0, False, 0.0), (2.0, True, 0.0), (12.0, True, 1.5)]
-    weather = pd.DataFrame(rows, columns=["wind", "sun", "false"])
+    rows = [(2.0, 0.0, 0.0), (12.0, 0.0, 0.0), (2.0, 4.0, 0.0), (12.0, 4.0, 1.5)]
+    weather = pd.DataFrame(rows, columns=["wind", "glint", "false"])
     words = text.weather_words(weather)
-    assert "without sun not at any wind up to 12 m/s" in words
-    assert "with the sun's glint in view from 12 m/s of wind on, and up to 1.5 an image" in words
-    assert charts.weather_shown(weather.assign(false=0.0))[2].count("not at any wind") == 2
+    assert "without sun there are none up to 12 m/s of wind" in words
+    assert "with a glint of 4 K in view there are some from 12 m/s of wind on, up to 1.5 an image" in words
+    assert charts.weather_shown(weather.assign(false=0.0))[2].count("there are none") == 2
 
 
 def test_claims_turn():

@@ -74,7 +74,7 @@ def detect_floating(
     image
         (H, W): uint8 grey levels, uint16 counts or floating kelvin.
     valid
-        (H, W): which pixels show anything; None is all of them.
+        (H, W): which pixels show anything; None is all of them. NaN shows nothing.
     thresholds
         Those of H 4.4.1 by default.
     errors
@@ -225,6 +225,8 @@ def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds:
             "give one value for each pixel",
             field="valid",
         )
+    if image.dtype.kind == "f" and not (finite := np.isfinite(image)).all():
+        valid = finite if valid is None else valid & finite
     grey = to_grey(image, valid, thresholds)
     size, sd = thresholds.smoothing_size, thresholds.smoothing_sd
     smoothed = np.asarray(cv2.GaussianBlur(grey, (size, size), sd, borderType=cv2.BORDER_REPLICATE))

@@ -38,6 +38,9 @@ class Draw:
         m/s.
     inside
         How far from the border of the image centres are put, px; negative is beyond it.
+    seas
+        How many different seas there are; None is one for each scene, whose waves take longer than the rest
+        of a small image.
     """
 
     length: tuple[float, float] = (5.0, 40.0)
@@ -49,6 +52,7 @@ class Draw:
     tilt: float = float(np.radians(30.0))
     wind: tuple[float, float] = (1.0, 8.0)
     inside: float = 40.0
+    seas: int | None = None
 
 
 class Drawn(NamedTuple):
@@ -99,12 +103,18 @@ def draw_scene(rng: np.random.Generator, camera: Camera, draw: Draw, kind: str =
     north, east, _ = georeference_pixels(poses, pixel[None], 0.0)[0]
     body = draw_vessel(rng, draw) if kind == "vessel" else KINDS[kind](seed=int(rng.integers(2**31)))
     body = body.at(float(north), float(east), float(rng.uniform(-np.pi, np.pi)), body.speed)
+    if draw.seas is not None:
+        rng = np.random.default_rng([17, int(rng.integers(draw.seas))])
+    return Drawn(Scene(draw_sea(rng, draw), (body,)), poses, height)
+
+
+def draw_sea(rng: np.random.Generator, draw: Draw) -> Sea:
+    """A sea with a wind within the range, and the sun out in every second one."""
     sun = float(rng.uniform(np.radians(10.0), np.radians(60.0))) if rng.random() < 0.5 else None
-    sea = Sea(
+    return Sea(
         wind_speed=float(rng.uniform(*draw.wind)),
         wind_from=float(rng.uniform(-np.pi, np.pi)),
         sun_azimuth=float(rng.uniform(-np.pi, np.pi)),
         sun_elevation=sun,
         seed=int(rng.integers(2**31)),
     )
-    return Drawn(Scene(sea, (body,)), poses, height)

@@ -117,7 +117,7 @@ def _slopes(side: float, cells: int, sea: Sea, variance: float, time: float) -> 
     return np.stack([field_north * factor, field_east * factor], axis=-1).astype(np.float32)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def tiles_at(sea: Sea, time: float) -> Tiles:
     """The sea's tiles at a time, s."""
     variance = mean_square_slope(sea.wind_speed)

@@ -116,8 +116,8 @@ def contrast_shown(contrast: pd.DataFrame, height: float) -> Shown:
 def weather_shown(weather: pd.DataFrame) -> Shown:
     """False alarms on an empty sea against the wind, with and without glint."""
     fig, ax = new_figure(5.6, 3.0)
-    for sun, own in weather.groupby("sun"):
-        label, colour = ("sun mirrored in view", ORANGE) if sun else ("no sun", BLUE)
+    for colour, (glint, own) in zip(_COLOURS, weather.groupby("glint"), strict=False):
+        label = f"glint of {glint:g} K" if glint else "no sun"
         ax.plot(own["wind"], own["false"], "o-", color=colour, label=label)
     ax.set(xlabel="wind (m/s)", ylabel="false alarms an image")
     ax.set_ylim(bottom=-0.03 * max(1.0, float(weather["false"].max())))
@@ -127,7 +127,7 @@ def weather_shown(weather: pd.DataFrame) -> Shown:
         if calm
         else f"Up to {weather['false'].max():.2g} false alarms an image"
     )
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     said = words.weather_words(weather)
     return fig, "weather", said, f"From 100 m, the camera halfway to the horizon. {said}"
 

@@ -30,6 +30,10 @@ EXCESSES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 #: Winds of the sweep over weather, m/s, and how far its camera is tilted from straight down, rad.
 WINDS = (2.0, 5.0, 8.0, 12.0, 16.0)
 TILT = float(np.radians(45.0))
+#: How much warmer the mirrored sun makes the water look, K: H says nothing of it.
+GLINTS = (0.0, 1.0, 4.0)
+#: How many seas the sweeps over single things share.
+SEAS = 6
 #: How long a side of a small image is at least, and over the length of what it shows, px.
 _SIDE, _AROUND = 96, 2.5
 _LARGEST = {"person": 0.5, "buoy": 1.6, "boat": 5.0, "mammal": 6.0}
@@ -72,7 +76,9 @@ def over_heights(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
     for kind in KINDS:
         for height in HEIGHTS:
             window = small_camera(camera, _LARGEST[kind], height)
-            draw = Draw(height=(height, height), tilt=float(np.radians(10.0)), inside=0.4 * window.width)
+            draw = Draw(
+                height=(height, height), tilt=float(np.radians(10.0)), inside=0.4 * window.width, seas=SEAS
+            )
             rng = np.random.default_rng([seed, int(height), len(kind)])
             scenes = [(draw_scene(rng, window, draw, kind), window) for _ in range(draws)]
             fixed = FloatingThresholds()
@@ -95,7 +101,7 @@ def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) 
         for excess in EXCESSES:
             draw = Draw(
                 length=(length, length), excess=(excess, excess), engine=(0.0, 0.0), height=(height, height),
-                tilt=float(np.radians(10.0)), inside=0.4 * window.width,
+                tilt=float(np.radians(10.0)), inside=0.4 * window.width, seas=SEAS,
             )  # fmt: skip
             rng = np.random.default_rng([seed, int(length), int(10 * excess)])
             scenes = [(draw_scene(rng, window, draw), window) for _ in range(draws)]
@@ -105,32 +111,30 @@ def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) 
 
 
 def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
-    """False alarms on an empty sea, by wind and sun, the camera tilted half way to the horizon.
+    """False alarms on an empty sea, by wind and glint, the camera tilted half way to the horizon.
 
     Returns
     -------
     DataFrame
-        ``wind`` m/s, ``sun`` (whether it is out, and mirrored in view), ``false`` alarms per image.
+        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per image.
     """
     response = CameraResponse()
     sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
     R_nb = euler_to_matrix(0.0, TILT, 0.0)
-    poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -REFERENCE]), R_nb)
     rows = []
     for wind in WINDS:
-        for sun in (False, True):
+        for glint in GLINTS:
+            # Ahead, as far above the horizon as the camera looks below it: mirrored in the image's middle.
+            elevation = float(np.pi / 2 - TILT) if glint else None
+            sea = Sea(wind_speed=wind, sun_azimuth=0.0, sun_elevation=elevation, glint=glint, seed=seed)
             alarms = 0
             for number in range(draws):
-                rng = np.random.default_rng([seed, int(10 * wind), sun, number])
-                sea = Sea(
-                    wind_speed=wind, wind_from=float(rng.uniform(-np.pi, np.pi)),
-                    seed=int(rng.integers(2**31)),
-                    # Ahead, as far above the horizon as the camera looks below it: mirrored in its middle.
-                    sun_azimuth=0.0, sun_elevation=float(np.pi / 2 - TILT) if sun else None,
-                )  # fmt: skip
+                rng = np.random.default_rng([seed, int(10 * wind), int(10 * glint), number])
+                at = np.array([*rng.uniform(-1000.0, 1000.0, 2), -REFERENCE])
+                poses = CameraPoses(camera, Mount("down"), at, R_nb)
                 view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
                 alarms += len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
-            rows.append({"wind": wind, "sun": sun, "false": alarms / draws})
+            rows.append({"wind": wind, "glint": glint, "false": alarms / draws})
     return pd.DataFrame(rows)
 
 

@@ -156,18 +156,18 @@ def contrast_words(contrast: pd.DataFrame) -> str:
 def weather_words(weather: pd.DataFrame) -> str:
     """From which wind on an empty sea gives false alarms, with and without the sun in view."""
     parts = []
-    for sun, own in weather.groupby("sun"):
+    for glint, own in weather.groupby("glint"):
         loud = own[own["false"] > 0].sort_values("wind")
-        where = "with the sun's glint in view" if sun else "without sun"
+        where = f"with a glint of {glint:g} K in view" if glint else "without sun"
         if len(loud):
             worst = own.loc[own["false"].idxmax()]
             parts.append(
-                f"{where} from {loud['wind'].iloc[0]:g} m/s of wind on, "
-                f"and up to {worst['false']:.2g} an image"
+                f"{where} there are some from {loud['wind'].iloc[0]:g} m/s of wind on, "
+                f"up to {worst['false']:.2g} an image"
             )
         else:
-            parts.append(f"{where} not at any wind up to {own['wind'].max():g} m/s")
-    return f"On an empty sea there are false alarms {'; '.join(parts)}."
+            parts.append(f"{where} there are none up to {own['wind'].max():g} m/s of wind")
+    return f"False alarms on an empty sea: {'; '.join(parts)}."
 
 
 def scaled_words(heights: pd.DataFrame) -> str:
