@@ -111,6 +111,25 @@ def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
     assert faults(folder / "report.html") == []
 
 
+def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) -> None:
+    folder = run("vessel-detection", reports, seeds=2)
+    found = values(folder)
+    for name, subject in (
+        ("detection_rate", "ship"),
+        ("detection_rate", "boats-whole"),
+        ("false_alarms_per_image", "ship"),
+        ("false_alarms_per_image", "boats"),
+    ):
+        metric = found[name, subject]
+        assert metric["low"] <= metric["value"] <= metric["high"]
+        assert metric["published"] is not None
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 5)
+    for figure in ("rates", "steps-ship", "steps-boats-whole", "shares", "heights", "contrast", "weather"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_survey_markers_beside_the_published_accuracy(
     reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:

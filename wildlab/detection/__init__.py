@@ -3,7 +3,13 @@
 An image is (H, W) grey levels, counts or kelvin, and ``valid`` (H, W) says where it shows the scene. What is
 found is a `Detections` with a row for each thing; (0, 0) is the middle of the upper left pixel. Thresholds
 are frozen dataclasses with defaults. F is A. Flodell and C. Christensson, Wildlife Surveillance Using a UAV
-and Thermal Imagery, master's thesis, Linköping University 2016.
+and Thermal Imagery, master's thesis, Linköping University 2016; H is H. H. Helgesen, Detection and Tracking
+of Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
+
+- `wildlab.detection.contrast`, `warm`: warm things by local contrast, and animals as F finds them.
+- `wildlab.detection.floating`: whatever floats on a homogeneous sea, by its edges (H 4.3); `border`: what the
+  border of the image cuts (H 4.7); `features`: shape of a region by its moments (H 4.5, 4.6).
+- `wildlab.detection.boards`: calibration boards.
 
 >>> import numpy as np
 >>> from wildlab.detection import find_by_contrast

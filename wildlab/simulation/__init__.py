@@ -18,7 +18,7 @@ Where a change belongs:
 - speed: `kernels`, compiled, each with its twin in readable numpy in `plain`;
 - tables: `onboard_sensors`; `camera_detections` with `camera_view`, `animal_detections`,
   `extended_target_detections` and `clipped_outlines`; `manifest`;
-- the whole flight: `twins`.
+- the whole flight: `twins`; what its camera would have seen, as images with labels: `scene`.
 """
 
 from __future__ import annotations

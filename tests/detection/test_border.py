@@ -1,0 +1,82 @@
+"""The centre of what the border cuts, H (4.7)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.detection.border import adjust_at_border, border_moves, to_border
+from wildlab.detection.floating import detect_floating
+from wildlab.errors import WildlabError
+
+
+def ellipse_image(centre, axes, angle, shape=(200, 260)):
+    v, u = np.mgrid[: shape[0], : shape[1]].astype(float)
+    along = (u - centre[0]) * np.cos(angle) + (v - centre[1]) * np.sin(angle)
+    across = -(u - centre[0]) * np.sin(angle) + (v - centre[1]) * np.cos(angle)
+    inside = (2 * along / axes[0]) ** 2 + (2 * across / axes[1]) ** 2 <= 1
+    return (288.0 + 12.0 * inside).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("centre", "angle"),
+    [((8.0, 90.0), 0.1), ((250.0, 90.0), -0.2), ((120.0, 5.0), 1.5), ((120.0, 192.0), 1.7)],
+)
+def test_the_centre_comes_near_to_the_true_one_and_is_inside_what_is_stated(centre, angle):
+    image = ellipse_image(centre, (120.0, 24.0), angle)
+    seen = detect_floating(image)
+    assert len(seen) == 1
+    moved = adjust_at_border(seen, image.shape, 124.0, 4.0)
+    before, after = (np.linalg.norm(found.uv[0] - centre) for found in (seen, moved))
+    assert before > 18
+    assert after < before / 3
+    miss = moved.uv[0] - centre
+    assert miss @ np.linalg.solve(moved.covariance[0], miss) < 9.2
+    assert np.trace(moved.covariance[0]) < np.trace(seen.covariance[0])
+    # Half the axis in (4.7) moves it too far.
+    half = adjust_at_border(seen, image.shape, 124.0, full_axis=False)
+    assert np.linalg.norm(half.uv[0] - centre) > 2 * after
+
+
+def test_h_4_7_holds_for_the_full_axis_where_the_blob_ends_at_the_border():
+    """A uniform ellipse cut at its very end: i is half the full axis, and L/2 - (a - i) is zero."""
+    image = ellipse_image((62.5, 100.0), (120.0, 30.0), 0.0)
+    seen = detect_floating(image)
+    i = abs(to_border(seen.uv[0], np.array([1.0, 0.0]), 260, 200))
+    moves = border_moves(seen, image.shape, np.array([seen.axes[0, 0]]))
+    expected = seen.axes[0, 0] / 2 - (seen.axes[0, 0] - i)
+    assert np.isnan(moves).all() or np.isclose(abs(moves[0, 0]), abs(expected), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("centre", "axes", "angle", "why"),
+    [
+        ((130.0, 100.0), (120.0, 24.0), 0.3, "whole"),
+        ((3.0, 100.0), (60.0, 56.0), 0.0, "round"),
+        ((130.0, 100.0), (400.0, 30.0), 0.0, "cut at both ends"),
+        ((130.0, 4.0), (120.0, 30.0), 0.0, "along the border"),
+    ],
+)
+def test_what_is_whole_round_or_cut_otherwise_stays(centre, axes, angle, why):
+    image = ellipse_image(centre, axes, angle)
+    seen = detect_floating(image)
+    assert len(seen) == 1, why
+    assert np.array_equal(adjust_at_border(seen, image.shape, 150.0).uv, seen.uv), why
+
+
+def test_an_unknown_length_moves_nothing():
+    image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
+    seen = detect_floating(image)
+    assert np.array_equal(adjust_at_border(seen, image.shape, np.nan).uv, seen.uv)
+
+
+def test_the_nearer_border():
+    assert to_border(np.array([9.5, 50.0]), np.array([1.0, 0.0]), 100, 100) == -10
+    assert to_border(np.array([90.5, 50.0]), np.array([1.0, 0.0]), 100, 100) == 9
+    assert to_border(np.array([50.0, 10.5]), np.array([0.0, 1.0]), 100, 100) == -11
+
+
+def test_a_length_of_nothing_is_refused():
+    with pytest.raises(WildlabError, match="Give one above zero") as error:
+        adjust_at_border(detect_floating(ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)), (200, 260), 0.0)
+    assert error.value.field == "length"

@@ -1,0 +1,147 @@
+"""Are the stated covariances of the centres honest? On scenes whose seeds were used for nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.detection.border import adjust_at_border
+from wildlab.detection.floating import (
+    centre_covariance,
+    cut_sides,
+    detect_floating,
+    find_objects,
+    hidden_part,
+)
+from wildlab.detection.ground import locate
+from wildlab.detection.thresholds import CentreErrors
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
+from wildlab.geometry.mount import Mount
+from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.simulation.clipped_outlines import moments
+from wildlab.simulation.scene import CameraResponse, expose, render, sensor_of
+from wildlab.simulation.scene.drawn import Draw, draw_scene
+
+CAMERA = Camera(640, 512, 1159.2, 1167.8, 313.0, 265.0)
+HONEST = (0.85, 0.95)
+POSE = np.diag(np.array([2.0, 2.0, 3.0, *np.radians([1.0, 1.0, 1.5])]) ** 2)
+
+
+def test_the_covariance_grows_with_what_it_is_made_of():
+    region, boundary = np.diag([400.0, 25.0]), np.diag([30000.0, 3000.0])
+    filled = 4 * np.pi * np.sqrt(400.0 * 25.0)
+    whole, errors = np.zeros(4, bool), CentreErrors()
+
+    def of(area=filled, cut=whole, blur=1.1):
+        return np.trace(centre_covariance(area, region, boundary, cut, blur, errors))
+
+    assert of(blur=3.0) > of()
+    assert of(area=0.3 * filled) > 10 * of()
+    left = np.array([True, False, False, False])
+    assert of(cut=left) > 100 * of()
+    hidden = hidden_part(region, left, errors)
+    assert hidden[0, 0] > hidden[1, 1] > 0
+    assert np.array_equal(hidden_part(region, whole, errors), np.zeros((2, 2)))
+    assert np.allclose(
+        centre_covariance(filled, region, boundary, whole, 1.1, CentreErrors(0.3, 0.0, 0.0)), 0.09 * np.eye(2)
+    )
+
+
+def seen_and_found(seeds, draw):
+    """(seen, detections, row, pose, body) of the vessel of each scene that was found."""
+    response = CameraResponse()
+    sensor = sensor_of(response, (512, 640), np.random.default_rng(9))
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        drawn = draw_scene(rng, CAMERA, draw)
+        view = render(drawn.scene, CAMERA, drawn.poses.p_nc, drawn.poses.R_nc)
+        if not view.seen:
+            continue
+        found = find_objects(expose(view.kelvin, response, sensor, rng))
+        inside = [(view.labels[found.labels == row + 1] > 0).sum() for row in range(len(found.detections))]
+        if sum(inside):
+            yield view.seen[0], found.detections, int(np.argmax(inside)), drawn, rng
+
+
+def share_inside(misses, covariances):
+    return inside_ellipse(np.array(misses), np.array(covariances), 0.9).mean()
+
+
+@pytest.mark.slow
+def test_ellipses_in_the_image_and_on_the_water_hold_nine_in_ten_true_centres():
+    image, ground = ([], []), ([], [])
+    for seen, detections, row, drawn, rng in seen_and_found(range(50000, 50300), Draw()):
+        if cut_sides(detections.box[row], (512, 640)).any():
+            continue
+        image[0].append(detections.uv[row] - seen.centre)
+        image[1].append(detections.covariance[row])
+        # The pose that is known of differs from the true one by what is stated.
+        error = np.linalg.cholesky(POSE) @ rng.standard_normal(6)
+        R_nb = drawn.poses.R_nb @ rotation_vector_to_matrix(error[3:])
+        poses = CameraPoses(CAMERA, Mount("down"), drawn.poses.p_nb + error[:3], R_nb)
+        located = locate(detections, poses, POSE, np.zeros((3, 3)))
+        ground[0].append(located.points[row, :2] - drawn.scene.bodies[0].centre(0.0)[:2])
+        ground[1].append(located.covariance[row])
+    assert len(image[0]) > 230
+    assert HONEST[0] <= share_inside(*image) <= HONEST[1]
+    assert HONEST[0] <= share_inside(*ground) <= HONEST[1]
+
+
+@pytest.mark.slow
+def test_on_the_water_they_do_so_with_a_known_pose_too():
+    """Then what is left is how high the visible centre is, and the pixel."""
+    misses, covariances = [], []
+    for _, detections, row, drawn, _ in seen_and_found(range(51000, 51200), Draw(excess=(5.0, 10.0))):
+        if cut_sides(detections.box[row], (512, 640)).any():
+            continue
+        located = locate(detections, drawn.poses, np.zeros((6, 6)), np.zeros((3, 3)))
+        misses.append(located.points[row, :2] - drawn.scene.bodies[0].centre(0.0)[:2])
+        covariances.append(located.covariance[row])
+    assert share_inside(misses, covariances) >= HONEST[0]
+
+
+@pytest.mark.slow
+def test_ellipses_of_what_the_border_cuts_hold_nine_in_ten_moved_or_not():
+    draw = Draw(excess=(4.0, 10.0), length=(10.0, 70.0), inside=-30.0, height=(80.0, 250.0))
+    still, moved, distances = ([], []), ([], []), []
+    for seen, detections, row, _, _ in seen_and_found(range(52000, 52300), draw):
+        if seen.whole or not cut_sides(detections.box[row], (512, 640)).any():
+            continue
+        still[0].append(detections.uv[row] - seen.centre)
+        still[1].append(detections.covariance[row])
+        length = 4 * np.sqrt(np.linalg.eigvalsh(moments(seen.outline)[2])[1])
+        adjusted = adjust_at_border(detections, (512, 640), length, 0.05 * length)
+        if not np.array_equal(adjusted.uv[row], detections.uv[row]):
+            moved[0].append(adjusted.uv[row] - seen.centre)
+            moved[1].append(adjusted.covariance[row])
+            distances.append([np.linalg.norm(still[0][-1]), np.linalg.norm(moved[0][-1])])
+    assert len(still[0]) > 100
+    assert HONEST[0] <= share_inside(*still) <= HONEST[1]
+    assert HONEST[0] <= share_inside(*moved) <= HONEST[1]
+    before, after = np.median(distances, axis=0)
+    assert after < 0.6 * before
+
+
+def test_nothing_found_is_nothing_located():
+    none = detect_floating(np.full((512, 640), 288.0, np.float32))
+    poses = CameraPoses(CAMERA, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
+    located = locate(none, poses, POSE, np.zeros((3, 3)))
+    assert located.points.shape == (0, 3)
+    assert located.covariance.shape == (0, 2, 2)
+
+
+def test_the_height_of_what_is_seen_widens_the_ellipse_away_from_the_camera():
+    image = np.full((512, 640), 288.0, np.float32)
+    image[60:100, 300:340] += 12
+    found = detect_floating(image)
+    poses = CameraPoses(CAMERA, Mount("down"), np.array([0.0, 0.0, -100.0]), euler_to_matrix(0.0, 0.6, 0.0))
+    flat = locate(found, poses, np.zeros((6, 6)), np.zeros((3, 3)), rise=0.0)
+    high = locate(found, poses, np.zeros((6, 6)), np.zeros((3, 3)))
+    assert np.isclose(high.covariance[0, 1, 1], flat.covariance[0, 1, 1], rtol=0.2)
+    # A point at height s is seen s times the tangent of its angle from straight down further away.
+    away = np.tan(0.6 + np.arctan((265 - 79.5) / 1167.8))
+    expected = (0.05 * high.length[0] * away) ** 2
+    assert np.isclose(high.covariance[0, 0, 0] - flat.covariance[0, 0, 0], expected, rtol=0.02)
+    assert np.isclose(high.length[0], 4 * 40 / np.sqrt(12) * 100 / 1160, rtol=0.5)

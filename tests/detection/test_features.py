@@ -1,0 +1,83 @@
+"""Moments of regions against closed forms; Hu's invariants are invariant."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from wildlab.detection.features import axes_of, boundary_spread, region_moments, shape_of
+
+
+def drawn_ellipse(centre, axes, angle, size=400):
+    """An ellipse by the pixels whose centres lie within it: a tenth of a pixel about the smooth one."""
+    v, u = np.mgrid[:size, :size].astype(float)
+    along = (u - centre[0]) * np.cos(angle) + (v - centre[1]) * np.sin(angle)
+    across = -(u - centre[0]) * np.sin(angle) + (v - centre[1]) * np.cos(angle)
+    return ((2 * along / axes[0]) ** 2 + (2 * across / axes[1]) ** 2 <= 1).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1, 1), (7, 3), (40, 90)])
+def test_a_rectangle_has_the_moments_of_a_rectangle(width, height):
+    mask = np.zeros((120, 130), np.uint8)
+    mask[5 : 5 + height, 11 : 11 + width] = 1
+    shape = shape_of(mask)
+    assert shape.area == width * height
+    assert np.allclose(shape.centre, [11 + (width - 1) / 2, 5 + (height - 1) / 2])
+    assert np.allclose(shape.covariance, np.diag([width**2, height**2]) / 12)
+    assert np.allclose(shape.axes, np.array(sorted([width, height]))[::-1] * 4 / np.sqrt(12))
+    if width != height:
+        assert np.isclose(np.cos(shape.orientation), float(width > height), atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [-1.2, -0.3, 0.0, 0.7, 1.5])
+def test_an_ellipse_has_its_own_axes_and_angle(angle):
+    shape = shape_of(drawn_ellipse((203.3, 187.8), (160.0, 60.0), angle))
+    assert np.allclose(shape.centre, [203.3, 187.8], atol=0.1)
+    assert np.allclose(shape.axes, [160.0, 60.0], rtol=2e-3)
+    assert abs(np.sin(shape.orientation - angle)) < 2e-3
+
+
+def test_hu_invariants_do_not_change_with_place_angle_or_size_and_tell_shapes_apart():
+    own = shape_of(drawn_ellipse((200, 200), (150.0, 60.0), 0.3)).hu
+    for centre, angle, size in (((170, 230), 0.3, 1.0), ((200, 200), 1.4, 1.0), ((200, 200), 0.3, 0.5)):
+        other = shape_of(drawn_ellipse(centre, (150.0 * size, 60.0 * size), angle)).hu
+        assert np.isclose(other[0], own[0], rtol=5e-3)
+        assert np.isclose(other[1], own[1], rtol=2e-2)
+    # Closed form of the first for an ellipse with semi-axes a and b: (a / b + b / a) / (4 pi).
+    assert np.isclose(own[0], (75 / 30 + 30 / 75) / (4 * np.pi), rtol=2e-3)
+    triangle = cv2.fillPoly(np.zeros((400, 400), np.uint8), [np.array([[50, 60], [320, 90], [110, 300]])], 1)
+    turned = np.rot90(triangle)
+    assert np.allclose(shape_of(triangle).hu[:6], shape_of(turned).hu[:6], rtol=1e-9)
+    assert not np.isclose(shape_of(triangle).hu[2], own[2], rtol=0.5)
+
+
+def test_moments_against_sums_over_pixels():
+    mask = (np.random.default_rng(2).random((23, 31)) < 0.4).astype(np.uint8)
+    v, u = np.nonzero(mask)
+    raw, central = region_moments(mask, central=False), region_moments(mask)
+    for p in range(4):
+        for q in range(4 - p):
+            assert np.isclose(raw[p, q], (u.astype(float) ** p * v.astype(float) ** q).sum())
+            about = (u - u.mean()) ** p * (v - v.mean()) ** q
+            assert np.isclose(central[p, q], about.sum(), atol=1e-8)
+    assert np.isnan(raw[3, 3])
+
+
+def test_the_axes_of_h_4_6_need_central_moments_although_h_4_5_prints_raw_ones():
+    mask = drawn_ellipse((300, 60), (80.0, 30.0), 1.2)
+
+    def angle(moments):
+        return axes_of(np.array([[moments[2, 0], moments[1, 1]], [moments[1, 1], moments[0, 2]]]))[1]
+
+    assert abs(np.sin(angle(region_moments(mask)) - 1.2)) < 5e-3
+    to_centre = np.arctan2(60, 300)  # raw ones say where the region is, not how it lies
+    assert abs(np.sin(angle(region_moments(mask, central=False)) - to_centre)) < 0.05
+
+
+def test_the_boundary_of_a_disc_in_closed_form():
+    """Along a circle of radius r the integral of (r - c)(r - c)^T is pi r^3 times the identity."""
+    mask = drawn_ellipse((200, 200), (240.0, 240.0), 0.0)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    spread = boundary_spread(outlines[0], np.array([200.0, 200.0]))
+    assert np.allclose(spread, np.pi * 120.0**3 * np.eye(2), rtol=0.07, atol=1e3)

@@ -1,0 +1,341 @@
+"""The detector of floating objects, H 4.3, against a second writing of it in plain numpy, and its choices."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from wildlab.detection.floating import (
+    cut_sides,
+    detect_floating,
+    find_edges,
+    find_objects,
+    nested_in_boxes,
+    to_grey,
+)
+from wildlab.detection.thresholds import CHOSEN, PUBLISHED, FloatingThresholds
+from wildlab.errors import WildlabError
+
+
+def sea(height=90, width=120, noise=0.0, seed=0):
+    level = 288.0 + noise * np.random.default_rng(seed).standard_normal((height, width))
+    return level.astype(np.float32)
+
+
+def plain_steps(grey, size, sd, threshold):
+    """H (4.1) to (4.4) written out: sums over the kernel, rounded where an 8-bit image rounds."""
+    half = size // 2
+    x = np.arange(-half, half + 1)
+    g = np.exp(-(x**2) / (2 * sd**2))
+    kernel = np.outer(g, g) / g.sum() ** 2
+    padded = np.pad(grey.astype(float), half, mode="edge")
+    rows, columns = grey.shape
+    smoothed = sum(
+        kernel[i, j] * padded[i : i + rows, j : j + columns] for i in range(size) for j in range(size)
+    )
+    smoothed = np.round(smoothed)
+    padded = np.pad(smoothed, 1, mode="edge")
+    P = np.array([[-1, 0, 1]] * 3)
+    du = sum(P[i, j] * padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
+    dv = sum(P.T[i, j] * padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
+    gradient = np.sqrt(du**2 + dv**2)
+    return smoothed, gradient, np.round(np.minimum(gradient, 255)) >= threshold
+
+
+def plain_components(mask):
+    """Components of eight neighbours, by flooding one after the other."""
+    labels, count = np.zeros(mask.shape, int), 0
+    for start in zip(*np.nonzero(mask), strict=True):
+        if labels[start]:
+            continue
+        count += 1
+        todo = [start]
+        labels[start] = count
+        while todo:
+            r, c = todo.pop()
+            for i in range(max(r - 1, 0), min(r + 2, mask.shape[0])):
+                for j in range(max(c - 1, 0), min(c + 2, mask.shape[1])):
+                    if mask[i, j] and not labels[i, j]:
+                        labels[i, j] = count
+                        todo.append((i, j))
+    return labels, count
+
+
+def plain_filled(blob):
+    """A blob with its holes: all that cannot be reached from outside by four neighbours."""
+    padded = np.pad(blob, 1)
+    outside = np.zeros_like(padded)
+    outside[0, 0] = True
+    while True:
+        grown = outside.copy()
+        grown[1:] |= outside[:-1]
+        grown[:-1] |= outside[1:]
+        grown[:, 1:] |= outside[:, :-1]
+        grown[:, :-1] |= outside[:, 1:]
+        grown &= ~padded
+        if (grown == outside).all():
+            return ~outside[1:-1, 1:-1]
+        outside = grown
+
+
+def plain_detect(grey, thresholds):
+    """Steps 1 to 6 for objects within the image: centres and filled areas, largest first."""
+    steep = plain_steps(grey, thresholds.smoothing_size, thresholds.smoothing_sd, thresholds.gradient)[2]
+    labels, count = plain_components(steep)
+    blobs = [labels == number for number in range(1, count + 1)]
+    blobs = [blob for blob in blobs if blob.sum() >= thresholds.smallest_area]
+    boxes = []
+    for blob in blobs:
+        v, u = np.nonzero(blob)
+        boxes.append((u.min(), v.min(), u.max(), v.max()))
+    kept = []
+    for one, (left, top, right, bottom) in zip(blobs, boxes, strict=True):
+        inside = any(
+            a <= left
+            and b <= top
+            and c >= right
+            and d >= bottom
+            and (a, b, c, d) != (left, top, right, bottom)
+            for a, b, c, d in boxes
+        )
+        if not inside:
+            kept.append(plain_filled(one))
+    found = []
+    for blob in kept:
+        v, u = np.nonzero(blob)
+        found.append((int(blob.sum()), u.mean(), v.mean()))
+    return sorted(found, reverse=True)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_against_the_same_steps_in_plain_numpy(seed):
+    rng = np.random.default_rng(seed)
+    grey = rng.normal(60, 8, (70, 100))
+    for _ in range(4):
+        u, v = rng.integers(12, 70), rng.integers(12, 45)
+        grey[v : v + rng.integers(5, 14), u : u + rng.integers(6, 20)] += rng.uniform(90, 190)
+    grey = np.clip(np.round(grey), 0, 255).astype(np.uint8)
+    thresholds = FloatingThresholds(smallest_area=20, close_at_border=False)
+    smoothed, gradient, steep = plain_steps(grey, 5, 1.1, 230)
+    steps = find_edges(grey, None, thresholds)
+    # OpenCV's kernel has fixed-point weights: a grey level may differ by one, its gradient by a few.
+    assert np.abs(steps.smoothed - smoothed).max() <= 1
+    assert np.abs(steps.gradient - gradient).max() <= 6
+    assert ((steps.steep > 0) != steep)[np.abs(gradient - 230) > 6].sum() == 0
+    same = plain_detect(grey, thresholds)
+    found = detect_floating(grey, thresholds=thresholds)
+    assert len(found) == len(same) > 0
+    assert np.allclose(found.area, [area for area, _, _ in same], atol=6)
+    assert np.allclose(found.uv, [centre for _, *centre in same], atol=0.3)
+
+
+def test_a_warm_rectangle_is_found_where_it_is_and_as_large():
+    image = sea(noise=0.05)
+    image[30:50, 40:90] += 12
+    found = detect_floating(image)
+    assert len(found) == 1
+    assert np.allclose(found.uv[0], [64.5, 39.5], atol=0.1)
+    # The contour reaches beyond the edge by less than the blur of both kernels.
+    assert 20 * 50 < found.area[0] < 25 * 55
+    warm = 20 * 50 / found.area[0]
+    assert np.isclose(found.intensity[0], 288 + 12 * warm, atol=0.05)
+    assert found.score[0] >= 1
+    assert np.allclose(found.box[0, :2] + found.box[0, 2:] / 2, [65, 40], atol=1)
+
+
+def test_nothing_is_found_on_an_even_or_noisy_sea():
+    assert len(detect_floating(sea())) == 0
+    assert len(detect_floating(sea(noise=0.3, height=512, width=640))) == 0
+    assert detect_floating(sea()).covariance.shape == (0, 2, 2)
+
+
+def test_an_image_of_grey_levels_is_taken_as_it_is_and_counts_as_kelvin_by_their_gain():
+    image = sea(noise=0.05)
+    image[30:50, 40:90] += 12
+    counts = np.round((image - 273.15) * 25 + 4000).astype(np.uint16)
+    assert np.allclose(detect_floating(counts).uv, detect_floating(image).uv, atol=0.1)
+    grey = np.full((90, 120), 90, np.uint8)
+    grey[30:50, 40:90] = 130  # 40 levels are too little for a threshold of 230, whatever the range
+    assert len(detect_floating(grey)) == 0
+    grey[30:50, 40:90] = 250
+    assert len(detect_floating(grey)) == 1
+
+
+def test_a_narrow_range_is_not_stretched_to_black_and_white():
+    thresholds = FloatingThresholds(scaling="stretched")
+    image = sea(noise=0.1)
+    assert np.ptp(to_grey(image, None, thresholds).astype(float)) < 90
+    image[:45] += 30
+    grey = to_grey(image, None, thresholds)
+    assert grey.min() == 0 and grey.max() == 255
+    fixed = to_grey(image, None, FloatingThresholds(scaling="fixed"))
+    assert 0.4 < (fixed == 255).mean() < 0.6
+    assert 3 < fixed[45:].std() < 9  # 0.1 K at 255 levels over 4 K
+
+
+def test_a_gradient_of_counts_is_that_of_their_kelvin():
+    """A step of s counts has a Prewitt gradient of 3 s where nothing smooths it."""
+    thresholds = FloatingThresholds(scaling="counts", smoothing_size=1, smoothing_sd=0.01)
+    image = sea()
+    image[:, 60:] += 4.0  # 100 counts
+    assert find_edges(image, None, thresholds).gradient.max() == 300
+    counts = np.round((image - 273.15) * 25 + 100).astype(np.uint16)
+    assert find_edges(counts, None, thresholds).gradient.max() == 300
+
+
+def test_gradients_divided_by_their_largest_find_steep_pixels_in_every_image():
+    """The other reading of an 8-bit gradient image: whatever is steepest is above 230 of 255."""
+    noise = sea(noise=0.2)
+    assert find_edges(noise, None, FloatingThresholds(clipping="normalised")).steep.any()
+    assert not find_edges(noise, None, FloatingThresholds()).steep.any()
+
+
+def ring(thickness_gap=0):
+    image = sea()
+    image[20:70, 30:100] += 12
+    return image
+
+
+def test_whether_the_contour_or_the_filled_blob_is_small():
+    """A ring of steep pixels is counted before it is filled, H 4.3, or after."""
+    image = ring()
+    edges = int((find_edges(image, None, FloatingThresholds()).steep > 0).sum())
+    assert edges < 50 * 70
+    between = (edges + 50 * 70) / 2
+    assert len(detect_floating(image, thresholds=FloatingThresholds(smallest_area=between))) == 0
+    filled = FloatingThresholds(smallest_area=between, area_of="filled")
+    assert len(detect_floating(image, thresholds=filled)) == 1
+    largest = FloatingThresholds(smallest_area=10, largest_area=between)
+    assert len(detect_floating(image, thresholds=largest)) == 1
+    largest = FloatingThresholds(smallest_area=10, largest_area=between, area_of="filled")
+    assert len(detect_floating(image, thresholds=largest)) == 0
+
+
+def test_texture_inside_is_no_object_of_its_own_and_the_inside_is_filled():
+    image = ring()
+    image[40:50, 60:72] += 25
+    found = find_objects(image)
+    assert len(found.detections) == 1
+    assert (found.labels[22:68, 32:98] == 1).all()
+    assert len(detect_floating(image, thresholds=FloatingThresholds(nested="contours"))) == 1
+
+
+def test_a_buoy_in_the_corner_of_a_slanting_ships_box_is_lost_by_boxes_and_kept_by_contours():
+    image = sea(200, 200)
+    v, u = np.mgrid[:200, :200]
+    image[(np.abs(u - v) < 14) & (u + v > 60) & (u + v < 340)] += 12
+    image[40:50, 140:152] += 12
+    assert len(detect_floating(image)) == 1
+    assert len(detect_floating(image, thresholds=FloatingThresholds(nested="contours"))) == 2
+
+
+def test_boxes_in_boxes():
+    boxes = np.array([[0, 0, 50, 50], [10, 10, 20, 20], [40, 40, 20, 20], [0, 0, 50, 50], [10, 10, 20, 20]])
+    assert nested_in_boxes(boxes).tolist() == [False, True, False, False, True]
+    assert nested_in_boxes(np.empty((0, 4))).tolist() == []
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        (slice(0, 20), slice(40, 80)),
+        (slice(70, 90), slice(40, 80)),
+        (slice(30, 60), slice(0, 30)),
+        (slice(30, 60), slice(90, 120)),
+        (slice(0, 40), slice(0, 50)),
+        (slice(60, 90), slice(90, 120)),
+        (slice(0, 90), slice(45, 75)),
+        (slice(30, 60), slice(0, 120)),
+    ],
+)
+def test_what_the_border_cuts_is_filled_and_is_one(where):
+    image = sea(noise=0.05)
+    image[where] += 12
+    found = find_objects(image)
+    assert len(found.detections) == 1
+    assert (found.labels[where] == 1).mean() > 0.99
+    assert (found.labels > 0).mean() < 1.35 * (image > 294).mean()
+    assert cut_sides(found.detections.box[0], image.shape).any()
+    assert np.trace(found.detections.covariance[0]) > 50
+
+
+def test_a_cold_object_at_the_border_is_filled_where_it_is_said_to_be_cold():
+    image = sea(noise=0.05)
+    image[0:30, 40:80] -= 12
+    cold = find_objects(image, thresholds=FloatingThresholds(warm=False))
+    assert (cold.labels[0:30, 40:80] == 1).mean() > 0.99
+    assert (cold.labels > 0).mean() < 0.2
+
+
+def test_pixels_that_show_nothing_have_no_edges():
+    image, valid = sea(noise=0.05), np.ones((90, 120), bool)
+    image[:, :25] = 0.0
+    valid[:, :25] = False
+    image[40:60, 60:90] += 12
+    assert len(detect_floating(image, valid)) == 1
+    image[:, :25] = np.nan
+    found = detect_floating(image, valid)
+    assert len(found) == 1
+    assert np.allclose(found.uv[0], [74.5, 49.5], atol=0.1)
+    assert np.allclose(detect_floating(image).uv, found.uv)
+    assert len(detect_floating(image, np.zeros_like(valid))) == 0
+
+
+def test_every_number_says_whose_it_is():
+    assert set(PUBLISHED) | set(CHOSEN) == {field.name for field in fields(FloatingThresholds)}
+    assert not set(PUBLISHED) & set(CHOSEN)
+    assert FloatingThresholds().gradient == 230
+    assert FloatingThresholds().smallest_area == 50
+
+
+def test_areas_go_with_the_height():
+    """H 4.4.1: a contour goes with the scale, a filled area with its square."""
+    ring_, filled = FloatingThresholds(), FloatingThresholds(area_of="filled", largest_area=800)
+    assert ring_.at_height(200, 100).smallest_area == 25
+    assert filled.at_height(200, 100).smallest_area == 12.5
+    assert filled.at_height(50, 100).largest_area == 3200
+    assert ring_.at_height(50, 100).largest_area is None
+
+
+@pytest.mark.parametrize("height", [0.0, -5.0, float("nan")])
+def test_a_height_below_the_sea_is_refused(height):
+    with pytest.raises(WildlabError, match="Give both above zero") as error:
+        FloatingThresholds().at_height(height, 100)
+    assert error.value.field == "height"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("gradient", 0.0, "above 0, up to 255"),
+        ("gradient", 300.0, "above 0, up to 255"),
+        ("smallest_area", 0.0, "above 0"),
+        ("largest_area", 10.0, "no smaller than smallest_area"),
+        ("smoothing_size", 4, "odd"),
+        ("smoothing_sd", 0.0, "above 0"),
+        ("stretched_share", 0.5, "below 0.5"),
+        ("smallest_range_k", 0.0, "kelvin"),
+        ("counts_per_kelvin", -1.0, "above 0"),
+        ("gradient_gain", 0.0, "above 0"),
+        ("scaling", "squeezed", "'fixed', 'stretched' or 'counts'"),
+        ("clipping", "none", "'saturated' or 'normalised'"),
+        ("area_of", "box", "'edges' or 'filled'"),
+        ("nested", "no", "'boxes' or 'contours'"),
+    ],
+)
+def test_unusable_thresholds_are_refused(name, value, says):
+    with pytest.raises(WildlabError, match=says) as error:
+        FloatingThresholds(**{name: value})
+    assert error.value.field == name
+
+
+def test_a_colour_image_is_refused():
+    with pytest.raises(WildlabError, match="Give a grey image"):
+        detect_floating(np.zeros((5, 5, 3), np.uint8))
+
+
+def test_a_mask_of_another_shape_is_refused():
+    with pytest.raises(WildlabError, match="Give one value for each pixel"):
+        detect_floating(sea(), np.ones((3, 3), bool))

@@ -1,0 +1,105 @@
+"""What a camera makes of a scene."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.simulation.scene import (
+    IDEAL,
+    CameraResponse,
+    expose,
+    gain_control,
+    in_shutter,
+    sensor_of,
+    shutter_image,
+    to_kelvin,
+)
+
+SHAPE = (120, 160)
+
+
+def even(level=290.15):
+    return np.full(SHAPE, level, np.float32)
+
+
+def test_an_ideal_camera_only_counts():
+    sensor = sensor_of(IDEAL, SHAPE, np.random.default_rng(1))
+    image = even()
+    image[40:60, 50:70] = 300.15
+    counts = expose(image, IDEAL, sensor, np.random.default_rng(2))
+    assert counts[50, 60] - counts[0, 0] == 250
+    assert np.abs(to_kelvin(counts, IDEAL) - image).max() <= 0.02 + 1e-4
+    assert counts.max() < 2**14
+
+
+def test_noise_and_pattern_have_their_deviations_and_the_pattern_stays():
+    response = CameraResponse(vignetting=0.0, dead_share=0.0)
+    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
+    images = [to_kelvin(expose(even(), response, sensor, np.random.default_rng(k)), response) for k in (2, 3)]
+    difference = (images[0] - images[1]).std()
+    # Rounding to counts of 0.04 K adds its own.
+    assert np.isclose(difference, np.sqrt(2 * (0.05**2 + 0.04**2 / 12)), rtol=0.03)
+    mean = (images[0] + images[1]) / 2
+    expected = 0.05**2 / 2 + 0.04**2 / 24 + 0.02**2 + 0.015**2
+    assert np.isclose(mean.var(), expected, rtol=0.12)
+
+
+def test_corners_look_warmer_by_the_vignetting():
+    response = CameraResponse(noise=0.0, pattern=0.0, stripes=0.0, dead_share=0.0, vignetting=2.0)
+    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
+    kelvin = to_kelvin(expose(even(), response, sensor, np.random.default_rng(1)), response)
+    assert np.isclose(kelvin[0, 0] - kelvin[60, 80], 2.0, atol=0.05)
+
+
+def test_blur_keeps_the_energy_and_widens_a_point():
+    response = CameraResponse(blur_sd=1.5, noise=0, pattern=0, stripes=0, vignetting=0, dead_share=0)
+    image = even()
+    image[60, 80] += 200.0
+    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
+    excess = (
+        to_kelvin(expose(image, response, sensor, np.random.default_rng(1)), response).astype(float) - 290.15
+    )
+    assert np.isclose(excess[40:80, 60:100].sum(), 200, rtol=0.05)
+    v = np.arange(SHAPE[0]) - 60
+    assert np.isclose(
+        (excess[:, 60:100].sum(axis=1) * v**2).sum() / excess[:, 60:100].sum(), 1.5**2, rtol=0.1
+    )
+
+
+def test_dead_pixels_show_the_same_in_every_image():
+    response = CameraResponse(dead_share=0.01)
+    sensor = sensor_of(response, SHAPE, np.random.default_rng(1))
+    assert 0.005 < sensor.dead.mean() < 0.02
+    one, two = (expose(even(280.0 + k), response, sensor, np.random.default_rng(k)) for k in (1, 9))
+    assert np.array_equal(one[sensor.dead], two[sensor.dead])
+    assert set(np.unique(one[sensor.dead])) <= {0, 2**14 - 1}
+
+
+def test_the_shutter_closes_for_its_time_and_shows_an_even_image():
+    times = np.arange(0, 300, 1 / 7.5)
+    closed = in_shutter(times, every=60.0, lasting=0.6)
+    assert closed.sum() == 5 * 5
+    assert not in_shutter([-1.0], every=60.0, lasting=0.5).any()
+    image = to_kelvin(
+        shutter_image(SHAPE, 301.0, CameraResponse(), np.random.default_rng(1)), CameraResponse()
+    )
+    assert np.isclose(image.mean(), 301.0, atol=0.02)
+    assert image.std() < 0.07
+
+
+def test_gain_control_stretches_to_all_levels():
+    counts = np.linspace(7000, 7400, 19200).reshape(SHAPE).astype(np.uint16)
+    grey = gain_control(counts)
+    assert grey.min() == 0
+    assert grey.max() == 255
+    assert np.isclose(grey[60, 80], 127, atol=4)
+    assert gain_control(np.full(SHAPE, 5000, np.uint16)).max() == 0
+
+
+def test_a_sensor_of_another_size_is_refused():
+    sensor = sensor_of(IDEAL, (10, 10), np.random.default_rng(1))
+    with pytest.raises(WildlabError, match="Draw one of that size") as error:
+        expose(even(), IDEAL, sensor, np.random.default_rng(1))
+    assert error.value.field == "sensor"

@@ -1,0 +1,466 @@
+"""Floating objects in thermal images of the sea, by their edges: the seven steps of H 4.3.
+
+1. Smooth with a Gaussian (4.1).
+2. Gradient by the Prewitt operator (4.2), (4.3).
+3. Keep what is steep (4.4).
+4. Connect, and remove what is too small or too large.
+5. Remove what lies in the box of something larger.
+6. Fill.
+7. At the border of the image, move the centre where the size is known (4.7): `wildlab.detection.border`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.detection.detections import Detections
+from wildlab.detection.features import axes_of, boundary_spread, shape_of
+from wildlab.detection.thresholds import FILLED, CentreErrors, FloatingThresholds
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+
+#: Rows and columns at the border in which the contour of something cut may end.
+AT_BORDER = 2
+#: Of how many pixels along each side one is looked at to find an image's range.
+SPARSE = 8
+#: Count of 14 bits for 0 deg C, where kelvin are taken to counts; a gradient does not depend on it.
+COUNTS_AT_ZERO = 7000.0
+_PREWITT = np.array([-1.0, 0.0, 1.0]), np.ones(3)
+_AROUND = np.ones((3, 3), np.uint8)
+
+
+class Steps(NamedTuple):
+    """What the steps make of an image, each (H, W).
+
+    Attributes
+    ----------
+    grey
+        0 to 255; counts, where the scaling is that.
+    smoothed
+        Step 1.
+    gradient
+        Step 2, not limited to 255.
+    steep
+        Step 3: 255 where the gradient is at or above the threshold, 0 elsewhere.
+    """
+
+    grey: NDArray[Any]
+    smoothed: NDArray[Any]
+    gradient: NDArray[Any]
+    steep: NDArray[np.uint8]
+
+
+class FloatingObjects(NamedTuple):
+    """What was found: ``labels`` (H, W) is the detection's row plus one inside of it, 0 elsewhere."""
+
+    detections: Detections
+    labels: NDArray[np.int32]
+
+
+def detect_floating(
+    image: NDArray[Any],
+    valid: NDArray[np.bool_] | None = None,
+    thresholds: FloatingThresholds | None = None,
+    errors: CentreErrors | None = None,
+) -> Detections:
+    """Floating objects of one image, H 4.3; `find_objects` gives their pixels as well.
+
+    Parameters
+    ----------
+    image
+        (H, W): uint8 grey levels, uint16 counts or floating kelvin.
+    valid
+        (H, W): which pixels show anything; None is all of them. NaN shows nothing.
+    thresholds
+        Those of H 4.4.1 by default.
+    errors
+        What the covariances of the centres are made of.
+
+    Returns
+    -------
+    Detections
+        By area, the largest first. The centre of what the border cuts is that of the visible part, and its
+        covariance says so; `wildlab.detection.border.adjust_at_border` moves it.
+
+    Raises
+    ------
+    WildlabError
+        Where the image is no grey image, or ``valid`` has another shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sea = np.full((60, 80), 288.0)
+    >>> sea[20:40, 30:61] += 12.0
+    >>> detect_floating(sea).uv.round(1)
+    array([[45. , 29.5]])
+    """
+    return find_objects(image, valid, thresholds, errors).detections
+
+
+def find_objects(
+    image: NDArray[Any],
+    valid: NDArray[np.bool_] | None = None,
+    thresholds: FloatingThresholds | None = None,
+    errors: CentreErrors | None = None,
+) -> FloatingObjects:
+    """As :func:`detect_floating`, with the pixels of each object.
+
+    Parameters
+    ----------
+    image, valid, thresholds, errors
+        As there.
+
+    Returns
+    -------
+    FloatingObjects
+
+    Raises
+    ------
+    WildlabError
+        As there.
+    """
+    given = thresholds or FloatingThresholds()
+    steps = find_edges(image, valid, given)
+    filled, edges = _filled(steps, given)
+    outlines, _ = cv2.findContours(filled, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    objects = [_within(outline) for outline in outlines]
+    if given.area_of == "filled":
+        objects = [found for found in objects if _size_fits(int(found.mask.sum()), given)]
+    objects.sort(key=lambda found: -int(found.mask.sum()))
+    labels = np.zeros(filled.shape, np.int32)
+    for number, found in enumerate(objects, start=1):
+        labels[found.here][found.mask > 0] = number
+    return FloatingObjects(
+        _described(np.asarray(image), steps, edges, objects, given, errors or CentreErrors()), labels
+    )
+
+
+class _Region(NamedTuple):
+    """The pixels within an outline: their box, what that cuts out of the image, which of it they are."""
+
+    box: tuple[int, int, int, int]
+    here: tuple[slice, slice]
+    mask: NDArray[np.uint8]
+    outline: NDArray[Any]
+
+
+def _within(outline: Any) -> _Region:
+    left, top, width, height = cv2.boundingRect(outline)
+    mask = np.zeros((height, width), np.uint8)
+    cv2.drawContours(mask, [outline], 0, 1, cv2.FILLED, offset=(-left, -top))
+    here = slice(top, top + height), slice(left, left + width)
+    return _Region((left, top, width, height), here, mask, outline)
+
+
+def to_grey(
+    image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds
+) -> NDArray[Any]:
+    """An image in 256 grey levels, or in counts, (H, W); see ``scaling`` of `FloatingThresholds`.
+
+    Parameters
+    ----------
+    image
+        (H, W): uint8 grey levels, uint16 counts or floating kelvin.
+    valid
+        (H, W): which pixels the range of an image is taken from; None is all of them.
+    thresholds
+        With the scaling.
+
+    Returns
+    -------
+    (H, W) uint8; uint16 counts where the scaling is that.
+    """
+    if image.dtype == np.uint8:
+        return np.ascontiguousarray(image)
+    unit = thresholds.counts_per_kelvin if image.dtype.kind in "ui" else 1.0
+    plain = image if image.dtype in (np.uint16, np.float32, np.float64) else image.astype(np.float32)
+    if thresholds.scaling == "counts":
+        counts = plain if unit != 1.0 else (plain - 273.15) * thresholds.counts_per_kelvin + COUNTS_AT_ZERO
+        return np.asarray(np.clip(np.rint(np.nan_to_num(counts)), 0, 2**14 - 1), np.uint16)
+    sparse = image[::SPARSE, ::SPARSE]
+    seen = sparse.ravel() if valid is None else sparse[valid[::SPARSE, ::SPARSE]]
+    if seen.dtype.kind == "f":
+        seen = seen[np.isfinite(seen)]
+    if not len(seen):
+        return np.zeros(image.shape, np.uint8)
+    smallest = thresholds.smallest_range_k * unit
+    low, high = np.quantile(seen, [thresholds.stretched_share, 1 - thresholds.stretched_share])
+    span = max(high - low, smallest) if thresholds.scaling == "stretched" else smallest
+    gain = 255.0 / span
+    return np.asarray(cv2.addWeighted(plain, gain, plain, 0.0, -low * gain, dtype=cv2.CV_8U))
+
+
+def find_edges(image: NDArray[Any], valid: NDArray[np.bool_] | None, thresholds: FloatingThresholds) -> Steps:
+    """Steps 1 to 3, H (4.1) to (4.4).
+
+    Parameters
+    ----------
+    image, valid, thresholds
+        As for :func:`detect_floating`.
+
+    Returns
+    -------
+    Steps
+
+    Raises
+    ------
+    WildlabError
+        Where the image is no grey image, or ``valid`` has another shape.
+    """
+    image = np.asarray(image)
+    if image.ndim != 2 or not image.size or image.dtype.kind not in "uif":
+        raise WildlabError(
+            f"an image of the shape {image.shape} and type {image.dtype}",
+            "give a grey image: rows by columns of grey levels, counts or kelvin",
+            field="image",
+        )
+    if valid is not None and valid.shape != image.shape:
+        raise WildlabError(
+            f"a mask of the shape {valid.shape} for an image of the shape {image.shape}",
+            "give one value for each pixel",
+            field="valid",
+        )
+    if image.dtype.kind == "f" and not (finite := np.isfinite(image)).all():
+        valid = finite if valid is None else valid & finite
+    grey = to_grey(image, valid, thresholds)
+    size, sd = thresholds.smoothing_size, thresholds.smoothing_sd
+    smoothed = np.asarray(cv2.GaussianBlur(grey, (size, size), sd, borderType=cv2.BORDER_REPLICATE))
+    along, across = _PREWITT
+    du = cv2.sepFilter2D(smoothed, cv2.CV_32F, along, across, borderType=cv2.BORDER_REPLICATE)
+    dv = cv2.sepFilter2D(smoothed, cv2.CV_32F, across, along, borderType=cv2.BORDER_REPLICATE)
+    gradient: NDArray[Any] = np.asarray(cv2.magnitude(du, dv))
+    if thresholds.gradient_gain != 1.0:
+        gradient = gradient * np.float32(thresholds.gradient_gain)
+    if valid is not None and not valid.all():
+        reach = size + 2  # what the two kernels see of a pixel that shows nothing
+        shows = cv2.erode(valid.astype(np.uint8), np.ones((reach, reach), np.uint8), borderValue=1)
+        gradient = gradient * np.asarray(shows)
+    if thresholds.clipping == "normalised" and (largest := float(gradient.max())) > 0:
+        gradient = gradient * np.float32(255.0 / largest)
+    # The gradient image has 8 bits: rounded, and whatever lies above 255 is at or above any threshold.
+    limit: Any = thresholds.gradient - 0.5
+    steep = cv2.compare(gradient, limit, cv2.CMP_GE)
+    return Steps(grey, smoothed, gradient, np.asarray(steep, np.uint8))
+
+
+def nested_in_boxes(boxes: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which boxes (N, 4), left, top, width, height, lie completely in a larger one, H 4.3.
+
+    Parameters
+    ----------
+    boxes
+        (N, 4) px.
+
+    Returns
+    -------
+    (N,) bool; of two alike both stay.
+
+    Examples
+    --------
+    >>> nested_in_boxes(np.array([[0, 0, 9, 9], [2, 2, 5, 5], [6, 6, 5, 5]])).tolist()
+    [False, True, False]
+    """
+    left, top, width, height = np.asarray(boxes, float).T
+    area = width * height
+    inside = np.zeros(len(left), bool)
+    for row in range(len(left)):
+        inside[row] = bool(
+            (
+                (left <= left[row])
+                & (top <= top[row])
+                & (left + width >= left[row] + width[row])
+                & (top + height >= top[row] + height[row])
+                & (area > area[row])
+            ).any()
+        )
+    return inside
+
+
+def _size_fits(area: int, thresholds: FloatingThresholds) -> bool:
+    largest = np.inf if thresholds.largest_area is None else thresholds.largest_area
+    return bool(thresholds.smallest_area <= area <= largest)
+
+
+def _filled(steps: Steps, thresholds: FloatingThresholds) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Steps 4 to 6: what belongs to objects, filled, and the steep pixels of these, (H, W) of 0 and 1."""
+    filled = np.zeros(steps.steep.shape, np.uint8)
+    edges = np.zeros_like(filled)
+    # Contours in place of labels: the components are the same, and an image has few steep pixels. The first
+    # level are outer contours, of components inside the holes of others too.
+    outlines, levels = cv2.findContours(steps.steep, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    blobs = []
+    for row, outline in enumerate(outlines):
+        left, top, width, height = cv2.boundingRect(outline)
+        if levels[0, row, 3] >= 0 or width * height < thresholds.smallest_area:
+            continue
+        here = slice(top, top + height), slice(left, left + width)
+        _, labels = cv2.connectedComponents(steps.steep[here], connectivity=8, ltype=cv2.CV_16U)
+        u, v = outline[0, 0]
+        blob = (labels == labels[v - top, u - left]).astype(np.uint8)
+        if thresholds.area_of == "filled" or _size_fits(int(blob.sum()), thresholds):
+            blobs.append((outline, (left, top, width, height), here, blob))
+    if thresholds.nested == "boxes" and blobs:
+        nested = nested_in_boxes(np.array([box for _, box, _, _ in blobs]))
+        blobs = [blob for blob, inside in zip(blobs, nested, strict=True) if not inside]
+    for outline, _, here, blob in blobs:
+        edges[here] |= blob
+        cv2.drawContours(filled, [outline], 0, 1, cv2.FILLED)
+    if thresholds.close_at_border and blobs:
+        _close_at_border(filled, edges, steps.smoothed, warm=thresholds.warm)
+    return filled, edges
+
+
+def _close_at_border(
+    filled: NDArray[np.uint8], edges: NDArray[np.uint8], smoothed: NDArray[Any], *, warm: bool
+) -> None:
+    """Fill, in place, what open contours cut off at the border of the image, where it is on the warm side.
+
+    The pixels of a contour lie on the slope between sea and object, so their mean is between the two: what
+    is brighter than the contour it touches is inside.
+    """
+    rows, columns = filled.shape
+    rim = np.ones_like(filled)
+    rim[AT_BORDER:-AT_BORDER, AT_BORDER:-AT_BORDER] = 0
+    if not (filled & rim).any():
+        return
+    count, regions, stats, _ = cv2.connectedComponentsWithStats(1 - filled, connectivity=4, ltype=cv2.CV_16U)
+    for number in range(1, count):
+        left, top, width, height, _ = stats[number]
+        if left > 0 and top > 0 and left + width < columns and top + height < rows:
+            continue
+        here = (
+            slice(max(top - 1, 0), min(top + height + 1, rows)),
+            slice(max(left - 1, 0), min(left + width + 1, columns)),
+        )
+        region = (regions[here] == number).astype(np.uint8)
+        contour = np.asarray(cv2.dilate(region, _AROUND), np.uint8) & edges[here]
+        if not contour.any():
+            continue
+        inside = cv2.mean(smoothed[here], region)[0] - cv2.mean(smoothed[here], contour)[0]
+        if (inside > 0) == warm and inside != 0:
+            filled[here] |= region
+
+
+def _described(
+    image: NDArray[Any],
+    steps: Steps,
+    edges: NDArray[np.uint8],
+    objects: list[_Region],
+    thresholds: FloatingThresholds,
+    errors: CentreErrors,
+) -> Detections:
+    """Features of the objects, in their order."""
+    n = len(objects)
+    uv, axes, covariance = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2, 2))
+    area, intensity, orientation, score = (np.empty(n) for _ in range(4))
+    hu = np.empty((n, 7))
+    for row, (box, here, mask, outline) in enumerate(objects):
+        shape = shape_of(mask, box[0], box[1])
+        uv[row], axes[row], hu[row] = shape.centre, shape.axes, shape.hu
+        area[row], orientation[row] = shape.area, shape.orientation
+        intensity[row] = cv2.mean(image[here], mask)[0]
+        score[row] = cv2.mean(steps.gradient[here], mask & edges[here])[0] / thresholds.gradient
+        covariance[row] = centre_covariance(
+            shape.area,
+            shape.covariance,
+            boundary_spread(outline, shape.centre),
+            cut_sides(np.array(box), image.shape),
+            thresholds.smoothing_sd,
+            errors,
+        )
+    box_table = np.array([found.box for found in objects], float).reshape(-1, 4)
+    return Detections(uv, covariance, area, intensity, box_table, axes, orientation, hu, score)
+
+
+def cut_sides(box: NDArray[Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which borders of an image of that shape (rows, columns) a box touches: left, top, right, bottom.
+
+    Parameters
+    ----------
+    box
+        (4,) left, top, width, height, px.
+    shape
+        Rows and columns of the image.
+
+    Returns
+    -------
+    (4,) bool.
+    """
+    left, top, width, height = box
+    return np.array(
+        [
+            left < AT_BORDER,
+            top < AT_BORDER,
+            left + width > shape[1] - AT_BORDER,
+            top + height > shape[0] - AT_BORDER,
+        ]
+    )
+
+
+def centre_covariance(
+    area: float,
+    region: Array,
+    boundary: Array,
+    cut: NDArray[np.bool_],
+    smoothing_sd: float,
+    errors: CentreErrors,
+) -> Array:
+    """Covariance (2, 2) of an object's centre, px^2: from its shape, the blur, and the border of the image.
+
+    Each piece of the contour, as long as the blur is wide, lies somewhere within the blur; parts that look
+    different move the centre by a share of the object's own spread; where the contour is broken only a line
+    of it was found; at the border of the image an unknown part is hidden beyond it.
+
+    Parameters
+    ----------
+    area
+        px^2.
+    region, boundary
+        (2, 2) each: `Shape.covariance`, and what `wildlab.detection.features.boundary_spread` gives.
+    cut
+        (4,) from :func:`cut_sides`.
+    smoothing_sd
+        Of the smoothing, px.
+    errors
+        CentreErrors.
+
+    Returns
+    -------
+    (2, 2).
+    """
+    blur = float(np.hypot(smoothing_sd, 1.0))
+    pieces = 2 * np.sqrt(np.pi) * blur  # over which a Gaussian blur makes the contour lie alike
+    contour = (errors.edge * blur) ** 2 * pieces / area**2 * boundary
+    ellipse = 4 * np.pi * np.sqrt(max(float(np.linalg.det(region)), 1e-12))
+    line = errors.broken * max(FILLED - area / ellipse, 0.0) * float(axes_of(region)[0][0])
+    even = (errors.floor**2 + line**2) * np.eye(2)
+    return np.asarray(contour + errors.shape**2 * region + even + hidden_part(region, cut, errors))
+
+
+def hidden_part(region: Array, cut: NDArray[np.bool_], errors: CentreErrors) -> Array:
+    """What the border of the image adds to the covariance of a centre (2, 2), px^2; zero for what is whole.
+
+    Parameters
+    ----------
+    region
+        (2, 2) covariance of the points of the visible part, px^2.
+    cut
+        (4,) from :func:`cut_sides`.
+    errors
+        CentreErrors.
+
+    Returns
+    -------
+    (2, 2).
+    """
+    if not cut.any():
+        return np.zeros((2, 2))
+    across = np.diag(np.array([cut[0] or cut[2], cut[1] or cut[3]], float))
+    # Along its own axes, and across the border: a ship of which a corner shows lies any way.
+    major = float(axes_of(region)[0][0])
+    return np.asarray(errors.cut**2 * (16 * region + 0.25 * major**2 * across))

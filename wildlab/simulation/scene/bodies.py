@@ -1,0 +1,261 @@
+"""What floats: bodies made of even-sided layers above the sea, with temperatures; vessels, people, animals.
+
+A body has its own axes, x ahead and y to the right, about its centre on the water. A layer is a convex
+outline at a height; the sides below it are not drawn, so tall bodies have several. Each layer is
+warmer than the sea by ``excess`` K, with a texture and hot places; cold ones have it negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.simulation.clipped_outlines import moments
+
+
+@dataclass(frozen=True)
+class Hot:
+    """A hot place, a Gaussian over the layer: where (m in the body's axes), how wide (m), by how much (K)."""
+
+    ahead: float
+    right: float
+    width: float
+    excess: float
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One level of a body.
+
+    Attributes
+    ----------
+    outline
+        Corners (x ahead, y right), m, convex, in order.
+    height
+        Above the sea, m.
+    excess
+        Warmer than the sea by that, K.
+    texture_sd, texture_length
+        Of what is uneven on it, K, and over how many metres.
+    hot
+        Hot places.
+    """
+
+    outline: tuple[tuple[float, float], ...]
+    height: float
+    excess: float
+    texture_sd: float = 0.0
+    texture_length: float = 1.0
+    hot: tuple[Hot, ...] = ()
+
+
+@dataclass(frozen=True)
+class Wake:
+    """What a moving vessel leaves behind: a band that widens and fades, warmer or colder than the sea (K)."""
+
+    length: float
+    width: float
+    excess: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """Something that floats.
+
+    Attributes
+    ----------
+    kind
+        What it is, as labels say it.
+    layers
+        From the water up.
+    north, east, course, speed
+        Where its centre is at time zero (m), where it points and how fast it goes (rad, m/s).
+    wake
+        None where there is none.
+    texture_seed
+        Of its unevenness.
+    """
+
+    kind: str
+    layers: tuple[Layer, ...]
+    north: float = 0.0
+    east: float = 0.0
+    course: float = 0.0
+    speed: float = 0.0
+    wake: Wake | None = None
+    texture_seed: int = 0
+
+    def __post_init__(self) -> None:
+        for layer in self.layers:
+            corners = np.array(layer.outline, float)
+            if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
+                raise WildlabError(
+                    f"an outline of {len(layer.outline)} corners",
+                    "give at least three (x, y)",
+                    field="outline",
+                )
+            edge = np.roll(corners, -1, axis=0) - corners
+            following = np.roll(edge, -1, axis=0)
+            turns = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+            if not ((turns >= -1e-9).all() or (turns <= 1e-9).all()):
+                raise WildlabError(
+                    "an outline turns inward somewhere",
+                    "give convex outlines, or more layers",
+                    field="outline",
+                )
+
+    def at(self, north: float, east: float, course: float = 0.0, speed: float = 0.0) -> Body:
+        """The same body elsewhere, m, rad and m/s."""
+        return replace(self, north=north, east=east, course=course, speed=speed)
+
+    def centre(self, time: float) -> Array:
+        """Its centre on the water at a time, (3,) m in n."""
+        along = self.speed * time
+        return np.array(
+            [self.north + along * np.cos(self.course), self.east + along * np.sin(self.course), 0.0]
+        )
+
+    def top(self, time: float) -> Array:
+        """The same at the height of its uppermost layer."""
+        return self.centre(time) - [0.0, 0.0, max(layer.height for layer in self.layers)]
+
+    def corners(self, layer: Layer, time: float) -> Array:
+        """Corners of one of its layers at a time, (K, 3) m in n."""
+        cos, sin = np.cos(self.course), np.sin(self.course)
+        x, y = np.array(layer.outline, float).T
+        north, east, _ = self.centre(time)
+        return np.stack(
+            [north + cos * x - sin * y, east + sin * x + cos * y, np.full(len(x), -layer.height)], axis=1
+        )
+
+
+def rectangle(length: float, beam: float, excess: float, height: float = 0.0) -> Body:
+    """An even rectangle on the water: what it looks like is known in closed form.
+
+    Parameters
+    ----------
+    length, beam
+        m.
+    excess
+        Over the sea, K.
+    height
+        Above the water, m.
+
+    Returns
+    -------
+    Body
+        About the origin, its length to the north.
+    """
+    x, y = length / 2, beam / 2
+    outline = ((x, -y), (x, y), (-x, y), (-x, -y))
+    return Body("rectangle", (Layer(outline, height, excess),))
+
+
+def hull(length: float, beam: float, bow: float = 0.25) -> tuple[tuple[float, float], ...]:
+    """Outline of a hull about the centre of its area: straight sides, a blunt stern, a bow of that share."""
+    x, y, shoulder = length / 2, beam / 2, length * (0.5 - bow)
+    corners = np.array(
+        [
+            (x, 0.0),
+            (x - 0.35 * bow * length, 0.62 * y),
+            (shoulder, y),
+            (-x, 0.9 * y),
+            (-x, -0.9 * y),
+            (shoulder, -y),
+            (x - 0.35 * bow * length, -0.62 * y),
+        ]
+    )
+    ahead = moments(corners)[1][0]
+    return tuple((float(a - ahead), float(b)) for a, b in corners)
+
+
+def _disc(radius: float, corners: int = 12, stretch: float = 1.0) -> tuple[tuple[float, float], ...]:
+    angles = 2 * np.pi * np.arange(corners) / corners
+    return tuple((float(stretch * radius * np.cos(a)), float(radius * np.sin(a))) for a in angles)
+
+
+def vessel(
+    length: float,
+    beam: float,
+    excess: float = 6.0,
+    *,
+    speed: float = 0.0,
+    engine: float = 15.0,
+    seed: int = 0,
+) -> Body:
+    """A vessel: hull, deck with texture, a house behind the middle, a warm engine, and a wake if it moves.
+
+    Parameters
+    ----------
+    length, beam
+        m.
+    excess
+        Its deck above the sea's temperature, K.
+    speed
+        m/s; the wake follows from it.
+    engine
+        What the engine's place on deck has more, K.
+    seed
+        Of its texture.
+
+    Returns
+    -------
+    Body
+        At the origin, pointing north.
+    """
+    freeboard = max(0.06 * length, 0.4)
+    outline = hull(length, beam)
+    house = rectangle(0.22 * length, 0.75 * beam, 1.0).layers[0].outline
+    back = tuple((x - 0.2 * length, y) for x, y in house)
+    texture = 0.3 * abs(excess)
+    width = max(0.12 * length, 0.5)
+    levels = tuple(
+        Layer(outline, height, 0.7 * excess, texture, 0.2 * length)
+        for height in np.linspace(0.0, 0.6 * freeboard, 2)
+    )
+    deck = Layer(
+        outline, freeboard, excess, texture, 0.12 * length, (Hot(-0.3 * length, 0.0, width, engine),)
+    )
+    top = Layer(back, 1.8 * freeboard, 1.2 * excess, texture, 0.1 * length)
+    wake = None if speed == 0 else Wake(min(12.0 * speed, 8 * length), 1.1 * beam, 0.25 * np.sqrt(speed))
+    return Body("vessel", (*levels, deck, top), speed=speed, wake=wake, texture_seed=seed)
+
+
+def boat(seed: int = 0) -> Body:
+    """An open boat of five metres with an outboard engine."""
+    outline = hull(5.0, 2.0)
+    return Body(
+        "boat",
+        (
+            Layer(outline, 0.0, 4.0, 0.6, 1.0),
+            Layer(outline, 0.5, 6.0, 1.0, 0.8, (Hot(-2.2, 0.0, 0.4, 20.0),)),
+        ),
+        texture_seed=seed,
+    )
+
+
+def person(seed: int = 0) -> Body:
+    """Somebody in the water: head and shoulders above it."""
+    shoulders = _disc(0.25, stretch=0.7)
+    return Body("person", (Layer(shoulders, 0.05, 6.0), Layer(_disc(0.12), 0.3, 12.0)), texture_seed=seed)
+
+
+def buoy(seed: int = 0) -> Body:
+    """A buoy of a metre and a half, warmed by the sun."""
+    return Body(
+        "buoy",
+        (Layer(_disc(0.75), 0.0, 5.0, 0.3, 0.5), Layer(_disc(0.6), 0.8, 7.0, 0.3, 0.5)),
+        texture_seed=seed,
+    )
+
+
+def mammal(seed: int = 0) -> Body:
+    """The wet back of a whale at the surface: large, and hardly warmer than the sea."""
+    return Body("mammal", (Layer(_disc(0.9, stretch=3.2), 0.15, 1.6, 0.3, 0.8),), texture_seed=seed)
+
+
+#: Small things by name.
+KINDS = {"person": person, "buoy": buoy, "boat": boat, "mammal": mammal}

@@ -1,0 +1,138 @@
+"""A twin's flight as scenes: rendered from its own true poses, over its own targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.simulation.as_flown import as_flown
+from wildlab.simulation.camera_detections import exposure_times
+from wildlab.simulation.camera_sway import camera_motion
+from wildlab.simulation.camera_view import Exposures
+from wildlab.simulation.clipped_outlines import visible_part
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import TwinParameters
+from wildlab.simulation.scene.bodies import Body, vessel
+from wildlab.simulation.scene.render import Scene, View, outline_of, render
+from wildlab.simulation.scene.sea import Sea
+from wildlab.simulation.target_motion import target_path
+from wildlab.simulation.twin_trajectory import twin_trajectory
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a twin does not say of its vessels: how they look. All chosen.
+
+    Attributes
+    ----------
+    lengths, slender
+        Of targets without an outline, m, in their order, and how many times their beam that is.
+    excess, engine
+        Of decks and engines over the sea, K.
+    glint_share
+        Of the flights, how many have the sun out.
+    """
+
+    lengths: tuple[float, ...] = (11.0, 7.0)
+    slender: float = 3.0
+    excess: float = 8.0
+    engine: float = 15.0
+    glint_share: float = 0.5
+
+
+class SceneFlight:
+    """A flight of a twin whose images can be rendered, one exposure at a time.
+
+    Attributes
+    ----------
+    times
+        (N,) s, of all exposures.
+    poses
+        The camera's true poses at these.
+    """
+
+    def __init__(self, twin: TwinParameters, seed: int, look: Look | None = None) -> None:
+        flown, look = as_flown(twin, seed), look or Look()
+        trajectory = twin_trajectory(twin, stream(seed, "trajectory"))
+        exposures = Exposures(flown, camera_motion(twin, trajectory, exposure_times(twin), seed))
+        self.times: Array = exposures.times
+        self.poses: CameraPoses = exposures.poses
+        self._paths = [target_path(target, seed) for target in twin.targets]
+        rng = stream(seed, "scene")
+        self._vessels: list[Body] = []
+        self._courses: list[float] = []
+        for number, target in enumerate(twin.targets):
+            length = look.lengths[number % len(look.lengths)]
+            beam = length / look.slender
+            if target.outline is not None:
+                length, beam = target.outline.length.si, target.outline.beam.si
+            speed = 0.0 if target.motion is None else target.motion.speed.si
+            self._vessels.append(
+                vessel(
+                    length, beam, look.excess, speed=speed, engine=look.engine, seed=int(rng.integers(2**31))
+                )
+            )
+            self._courses.append(0.0 if target.motion is None else target.motion.course.si)
+        sun = float(np.radians(rng.uniform(10, 50))) if rng.random() < look.glint_share else None
+        self.sea = Sea(
+            wind_speed=twin.flight.wind_speed.si,
+            wind_from=twin.flight.wind_from.si,
+            sun_azimuth=float(rng.uniform(-np.pi, np.pi)),
+            sun_elevation=sun,
+            seed=int(rng.integers(2**31)),
+        )
+
+    def bodies(self, exposure: int) -> tuple[Body, ...]:
+        """The vessels where they are at an exposure, in the order of the twin's targets."""
+        time = self.times[exposure : exposure + 1]
+        places = [path(time)[0] for path in self._paths]
+        return tuple(
+            body.at(float(place[0]), float(place[1]), course)
+            for body, place, course in zip(self._vessels, places, self._courses, strict=True)
+        )
+
+    def near(self) -> NDArray[np.bool_]:
+        """(N, targets): at which exposures a target's middle is within its own length of the image.
+
+        Quick, to choose which exposures to render; what an image shows is in `View.seen`.
+        """
+        camera, found = self.poses.camera, []
+        size = np.array([camera.width, camera.height], float)
+        for body, path in zip(self._vessels, self._paths, strict=True):
+            points = path(self.times)
+            uv = ground_to_pixel(camera, points, self.poses.p_nc, self.poses.R_nc)
+            depth = np.linalg.norm(points - self.poses.p_nc, axis=1)
+            length = max(x for layer in body.layers for x, _ in layer.outline) * 2
+            reach = (length / depth * camera.fx)[:, None]
+            with np.errstate(invalid="ignore"):
+                found.append(((uv > -reach) & (uv < size + reach)).all(axis=1))
+        return np.stack(found, axis=1)
+
+    def shares(self, exposure: int) -> Array:
+        """(targets,): which share of each target's outline lies within the image, without rendering it."""
+        pose, camera = self.poses.take(exposure), self.poses.camera
+        found = []
+        for body in self.bodies(exposure):
+            outline = outline_of(body, camera, pose.p_nc, pose.R_nc)
+            if outline is None:
+                found.append(0.0)
+                continue
+            whole = visible_part(outline - outline.min(axis=0), np.inf, np.inf).area
+            found.append(visible_part(outline + 0.5, camera.width, camera.height).area / whole)
+        return np.array(found)
+
+    def view(self, exposure: int, *, waves_move: bool = True) -> View:
+        """The image of an exposure in kelvin, with its labels.
+
+        Waves that stand still are quicker, and as good for single images: each shows another place.
+        """
+        pose, time = self.poses.take(exposure), float(self.times[exposure])
+        # The vessels are where they are already: their own motion from time zero on must not be added.
+        bodies = tuple(replace(body, speed=0.0) for body in self.bodies(exposure))
+        scene = Scene(self.sea, bodies)
+        return render(scene, self.poses.camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)

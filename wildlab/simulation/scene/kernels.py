@@ -1,0 +1,235 @@
+"""What each pixel sees, compiled: the sea, the sky, and the layers of bodies.
+
+The tests hold it against closed forms: projected outlines, areas, layers, horizon, mirrored sun. All of it
+stands in one file, for the compiler's cache looks at one file only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wildlab.geometry.compilation import compiled
+
+#: Any array: the types are the compiler's business.
+Array = Any
+
+#: Reflectance of water straight down, in the long-wave infrared.
+STRAIGHT = 0.01
+#: Samples along each side of a pixel that an outline crosses.
+FINE = 5
+
+
+@compiled
+def sky(up: float, air: float, zenith: float) -> float:
+    """Temperature of a clear sky by the sine of the elevation, K: as the air at the horizon, colder above."""
+    return float(zenith + (air - zenith) * np.exp(-4.0 * max(up, 0.0)))
+
+
+@compiled
+def sampled(tile: Array, per_metre: float, north: float, east: float) -> float:
+    """Bilinear value of a tile that repeats; its side is a power of two."""
+    a, b = north * per_metre, east * per_metre
+    fa, fb = np.floor(a), np.floor(b)
+    wa, wb = a - fa, b - fb
+    last = tile.shape[0] - 1
+    i, j = int(fa) & last, int(fb) & last
+    k, m = (i + 1) & last, (j + 1) & last
+    low = tile[i, j] + wb * (tile[i, m] - tile[i, j])
+    high = tile[k, j] + wb * (tile[k, m] - tile[k, j])
+    return float(low + wa * (high - low))
+
+
+@compiled
+def slopes(tile: Array, per_metre: float, north: float, east: float) -> tuple[float, float]:
+    """Bilinear slopes of a tile (n, n, 2) that repeats; its side is a power of two."""
+    a, b = north * per_metre, east * per_metre
+    fa, fb = np.floor(a), np.floor(b)
+    wa, wb = a - fa, b - fb
+    last = tile.shape[0] - 1
+    i, j = int(fa) & last, int(fb) & last
+    k, m = (i + 1) & last, (j + 1) & last
+    w00, w01, w10, w11 = (1 - wa) * (1 - wb), (1 - wa) * wb, wa * (1 - wb), wa * wb
+    return (
+        w00 * tile[i, j, 0] + w01 * tile[i, m, 0] + w10 * tile[k, j, 0] + w11 * tile[k, m, 0],
+        w00 * tile[i, j, 1] + w01 * tile[i, m, 1] + w10 * tile[k, j, 1] + w11 * tile[k, m, 1],
+    )
+
+
+@compiled
+def render_sea(
+    rays: Array, p: Array, R: Array, focal: float, waves: Array, ripples: Array, patches: Array,
+    scales: Array, weather: Array, sun: Array, out: Array, horizon: Array,
+) -> None:  # fmt: skip
+    """Fills ``out`` (H, W) with apparent temperatures and ``horizon`` (H, W) with whether it is the sea.
+
+    ``rays`` (H, W, 2) normalised coordinates; ``scales`` (3,) cells per metre of the tiles of waves, ripples
+    and patches; ``weather`` (4,) temperatures of sea, air, zenith, and glint; ``sun`` (4,) a unit vector
+    towards it in n and the width of the glint, zero for none.
+    """
+    rows, columns = out.shape
+    water, air, zenith, glint = weather
+    R00, R01, R02 = R[0, 0], R[0, 1], R[0, 2]
+    R10, R11, R12 = R[1, 0], R[1, 1], R[1, 2]
+    R20, R21, R22 = R[2, 0], R[2, 1], R[2, 2]
+    near = 18 * sun[3] ** 2
+    for i in range(rows):
+        for j in range(columns):
+            x, y = rays[i, j, 0], rays[i, j, 1]
+            dn, de, dd = R00 * x + R01 * y + R02, R10 * x + R11 * y + R12, R20 * x + R21 * y + R22
+            size = 1 / np.sqrt(dn * dn + de * de + dd * dd)
+            dn, de, dd = dn * size, de * size, dd * size
+            if dd <= 1e-4:
+                out[i, j] = sky(-dd, air, zenith)
+                horizon[i, j] = False
+                continue
+            horizon[i, j] = True
+            distance = -p[2] / dd
+            north, east = p[0] + distance * dn, p[1] + distance * de
+            wide = distance / (focal * dd)  # how long a pixel is on the water
+            # A pixel averages over what is smaller than itself.
+            large, small = wide * scales[0] / 4, wide * scales[1] / 4
+            sn, se = slopes(waves, scales[0], north, east)
+            rn, re = slopes(ripples, scales[1], north, east)
+            large, small = 1 / (1 + large * large), 1 / (1 + small * small)
+            sn, se = large * sn + small * rn, large * se + small * re
+            norm = 1 / np.sqrt(1 + sn * sn + se * se)
+            nn, ne, nd = -sn * norm, -se * norm, -norm
+            cos = max(-(dn * nn + de * ne + dd * nd), 0.02)
+            miss = 1 - cos
+            square = miss * miss
+            reflectance = STRAIGHT + (1 - STRAIGHT) * square * square * miss
+            un, ue, ud = dn + 2 * cos * nn, de + 2 * cos * ne, dd + 2 * cos * nd
+            value = water + sampled(patches, scales[2], north, east)
+            value += reflectance * (sky(-ud, air, zenith) - value)
+            if near > 0:
+                off = 2 * (1 - (un * sun[0] + ue * sun[1] + ud * sun[2]))  # squared angle, where it is small
+                if off < near:
+                    bright = min(reflectance / STRAIGHT, 20.0)
+                    value += glint * bright * np.exp(-off / (2 * sun[3] * sun[3]))
+            out[i, j] = value
+
+
+@compiled
+def outside(edges: Array, first: int, last: int, x: float, y: float) -> float:
+    """How far a point is outside of a convex outline, m; negative inside."""
+    far = -1e30
+    for k in range(first, last):
+        d = edges[k, 0] * x + edges[k, 1] * y - edges[k, 2]
+        if d > far:
+            far = d
+    return far
+
+
+@compiled
+def layer_at(
+    rx: float, ry: float, p: Array, R: Array, frame: Array, edges: Array, spans: Array, heights: Array,
+    found: Array,
+) -> int:  # fmt: skip
+    """Uppermost layer that a ray meets, or -1; ``found`` gets its place on it and the distance from its edge.
+
+    Seen from above, what meets the higher layer first hides the lower one. ``frame`` (4,) north and east of
+    the body, cosine and sine of its course.
+    """
+    dn = R[0, 0] * rx + R[0, 1] * ry + R[0, 2]
+    de = R[1, 0] * rx + R[1, 1] * ry + R[1, 2]
+    dd = R[2, 0] * rx + R[2, 1] * ry + R[2, 2]
+    nearest = 1e30
+    hit = -1
+    for layer in range(len(heights) - 1, -1, -1):
+        if dd <= 1e-6:
+            continue
+        t = (-heights[layer] - p[2]) / dd
+        if t <= 0:
+            continue
+        n, e = p[0] + t * dn - frame[0], p[1] + t * de - frame[1]
+        x, y = frame[2] * n + frame[3] * e, -frame[3] * n + frame[2] * e
+        far = outside(edges, spans[layer, 0], spans[layer, 1], x, y)
+        if abs(far) < nearest:
+            nearest = abs(far)
+        if far <= 0:
+            hit = layer
+            found[0], found[1] = x, y
+            break
+    found[2] = nearest
+    return hit
+
+
+@compiled
+def warmth(layer: int, x: float, y: float, values: Array, hot: Array, texture: Array, origin: float) -> float:
+    """Excess of a place on a layer, K: even part, texture, and hot places.
+
+    ``values`` (K, 3) excess, texture's deviation and its cells per metre; ``hot`` (M, 5) layer, x, y, width,
+    excess.
+    """
+    value = values[layer, 0]
+    if values[layer, 1] > 0:
+        value += values[layer, 1] * sampled(texture, values[layer, 2], x + origin, y)
+    for k in range(len(hot)):
+        if int(hot[k, 0]) == layer:
+            a, b = x - hot[k, 1], y - hot[k, 2]
+            value += hot[k, 4] * np.exp(-(a * a + b * b) / (2 * hot[k, 3] ** 2))
+    return float(value)
+
+
+@compiled
+def render_body(
+    rays: Array, step: Array, p: Array, R: Array, box: Array, frame: Array, edges: Array, spans: Array,
+    heights: Array, values: Array, hot: Array, texture: Array, water: float, metres: float, number: int,
+    out: Array, labels: Array,
+) -> float:  # fmt: skip
+    """Draws a body over ``out`` (H, W) and ``labels`` (H, W); the number of pixels it covers, with parts.
+
+    Within ``box`` (4,) first and last row and column. ``step`` (2,) how far rays of neighbours are apart;
+    ``metres`` how large a pixel is on the body, at most. A pixel that no outline crosses takes one sample,
+    the others `FINE` by `FINE`.
+    """
+    found = np.empty(3)
+    covered = 0.0
+    for i in range(box[0], box[1]):
+        for j in range(box[2], box[3]):
+            hit = layer_at(rays[i, j, 0], rays[i, j, 1], p, R, frame, edges, spans, heights, found)
+            if hit >= 0:
+                labels[i, j] = number
+            if found[2] > metres:
+                if hit >= 0:
+                    covered += 1
+                    value = warmth(hit, found[0], found[1], values, hot, texture, 1000.0)
+                    out[i, j] = water + value
+                continue
+            total, hits = 0.0, 0
+            for a in range(FINE):
+                for b in range(FINE):
+                    rx = rays[i, j, 0] + ((b + 0.5) / FINE - 0.5) * step[0]
+                    ry = rays[i, j, 1] + ((a + 0.5) / FINE - 0.5) * step[1]
+                    one = layer_at(rx, ry, p, R, frame, edges, spans, heights, found)
+                    if one >= 0:
+                        hits += 1
+                        total += water + warmth(one, found[0], found[1], values, hot, texture, 1000.0)
+            part = hits / (FINE * FINE)
+            covered += part
+            if hits:
+                out[i, j] = (1 - part) * out[i, j] + part * total / hits
+    return covered
+
+
+@compiled
+def render_wake(rays: Array, p: Array, R: Array, box: Array, frame: Array, wake: Array, out: Array) -> None:
+    """Adds a wake to ``out``: ``wake`` (4,) where it begins (m ahead of the centre), length, width, K."""
+    for i in range(box[0], box[1]):
+        for j in range(box[2], box[3]):
+            x, y = rays[i, j, 0], rays[i, j, 1]
+            dd = R[2, 0] * x + R[2, 1] * y + R[2, 2]
+            if dd <= 1e-6:
+                continue
+            t = -p[2] / dd
+            n = p[0] + t * (R[0, 0] * x + R[0, 1] * y + R[0, 2]) - frame[0]
+            e = p[1] + t * (R[1, 0] * x + R[1, 1] * y + R[1, 2]) - frame[1]
+            ahead, right = frame[2] * n + frame[3] * e, -frame[3] * n + frame[2] * e
+            behind = wake[0] - ahead
+            if behind < 0 or behind > wake[1]:
+                continue
+            width = wake[2] * (0.4 + 0.8 * behind / wake[1])
+            fade = 1 - behind / wake[1]
+            out[i, j] += wake[3] * fade * np.exp(-((right / width) ** 2))

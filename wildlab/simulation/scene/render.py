@@ -1,0 +1,342 @@
+"""A scene as a camera at a pose sees it, in kelvin, with exact labels: before lens blur, noise and 14 bits.
+
+Pixels are squares about their centres, the upper left one's at (0, 0), as in OpenCV and in
+`wildlab.detection`; projection is that of `wildlab.geometry`, both ways.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, normalise
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.simulation.clipped_outlines import visible_part
+from wildlab.simulation.scene import kernels
+from wildlab.simulation.scene.bodies import Body
+from wildlab.simulation.scene.sea import PATCHES, RIPPLES, WAVES, Sea, tiles_at
+
+#: Pixels around a body's projected outlines that are looked at too.
+_MARGIN = 3
+_TEXTURE = 128
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A sea and what floats on it."""
+
+    sea: Sea
+    bodies: tuple[Body, ...] = ()
+
+
+class Seen(NamedTuple):
+    """What an image shows of a body.
+
+    Attributes
+    ----------
+    number
+        Its label: the place in `Scene.bodies`, from 1.
+    kind
+        Its `Body.kind`.
+    uv
+        (2,) where its centre on the water is, px; maybe outside of the image.
+    centre
+        (2,) centre of its whole outline, px; maybe outside too.
+    middle
+        (2,) centre of the visible part of its outline, px.
+    outline
+        (K, 2) convex hull of the projected corners of all layers, px.
+    area
+        Visible part of that, px^2: exact, by cutting the polygon.
+    share
+        Visible share of the whole outline.
+    covered
+        Pixels of the image that it covers, in parts.
+    """
+
+    number: int
+    kind: str
+    uv: Array
+    centre: Array
+    middle: Array
+    outline: Array
+    area: float
+    share: float
+    covered: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether the entire contour is in view."""
+        return self.share > 1 - 1e-9
+
+
+class View(NamedTuple):
+    """A rendered image.
+
+    Attributes
+    ----------
+    kelvin
+        (H, W) apparent temperatures.
+    labels
+        (H, W): number of the body at the pixel's centre, 0 for none.
+    water
+        (H, W): whether a pixel looks down at the sea; else it is sky.
+    seen
+        What there is to see of each body whose outline reaches into the image.
+    """
+
+    kelvin: NDArray[np.float32]
+    labels: NDArray[np.int16]
+    water: NDArray[np.bool_]
+    seen: tuple[Seen, ...]
+
+
+def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time: float = 0.0) -> View:
+    """A scene as a camera sees it.
+
+    Parameters
+    ----------
+    scene
+        Sea and bodies.
+    camera
+        Intrinsic parameters.
+    p_nc, R_nc
+        Pose of the camera, (3,) m and (3, 3); the sea is at zero down.
+    time
+        s, for waves and moving bodies.
+
+    Returns
+    -------
+    View
+
+    Raises
+    ------
+    WildlabError
+        Where the camera is not above the sea.
+
+    Examples
+    --------
+    >>> from wildlab.geometry import Camera
+    >>> from wildlab.geometry.mount import R_MC_DOWN
+    >>> from wildlab.simulation.scene.bodies import rectangle
+    >>> from wildlab.simulation.scene.sea import EVEN
+    >>> camera = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)
+    >>> view = render(Scene(EVEN, (rectangle(10.0, 4.0, 8.0),)), camera, [0.0, 0.0, -50.0], R_MC_DOWN)
+    >>> round(view.seen[0].area, 3), view.seen[0].uv.tolist()
+    (160.0, [31.5, 23.5])
+    """
+    p, R = np.asarray(p_nc, float), np.asarray(R_nc, float)
+    if not p[2] < 0:
+        raise WildlabError(
+            f"a camera {-p[2]:g} m above the sea",
+            "give a position with a negative down coordinate",
+            field="p_nc",
+        )
+    rays = pixel_coordinates(camera)
+    kelvin = np.empty((camera.height, camera.width), np.float32)
+    water = np.empty(kelvin.shape, bool)
+    sea = scene.sea
+    weather = np.array([sea.temperature, sea.air, sea.zenith, sea.glint])
+    scales = np.array([cells / side for side, cells in (WAVES, RIPPLES, PATCHES)])
+    focal = float(np.sqrt(camera.fx * camera.fy))
+    kernels.render_sea(
+        rays, p, R, focal, *tiles_at(sea, float(time)), scales, weather, _sun(sea), kelvin, water
+    )
+    labels = np.zeros(kelvin.shape, np.int16)
+    seen = []
+    # Those whose tops are further away first, so that nearer ones hide them.
+    order = sorted(
+        range(len(scene.bodies)), key=lambda k: -float(np.linalg.norm(scene.bodies[k].top(time) - p))
+    )
+    for k in order:
+        body = scene.bodies[k]
+        found = outline_of(body, camera, p, R, time)
+        if found is None:
+            continue
+        _draw_wake(body, camera, rays, p, R, time, kelvin)
+        covered = _draw(body, camera, rays, p, R, time, found, k + 1, sea, kelvin, labels)
+        size = visible_part(found + 0.5, camera.width, camera.height)  # a pixel reaches half a pixel around
+        if not size.area > 0:
+            continue
+        whole = visible_part(found - found.min(axis=0), np.inf, np.inf)
+        uv = ground_to_pixel(camera, body.centre(time)[None], p, R)[0]
+        seen.append(
+            Seen(
+                k + 1, body.kind, uv, whole.centre + found.min(axis=0), size.centre - 0.5, found, size.area,
+                min(size.area / whole.area, 1.0), covered,
+            )
+        )  # fmt: skip
+    return View(kelvin, labels, water, tuple(seen))
+
+
+def outline_of(body: Body, camera: Camera, p: Array, R: Array, time: float = 0.0) -> Array | None:
+    """Convex hull (K, 2) px of a body's projected corners, exact; None where one is behind the camera.
+
+    Parameters
+    ----------
+    body
+        With one layer or more.
+    camera
+        Intrinsic parameters.
+    p, R
+        Pose of the camera, (3,) m and (3, 3).
+    time
+        s.
+
+    Returns
+    -------
+    (K, 2) px in order, or None.
+    """
+    corners = np.concatenate([body.corners(layer, time) for layer in body.layers])
+    pixels = ground_to_pixel(camera, corners, p, R)
+    return _hull(pixels) if np.isfinite(pixels).all() else None
+
+
+@lru_cache(maxsize=4)
+def pixel_coordinates(camera: Camera) -> NDArray[np.float64]:
+    """Normalised coordinates (H, W, 2) of all pixels' centres."""
+    v, u = np.mgrid[: camera.height, : camera.width].astype(float)
+    return np.ascontiguousarray(normalise(camera, np.stack([u, v], axis=-1)))
+
+
+def _hull(points: Array) -> Array:
+    """Convex hull of points (N, 2) in order, by Andrew's chains."""
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+
+    def chain(several: Array) -> list[Array]:
+        kept: list[Array] = []
+        for point in several:
+            while len(kept) > 1:
+                a, b = kept[-1] - kept[-2], point - kept[-2]
+                if a[0] * b[1] - a[1] * b[0] > 0:
+                    break
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(chain(ordered) + chain(ordered[::-1]))
+
+
+def _sun(sea: Sea) -> Array:
+    """Unit vector towards the sun in n, and the width of its glint; zeros without a sun."""
+    if sea.sun_elevation is None:
+        return np.zeros(4)
+    level = np.cos(sea.sun_elevation)
+    direction = [
+        level * np.cos(sea.sun_azimuth), level * np.sin(sea.sun_azimuth), -np.sin(sea.sun_elevation),
+    ]  # fmt: skip
+    return np.array([*direction, sea.glint_width])
+
+
+@lru_cache(maxsize=64)
+def _texture(seed: int) -> NDArray[np.float32]:
+    """An uneven surface of unit variance (n, n), a few cells coarse, that repeats."""
+    rng = np.random.default_rng([seed, 3])
+    k = np.fft.fftfreq(_TEXTURE) * _TEXTURE
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    field = np.fft.ifft2(
+        np.exp(-size2 / (2 * 9.0**2)) * np.fft.fft2(rng.standard_normal((_TEXTURE,) * 2))
+    ).real
+    return np.asarray(field / field.std(), np.float32)
+
+
+def _frame(body: Body, time: float) -> Array:
+    north, east, _ = body.centre(time)
+    return np.array([north, east, np.cos(body.course), np.sin(body.course)])
+
+
+def _box(pixels: Array, camera: Camera) -> NDArray[np.int64]:
+    """First and last rows and columns of the image about pixels (N, 2)."""
+    low = np.floor(pixels.min(axis=0)) - _MARGIN
+    high = np.ceil(pixels.max(axis=0)) + _MARGIN + 1
+    columns = np.clip([low[0], high[0]], 0, camera.width)
+    rows = np.clip([low[1], high[1]], 0, camera.height)
+    return np.array([*rows, *columns], np.int64)
+
+
+def _draw(
+    body: Body,
+    camera: Camera,
+    rays: Array,
+    p: Array,
+    R: Array,
+    time: float,
+    outline: Array,
+    number: int,
+    sea: Sea,
+    kelvin: NDArray[np.float32],
+    labels: NDArray[np.int16],
+) -> float:
+    box = _box(outline, camera)
+    if box[0] >= box[1] or box[2] >= box[3]:
+        return 0.0
+    edges: list[list[float]] = []
+    spans: list[list[int]] = []
+    hot: list[list[float]] = []
+    for layer_number, layer in enumerate(body.layers):
+        first = len(edges)
+        edges += _edges(np.array(layer.outline, float))
+        spans.append([first, len(edges)])
+        hot += [[layer_number, h.ahead, h.right, h.width, h.excess] for h in layer.hot]
+    values = np.array(
+        [[v.excess, v.texture_sd, _TEXTURE / (24.0 * v.texture_length)] for v in body.layers], float
+    )
+    # How long a pixel is on the water, at most within the box: at its top, where the camera looks flattest.
+    corners = rays[[box[0], box[0], box[1] - 1, box[1] - 1], [box[2], box[3] - 1, box[2], box[3] - 1]]
+    down = corners @ R[2, :2] + R[2, 2]
+    flat = max(float(down.min()), 0.02)
+    focal = min(camera.fx, camera.fy)
+    metres = 1.5 * -p[2] / (focal * flat**2)
+    step = np.array([1 / camera.fx, 1 / camera.fy])
+    return float(
+        kernels.render_body(
+            rays, step, p, R, box, _frame(body, time), np.array(edges), np.array(spans, np.int64),
+            np.array([layer.height for layer in body.layers], float), values,
+            np.array(hot, float).reshape(-1, 5), _texture(body.texture_seed), sea.temperature, metres, number,
+            kelvin, labels,
+        )
+    )  # fmt: skip
+
+
+def _edges(corners: Array) -> list[list[float]]:
+    """Half planes (normal x, normal y, offset) of a convex outline, normals outward."""
+    middle = corners.mean(axis=0)
+    found = []
+    for here, there in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = there - here
+        normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        if normal @ (here - middle) < 0:
+            normal = -normal
+        found.append([float(normal[0]), float(normal[1]), float(normal @ here)])
+    return found
+
+
+def _draw_wake(
+    body: Body,
+    camera: Camera,
+    rays: Array,
+    p: Array,
+    R: Array,
+    time: float,
+    kelvin: NDArray[np.float32],
+) -> None:
+    if body.wake is None:
+        return
+    stern = min(x for layer in body.layers for x, _ in layer.outline)
+    half = 2.0 * body.wake.width
+    cos, sin = np.cos(body.course), np.sin(body.course)
+    x = np.array([stern, stern, stern - body.wake.length, stern - body.wake.length])
+    y = np.array([-half, half, half, -half])
+    north, east, _ = body.centre(time)
+    corners = np.stack([north + cos * x - sin * y, east + sin * x + cos * y, np.zeros(4)], axis=1)
+    pixels = ground_to_pixel(camera, corners, p, R)
+    everything = np.array([0, camera.height, 0, camera.width], np.int64)
+    box = _box(pixels, camera) if np.isfinite(pixels).all() else everything
+    wake = np.array([stern, body.wake.length, body.wake.width, body.wake.excess])
+    kernels.render_wake(rays, p, R, box, _frame(body, time), wake, kelvin)

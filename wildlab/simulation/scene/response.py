@@ -1,0 +1,199 @@
+"""What a thermal camera makes of a scene: blur, vignetting, noise, dead pixels, 14 bits, shutter, 8 bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+
+#: Largest count of 14 bits.
+LARGEST = 2**14 - 1
+
+
+@dataclass(frozen=True)
+class CameraResponse:
+    """A thermal camera beyond its geometry. The sensitivity is H's (appendix A), the rest is chosen.
+
+    Attributes
+    ----------
+    blur_sd
+        Of lens and detector together, px.
+    noise
+        Temporal, per pixel, K: below 50 mK (H table A.1).
+    pattern, stripes
+        What stays from image to image, per pixel and per column, K.
+    vignetting
+        How much warmer the corners look, K: the housing seen past the lens.
+    dead_share
+        Of the pixels, that always show the same.
+    counts_per_kelvin, counts_at, counts_level
+        Linear: so many counts per kelvin, and which count stands for which temperature (K).
+    """
+
+    blur_sd: float = 0.6
+    noise: float = 0.05
+    pattern: float = 0.02
+    stripes: float = 0.015
+    vignetting: float = 0.4
+    dead_share: float = 1e-4
+    counts_per_kelvin: float = 25.0
+    counts_at: float = 273.15
+    counts_level: float = 7000.0
+
+
+#: One that changes nothing but the unit.
+IDEAL = CameraResponse(blur_sd=0.0, noise=0.0, pattern=0.0, stripes=0.0, vignetting=0.0, dead_share=0.0)
+
+
+class Sensor(NamedTuple):
+    """What one camera has and keeps: ``offset`` (H, W) K, and which pixels are ``dead``, at what count."""
+
+    offset: NDArray[np.float32]
+    dead: NDArray[np.bool_]
+    stuck: NDArray[np.uint16]
+
+
+def sensor_of(response: CameraResponse, shape: tuple[int, int], rng: np.random.Generator) -> Sensor:
+    """Draws a camera of that kind: its fixed pattern, and its dead pixels.
+
+    Parameters
+    ----------
+    response
+        Which kind.
+    shape
+        Rows and columns.
+    rng
+        Of that camera.
+
+    Returns
+    -------
+    Sensor
+    """
+    rows, columns = shape
+    v, u = np.mgrid[:rows, :columns].astype(float)
+    middle = np.array([(rows - 1) / 2, (columns - 1) / 2])
+    radius2 = ((v - middle[0]) ** 2 + (u - middle[1]) ** 2) / max((middle**2).sum(), 1.0)
+    offset = response.vignetting * radius2
+    offset = offset + response.pattern * rng.standard_normal(shape)
+    offset = offset + response.stripes * rng.standard_normal(columns)
+    dead = rng.random(shape) < response.dead_share
+    stuck = rng.choice(np.array([0, LARGEST], np.uint16), shape)
+    return Sensor(offset.astype(np.float32), dead, stuck)
+
+
+def expose(
+    kelvin: NDArray[np.floating], response: CameraResponse, sensor: Sensor, rng: np.random.Generator
+) -> NDArray[np.uint16]:
+    """An image in counts of 14 bits.
+
+    Parameters
+    ----------
+    kelvin
+        (H, W) apparent temperatures, as `wildlab.simulation.scene.render` gives them.
+    response, sensor
+        The camera.
+    rng
+        Of the image.
+
+    Returns
+    -------
+    (H, W) counts.
+
+    Raises
+    ------
+    WildlabError
+        Where the sensor has another number of pixels.
+    """
+    if sensor.offset.shape != kelvin.shape:
+        raise WildlabError(
+            f"a sensor of {sensor.offset.shape} pixels for an image of {kelvin.shape}",
+            "draw one of that size with sensor_of",
+            field="sensor",
+        )
+    seen: NDArray[Any] = np.asarray(kelvin, np.float32)
+    if response.blur_sd > 0:
+        seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), response.blur_sd, borderType=cv2.BORDER_REPLICATE))
+    seen = seen + sensor.offset
+    if response.noise > 0:
+        seen += np.float32(response.noise) * rng.standard_normal(seen.shape, np.float32)
+    counts = response.counts_level + (seen - np.float32(response.counts_at)) * response.counts_per_kelvin
+    counts = np.clip(np.rint(counts), 0, LARGEST).astype(np.uint16)
+    counts[sensor.dead] = sensor.stuck[sensor.dead]
+    return np.asarray(counts)
+
+
+def to_kelvin(counts: NDArray[np.integer], response: CameraResponse) -> NDArray[np.float32]:
+    """Kelvin of counts (H, W), by the gain and the level of ``response``."""
+    value = (counts.astype(np.float32) - response.counts_level) / response.counts_per_kelvin
+    return np.asarray(value + np.float32(response.counts_at), np.float32)
+
+
+def gain_control(counts: NDArray[np.integer], share: float = 0.01) -> NDArray[np.uint8]:
+    """256 grey levels of counts, from the ``share`` of the darkest to that of the brightest: simple AGC.
+
+    Parameters
+    ----------
+    counts
+        (H, W).
+    share
+        Of the pixels that may be black, and white.
+
+    Returns
+    -------
+    (H, W) uint8.
+    """
+    low, high = np.quantile(counts, [share, 1 - share])
+    return np.asarray(np.clip(np.rint((counts - low) * (255 / max(high - low, 1.0))), 0, 255), np.uint8)
+
+
+def in_shutter(times: ArrayLike, every: float, lasting: float, first: float = 0.0) -> NDArray[np.bool_]:
+    """Which exposures meet a closed shutter (flat-field correction), at which the image is even and the same.
+
+    Parameters
+    ----------
+    times
+        (N,) s.
+    every, lasting, first
+        A correction begins so often, takes so long, and begins then for the first time, s.
+
+    Returns
+    -------
+    (N,) bool.
+
+    Examples
+    --------
+    >>> in_shutter([0.0, 0.3, 1.0, 60.2], every=60.0, lasting=0.5).tolist()
+    [True, True, False, True]
+    """
+    since = np.asarray(times, float) - first
+    return np.asarray((since >= 0) & (np.mod(since, every) < lasting))
+
+
+def shutter_image(
+    shape: tuple[int, int], level: float, response: CameraResponse, rng: np.random.Generator
+) -> NDArray[np.uint16]:
+    """What a camera shows with its shutter closed: the shutter's temperature ``level`` (K), and noise.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns.
+    level
+        K.
+    response
+        The camera.
+    rng
+        Of the image.
+
+    Returns
+    -------
+    (H, W) counts.
+    """
+    even = np.full(shape, level, np.float32)
+    nothing = Sensor(np.zeros(shape, np.float32), np.zeros(shape, bool), np.zeros(shape, np.uint16))
+    return expose(even, response, nothing, rng)

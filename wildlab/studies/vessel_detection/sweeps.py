@@ -1,0 +1,179 @@
+"""How the rate goes with size, height and contrast, and with what H leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from wildlab.detection.floating import find_objects
+from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.mount import Mount
+from wildlab.simulation.scene.bodies import KINDS
+from wildlab.simulation.scene.drawn import Draw, Drawn, draw_scene
+from wildlab.simulation.scene.render import Scene, render
+from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+from wildlab.simulation.scene.sea import Sea
+from wildlab.studies.vessel_detection.trial import SHIP, WHOLE, Image, judge, numbers_of, tally
+
+#: Heights of the sweep over kinds, m, and for which of them the smallest area of 50 px is.
+HEIGHTS = (25.0, 50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
+REFERENCE = 100.0
+#: Lengths of vessels, m, and what their decks have over the sea, K.
+LENGTHS = (5.0, 10.0, 20.0, 40.0)
+EXCESSES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+#: Winds of the sweep over weather, m/s, and how far its camera is tilted from straight down, rad.
+WINDS = (2.0, 5.0, 8.0, 12.0, 16.0)
+TILT = float(np.radians(45.0))
+#: How much warmer the mirrored sun makes the water look, K: H says nothing of it.
+GLINTS = (0.0, 1.0, 4.0)
+#: How many seas the sweeps over single things share.
+SEAS = 6
+#: How long a side of a small image is at least, and over the length of what it shows, px.
+_SIDE, _AROUND = 96, 2.5
+_LARGEST = {"person": 0.5, "buoy": 1.6, "boat": 5.0, "mammal": 6.0}
+
+
+def small_camera(camera: Camera, length: float, height: float) -> Camera:
+    """A window of a camera's image, just large enough for something of that length (m) seen from there."""
+    side = int(max(_SIDE, _AROUND * length * camera.fx / height))
+    side = min(side, camera.height)
+    middle = (side - 1) / 2
+    return Camera(side, side, camera.fx, camera.fy, middle, middle)
+
+
+def found_share(
+    scenes: Sequence[tuple[Drawn, Camera]], thresholds: Sequence[FloatingThresholds], seed: int
+) -> list[float]:
+    """In which share of scenes what floats there is found, with each of several thresholds."""
+    response = replace(CameraResponse(), vignetting=0.0)
+    hits = np.zeros(len(thresholds))
+    for number, (drawn, camera) in enumerate(scenes):
+        rng = np.random.default_rng([seed, number])
+        view = render(drawn.scene, camera, drawn.poses.p_nc, drawn.poses.R_nc)
+        sensor = sensor_of(response, (camera.height, camera.width), rng)
+        counts = expose(view.kelvin, response, sensor, rng)
+        for k, one in enumerate(thresholds):
+            hits[k] += any(judge(view, find_objects(counts, thresholds=one)).found.values())
+    return [float(share) for share in hits / len(scenes)]
+
+
+def over_heights(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
+    """Small things from several heights.
+
+    Returns
+    -------
+    DataFrame
+        ``kind``, ``height_m``, ``found`` with the printed area, ``scaled`` with that scaled with the height
+        (H 4.4.1) from `REFERENCE` on.
+    """
+    rows = []
+    for kind in KINDS:
+        for height in HEIGHTS:
+            window = small_camera(camera, _LARGEST[kind], height)
+            draw = Draw(
+                height=(height, height), tilt=float(np.radians(10.0)), inside=0.4 * window.width, seas=SEAS
+            )
+            rng = np.random.default_rng([seed, int(height), len(kind)])
+            scenes = [(draw_scene(rng, window, draw, kind), window) for _ in range(draws)]
+            fixed = FloatingThresholds()
+            found, scaled = found_share(scenes, (fixed, fixed.at_height(height, REFERENCE)), seed)
+            rows.append({"kind": kind, "height_m": height, "found": found, "scaled": scaled})
+    return pd.DataFrame(rows)
+
+
+def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) -> pd.DataFrame:
+    """Vessels of several lengths and temperatures from one height, without a hot engine.
+
+    Returns
+    -------
+    DataFrame
+        ``length_m``, ``excess_k`` of the deck, ``found``.
+    """
+    rows = []
+    for length in LENGTHS:
+        window = small_camera(camera, length, height)
+        for excess in EXCESSES:
+            draw = Draw(
+                length=(length, length), excess=(excess, excess), engine=(0.0, 0.0), height=(height, height),
+                tilt=float(np.radians(10.0)), inside=0.4 * window.width, seas=SEAS,
+            )  # fmt: skip
+            rng = np.random.default_rng([seed, int(length), int(10 * excess)])
+            scenes = [(draw_scene(rng, window, draw), window) for _ in range(draws)]
+            (found,) = found_share(scenes, (FloatingThresholds(),), seed)
+            rows.append({"length_m": length, "excess_k": excess, "found": found})
+    return pd.DataFrame(rows)
+
+
+def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
+    """False alarms on an empty sea, by wind and glint, the camera tilted half way to the horizon.
+
+    Returns
+    -------
+    DataFrame
+        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per image.
+    """
+    response = CameraResponse()
+    sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
+    R_nb = euler_to_matrix(0.0, TILT, 0.0)
+    rows = []
+    for wind in WINDS:
+        for glint in GLINTS:
+            # Ahead, as far above the horizon as the camera looks below it: mirrored in the image's middle.
+            elevation = float(np.pi / 2 - TILT) if glint else None
+            sea = Sea(wind_speed=wind, sun_azimuth=0.0, sun_elevation=elevation, glint=glint, seed=seed)
+            alarms = 0
+            for number in range(draws):
+                rng = np.random.default_rng([seed, int(10 * wind), int(10 * glint), number])
+                at = np.array([*rng.uniform(-1000.0, 1000.0, 2), -REFERENCE])
+                poses = CameraPoses(camera, Mount("down"), at, R_nb)
+                view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
+                alarms += len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
+            rows.append({"wind": wind, "glint": glint, "false": alarms / draws})
+    return pd.DataFrame(rows)
+
+
+#: What H leaves open, another way each.
+READINGS: dict[str, FloatingThresholds] = {
+    "as chosen": FloatingThresholds(),
+    "8 bits stretched over each image": FloatingThresholds(scaling="stretched"),
+    "only the gradient in 8 bits, of counts": FloatingThresholds(scaling="counts"),
+    "gradient divided by its largest": FloatingThresholds(clipping="normalised"),
+    "8 bits over 2 K": FloatingThresholds(smallest_range_k=2.0),
+    "8 bits over 8 K": FloatingThresholds(smallest_range_k=8.0),
+    "Prewitt operator divided by three": FloatingThresholds(gradient_gain=1 / 3),
+    "hardly smoothed (3 px)": FloatingThresholds(smoothing_size=3, smoothing_sd=0.8),
+    "smoothed more (9 px)": FloatingThresholds(smoothing_size=9, smoothing_sd=2.0),
+    "area of the filled blob": FloatingThresholds(area_of="filled"),
+    "nested by contours, not by boxes": FloatingThresholds(nested="contours"),
+    "open contours not closed at the border": FloatingThresholds(close_at_border=False),
+}
+
+
+def over_readings(images: list[Image]) -> pd.DataFrame:
+    """The same images with each of `READINGS`.
+
+    Returns
+    -------
+    DataFrame
+        ``reading``; ``ship`` and ``boats`` found, ``false`` alarms per image, ``pieces`` per ship.
+    """
+    rows = []
+    for reading, thresholds in READINGS.items():
+        objects, frames = tally(images, thresholds)
+        numbers = numbers_of(objects, frames)
+        rows.append(
+            {
+                "reading": reading,
+                "ship": numbers[SHIP, "detection_rate"],
+                "boats": numbers[WHOLE, "detection_rate"],
+                "false": float(frames["false"].mean()),
+                "pieces": numbers[SHIP, "pieces"],
+            }
+        )
+    return pd.DataFrame(rows)

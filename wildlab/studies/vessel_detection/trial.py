@@ -1,0 +1,267 @@
+"""Images of two twins, rendered, and what the detector of H 4.3 finds in them.
+
+The ship is that of H 6.4.1, of which H 4.4.1 counts 441 images; the boats are the two of H 6.4.4, whose
+flight is taken for that of the 27866 images. Both are rendered here and there along the flight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.detection.floating import FloatingObjects, find_objects
+from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.simulation.scene.render import Seen, View
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
+
+#: The ship, in whatever part; the boats with their whole contour in view, and cut; images without any.
+SHIP, WHOLE, CUT, SEA = "ship", "boats-whole", "boats-cut", "sea"
+#: All images of the second flight together.
+BOATS = "boats"
+SUBJECTS = (SHIP, WHOLE, CUT, BOATS, SEA)
+#: Names of the numbers that are recorded, and their units.
+RECORDED = {
+    "detection_rate": "1",
+    "false_alarms_per_image": "1",
+    "pieces": "1",
+    "ellipse_coverage_90": "1",
+    "smallest_share_found": "1",
+    "images": "1",
+}
+#: Of the pixels of a detection, the share on an object from which on it is one of that object.
+OVERLAP = 0.25
+
+
+class Image(NamedTuple):
+    """One image of a flight: what it is of, what there is to see, and the camera's counts."""
+
+    subject: str
+    view: View
+    counts: NDArray[np.uint16]
+
+
+class Judged(NamedTuple):
+    """What detections of an image are worth.
+
+    Attributes
+    ----------
+    found
+        By the number of each body in view: the rows of its detections, the largest first.
+    merged
+        Numbers of bodies without their own that lie in the detection of another.
+    false
+        How many detections are of nothing.
+    """
+
+    found: dict[int, list[int]]
+    merged: set[int]
+    false: int
+
+
+def judge(view: View, objects: FloatingObjects) -> Judged:
+    """Which detection is of which body, by the pixels that they share."""
+    found: dict[int, list[int]] = {seen.number: [] for seen in view.seen}
+    inside: set[int] = set()
+    false = 0
+    for row in range(len(objects.detections)):
+        under = view.labels[objects.labels == row + 1]
+        count = np.bincount(under[under > 0], minlength=1)
+        best = int(count.argmax()) if len(count) else 0
+        if count.sum() >= OVERLAP * len(under) and best in found:
+            found[best].append(row)
+            inside |= {n for n in found if n < len(count) and 2 * count[n] > (view.labels == n).sum()}
+        else:
+            false += 1
+    return Judged(found, {n for n in inside if not found[n]}, false)
+
+
+def choose(flight: SceneFlight, images: int, rng: np.random.Generator) -> dict[str, list[int]]:
+    """Which exposures of a flight are looked at: with something whole, with something cut only, with nothing.
+
+    ``images`` of each kind, or as many as there are among six times as many draws.
+    """
+    near = np.flatnonzero(flight.near().any(axis=1))
+    kinds: dict[str, list[int]] = {"whole": [], "cut": [], "empty": []}
+    for exposure in rng.permutation(near)[: 6 * images]:
+        shares = flight.shares(int(exposure))
+        kind = "whole" if (shares > 1 - 1e-9).any() else "cut" if (shares > 0).any() else "empty"
+        # Where one boat is whole and the other cut, the image counts as neither.
+        if kind == "whole" and ((shares > 0) & (shares < 1 - 1e-9)).any():
+            continue
+        kinds[kind].append(int(exposure))
+    far = np.setdiff1d(np.arange(len(flight.times)), near)
+    kinds["empty"] = [int(one) for one in rng.permutation(far)[:images]]
+    return {kind: chosen[:images] for kind, chosen in kinds.items()}
+
+
+def images_of(twin: str, second: str, seed: int, images: int) -> Iterator[Image]:
+    """The images of one simulated flight over the ship and one over the boats.
+
+    Parameters
+    ----------
+    twin, second
+        Of the ship, and of the boats.
+    seed
+        Of both flights and of the camera.
+    images
+        Of each subject.
+    """
+    response = CameraResponse()
+    for name, subjects in (
+        (twin, {"whole": SHIP, "cut": SHIP}),
+        (second, {"whole": WHOLE, "cut": CUT, "empty": SEA}),
+    ):
+        flight = SceneFlight(load_twin(name), seed)
+        camera = flight.poses.camera
+        sensor: Sensor = sensor_of(response, (camera.height, camera.width), stream(seed, f"sensor of {name}"))
+        rng = stream(seed, f"images of {name}")
+        if name == twin:
+            # Of the ship every image that shows some of it is of the same kind, as in H 4.4.1.
+            near = np.flatnonzero(flight.near().any(axis=1))
+            seen = [
+                int(one) for one in rng.permutation(near)[: 3 * images] if flight.shares(int(one)).max() > 0
+            ]
+            chosen = {SHIP: seen[:images]}
+        else:
+            chosen = {subjects[kind]: numbers for kind, numbers in choose(flight, images, rng).items()}
+        for subject, exposures in chosen.items():
+            for exposure in sorted(exposures):
+                view = flight.view(exposure, waves_move=False)
+                yield Image(subject, view, expose(view.kelvin, response, sensor, rng))
+
+
+def tally(images: list[Image], thresholds: FloatingThresholds) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What the detector finds in images.
+
+    Parameters
+    ----------
+    images
+        As `images_of` gives them.
+    thresholds
+        Of the detector.
+
+    Returns
+    -------
+    (objects, frames)
+        One row for each body in view (``subject``, ``image``, ``kind``, ``share`` in view, ``area`` px^2,
+        ``found``, ``merged`` with another, ``pieces``, ``inside`` its 90 % ellipse, NaN where not found); one
+        for each image (``subject``, ``image``, ``false`` alarms, ``bodies``, ``missed``).
+    """
+    objects: list[dict[str, object]] = []
+    frames: list[dict[str, object]] = []
+    for number, (subject, view, counts) in enumerate(images):
+        result = find_objects(counts, thresholds=thresholds)
+        judged = judge(view, result)
+        missed = 0
+        for seen in view.seen:
+            rows = judged.found[seen.number]
+            missed += not rows
+            objects.append(
+                {
+                    "subject": subject, "image": number, "kind": seen.kind, "share": seen.share,
+                    "area": seen.area, "found": bool(rows), "merged": seen.number in judged.merged,
+                    "pieces": len(rows) if rows else np.nan,
+                    "inside": _inside(seen, result, rows),
+                }
+            )  # fmt: skip
+        frames.append(
+            {
+                "subject": subject, "image": number, "false": judged.false, "bodies": len(view.seen),
+                "missed": missed,
+            }
+        )  # fmt: skip
+    columns = ["subject", "image", "kind", "share", "area", "found", "merged", "pieces", "inside"]
+    return (
+        pd.DataFrame(objects, columns=columns),
+        pd.DataFrame(frames, columns=["subject", "image", "false", "bodies", "missed"]),
+    )
+
+
+def _inside(seen: Seen, result: FloatingObjects, rows: list[int]) -> float:
+    """Whether the ellipse of the largest piece holds the centre of the outline: 1, 0, NaN where not found."""
+    if not rows:
+        return np.nan
+    one = result.detections
+    return float(inside_ellipse(one.uv[rows[:1]] - seen.centre, one.covariance[rows[:1]], 0.9)[0])
+
+
+def numbers_of(objects: pd.DataFrame, frames: pd.DataFrame) -> dict[tuple[str, str], float]:
+    """What `tally` gives, by (subject, name): see `RECORDED`.
+
+    A rate is of images with something in view, where all of it was found.
+    """
+    numbers: dict[tuple[str, str], float] = {}
+    for subject in SUBJECTS:
+        own = [WHOLE, CUT, SEA] if subject == BOATS else [subject]
+        shown, seen = frames[frames["subject"].isin(own)], objects[objects["subject"].isin(own)]
+        numbers[subject, "images"] = len(shown)
+        numbers[subject, "false_alarms_per_image"] = float(shown["false"].mean()) if len(shown) else np.nan
+        if subject in (BOATS, SEA):
+            continue
+        with_some = shown[shown["bodies"] > 0]
+        rate = 1 - float((with_some["missed"] > 0).mean()) if len(with_some) else np.nan
+        numbers[subject, "detection_rate"] = rate
+        found = seen[seen["found"].astype(bool)]
+        numbers[subject, "pieces"] = float(found["pieces"].mean()) if len(found) else np.nan
+        numbers[subject, "ellipse_coverage_90"] = float(found["inside"].mean()) if len(found) else np.nan
+        numbers[subject, "smallest_share_found"] = float(found["share"].min()) if len(found) else np.nan
+        missed = seen[~seen["found"].astype(bool)]
+        numbers[subject, "missed"] = float(len(missed))
+        numbers[subject, "merged"] = float(missed["merged"].sum())
+        numbers[subject, "largest_share_missed"] = float(missed["share"].max()) if len(missed) else np.nan
+    return numbers
+
+
+def trial(seed: int, *, twin: str, second: str, images: int) -> dict[tuple[str, str], float]:
+    """One simulated flight over the ship and one over the boats, by `numbers_of`.
+
+    Raises
+    ------
+    WildlabError
+        If there is no such twin, or one of them shows nothing of its targets.
+    """
+    rendered = list(images_of(twin, second, seed, images))
+    for name, subject in ((twin, SHIP), (second, WHOLE)):
+        if not any(image.subject == subject for image in rendered):
+            raise WildlabError(
+                f"on the flight of seed {seed} no image shows what is looked for",
+                "look at the twin",
+                file=name,
+            )
+    return numbers_of(*tally(rendered, FloatingThresholds()))
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the flights give for each claim of H 4.3 and 4.4.1, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+    """
+
+    def of(subject: str, name: str) -> NDArray[np.float64]:
+        return spread[subject, name].to_numpy(float)
+
+    missed = of(SHIP, "missed")
+    with np.errstate(invalid="ignore"):
+        small = of(SHIP, "largest_share_missed")
+    return {
+        "near-perfect": Check(
+            measured=np.minimum(of(SHIP, "detection_rate"), of(WHOLE, "detection_rate")), above=True
+        ),
+        "ship-without-false-alarm": Check(true=of(SHIP, "false_alarms_per_image") == 0),
+        "whole-always-found": Check(true=of(WHOLE, "detection_rate") == 1),
+        "only-small-parts-missed": Check(measured=small, premise=missed > 0),
+        "no-blob-in-empty-images": Check(true=of(SEA, "false_alarms_per_image") == 0),
+    }
