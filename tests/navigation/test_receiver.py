@@ -107,6 +107,15 @@ def test_scoring_stays_within_its_bounds_and_moves_the_others():
     assert np.isnan(found.sd[0])
 
 
+def test_a_filter_that_is_lost_where_it_begins_stays_there_without_deviations():
+    def run(p):
+        return np.full((5, 1), np.nan), np.ones((5, 1, 1))
+
+    found = maximise(run, [0.5, 1.0], [0, 1], [0.0, 0.0], [2.0, 2.0])
+    assert found.parameters.tolist() == [0.5, 1.0] and np.isnan(found.sd).all()
+    assert found.log_likelihood == -np.inf
+
+
 def test_a_filter_that_is_lost_is_never_the_likeliest():
     assert gaussian_log_likelihood([[np.nan]], [[[1.0]]]) == -np.inf
     assert gaussian_log_likelihood([[1.0]], [[[-1.0]]]) == -np.inf

@@ -97,6 +97,9 @@ def maximise(
     for _ in range(iterations):
         slope, information = _score(run, p, moving, y, S)
         runs += len(moving)
+        if not (np.isfinite(slope).all() and np.isfinite(information).all()):  # it is lost, or next to it
+            at_work = moving[:0]
+            break
         # Against a bound it cannot go further: the others move without it.
         stuck = ((p[moving] <= bottom[moving]) & (slope <= 0)) | ((p[moving] >= top[moving]) & (slope >= 0))
         at_work, slope = moving[~stuck], slope[~stuck]
