@@ -259,3 +259,61 @@ def test_removing_does_not_go_on_from_what_was_removed() -> None:
 def test_an_even_image_has_nothing(find: Callable[..., Detections]) -> None:
     assert len(find(np.full((160, 200), 100, np.uint8), EVERYWHERE)) == 0
     assert len(join([no_detections(), no_detections()])) == 0
+
+
+def test_one_grey_level_on_even_ground_is_rounding_and_not_an_animal() -> None:
+    image = np.full((160, 200), 100, np.uint8)
+    image[60:70, 90:100] = 101
+    assert len(find_by_contrast(image, EVERYWHERE)) == 0
+    image[60:70, 90:100] = 110
+    assert len(find_by_contrast(image, EVERYWHERE)) == 1
+
+
+def test_what_is_too_hot_for_an_animal_is_left_out_in_kelvin() -> None:
+    """F 8.4: a fire beside a deer, in an image of temperatures."""
+    kelvin = np.full((160, 200), 280, np.float32)
+    kelvin[ellipse(50, 80, 9, 6)] = 300
+    kelvin[ellipse(150, 80, 9, 6)] = 700
+    window = (270.0, 310.0)
+    assert len(find_warm(kelvin, EVERYWHERE, Warm(window=window))) == 2
+    cool = find_warm(kelvin, EVERYWHERE, Warm(window=window, hottest=320.0))
+    assert np.allclose(cool.uv, [[50, 80]], atol=0.1) and cool.intensity[0] == 300
+
+
+def test_f_in_a_black_hot_image_and_beside_a_border() -> None:
+    image = np.full((160, 200), 150, np.uint8)
+    image[ellipse(50, 80, 9, 6)] = 40
+    assert len(find_warm(image, EVERYWHERE)) == 0
+    assert len(find_warm(image, EVERYWHERE, Warm(warm_is_bright=False))) == 1
+    valid = EVERYWHERE.copy()
+    valid[:, :60] = False
+    assert len(find_warm(image, valid, Warm(warm_is_bright=False))) == 0
+
+
+def test_parts_of_one_animal_are_merged_where_that_is_asked_for() -> None:
+    image = np.full((160, 200), 90, np.uint8)
+    for u in (80, 94):
+        image[ellipse(u, 80, 5, 5)] = 200
+    assert len(find_warm(image, EVERYWHERE, Warm(apart_px=0))) == 2
+    removed, merged = (find_warm(image, EVERYWHERE, Warm(apart_px=20, merge=one)) for one in (False, True))
+    assert removed.uv[0, 0] in (pytest.approx(80), pytest.approx(94))
+    assert np.allclose(merged.uv, [[87, 80]]) and merged.area[0] == 2 * removed.area[0]
+    assert merged.axes[0, 0] > removed.axes[0, 0] + 10
+
+
+def test_a_share_of_the_strongest_leaves_the_weak_out() -> None:
+    image = ground(noise=1.0)
+    image[ellipse(50, 40, 12, 10)] += 150
+    image[ellipse(150, 100, 9, 6)] += 30
+    assert len(find_by_contrast(image, EVERYWHERE)) == 2
+    assert np.allclose(find_by_contrast(image, EVERYWHERE, Contrast(of_image=0.5)).uv, [[50, 40]], atol=0.5)
+
+
+def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
+    rng = np.random.default_rng(2)
+    image = ground(noise=1.0)
+    image[:, 100:] += cv2.GaussianBlur(rng.normal(0, 60, (160, 100)), (0, 0), 1.5)
+    image[ellipse(50, 80, 6, 4)] += 40
+    over_all = find_by_contrast(image, EVERYWHERE, Contrast(peak=7))
+    by_window = find_by_contrast(image, EVERYWHERE, Contrast(peak=7, deviation="window"))
+    assert len(by_window) < len(over_all) / 2 and np.abs(by_window.uv - [50, 80]).sum(axis=1).min() < 1

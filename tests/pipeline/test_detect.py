@@ -15,7 +15,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline import detect as subject
-from wildlab.pipeline.detect import detect_frame, run_detection, thresholds_from
+from wildlab.pipeline.detect import METHODS, detect_frame, run_detection, thresholds_from
 from wildlab.pipeline.detect_command import read_thresholds, samples_of, write_thresholds
 from wildlab.pipeline.detection_fit import Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import judge_detections
@@ -185,3 +185,11 @@ def test_a_classifier_of_shapes_learns_what_a_size_cannot_tell(tmp_path: Path) -
 def test_shapes_cannot_be_learnt_from_what_is_all_wanted_or_all_not() -> None:
     with pytest.raises(WildlabError, match="0 of 5 warm regions belong to a label"):
         fit_shape(np.zeros((5, 9)), np.zeros(5), Shape().regions)
+
+
+@pytest.mark.parametrize("method", ["contrast", "warm"])
+def test_black_hot_frames_are_turned(tmp_path: Path, method: str) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), 255 - picture([(50, 40)], 1, size=7, warmer=80))
+    for polarity, wanted in (("black-hot", 1), ("white-hot", 0)):
+        frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
+        assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted

@@ -15,6 +15,8 @@ Mask = NDArray[np.bool_]
 
 #: What a standard deviation is to the median absolute deviation, for normal noise.
 MAD = 1.4826
+#: Standard deviation of what rounding to whole numbers takes away.
+ROUNDING = 12**-0.5
 #: Pixels of a window's side after it was made smaller: finer says nothing of a median over so many.
 COARSE = 15
 
@@ -98,7 +100,7 @@ def median_background(image: Image, window_px: int) -> Image:
     return np.asarray(found, np.float32)
 
 
-def robust_deviation(contrast: Image, valid: Mask) -> float:
+def robust_deviation(contrast: Image, valid: Mask, least: float = 1e-6) -> float:
     """Standard deviation of an image about zero, by its median absolute value.
 
     Parameters
@@ -107,11 +109,13 @@ def robust_deviation(contrast: Image, valid: Mask) -> float:
         (H, W).
     valid
         (H, W) bool.
+    least
+        What it is at least: of whole numbers `ROUNDING`, or even ground would have no noise at all.
 
     Returns
     -------
     float
-        Of every fourth pixel in both directions; never 0.
+        Of every fourth pixel in both directions.
 
     Examples
     --------
@@ -121,15 +125,15 @@ def robust_deviation(contrast: Image, valid: Mask) -> float:
     """
     some = contrast[::4, ::4][valid[::4, ::4]]
     some = some if some.size else contrast[valid]
-    return max(MAD * float(np.median(np.abs(some))), 1e-6)
+    return max(MAD * float(np.median(np.abs(some))), least)
 
 
-def local_deviation(contrast: Image, valid: Mask, window_px: int) -> Image:
+def local_deviation(contrast: Image, valid: Mask, window_px: int, least: float = 1e-6) -> Image:
     """The same about each pixel, at least 0.7 of that of the whole image.
 
     Parameters
     ----------
-    contrast, valid
+    contrast, valid, least
         As for `robust_deviation`.
     window_px
         Side of the window, px.
@@ -138,6 +142,6 @@ def local_deviation(contrast: Image, valid: Mask, window_px: int) -> Image:
     -------
     (H, W) float32
     """
-    everywhere = robust_deviation(contrast, valid)
+    everywhere = robust_deviation(contrast, valid, least)
     there = MAD * median_background(np.abs(contrast), window_px)
     return np.asarray(np.maximum(there, 0.7 * everywhere), np.float32)

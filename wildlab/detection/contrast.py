@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.detection.background import (
+    ROUNDING,
     Image,
     Mask,
     fill_invalid,
@@ -169,12 +170,12 @@ def propose(
     if t.smooth_px > 0:
         smooth = np.asarray(cv2.GaussianBlur(filled, (0, 0), t.smooth_px), np.float32)
     contrast = smooth - median_background(filled, t.window_px)
-    noise = robust_deviation(contrast, valid)
-    ratio: Image = contrast / (
-        local_deviation(contrast, valid, 2 * t.window_px + 1)
-        if t.deviation == "window"
-        else np.float32(noise)
-    )
+    least = ROUNDING if image.dtype.kind in "ui" else 1e-6
+    noise = robust_deviation(contrast, valid, least)
+    if t.deviation == "window":
+        ratio: Image = contrast / local_deviation(contrast, valid, 2 * t.window_px + 1, least)
+    else:
+        ratio = contrast / np.float32(noise)
     # Beside a border smoothing has mixed in what was filled in.
     if not valid.all():
         ratio[~valid] = 0

@@ -274,3 +274,28 @@ def test_a_strip_along_one_side_is_masked_though_it_reaches_no_corner() -> None:
     image[20:80, :6] = 0
     found = find_no_data(image)
     assert found[20:80, :6].all() and not found[:15].any() and not found[:, 12:].any()
+
+
+def test_kinds_of_numbers(tmp_path: Path) -> None:
+    kelvin = (280 + scene() / 10).astype(np.float32)
+    kelvin[3, 4] = np.nan
+    colour = np.stack([scene(1), scene(2), scene(3)], axis=2)
+    write(tmp_path / "kelvin.tiff", kelvin)
+    write(tmp_path / "colour.png", colour)
+    write(tmp_path / "deep.png", colour.astype(np.uint16) * 200)
+    write(tmp_path / "counts.png", scene().astype(np.uint16) * 200)
+    write(tmp_path / "share.tiff", (scene() / 255).astype(np.float32))
+    found = {one.name: one for one in open_frames(tmp_path)}
+    assert found["kelvin.tiff"].unit == "kelvin" and not found["kelvin.tiff"].valid[3, 4]
+    assert found["kelvin.tiff"].valid.mean() > 0.99
+    assert found["colour.png"].unit == "colour" and (found["colour.png"].image == colour[..., ::-1]).all()
+    assert found["counts.png"].unit == "counts" and found["counts.png"].image.dtype == np.uint16
+    assert "colour image of 16 bits" in found["deep.png"].problem
+    assert "no temperatures in kelvin" in found["share.tiff"].problem
+
+
+def test_polarity_is_the_callers_unless_the_file_knows(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", scene())
+    (tmp_path / "b.fff").write_bytes(fff(np.full((96, 128), 3000, np.uint16) + scene(), PLANCK))
+    grey, kelvin = open_frames(tmp_path, polarity="black-hot")
+    assert (grey.polarity, kelvin.polarity) == ("black-hot", "white-hot")
