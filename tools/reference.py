@@ -25,7 +25,8 @@ INTO = ROOT / "reports" / "reference"
 #: What is called from a notebook or a script. Of the studies only what a study has to offer: the cases
 #: themselves are read in their reports; `wildlab --help` tells the runner and the command line.
 ROOMS = (
-    *("api", "geometry", "flight", "navigation", "tracking", "simulation", "evaluation", "pipeline"),
+    *("api", "geometry", "flight", "navigation", "tracking", "simulation", "detection"),
+    *("evaluation", "pipeline"),
     "reporting",
 )
 
