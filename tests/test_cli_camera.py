@@ -84,6 +84,9 @@ def test_as_json_with_a_view_that_disagrees(capsys, copy):
 def test_no_board_and_too_few_are_sentences(capsys, boards, tmp_path):
     code, _, err = run(capsys, boards / "0.png", boards / "1.png", board="9x6")
     assert code == 2 and "a board of 9 x 6 inner corners is in none of the 2 images" in err
+    assert "--staggered" not in err
+    code, _, err = call(capsys, "camera", boards / "0.png", "--circles", "4x11", "--square", "20mm")
+    assert code == 2 and "4 x 11 circles is in none of the 1 images" in err and "add --staggered" in err
     code, _, err = run(capsys, boards / "0.png", boards / "1.png", "--into", tmp_path / "camera.toml")
     assert code == 2 and "is in 2 of 2 images, and at least 4 are needed" in err
     assert not (tmp_path / "camera.toml").exists()

@@ -348,9 +348,11 @@ def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
     kind = "inner corners" if board.pattern == "chessboard" else "circles"
     what = f"{board.columns} x {board.rows} {kind}"
     if n == 0:
+        other = "; add --staggered where every other row is moved by half a step"
         raise WildlabError(
             f"a board of {what} is in none of the {len(images)} images",
-            f"count the {kind}, columns times rows; the whole board must be in view, and in focus",
+            f"count the {kind}, columns times rows; the whole board must be in view, and in focus"
+            + (other if board.pattern == "circles" else ""),
             field="--board" if board.pattern == "chessboard" else "--circles",
         )
     raise WildlabError(
