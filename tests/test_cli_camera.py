@@ -84,13 +84,16 @@ def test_as_json_with_a_view_that_disagrees(capsys, copy):
 def test_no_board_and_too_few_are_sentences(capsys, boards, tmp_path):
     code, _, err = run(capsys, boards / "0.png", boards / "1.png", board="9x6")
     assert code == 2 and "a board of 9 x 6 inner corners is in none of the 2 images" in err
+    assert "--staggered" not in err
+    code, _, err = call(capsys, "camera", boards / "0.png", "--circles", "4x11", "--square", "20mm")
+    assert code == 2 and "4 x 11 circles is in none of the 1 images" in err and "add --staggered" in err
     code, _, err = run(capsys, boards / "0.png", boards / "1.png", "--into", tmp_path / "camera.toml")
     assert code == 2 and "is in 2 of 2 images, and at least 4 are needed" in err
     assert not (tmp_path / "camera.toml").exists()
 
 
 def test_mixed_sizes_are_a_sentence(capsys, copy):
-    cv2.imwrite(str(copy / "5.png"), np.zeros((100, 120), np.uint8))
+    cv2.imwrite(str(copy / "5.png"), np.tile(np.arange(60, 180, dtype=np.uint8), (100, 1)))
     code, _, err = run(capsys, copy)
     assert code == 2 and "5.png: has 120 x 100 pixels, and 9 other images have 320 x 256" in err
     assert run(capsys, copy, "--without", "5.png")[0] == 0
@@ -128,16 +131,9 @@ def test_hostile_images_are_said_and_the_rest_goes_on(capsys, copy):
     code, out, err = run(capsys, copy, "--lens", "k1")
     assert code == 0, err
     assert " of 17 images" in out.splitlines()[0]
-    for line in (
-        "cut.png: is damaged or cut off.",
-        "cut.jpg: is damaged or cut off.",
-        "huge.png: claims to be 32000 x 32000 pixels",
-        "empty.png: is empty.",
-        "text.jpg: is no PNG, JPEG, TIFF or BMP image.",
-        "black.png: nothing differs in it.",
-        "white.png: nothing differs in it.",
-    ):
-        assert line in err
+    for name in ("cut.png", "cut.jpg", "huge.png", "empty.png", "text.jpg", "black.png", "white.png"):
+        line = next(one for one in err.splitlines() if one.startswith(f"{name}: "))
+        assert line.endswith(".") and len(line) > len(name) + 10
 
 
 @pytest.mark.parametrize(

@@ -72,8 +72,9 @@ def test_the_printed_error_at_the_height_of_the_flight():
 def test_aspect_and_offset_turn():
     apart, sd = text.aspect(found(), TAU2)
     assert apart == pytest.approx(8.6) and 0.2 < sd < 0.7
-    assert "times what chance gives" in text.aspect_words(8.6, 0.4)
-    assert "which chance may give" in text.aspect_words(8.6, 5.0)
+    said = text.aspect_words(8.6, 0.43, 0.05)
+    assert "20 times what chance gives here: circles would have to be 0.5 pixels off" in said
+    assert "which chance may give" in text.aspect_words(8.6, 5.0, 0.05)
     said = text.offset_words(TAU2, theoretical(), found(), 3.4, 6.3)
     assert "7 and 9 pixels" in said and "times what chance" in said and "3.7 and 4.5 % longer" in said
     assert "no more than chance may give" in text.offset_words(TAU2, theoretical(), found(9, 9), 3.4, 6.3)

@@ -14,7 +14,7 @@ from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_boar
 from wildlab.errors import WildlabError
 from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest import CameraPart
-from wildlab.flight.readers.stills import read_still
+from wildlab.flight.readers.frames.image import read_image
 from wildlab.geometry.board_views import parameters_of
 from wildlab.geometry.frames import Array
 from wildlab.geometry.intrinsics import FEWEST, LENSES, PINHOLE, Intrinsics, calibrate_camera, view_errors
@@ -40,7 +40,7 @@ class BoardImage:
     name
         Of the file.
     problem
-        Why it is not used, as a clause; empty where it is.
+        Why it is not used; empty where it is.
     uv
         (M, 2) pixels of the board's points; None where there is none.
     inverted
@@ -141,11 +141,11 @@ def calibrate_images(
     sizes: dict[str, tuple[int, int]] = {}
     coded: dict[str, int] = {}
     for path in progress([one for one in paths if one.name not in leave_out]):
-        try:
-            pixels = read_still(path)
-        except WildlabError as error:
-            images.append(BoardImage(path.name, error.problem))
+        frame = read_image(path)
+        if frame.problem:
+            images.append(BoardImage(path.name, frame.problem))
             continue
+        pixels = frame.image
         sizes[path.name] = (pixels.shape[1], pixels.shape[0])
         images.append(_look(path.name, pixels, board))
         if len(sizes) <= LOOKED_AT or images[-1].uv is None:
@@ -348,9 +348,11 @@ def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:
     kind = "inner corners" if board.pattern == "chessboard" else "circles"
     what = f"{board.columns} x {board.rows} {kind}"
     if n == 0:
+        other = "; add --staggered where every other row is moved by half a step"
         raise WildlabError(
             f"a board of {what} is in none of the {len(images)} images",
-            f"count the {kind}, columns times rows; the whole board must be in view, and in focus",
+            f"count the {kind}, columns times rows; the whole board must be in view, and in focus"
+            + (other if board.pattern == "circles" else ""),
             field="--board" if board.pattern == "chessboard" else "--circles",
         )
     raise WildlabError(

@@ -131,7 +131,7 @@ def explain(rng: np.random.Generator, cause: str, runs: int) -> Cause:
     cause
         One of `CAUSES`.
     runs
-        How many calibrations, each time.
+        How many calibrations; half as many to find the size.
 
     Returns
     -------
@@ -139,7 +139,8 @@ def explain(rng: np.random.Generator, cause: str, runs: int) -> Cause:
     """
     unit, size = CAUSES[cause]
     for _ in range(2):  # what is left grows with the size, nearly in proportion
-        left = float(np.mean([calibrate_once(rng, cause, size)[0].error for _ in range(runs)]))
+        tried = [calibrate_once(rng, cause, size)[0].error for _ in range(max(runs // 2, 2))]
+        left = float(np.mean(tried))
         size *= PRINTED_ERROR / left
     found = [calibrate_once(rng, cause, size) for _ in range(runs)]
     left = float(np.mean([one.error for one, _ in found]))

@@ -32,14 +32,15 @@ def focal_words(found: pd.DataFrame, images: int, noise: float) -> str:
     )
 
 
-def aspect_words(apart: float, sd: float) -> str:
-    """Whether the difference of the two printed focal lengths may be chance."""
+def aspect_words(apart: float, sd: float, noise: float) -> str:
+    """Whether the printed focal lengths may differ by chance, with circles found to ``noise`` px."""
     times = abs(apart) / sd
     said = f"The two focal lengths that the thesis prints differ by {abs(apart):.1f} pixels"
     if times > CHANCE:
         return (
-            f"{said}, {times:.0f} times what chance gives here: either pixels or lens are not even, or "
-            "something other than the noise of the circles moved the calibration."
+            f"{said}, {times:.0f} times what chance gives here: circles would have to be "
+            f"{noise * times / 2:.1f} "
+            "pixels off, or pixels, lens or plate are not even."
         )
     return f"{said}, which chance may give (its standard deviation is {sd:.1f} pixels)."
 
