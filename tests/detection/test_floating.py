@@ -7,8 +7,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from wildlab.detection.centres import cut_sides
 from wildlab.detection.floating import (
-    cut_sides,
     detect_floating,
     find_edges,
     find_objects,
