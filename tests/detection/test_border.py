@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,14 @@ def test_an_unknown_length_moves_nothing():
     image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
     seen = detect_floating(image)
     assert np.array_equal(adjust_at_border(seen, image.shape, np.nan).uv, seen.uv)
+
+
+def test_of_a_broken_contour_the_axis_is_not_trusted():
+    image = ellipse_image((8.0, 90.0), (120.0, 24.0), 0.1)
+    seen = detect_floating(image)
+    line = replace(seen, area=0.3 * seen.area)
+    assert not np.array_equal(adjust_at_border(seen, image.shape, 124.0).uv, seen.uv)
+    assert np.array_equal(adjust_at_border(line, image.shape, 124.0).uv, seen.uv)
 
 
 def test_the_nearer_border():

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 from wildlab.detection.border import adjust_at_border
-from wildlab.detection.floating import (
-    centre_covariance,
-    cut_sides,
-    detect_floating,
-    find_objects,
-    hidden_part,
-)
+from wildlab.detection.centres import centre_covariance, cut_sides, hidden_part
+from wildlab.detection.floating import detect_floating, find_objects
 from wildlab.detection.ground import locate
 from wildlab.detection.thresholds import CentreErrors
 from wildlab.geometry.camera import Camera

@@ -7,8 +7,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from wildlab.detection.centres import cut_sides
 from wildlab.detection.floating import (
-    cut_sides,
     detect_floating,
     find_edges,
     find_objects,
@@ -207,6 +207,9 @@ def test_whether_the_contour_or_the_filled_blob_is_small():
     assert len(detect_floating(image, thresholds=FloatingThresholds(smallest_area=between))) == 0
     filled = FloatingThresholds(smallest_area=between, area_of="filled")
     assert len(detect_floating(image, thresholds=filled)) == 1
+    # What is too large leaves nothing behind, also not the inner side of its ring.
+    largest = FloatingThresholds(smallest_area=10, largest_area=edges - 1)
+    assert len(detect_floating(image, thresholds=largest)) == 0
     largest = FloatingThresholds(smallest_area=10, largest_area=between)
     assert len(detect_floating(image, thresholds=largest)) == 1
     largest = FloatingThresholds(smallest_area=10, largest_area=between, area_of="filled")

@@ -150,7 +150,7 @@ def test_what_scaling_the_area_does_is_said_as_it_is():
 def test_missed_vessels_are_counted_and_none_is_said_where_there_are_none():
     assert text.missed_words(spread_of()).count("none missed") == 3
     words = text.missed_words(spread_of(ship__missed=1.0, ship__largest_share_missed=0.03, whole__merged=1.0))
-    assert "ship: 40 missed, of which up to 3.0 % of the outline showed" in words
+    assert "Ship: 40 missed, of which up to 3.0 % of the outline showed" in words
     assert words.endswith("; 40 of the whole ones were one blob with the other boat.")
 
 
@@ -189,7 +189,7 @@ def test_weather_is_blamed_only_where_it_alarms():
 def test_claims_turn():
     good = check_claims(spread_of())
     assert {claim["id"] for claim in load_claims("vessel-detection")} == set(good)
-    assert good["near-perfect"].holds(0.98).all()
+    assert good["near-perfect"].holds(0.02).all()
     assert good["ship-without-false-alarm"].holds().all()
     assert not good["only-small-parts-missed"].premise.any()
     bad = check_claims(
@@ -199,7 +199,7 @@ def test_claims_turn():
         )
     )  # fmt: skip
     for name, check in bad.items():
-        threshold = {"near-perfect": 0.98, "only-small-parts-missed": 0.1}.get(name)
+        threshold = {"near-perfect": 0.02, "only-small-parts-missed": 0.1}.get(name)
         assert not check.holds(threshold).any(), name
     assert bad["only-small-parts-missed"].premise.all()
     small = check_claims(spread_of(ship__missed=1.0, ship__largest_share_missed=0.02))
@@ -220,6 +220,9 @@ def test_charts_say_what_they_show():
     assert "a boat from all heights" in alt
     image = image_of(rectangle(10, 5, 12.0))
     assert "1 of 1 vessel found, 0 false alarms" in charts.steps_shown(image, FloatingThresholds())[2]
+    broken = image_of(rectangle(30, 4, 12.0).at(0, -4), subject=SHIP)
+    broken.counts[60:68, :] = broken.counts[0, 0]  # a cold stripe through the middle of it
+    assert "1 of 1 vessel found in 2 pieces" in charts.steps_shown(broken, FloatingThresholds())[2]
     objects, _ = tally([image, image_of(rectangle(10, 5, 0.5).at(0, 16.5))], FloatingThresholds())
     assert "1 of 1 were missed" in charts.seen_shares(objects)[2]
     published = {SHIP: 0.993, WHOLE: 1.0}

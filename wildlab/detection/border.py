@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.detection.centres import cut_sides, hidden_part
 from wildlab.detection.detections import Detections
-from wildlab.detection.floating import cut_sides, hidden_part
 from wildlab.detection.thresholds import FILLED, CentreErrors
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array

@@ -95,7 +95,7 @@ def test_a_layer_above_the_water_is_displaced_by_its_height():
     assert np.isclose(low.seen[0].middle[1], 66 - 292 * 5 / 60)
     # The upper one hides the lower one where both are met.
     square = ((3.0, -3.0), (3.0, 3.0), (-3.0, 3.0), (-3.0, -3.0))
-    both, _ = rendered(Body("two", (Layer(square, 0.0, 5.0), Layer(square, 6.0, 9.0))).at(5.0, 0.0))
+    both, _ = rendered(Body("two", (Layer(square, 0.0, 5.0), Layer(square, 6.0, 9.0))).at(8.0, 0.0))
     assert np.isclose(both.kelvin.max(), 295.0, atol=1e-3)
     nine, five = (np.abs(both.kelvin - value) < 1e-3 for value in (295.0, 291.0))
     assert np.isclose(nine.sum(), 36 * 290 * 292 / 54**2, rtol=0.1)  # without those at its edge

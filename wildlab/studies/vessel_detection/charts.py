@@ -61,9 +61,13 @@ def steps_shown(image: Image, thresholds: FloatingThresholds) -> Shown:
         outline = Rectangle((left - 4, top - 4), width + 8, height + 8, fill=False, ec=ORANGE, lw=1.6)
         axes.flat[3].add_patch(outline)
     axes.flat[3].plot(*objects.detections.uv.T, "+", color=ORANGE, ms=8, mew=1.6)
+    rows, columns = image.counts.shape  # boxes and centres may reach beyond the image
+    axes.flat[3].set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
     judged = judge(image.view, objects)
     found = sum(bool(rows) for rows in judged.found.values())
     vessels = f"{found} of {len(image.view.seen)} vessel{'s' * (len(image.view.seen) != 1)} found"
+    pieces = sum(len(rows) for rows in judged.found.values())
+    vessels += f" in {pieces} pieces" if pieces > found else ""
     false = f"{judged.false} false alarm{'s' * (judged.false != 1)}"
     name = f"steps-{image.subject}"
     return (
@@ -139,7 +143,7 @@ def seen_shares(objects: pd.DataFrame) -> Shown:
     cut = objects[objects["share"] < 1]
     for row, (found, label, colour) in enumerate(((True, "found", BLUE), (False, "missed", VERMILLION))):
         share = 100 * cut[cut["found"].astype(bool) == found]["share"].to_numpy(float)
-        aside = np.linspace(-0.25, 0.25, len(share))
+        aside = np.linspace(-0.25, 0.25, len(share)) if len(share) > 1 else np.zeros(len(share))
         ax.plot(share, row + aside, "o", color=colour, ms=5, label=label)
     ax.set_yticks([0, 1], ["found", "missed"])
     ax.set(xlabel="visible part of the outline (%)", ylim=(1.6, -0.6), xlim=(-2, 102))

@@ -121,7 +121,8 @@ def missed_words(spread: pd.DataFrame) -> str:
         )
     merged = int(spread[WHOLE, "merged"].sum())
     joined = f"; {merged} of the whole ones were one blob with the other boat" if merged else ""
-    return "; ".join(parts) + joined + "."
+    words = "; ".join(parts) + joined + "."
+    return words[0].upper() + words[1:]
 
 
 def readings_words(readings: pd.DataFrame) -> str:

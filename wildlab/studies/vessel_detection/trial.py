@@ -258,7 +258,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         small = of(SHIP, "largest_share_missed")
     return {
         "near-perfect": Check(
-            measured=np.minimum(of(SHIP, "detection_rate"), of(WHOLE, "detection_rate")), above=True
+            measured=1 - np.minimum(of(SHIP, "detection_rate"), of(WHOLE, "detection_rate"))
         ),
         "ship-without-false-alarm": Check(true=of(SHIP, "false_alarms_per_image") == 0),
         "whole-always-found": Check(true=of(WHOLE, "detection_rate") == 1),
