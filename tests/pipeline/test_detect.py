@@ -11,11 +11,12 @@ import pytest
 
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape
+from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline import detect as subject
-from wildlab.pipeline.detect import METHODS, detect_frame, run_detection, thresholds_from
+from wildlab.pipeline.detect import METHODS, detect_frame, for_distance, run_detection, thresholds_from
 from wildlab.pipeline.detect_command import read_thresholds, samples_of, write_thresholds
 from wildlab.pipeline.detection_fit import Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import judge_detections
@@ -193,3 +194,34 @@ def test_black_hot_frames_are_turned(tmp_path: Path, method: str) -> None:
     for polarity, wanted in (("black-hot", 1), ("white-hot", 0)):
         frame = read_image(tmp_path / "a.png", polarity=polarity)  # type: ignore[arg-type]
         assert len(detect_frame(frame, method, METHODS[method].thresholds())) == wanted
+
+
+def test_floating_objects_are_found_by_the_same_command(tmp_path: Path) -> None:
+    (tmp_path / "sea").mkdir()
+    for number in range(2):
+        image = picture([(40 + 10 * number, 50)], number, size=15, warmer=150)
+        cv2.imwrite(str(tmp_path / "sea" / f"{number}.png"), image)
+        cv2.imwrite(str(tmp_path / f"cold{number}.png"), 255 - image)
+    frames = open_frames(tmp_path / "sea")
+    done = run_detection(frames, tmp_path / "out", "floating", FloatingThresholds())
+    np.testing.assert_allclose(done.detections["u_px"], [40, 50], atol=0.5)
+    np.testing.assert_allclose(done.detections["v_px"], 50, atol=0.5)
+    cold = read_image(tmp_path / "cold0.png", polarity="black-hot")
+    assert len(detect_frame(cold, "floating", FloatingThresholds())) == 1
+    far = for_distance(FloatingThresholds(), 100.0, 1000.0, 2.0)
+    assert (far.area_of, far.largest_area) == ("filled", 400.0)
+    # A seven times smaller thing is let through by neither limit.
+    assert len(detect_frame(next(iter(frames)), "floating", far)) == 1
+    near = for_distance(FloatingThresholds(), 10.0, 1000.0, 2.0)
+    assert len(detect_frame(next(iter(frames)), "floating", near)) == 0
+
+
+def test_thresholds_with_limits_that_there_may_be(tmp_path: Path) -> None:
+    for limit in (None, 900.0):
+        kept = FloatingThresholds(largest_area=limit)
+        write_thresholds(tmp_path / "t.json", "floating", kept)
+        assert read_thresholds(tmp_path / "t.json", "floating") == kept
+    with pytest.raises(WildlabError, match="threshold 'largest_area' is 'big'"):
+        thresholds_from(FloatingThresholds, {"largest_area": "big"})
+    with pytest.raises(WildlabError, match="thresholds do not fit together"):
+        thresholds_from(FloatingThresholds, {"largest_area": (1.0, 2.0)})

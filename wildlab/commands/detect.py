@@ -14,11 +14,14 @@ ANY = click.Path(path_type=Path)
 ABOVE_ZERO = click.FloatRange(0, min_open=True)
 
 
-@click.command(short_help="Find warm things in a folder of images or a video.")
+@click.command(short_help="Find animals, people or vessels in images or a video.")
 @click.argument("images", type=ANY, metavar="IMAGES")
 @click.option("--into", type=FOLDER, required=True, help="Folder for tables and pictures.")
 @click.option(
-    "--method", type=click.Choice(["contrast", "warm", "shape"]), default="contrast", show_default=True
+    "--method",
+    type=click.Choice(["contrast", "warm", "shape", "floating"]),
+    default="contrast",
+    show_default=True,
 )
 @click.option(
     "--labels", type=FILE, help="CSV of boxes or points in these images: what was missed, what invented?"
@@ -57,10 +60,11 @@ def detect(
     animal: float,
     as_json: bool,
 ) -> None:
-    """Find warm things in IMAGES: a folder of images, one image, a video, or a flight with a folder images.
+    """Find warm or floating things in IMAGES: a folder of images, one image, a video, or a flight with a
+    folder images.
 
-    contrast takes what stands out from what lies about it, warm is the chain of F 3.2, and shape a classifier
-    that has to be learnt with --fit first.
+    contrast takes what stands out from what lies about it, warm is the chain of F 3.2, shape a classifier
+    that has to be learnt with --fit first, and floating the chain of H 4.3: what floats on an even sea.
 
     Leaves detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and with labels
     what was missed and invented. A run that was broken off goes on where it stopped.
@@ -71,6 +75,7 @@ def detect(
       wildlab detect clip.mp4 --method warm --into found
       wildlab detect images --distance 60 --focal 765 --animal 1.5 --into found
       wildlab detect images --fit labels.csv --class Person --into found
+      wildlab detect sea --method floating --into found
     """
     from wildlab.pipeline.detect_command import Wanted, detect_images
 

@@ -15,7 +15,9 @@ import pandas as pd
 
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, no_detections
+from wildlab.detection.floating import detect_floating
 from wildlab.detection.shape import Shape, find_by_shape
+from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
@@ -42,6 +44,7 @@ METHODS: dict[str, Method] = {
     "contrast": Method(Contrast, find_by_contrast),
     "warm": Method(Warm, find_warm),
     "shape": Method(Shape, find_by_shape),
+    "floating": Method(FloatingThresholds, detect_floating),
 }
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25
@@ -96,6 +99,8 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
 def _for_black_hot(thresholds: Any) -> Any:
     if isinstance(thresholds, Shape):
         return replace(thresholds, regions=replace(thresholds.regions, warm_is_bright=False))
+    if isinstance(thresholds, FloatingThresholds):
+        return replace(thresholds, warm=False)
     return replace(thresholds, warm_is_bright=False)
 
 
@@ -329,7 +334,7 @@ def for_distance(thresholds: Any, distance_m: float, focal_px: float, animal_m: 
     Parameters
     ----------
     thresholds
-        `Warm`, `Contrast`, or another, which stays as it is.
+        `Warm`, `Contrast`, `FloatingThresholds`, or another, which stays as it is.
     distance_m
         From the camera to the ground along the middle of the image, m.
     focal_px
@@ -361,6 +366,8 @@ def for_distance(thresholds: Any, distance_m: float, focal_px: float, animal_m: 
     if isinstance(thresholds, Contrast):
         window = block_from_distance(distance_m, focal_px, animal_m, WINDOW_LENGTHS)
         return replace(thresholds, smallest_px=smallest, largest_px=largest, window_px=window)
+    if isinstance(thresholds, FloatingThresholds):
+        return replace(thresholds, smallest_area=smallest, largest_area=largest, area_of="filled")
     return thresholds
 
 
@@ -391,9 +398,16 @@ def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:
         default = known[name]
         numbers = isinstance(default, int | float) and not isinstance(default, bool)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
-        good = plain if numbers else default is None or isinstance(value, type(default))
+        good = plain if numbers else isinstance(value, type(default))
+        if default is None:  # a limit, or two, that there may be
+            several = value if isinstance(value, tuple) else (value,)
+            good = value is None or all(isinstance(one, int | float) for one in several)
         if isinstance(default, tuple):
             good = isinstance(value, tuple) and all(isinstance(one, int | float) for one in value)
         if not good:
-            raise WildlabError(f"the threshold {name!r} is {value!r}", f"give one like {default!r}")
-    return kind(**given)
+            like = "give a number, or leave it out" if default is None else f"give one like {default!r}"
+            raise WildlabError(f"the threshold {name!r} is {value!r}", like)
+    try:
+        return kind(**given)
+    except TypeError:  # one number in place of two, or the other way round
+        raise WildlabError("the thresholds do not fit together", "write them anew with --fit") from None

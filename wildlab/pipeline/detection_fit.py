@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.detection.contrast import Contrast
+from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.detection.warm import Warm
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
@@ -41,6 +42,16 @@ GRIDS: dict[str, dict[str, tuple[Any, ...]]] = {
         "smallest_px": (4.0, 10.0, 20.0, 40.0, 80.0),
         "largest_px": (300.0, 600.0, 1200.0, 4000.0),
         "apart_px": (0.0, 10.0, 20.0),
+    },
+    "floating": {
+        "gradient": (60.0, 110.0, 160.0, 230.0),
+        "gradient_gain": (0.5, 1.0, 2.0, 4.0),
+        "scaling": ("fixed", "stretched"),
+        "smallest_range_k": (2.0, 4.0, 8.0),
+        "smallest_area": (5.0, 15.0, 50.0, 120.0),
+        "largest_area": (None, 1000.0, 4000.0),
+        "area_of": ("edges", "filled"),
+        "nested": ("boxes", "contours"),
     },
 }
 #: Sets of thresholds that are tried, the defaults among them; and most labelled frames that are looked at.
@@ -140,7 +151,7 @@ def fit_thresholds(
     method: str,
     samples: Sequence[Sample],
     *,
-    tried: Sequence[Contrast | Warm] | None = None,
+    tried: Sequence[Contrast | Warm | FloatingThresholds] | None = None,
     rule: Rule | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> Fitted:
