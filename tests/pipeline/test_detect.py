@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape
 from wildlab.detection.thresholds import FloatingThresholds
@@ -225,3 +226,14 @@ def test_thresholds_with_limits_that_there_may_be(tmp_path: Path) -> None:
         thresholds_from(FloatingThresholds, {"largest_area": "big"})
     with pytest.raises(WildlabError, match="thresholds do not fit together"):
         thresholds_from(FloatingThresholds, {"largest_area": (1.0, 2.0)})
+
+
+def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
+    image = np.full((360, 640, 3), 120, np.uint8)
+    image[200:210, 300:330] = (255, 110, 0)  # OpenCV writes blue first
+    (tmp_path / "ground").mkdir()
+    cv2.imwrite(str(tmp_path / "ground" / "a.png"), image)
+    done = run_detection(open_frames(tmp_path / "ground"), tmp_path / "out", "colour", Colour())
+    assert done.detections[["u_px", "v_px"]].to_numpy().tolist() == [[314.5, 204.5]]
+    write_thresholds(tmp_path / "t.json", "colour", Colour(hue=(170.0, 10.0)))
+    assert read_thresholds(tmp_path / "t.json", "colour") == Colour(hue=(170.0, 10.0))

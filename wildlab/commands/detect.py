@@ -19,7 +19,7 @@ ABOVE_ZERO = click.FloatRange(0, min_open=True)
 @click.option("--into", type=FOLDER, required=True, help="Folder for tables and pictures.")
 @click.option(
     "--method",
-    type=click.Choice(["contrast", "warm", "shape", "floating"]),
+    type=click.Choice(["contrast", "warm", "shape", "floating", "colour"]),
     default="contrast",
     show_default=True,
 )
@@ -64,7 +64,8 @@ def detect(
     folder images.
 
     contrast takes what stands out from what lies about it, warm is the chain of F 3.2, shape a classifier
-    that has to be learnt with --fit first, and floating the chain of H 4.3: what floats on an even sea.
+    that has to be learnt with --fit first, floating the chain of H 4.3 for what floats on an even sea, and
+    colour the blue tarpaulin of H 4.4.2 in colour images.
 
     Leaves detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and with labels
     what was missed and invented. A run that was broken off goes on where it stopped.

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.detection.colour import Colour, find_coloured
 from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.floating import detect_floating
@@ -45,6 +46,7 @@ METHODS: dict[str, Method] = {
     "warm": Method(Warm, find_warm),
     "shape": Method(Shape, find_by_shape),
     "floating": Method(FloatingThresholds, detect_floating),
+    "colour": Method(Colour, find_coloured),
 }
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25
@@ -90,6 +92,8 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
         raise WildlabError(f"there is no method {method!r}", f"take one of {', '.join(METHODS)}")
     if not frame.usable:
         return no_detections()
+    if method == "colour":
+        return find_coloured(frame.image, frame.valid, thresholds)
     if frame.polarity == "black-hot":
         thresholds = _for_black_hot(thresholds)
     image = frame.image if frame.image.ndim == 2 else to_grey(frame.image)

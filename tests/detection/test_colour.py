@@ -1,0 +1,123 @@
+"""Things of one colour: limits as printed, pixels of the whole image, honest centres."""
+
+from __future__ import annotations
+
+import colorsys
+
+import cv2
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from wildlab.detection.colour import Colour, coloured, find_coloured
+from wildlab.errors import WildlabError
+
+BLUE = (10, 110, 240)
+
+
+def scene(places: list[tuple[float, float]], size: tuple[float, float], shape: tuple[int, int]) -> np.ndarray:
+    """Rectangles (centre u, v) of the tarpaulin's blue on green ground, drawn to a sixteenth of a pixel."""
+    image = np.full((*shape, 3), (60, 110, 70), np.uint8)
+    for u, v in places:
+        corners = np.array(
+            [(u + a * size[0] / 2, v + b * size[1] / 2) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        )
+        fine = np.round(16 * corners).astype(np.int32)
+        cv2.fillPoly(image, [fine], BLUE, lineType=cv2.LINE_AA, shift=4)
+    return image
+
+
+def all_of(image: np.ndarray) -> np.ndarray:
+    return np.ones(image.shape[:2], bool)
+
+
+def test_the_limits_are_those_of_another_conversion_of_colours() -> None:
+    rng = np.random.default_rng(1)
+    image = rng.integers(0, 256, (60, 80, 3), dtype=np.uint8)
+    image[:30, :, 0] //= 6
+    image[:30, :, 2] |= 0xC0
+    mask = coloured(cv2.cvtColor(image, cv2.COLOR_RGB2HSV), Colour(hue=(90, 130)))
+    own = np.array([[colorsys.rgb_to_hsv(*(pixel / 255)) for pixel in row] for row in image])
+    hue, saturation, value = np.moveaxis(own, -1, 0)
+    inside = (np.abs(hue * 180 - 110) <= 20) & (saturation >= 0.75) & (value >= 0.75)
+    # OpenCV rounds hue and saturation to whole numbers: only what is near a limit may differ.
+    near = (np.abs(np.abs(hue * 180 - 110) - 20) < 1) | (np.abs(saturation - 0.75) < 0.005)
+    assert mask.sum() > 100 and (mask == inside)[~near].all()
+
+
+def test_the_centre_is_in_pixels_of_the_whole_image() -> None:
+    for scale in (1, 2, 3):
+        u, v = scale * 300.0, scale * 150.0
+        image = scene([(u, v)], (scale * 24.0, scale * 16.0), (scale * 360, scale * 640))
+        found = find_coloured(image, all_of(image))
+        assert len(found) == 1
+        np.testing.assert_allclose(found.uv[0], [u, v], atol=0.6 * scale)
+        assert found.area[0] == pytest.approx(scale**2 * 24 * 16, rel=0.2)
+        np.testing.assert_allclose(found.box[0, :2] + found.box[0, 2:] / 2, [u, v], atol=0.6 * scale)
+        assert found.axes[0, 0] == pytest.approx(scale * 24 * 4 / np.sqrt(12), rel=0.15)
+
+
+def test_only_the_largest_and_only_far_from_the_border() -> None:
+    image = scene([(200, 180), (400, 180)], (20, 12), (360, 640))
+    image[170:190, 100:160] = BLUE
+    assert find_coloured(image, all_of(image)).uv.tolist() == [[129.5, 179.5]]
+    every = find_coloured(image, all_of(image), Colour(only_largest=False))
+    assert len(every) == 3 and (np.diff(every.area) <= 0).all()
+    for u, v, wanted in (
+        (29, 180, 0),
+        (31, 180, 1),
+        (610, 180, 0),
+        (300, 59, 0),
+        (300, 61, 1),
+        (300, 301, 0),
+    ):
+        edge = scene([(u, v)], (16, 12), (360, 640))
+        assert len(find_coloured(edge, all_of(edge))) == wanted, (u, v)
+    # The largest is at the horizon: what is smaller is not taken in its place, as in print.
+    image[0:40] = BLUE
+    assert len(find_coloured(image, all_of(image))) == 0
+
+
+def test_what_is_too_small_or_outside_of_the_scene_is_not_found() -> None:
+    image = scene([(300, 180)], (6, 5), (360, 640))
+    assert len(find_coloured(image, all_of(image))) == 0
+    assert len(find_coloured(image, all_of(image), Colour(smallest_px=20))) == 1
+    image = scene([(300, 180)], (30, 20), (360, 640))
+    valid = all_of(image)
+    valid[150:210, 250:350] = False
+    assert len(find_coloured(image, valid)) == 0
+
+
+def test_red_goes_through_zero() -> None:
+    image = np.full((360, 640, 3), 90, np.uint8)
+    image[150:170, 300:330] = (250, 10, 30)
+    assert len(find_coloured(image, all_of(image), Colour(hue=(170, 10)))) == 1
+    assert len(find_coloured(image, all_of(image))) == 0
+
+
+def test_centres_lie_in_their_ellipses_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(5)
+    squares, apart = [], []
+    for _ in range(300):
+        u, v = rng.uniform([100, 120], [540, 240])
+        clean = scene([(u, v)], tuple(rng.uniform([14, 10], [40, 24])), (360, 640))
+        image = np.clip(clean + rng.normal(0, 6, clean.shape), 0, 255).astype(np.uint8)
+        found = find_coloured(image, all_of(image), Colour(part=0.01, hue=(95, 115)))
+        assert len(found) == 1
+        off = found.uv[0] - [u, v]
+        squares.append(off @ np.linalg.solve(found.covariance[0], off))
+        apart.append(off)
+    # Drawn ones have no weakly coloured rim, for which the default allows more.
+    assert np.mean(np.array(squares) < chi2.ppf(0.9, 2)) > 0.87
+    assert np.abs(np.mean(apart, axis=0)).max() < 0.06
+
+
+def test_mistakes_are_sentences() -> None:
+    with pytest.raises(WildlabError, match="image has no colours"):
+        find_coloured(np.zeros((20, 30), np.uint8), np.ones((20, 30), bool))
+    with pytest.raises(WildlabError, match="limits of saturation are"):
+        Colour(saturation=(0.9, 0.1))
+    with pytest.raises(WildlabError, match="limits of hue"):
+        Colour(hue=(100, 250))
+    with pytest.raises(WildlabError, match="below zero"):
+        Colour(smallest_px=0)
