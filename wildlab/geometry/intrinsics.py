@@ -165,8 +165,8 @@ def calibrate_camera(
     >>> views = Views(euler_to_matrix(*tilts.T), np.tile([-3.0, -2.0, 14.0], (5, 1)))
     >>> uv = project_board([900, 905, 310, 250, 0, 0.1, 0, 0, 0, 0], views, board).uv
     >>> found = calibrate_camera(board, uv, 640, 512, ("fx", "fy", "cx", "cy", "k1"))
-    >>> print(np.round(found.values, 3))
-    [900.  905.  310.  250.    0.1]
+    >>> [round(float(value), 3) for value in found.values]
+    [900.0, 905.0, 310.0, 250.0, 0.1]
     """
     board, uv = np.asarray(board, float), np.asarray(uv, float)
     names = _checked(board, uv, estimate)

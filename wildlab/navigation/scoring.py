@@ -52,7 +52,7 @@ def gaussian_log_likelihood(innovation: ArrayLike, S: ArrayLike) -> float:
 
     Examples
     --------
-    >>> gaussian_log_likelihood([[2.0]], [[[4.0]]]) == -0.5 * (1 + np.log(4))
+    >>> bool(gaussian_log_likelihood([[2.0]], [[[4.0]]]) == -0.5 * (1 + np.log(4)))
     True
     """
     y, spread = np.asarray(innovation, float), np.asarray(S, float)
