@@ -44,7 +44,8 @@ class Inertial:
     def __init__(self, times: Array, columns: Mapping[str, Array]) -> None:
         self.times = times
         self._columns = columns
-        self._sums: dict[str, Array] = {}
+        # Of one sensor at a time: asked for many lags in a row, and three columns of ten hours are large.
+        self._kept: tuple[tuple[str, ...], list[Array]] = ((), [])
 
     def mean_force(self, start: Array, end: Array) -> Array:
         """Mean over intervals (K,) each, (K, 3); NaN where they are not inside of the samples."""
@@ -66,25 +67,25 @@ class Inertial:
         return np.sqrt(total, out=total)
 
     def _mean(self, names: Sequence[str], start: Array, end: Array) -> Array:
-        first, last = (
-            np.column_stack([np.interp(at, self.times, self._sum(name)) for name in names])
-            for at in (start, end)
-        )
-        mean = (last - first) / (end - start)[:, None]
+        if self._kept[0] != tuple(names):
+            self._kept = ((), [])
+            self._kept = (tuple(names), [self._sum(name) for name in names])
+        mean = np.empty((len(start), len(names)))
+        for column, total in enumerate(self._kept[1]):
+            mean[:, column] = np.interp(end, self.times, total) - np.interp(start, self.times, total)
+        mean /= (end - start)[:, None]
         mean[(start < self.times[0]) | (end > self.times[-1])] = np.nan
-        return np.asarray(mean)
+        return mean
 
     def _sum(self, name: str) -> Array:
         """Integral over time of a column, from the first sample on. (N,)"""
-        if name not in self._sums:
-            value = self._columns[name]
-            total = np.empty(len(value))
-            total[0] = 0.0
-            np.add(value[1:], value[:-1], out=total[1:])
-            total[1:] *= 0.5
-            total[1:] *= np.diff(self.times)
-            self._sums[name] = np.cumsum(total, out=total)
-        return self._sums[name]
+        value = self._columns[name]
+        total = np.empty(len(value))
+        total[0] = 0.0
+        np.add(value[1:], value[:-1], out=total[1:])
+        total[1:] *= 0.5
+        total[1:] *= np.diff(self.times)
+        return np.cumsum(total, out=total)
 
 
 @dataclass(frozen=True)
