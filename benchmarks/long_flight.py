@@ -21,6 +21,14 @@ HOURS, RATE = 10.0, 250
 RADIUS, SPEED, GRAVITY = 2000.0, 20.0, 9.815
 CHECKED_S, CHECKED_GB, IMPORTED_GB = 30.0, 1.5, 3.0
 
+#: The receiver and the autopilot say the same.
+MOTION = """position.north = { column = "n", unit = "m" }
+position.east = { column = "e", unit = "m" }
+position.down = { column = "d", unit = "m" }
+velocity.north = { column = "vn", unit = "m/s" }
+velocity.east = { column = "ve", unit = "m/s" }
+velocity.down = { column = "vd", unit = "m/s" }
+"""
 RECIPE = """
 name = "ten-hours"
 [files]
@@ -62,25 +70,15 @@ rate.z = { column = "wz", unit = "rad/s" }
 name = "a receiver"
 file = "log.csv"
 time = { column = "t", format = "elapsed" }
-position.north = { column = "n", unit = "m" }
-position.east = { column = "e", unit = "m" }
-position.down = { column = "d", unit = "m" }
-velocity.north = { column = "vn", unit = "m/s" }
-velocity.east = { column = "ve", unit = "m/s" }
-velocity.down = { column = "vd", unit = "m/s" }
+MOTION
 [poses.autopilot]
 file = "log.csv"
 time = { column = "t", format = "elapsed" }
-position.north = { column = "n", unit = "m" }
-position.east = { column = "e", unit = "m" }
-position.down = { column = "d", unit = "m" }
-velocity.north = { column = "vn", unit = "m/s" }
-velocity.east = { column = "ve", unit = "m/s" }
-velocity.down = { column = "vd", unit = "m/s" }
+MOTION
 attitude.roll = { column = "roll", unit = "rad" }
 attitude.pitch = { column = "pitch", unit = "rad" }
 attitude.yaw = { column = "yaw", unit = "rad" }
-"""
+""".replace("MOTION\n", MOTION)
 
 
 def write_tables(folder: Path, hours: float = HOURS, rate: int = RATE) -> None:

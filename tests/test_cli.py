@@ -220,7 +220,8 @@ def test_check_does_not_call_a_flight_usable_that_contradicts_itself(
         (errno.EISDIR, "A folder is where a file is wanted"),
         (errno.ENAMETOOLONG, "Give it a shorter name"),
         (errno.ELOOP, "Its links go in a circle"),
-        (errno.EIO, "Check the path, its permissions and its disk"),
+        (errno.EIO, "The disk cannot give it back"),
+        (errno.EBADF, "Check the path, its permissions and its disk"),
     ],
 )
 def test_what_the_system_says_is_a_sentence_with_the_file(

@@ -48,7 +48,13 @@ class RunFailed(WildlabError):
     exit_code = 1
 
 
-def system_error(error: OSError, file: str | os.PathLike[str] | None = None) -> WildlabError:
+def system_error(
+    error: OSError,
+    file: str | os.PathLike[str] | None = None,
+    field: str | None = None,
+    *,
+    cannot: str = "be written or read",
+) -> WildlabError:
     """What the system said of a file or folder, as a sentence with what to do.
 
     Parameters
@@ -57,6 +63,10 @@ def system_error(error: OSError, file: str | os.PathLike[str] | None = None) -> 
         As it was raised.
     file
         What it is about; left out, the file that the error names.
+    field
+        Who asked for it, for the message.
+    cannot
+        What was tried.
 
     Returns
     -------
@@ -79,11 +89,12 @@ def system_error(error: OSError, file: str | os.PathLike[str] | None = None) -> 
         errno.ENOTDIR: "a file is where a folder is wanted: move it away, or choose another name",
         errno.EISDIR: "a folder is where a file is wanted: choose another name",
         errno.ENAMETOOLONG: "give it a shorter name",
-        errno.ELOOP: "its links go in a circle: give the file itself",
+        errno.ELOOP: "its links go in a circle; give the file itself",
+        errno.EIO: "the disk cannot give it back: copy what can be read, and restore the rest",
     }.get(error.errno or 0, "check the path, its permissions and its disk")
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         fix = f"free some space on the disk at {_disk(about)}"
-    return WildlabError(f"cannot be written or read ({said})", fix, file=about)
+    return WildlabError(f"cannot {cannot} ({said})", fix, file=about, field=field)
 
 
 def _disk(file: str | bytes | os.PathLike[str] | int | None) -> str:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from wildlab.evaluation.causes import Linear, distances, draw_folds, gain_of, held_out, rank_models
+from wildlab.evaluation.causes import Gain, Linear, distances, draw_folds, gain_of, held_out, rank_models
+from wildlab.evaluation.runs import Interval
 
 BLOCKS = np.repeat(np.arange(12), 5)
 
@@ -87,3 +88,9 @@ def test_rivals_are_named_and_larger_sums_are_not():
     contents = [frozenset(), frozenset("a"), frozenset("b"), frozenset("ac")]
     found = rank_models([same + 3.0, same, like - like.mean() + same.mean() + 1e-3, same], contents, BLOCKS)
     assert found.winner == 1 and found.rivals == (2,)
+
+
+def test_a_widened_gain_has_both_ends_farther_from_its_estimate():
+    gain = Gain(5.0, 3.0, Interval(2.0, 1.5, 2.25))
+    assert gain.widened(2.0) == Gain(5.0, 3.0, Interval(2.0, 1.0, 2.5))
+    assert gain.counts and not gain.widened(5.0).counts

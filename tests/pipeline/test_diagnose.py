@@ -8,6 +8,7 @@ import pytest
 
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.errors import WildlabError
+from wildlab.evaluation.blocks import Neighbours
 from wildlab.pipeline.diagnose import diagnose
 from wildlab.pipeline.evaluate import score_points
 from wildlab.pipeline.georeference import georeference, observe
@@ -73,6 +74,22 @@ def test_what_is_wrong_is_named_and_its_size_recovered(keys):
 
 
 @pytest.mark.slow
+def test_intervals_allow_for_images_that_stay_wrong_alike(monkeypatch):
+    flight = simulate(Survey(tilt_deg=3.0))
+    found = []
+    for correlation in (0.0, 0.8):
+        alike = Neighbours(correlation, 40)
+        monkeypatch.setattr("wildlab.pipeline.diagnose._neighbours", lambda *_, alike=alike: alike)
+        found.append(diagnosed(flight))
+    wider = Neighbours(0.8, 40).widening(len(np.unique(found[0].blocks)))
+    assert wider > 2
+    plain, wide = (one.winner.gain.gain for one in found)
+    assert (wide.estimate, wide.high - wide.low) == pytest.approx(
+        (plain.estimate, wider * (plain.high - plain.low))
+    )
+    np.testing.assert_allclose(found[1].calibration.covariance, wider**2 * found[0].calibration.covariance)
+
+
 def test_a_wrong_focal_length_is_the_lens():
     found = diagnosed(simulate(Survey(focal=0.08)))
     assert found.counts and found.winner.causes == ("focal length",)

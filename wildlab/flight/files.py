@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from wildlab.errors import WildlabError
+from wildlab.errors import WildlabError, system_error
 
 #: What a flight, a nav source or a twin may be called: it becomes a file name on every system.
 SAFE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
@@ -204,16 +204,7 @@ def read_regular(path: Path, limit: int, field: str | None = None) -> bytes:
 
 def unreadable(error: OSError, path: Path, field: str | None = None) -> WildlabError:
     """What the system said of a file, as a sentence with what to do."""
-    said = error.strerror or type(error).__name__
-    fixes = {
-        errno.EACCES: "check its permissions",
-        errno.EPERM: "check its permissions",
-        errno.ENAMETOOLONG: "give it a shorter name",
-        errno.ELOOP: "its links go in a circle; give the file itself",
-        errno.EIO: "the disk cannot give it back: copy what can be read, and restore the rest",
-    }
-    fix = fixes.get(error.errno or 0, "check the path and its permissions")
-    return WildlabError(f"cannot be read ({said})", fix, file=path, field=field)
+    return system_error(error, path, field, cannot="be read")
 
 
 def check_model(model: type[Model], data: Any, path: Path | None) -> Model:

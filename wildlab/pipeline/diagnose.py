@@ -140,7 +140,7 @@ class Diagnosis:
     @property
     def counts(self) -> bool:
         """Whether taking the winner off gained something for certain, and a parameter of it is not zero."""
-        return bool(self.winner.causes) and self.winner.gain.counts and bool(_nonzero(self.calibration))
+        return _certain(self.winner, self.calibration)
 
     @property
     def shown(self) -> Model:
@@ -238,7 +238,7 @@ def diagnose(
     winner = replace(winner, gain=winner.gain.widened(wider))
     models[ranked.winner] = winner
     # What is far out is looked for with the winner taken off, where that gained something for certain.
-    shown = winner if winner.gain.counts and _nonzero(calibration) else models[0]
+    shown = winner if _certain(winner, calibration) else models[0]
     marks = scored["truth_id"].to_numpy(str)
     metres = place(shown.fit.names, shown.fit.values)
     outliers, inliers = find_outliers(shown.fit.r, metres, scored["frame_id"].to_numpy(str), marks)
@@ -309,6 +309,11 @@ def _search(
         more = [cause for cause in causes if cause not in winner.causes]
         add(tuple(c for c in causes if c in (*winner.causes, one)) for one in more)
     return models, alike
+
+
+def _certain(model: Model, calibration: Calibration) -> bool:
+    """Whether taking its causes off gained something for certain, and a parameter of them is not zero."""
+    return bool(model.causes) and model.gain.counts and bool(_nonzero(calibration))
 
 
 def _nonzero(calibration: Calibration) -> tuple[str, ...]:

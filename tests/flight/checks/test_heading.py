@@ -68,7 +68,10 @@ def test_it_is_a_warning_with_its_numbers() -> None:
     (found,) = heading(_Flight(-COURSE))  # type: ignore[arg-type]
     assert found.level == "warning" and found.table == "nav/log"
     assert "and it does if yaw has the wrong sign (1.00)" in found.sentence
-    assert "leave it for an aircraft that flies sideways or backwards" in found.fix
+    assert found.fix == (
+        "turn `negate` of yaw in [poses.log.attitude], and import again; leave it for an aircraft that flies "
+        "sideways or backwards"
+    )
 
 
 def test_the_mean_cosine_is_that_of_a_known_angle() -> None:

@@ -13,6 +13,7 @@ import pandas as pd
 
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.inertial_data import POSITION, QUATERNION
+from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, matrix_to_euler, quaternion_to_matrix
@@ -59,8 +60,7 @@ def heading(flight: Flight) -> Iterator[Finding]:
             "",
             f"the nose does not point where the aircraft goes (mean cosine {before:.2f} over {len(course)} "
             f"stretches), and it does if {named.said} ({best:.2f})",
-            f"write {named.write}, and import again; leave it for an aircraft that flies sideways or "
-            "backwards",
+            f"{words.fixes([named.write])}; leave it for an aircraft that flies sideways or backwards",
             (f"attitude: {named.cause}",),
         )
 
