@@ -74,7 +74,16 @@ def test_another_height_than_that_of_the_calibration_is_said():
     low = learnt().conditions.model_copy(update={"height_m": (10.0, 12.0)})
     other = learnt().model_copy(update={"conditions": low})
     assert "are from another height than there" in apply_learnt(flight, None, observe(flight), other).sentence
-    assert "another height" not in apply_learnt(flight, None, observe(flight), learnt()).sentence
+    logged = observe(flight)
+    height = logged.plane_down - logged.poses.p_nc[:, 2]
+    # A fifth lower or higher is the same height, a half is not.
+    for factor, other_height in ((1.2, False), (1.5, True)):
+        for low, high in ((factor * height.min(), 1e3), (1.0, height.max() / factor)):
+            near = learnt().conditions.model_copy(update={"height_m": (low, high)})
+            said = apply_learnt(
+                flight, None, logged, learnt().model_copy(update={"conditions": near})
+            ).sentence
+            assert ("another height" in said) == other_height
 
 
 def test_the_next_flight_is_as_good_as_if_nothing_were_wrong():
