@@ -108,20 +108,20 @@ def heights_of(**reach):
         for height in (50.0, 100.0, 200.0):
             found = float(height <= reach.get(kind, 0.0))
             scaled = float(height <= reach.get(f"{kind}_scaled", reach.get(kind, 0.0)))
-            rows.append({"kind": kind, "height_m": height, "found": found, "scaled": scaled})
+            rows.append({"kind": kind, "height_m": height, "found": found, "scaled": scaled, "draws": 20})
     return pd.DataFrame(rows)
 
 
 def test_the_summary_turns_with_the_numbers():
     heights = heights_of(person=50.0, boat=200.0)
     good = " ".join(text.summary(spread_of(), heights))
-    assert "In 100 % of the images the ship is found" in good
+    assert "In 100 % (99.0 % to 100 %) of the images the ship is found" in good
     assert "Not one false alarm came in 1600 images" in good
     assert "a person up to 50 m" in good and "a boat from all heights up to 200 m" in good
     bad = " ".join(
         text.summary(spread_of(ship__detection_rate=0.5, boats__false_alarms_per_image=0.1), heights_of())
     )
-    assert "In 50.0 % of the images the ship is found" in bad
+    assert "In 50.0 % (45.1 % to 54.9 %) of the images the ship is found" in bad
     assert "120 false alarms came in 1600 images" in bad
     assert "a person and a boat from none of the heights tried" in bad
 
@@ -156,9 +156,13 @@ def test_missed_vessels_are_counted_and_none_is_said_where_there_are_none():
 
 def test_ellipses_are_called_what_they_are():
     words = text.ellipse_words(spread_of(ship__ellipse_coverage_90=0.6, whole__ellipse_coverage_90=0.99))
-    assert "60.0 % for ship (too small)" in words
-    assert "99.0 % for boats, whole (too large)" in words
-    assert text.ellipse_words(spread_of()).count("(honest)") == 2
+    assert "60.0 % (60.0 % to 60.0 %: too small) for ship" in words
+    assert "99.0 % (99.0 % to 99.0 %: too large) for boats, whole" in words
+    assert text.ellipse_words(spread_of()).count("90.0 % lies within") == 2
+    few = spread_of(ship__ellipse_coverage_90=0.6)[:4].copy()
+    few[SHIP, "ellipse_coverage_90"] = [0.5, 1.0, 0.6, 0.95]  # too few to say that these are too small
+    assert "76.2 % (36.5 % to 100 %: 90.0 % lies within) for ship" in text.ellipse_words(few)
+    assert "too few flights for an interval" in text.ellipse_words(few[:1])
 
 
 def test_readings_are_summed_up_by_their_extremes():
@@ -173,13 +177,15 @@ def test_readings_are_summed_up_by_their_extremes():
 
 def test_contrasts_are_said_by_length():
     rows = [(5.0, 2.0, 0.0), (5.0, 4.0, 0.95), (20.0, 2.0, 0.5), (20.0, 4.0, 0.6)]
-    words = text.contrast_words(pd.DataFrame(rows, columns=["length_m", "excess_k", "found"]))
+    words = text.contrast_words(
+        pd.DataFrame(rows, columns=["length_m", "excess_k", "found"]).assign(draws=10)
+    )
     assert words.endswith("4 K at 5 m, more than 4 K at 20 m.")
 
 
 def test_weather_is_blamed_only_where_it_alarms():
     rows = [(2.0, 0.0, 0.0), (12.0, 0.0, 0.0), (2.0, 4.0, 0.0), (12.0, 4.0, 1.5)]
-    weather = pd.DataFrame(rows, columns=["wind", "glint", "false"])
+    weather = pd.DataFrame(rows, columns=["wind", "glint", "false"]).assign(draws=3)
     words = text.weather_words(weather)
     assert "without sun there are none up to 12 m/s of wind" in words
     assert "with a glint of 4 K in view there are some from 12 m/s of wind on, up to 1.5 an image" in words

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from wildlab.detection.floating import find_edges, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.evaluation.runs import share_interval
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.studies.vessel_detection import text as words
 from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image, judge
@@ -84,6 +86,7 @@ def heights_shown(heights: pd.DataFrame) -> Shown:
     fig, ax = new_figure(5.6, 3.7)
     for colour, (kind, own) in zip(_COLOURS, heights.groupby("kind", sort=False), strict=False):
         ax.plot(own["height_m"], 100 * own["found"], "o-", color=colour, label=str(kind))
+        _bars(ax, own, "height_m", colour)
         ax.plot(own["height_m"], 100 * own["scaled"], ":", color=colour)
     ax.plot([], [], ":", color=INK, label="area scaled with height")
     ax.set(xlabel="height (m)", ylabel="found (%)", ylim=(-3, 103))
@@ -93,8 +96,16 @@ def heights_shown(heights: pd.DataFrame) -> Shown:
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return (
         fig, "heights", f"Share found against height: {words.reach_words(heights)}.",
-        f"Straight down or nearly so, seas of many winds. {words.scaled_words(heights)}",
+        f"Bars: 95 % intervals. Straight down or nearly so, seas of many winds. "
+        f"{words.scaled_words(heights)}",
     )  # fmt: skip
+
+
+def _bars(ax: Axes, own: pd.DataFrame, along: str, colour: str) -> None:
+    """95 % intervals of the shares ``found``."""
+    for at, found, draws in zip(own[along], own["found"], own["draws"], strict=True):
+        share = share_interval(round(found * draws), int(draws))
+        ax.plot([at, at], [100 * share.low, 100 * share.high], color=colour, alpha=0.35, lw=2)
 
 
 def contrast_shown(contrast: pd.DataFrame, height: float) -> Shown:
@@ -102,6 +113,7 @@ def contrast_shown(contrast: pd.DataFrame, height: float) -> Shown:
     fig, ax = new_figure(5.6, 3.7)
     for colour, (length, own) in zip(_COLOURS, contrast.groupby("length_m"), strict=False):
         ax.plot(own["excess_k"], 100 * own["found"], "o-", color=colour, label=f"{length:g} m long")
+        _bars(ax, own, "excess_k", colour)
     ax.set(xlabel="deck warmer than the sea by (K)", ylabel="found (%)", ylim=(-3, 103))
     halves = contrast[contrast["found"] >= 0.5].groupby("length_m")["excess_k"].min()
     title = (
@@ -114,7 +126,7 @@ def contrast_shown(contrast: pd.DataFrame, height: float) -> Shown:
         *ax.get_legend_handles_labels(), loc="outside lower right", ncols=len(contrast["length_m"].unique())
     )
     said = words.contrast_words(contrast)
-    return fig, "contrast", said, f"From {height:.0f} m, without hot engines. {said}"
+    return fig, "contrast", said, f"Bars: 95 % intervals. From {height:.0f} m, without hot engines. {said}"
 
 
 def weather_shown(weather: pd.DataFrame) -> Shown:
@@ -128,7 +140,7 @@ def weather_shown(weather: pd.DataFrame) -> Shown:
     ax.set_ylim(bottom=-0.03 * max(1.0, float(weather["false"].max())))
     calm = float(weather["false"].max()) == 0
     ax.set_title(
-        "No weather makes a false alarm"
+        f"No false alarm in {int(weather['draws'].sum())} images of an empty sea"
         if calm
         else f"Up to {weather['false'].max():.2g} false alarms an image"
     )

@@ -70,7 +70,7 @@ def over_heights(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
     -------
     DataFrame
         ``kind``, ``height_m``, ``found`` with the printed area, ``scaled`` with that scaled with the height
-        (H 4.4.1) from `REFERENCE` on.
+        (H 4.4.1) from `REFERENCE` on, both shares of ``draws``.
     """
     rows = []
     for kind in KINDS:
@@ -83,7 +83,8 @@ def over_heights(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
             scenes = [(draw_scene(rng, window, draw, kind), window) for _ in range(draws)]
             fixed = FloatingThresholds()
             found, scaled = found_share(scenes, (fixed, fixed.at_height(height, REFERENCE)), seed)
-            rows.append({"kind": kind, "height_m": height, "found": found, "scaled": scaled})
+            row = {"kind": kind, "height_m": height, "found": found, "scaled": scaled, "draws": draws}
+            rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -93,7 +94,7 @@ def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) 
     Returns
     -------
     DataFrame
-        ``length_m``, ``excess_k`` of the deck, ``found``.
+        ``length_m``, ``excess_k`` of the deck, ``found``, a share of ``draws``.
     """
     rows = []
     for length in LENGTHS:
@@ -106,7 +107,7 @@ def over_contrast(camera: Camera, draws: int, seed: int, height: float = 300.0) 
             rng = np.random.default_rng([seed, int(length), int(10 * excess)])
             scenes = [(draw_scene(rng, window, draw), window) for _ in range(draws)]
             (found,) = found_share(scenes, (FloatingThresholds(),), seed)
-            rows.append({"length_m": length, "excess_k": excess, "found": found})
+            rows.append({"length_m": length, "excess_k": excess, "found": found, "draws": draws})
     return pd.DataFrame(rows)
 
 
@@ -116,7 +117,8 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per image.
+        ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per
+        image, of ``draws`` images.
     """
     response = CameraResponse()
     sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
@@ -134,7 +136,7 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
                 poses = CameraPoses(camera, Mount("down"), at, R_nb)
                 view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
                 alarms += len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
-            rows.append({"wind": wind, "glint": glint, "false": alarms / draws})
+            rows.append({"wind": wind, "glint": glint, "false": alarms / draws, "draws": draws})
     return pd.DataFrame(rows)
 
 

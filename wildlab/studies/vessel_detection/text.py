@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.runs import Interval, mean_interval, share_interval
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 
 NAMES = {
@@ -21,6 +21,8 @@ NAMES = {
 }
 #: From which share on something counts as found.
 FOUND = 0.9
+#: What the ellipse of a centre should hold.
+ELLIPSE = 0.9
 
 METHOD = r"""The seven steps of H 4.3, with the printed threshold of 230 of 255 and the printed smallest
 area of 50 pixels, counted before the blob is filled. What H does not print is chosen; the table above
@@ -54,9 +56,14 @@ def false_alarms(spread: pd.DataFrame, *subjects: str) -> tuple[int, int]:
 
 def percent(share: float) -> str:
     """A share in per cent; never rounded to all or to none."""
-    if share in (0.0, 1.0):
+    if min(share, 1 - share) < 1e-9:
         return f"{100 * share:.0f} %"
     return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
+
+
+def percent_within(share: Interval) -> str:
+    """A share in per cent with its 95 % interval."""
+    return f"{percent(share.estimate)} ({percent(share.low)} to {percent(share.high)})"
 
 
 def reach(heights: pd.DataFrame, kind: str, column: str = "found") -> float:
@@ -100,11 +107,16 @@ def summary(spread: pd.DataFrame, heights: pd.DataFrame) -> list[str]:
         else f"{alarms} false alarm{'s' * (alarms != 1)} came in {images} images"
     )
     return [
-        f"In {percent(ship.estimate)} of the images the ship is found, or the part of it that shows, and in "
-        f"{percent(whole.estimate)} all boats that are wholly in view.",
+        f"In {percent_within(ship)} of the images the ship is found, or the part of it that shows, and in "
+        f"{percent_within(whole)} all boats that are wholly in view.",
         f"{false}; the thesis counts 15 in 27866.",
-        f"Smaller things need a lower flight: {reach_words(heights)}.",
+        f"Up to which height smaller things are found nine times of ten, of {_draws(heights)} drawn at each: "
+        f"{reach_words(heights)}.",
     ]
+
+
+def _draws(sweep: pd.DataFrame) -> str:
+    return " or ".join(str(int(one)) for one in sorted(sweep["draws"].unique()))
 
 
 def missed_words(spread: pd.DataFrame) -> str:
@@ -151,7 +163,11 @@ def contrast_words(contrast: pd.DataFrame) -> str:
         good = own[own["found"] >= FOUND]["excess_k"]
         needed = f"{good.min():g} K" if len(good) else f"more than {own['excess_k'].max():g} K"
         parts.append(f"{needed} at {length:g} m")
-    return "What a deck must have over the sea for nine of ten to be found: " + ", ".join(parts) + "."
+    return (
+        f"What a deck must have over the sea for nine of ten to be found, of {_draws(contrast)} drawn each: "
+        + ", ".join(parts)
+        + "."
+    )
 
 
 def weather_words(weather: pd.DataFrame) -> str:
@@ -169,7 +185,7 @@ def weather_words(weather: pd.DataFrame) -> str:
             )
         else:
             parts.append(f"{where} there are none up to {own['wind'].max():g} m/s of wind")
-    return f"False alarms on an empty sea: {'; '.join(parts)}."
+    return f"False alarms on an empty sea, {_draws(weather)} images each: {'; '.join(parts)}."
 
 
 def scaled_words(heights: pd.DataFrame) -> str:
@@ -193,12 +209,28 @@ def scaled_words(heights: pd.DataFrame) -> str:
 
 
 def ellipse_words(spread: pd.DataFrame) -> str:
-    """How often the stated 90 % ellipse of a centre holds it."""
+    """How often the stated 90 % ellipse of a centre holds it, with the interval of the mean over flights."""
     parts = []
     for subject in (SHIP, WHOLE):
-        share = float(np.nanmean(spread[subject, "ellipse_coverage_90"]))
-        word = "too small" if share < 0.85 else "too large" if share > 0.95 else "honest"
-        parts.append(f"{percent(share)} for {NAMES[subject]} ({word})")
+        shares = spread[subject, "ellipse_coverage_90"].to_numpy(float)
+        if np.isfinite(shares).sum() < 2:
+            some = (
+                "in no flight" if not np.isfinite(shares).any() else f"{percent(float(np.nanmean(shares)))}"
+            )
+            parts.append(f"{some} for {NAMES[subject]} (too few flights for an interval)")
+            continue
+        share = mean_interval(shares)
+        low, high = max(share.low, 0.0), min(share.high, 1.0)
+        word = (
+            "too small"
+            if high < ELLIPSE
+            else "too large"
+            if low > ELLIPSE
+            else f"{percent(ELLIPSE)} lies within"
+        )
+        parts.append(
+            f"{percent(share.estimate)} ({percent(low)} to {percent(high)}: {word}) for {NAMES[subject]}"
+        )
     return (
         "The 90 % ellipse that goes with a centre holds the outline's true centre in "
         + " and ".join(parts)
