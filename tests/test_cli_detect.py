@@ -27,6 +27,8 @@ def test_a_folder_with_bad_images_leaves_tables_pictures_and_sentences(capsys, t
     assert out.startswith("12 detections in 6 frames of 8.") and "F1 1.00" in out
     assert "cut.png: The file is cut off" in err and "pipe.jpg: It is a named pipe" in err
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 6
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/jpeg") == 6 and str(tmp_path) not in page
     assert cv2.imread(str(tmp_path / "out" / "overlays" / "000.jpg")).shape == (96, 128, 3)
     assert len(pd.read_csv(tmp_path / "out" / "detections.csv")) == 12
 

@@ -11,6 +11,8 @@ from wildlab.commands.shared import FILE, FOLDER, terminal_console
 from wildlab.terminal import count, print_json, sentence, shown
 
 ANY = click.Path(path_type=Path)
+#: Overlays that the page shows, evenly over the run.
+ON_PAGE = 8
 ABOVE_ZERO = click.FloatRange(0, min_open=True)
 
 
@@ -67,8 +69,8 @@ def detect(
     that has to be learnt with --fit first, floating the chain of H 4.3 for what floats on an even sea, and
     colour the blue tarpaulin of H 4.4.2 in colour images.
 
-    Leaves detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and with labels
-    what was missed and invented. A run that was broken off goes on where it stopped.
+    Leaves report.html, detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and
+    with labels what was missed and invented. A run that was broken off goes on where it stopped.
 
     \b
     Examples:
@@ -96,6 +98,7 @@ def detect(
         animal,
     )
     result = detect_images(wanted, terminal_console())
+    write_page(into, images.resolve().name, result)
     if as_json:
         print_json(result)
         return
@@ -106,4 +109,34 @@ def detect(
         click.echo(f"{name}: {problem}", err=True)
     for line in result["sentences"]:
         click.echo(line)
-    click.echo(shown(into))
+    click.echo(shown(into / "report.html"))
+
+
+def write_page(into: Path, name: str, result: dict[str, Any]) -> None:
+    """Write ``report.html`` from what a run left in its folder.
+
+    Parameters
+    ----------
+    into
+        The folder.
+    name
+        Of what was looked at.
+    result
+        Of the run.
+    """
+    import json
+
+    import pandas as pd
+
+    from wildlab.files import write_atomic
+    from wildlab.reporting.detections import SHEETS, detections_page
+
+    frames = pd.read_csv(into / "frames.csv", dtype={"frame_id": str, "problem": str})
+    sheets = {key: (into / f"{key}.jpg").read_bytes() for key in SHEETS if key in result["pictures"]}
+    # In the order of their names, which is that of the frames; a few, evenly over the run.
+    drawn = sorted((into / "overlays").glob("*.jpg"))
+    step = max(1, -(-len(drawn) // ON_PAGE))
+    overlays = [(one.stem, one.read_bytes()) for one in drawn[::step]]
+    thresholds = json.loads((into / "thresholds.json").read_text(encoding="utf-8"))["thresholds"]
+    page = detections_page(name, result, frames, sheets, overlays, thresholds)
+    write_atomic(into / "report.html", page)

@@ -316,6 +316,7 @@ def _result(
     if judged is not None:
         result["judged"] = judged.as_plain()
         chosen_here = fitted is not None and wanted.labels == wanted.fit
+        result["chosen_here"] = chosen_here
         where = (
             "Beside the labels that the thresholds were chosen by (too good)"
             if chosen_here

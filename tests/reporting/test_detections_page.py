@@ -1,0 +1,132 @@
+"""The page of a run of a detector says what its numbers say, and stays small and harmless."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.reporting.detections import LISTED, ROOM, advice_of, detections_page
+
+JPEG = bytes(cv2.imencode(".jpg", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
+
+
+def rate(estimate, low=None, high=None):
+    return {"estimate": estimate, "low": low, "high": high}
+
+
+def rates(found, invented, missed, *, interval=True):
+    bounds = (0.1, 0.9) if interval else (None, None)
+    return {
+        "found": found, "invented": invented, "missed": missed, "groups": 6,
+        "recall": rate(found / (found + missed), *bounds), "f1": rate(0.5, *bounds),
+        "precision": rate(found / (found + invented), *bounds),
+    }  # fmt: skip
+
+
+def run(detections=10, usable=5, **more):
+    result = {
+        "method": "warm",
+        "frames": {"all": usable + len(more.get("problems", [])), "usable": usable, "kept": 0},
+        "detections": detections,
+        "problems": [],
+        "pictures": {"overlays": 1},
+        "sentences": [],
+    }
+    return result | more
+
+
+def shown(result, sheets=None, overlays=(), frames=None, thresholds=None, name="images"):
+    counts = [result["detections"]] + [0] * (result["frames"]["usable"] - 1)
+    rows = {"frame_id": [f"f{n}.png" for n in range(len(counts))], "detections": counts, "problem": None}
+    if frames is None:
+        frames = pd.DataFrame(rows)
+    page = detections_page(name, result, frames, sheets or {}, overlays, thresholds or {"level": 3})
+    return page, re.sub(r"\s+", " ", unescape(re.sub(r"<style.*?</style>|<[^>]+>", " ", page, flags=re.S)))
+
+
+def test_without_labels_nothing_is_called_right():
+    _, words = shown(run())
+    assert "10 detections; without labels, none is judged." in words
+    assert "--labels FILE" in words
+    assert "Rates" not in words and "recall" not in words
+
+
+def test_with_labels_the_counts_come_first():
+    judged = rates(found=6, invented=2, missed=3)
+    page, words = shown(run(judged=judged, pictures={"missed": 3, "invented": 2}), {"missed": JPEG})
+    assert "Of 9 labelled, 6 are found; 2 of 8 detections are none of them." in words
+    assert "2 detections of 10 are not judged" in words  # 10 - 6 - 2
+    assert "0.67 (0.10 to 0.90)" in words and "0.75 (0.10 to 0.90)" in words
+    assert "Labelled, and not found: 3" in words and "Found, and not labelled" not in words
+    assert page.count("data:image/jpeg") == 1
+
+
+def test_what_was_chosen_here_does_not_come_first():
+    fit = {"held_out": rates(5, 5, 4), "where_chosen": rates(8, 1, 1), "defaults": rates(2, 9, 7)}
+    result = run(judged=rates(8, 1, 1), fit=fit, chosen_here=True, detections=9)
+    _, words = shown(result)
+    assert "On images that thresholds were not chosen from: of 9 labelled, 5 are found; 5 of 10" in words
+    table = words[words.index("Rates") :]
+    assert table.index("0.56") < table.index("too good") < table.index("with the defaults")
+    assert "beside the labels" not in table
+    elsewhere = run(judged=rates(7, 1, 2), fit=fit, chosen_here=False, detections=8)
+    assert "beside the labels" in shown(elsewhere)[1]
+
+
+@pytest.mark.parametrize(
+    ("missed", "invented", "start"),
+    [
+        (5, 1, "More is missed: 5 missed"),
+        (1, 5, "More is invented: 1 missed"),
+        (2, 2, "2 missed, 2 invented"),
+    ],
+)
+def test_advice_follows_what_is_wrong(missed, invented, start):
+    (advice,) = advice_of(run(judged=rates(6, invented, missed)))
+    assert advice.startswith(start)
+    assert "--fit" in advice
+
+
+def test_no_advice_where_all_is_found_and_a_warning_where_labels_are_few():
+    assert advice_of(run(judged=rates(6, 0, 0))) == []
+    (few,) = advice_of(run(judged=rates(6, 0, 0, interval=False)))
+    assert "too few for an interval" in few
+
+
+def test_images_that_could_not_be_used_are_listed_and_never_silent():
+    problems = [[f"bad{n}.png", "it is empty"] for n in range(LISTED + 2)]
+    page, words = shown(run(problems=problems))
+    assert f"{LISTED + 2} images of {LISTED + 7} could not be used" in words
+    assert page.count("it is empty") == LISTED and "2 more are in frames.csv" in words
+    assert "No image could be used" in advice_of(run(usable=0, detections=0, problems=problems))[0]
+
+
+def test_names_are_names_and_nothing_more():
+    evil = "<script>alert(1)</script>"
+    page, _ = shown(
+        run(problems=[[evil, evil]]), {}, [(f'"{evil}', JPEG)], thresholds={evil: evil}, name=evil
+    )
+    assert "<script" not in page
+
+
+def test_pictures_have_an_end():
+    large = JPEG + bytes(ROOM // 2)
+    page, words = shown(run(), {}, [("a", large), ("b", JPEG), ("c", large), ("d", JPEG)])
+    assert page.count("data:image/jpeg") == 2
+    assert "2 more pictures in the folder overlays" in words
+    assert "too large for this page" in shown(run(), {}, [("a", large + large)])[1]
+
+
+def test_counts_of_each_image_are_said():
+    frames = pd.DataFrame(
+        {"frame_id": list("abcd"), "detections": [0, 3, 0, 9], "problem": [None] * 3 + ["bad"]}
+    )
+    _, words = shown(run(), frames=frames)
+    assert "2 of 3 images have none; the most has b, with 3." in words
+    _, none = shown(run(), frames=frames.assign(detections=0))
+    assert "None of 3 images has any." in none
