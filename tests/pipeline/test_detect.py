@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import cv2
 import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.commands.detect import detect
 from wildlab.detection.colour import Colour
 from wildlab.detection.contrast import Contrast
 from wildlab.detection.shape import Shape, fit_shape
@@ -17,10 +19,11 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline import detect as subject
-from wildlab.pipeline.detect import METHODS, detect_frame, for_distance, run_detection, thresholds_from
+from wildlab.pipeline.detect import detect_frame, run_detection, thresholds_from
 from wildlab.pipeline.detect_command import read_thresholds, samples_of, write_thresholds
 from wildlab.pipeline.detection_fit import Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import judge_detections
+from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_shape_fit import fit_shapes
 
 
@@ -209,11 +212,11 @@ def test_floating_objects_are_found_by_the_same_command(tmp_path: Path) -> None:
     np.testing.assert_allclose(done.detections["v_px"], 50, atol=0.5)
     cold = read_image(tmp_path / "cold0.png", polarity="black-hot")
     assert len(detect_frame(cold, "floating", FloatingThresholds())) == 1
-    far = for_distance(FloatingThresholds(), 100.0, 1000.0, 2.0)
+    far = for_distance("floating", FloatingThresholds(), 100.0, 1000.0, 2.0)
     assert (far.area_of, far.largest_area) == ("filled", 400.0)
     # A seven times smaller thing is let through by neither limit.
     assert len(detect_frame(next(iter(frames)), "floating", far)) == 1
-    near = for_distance(FloatingThresholds(), 10.0, 1000.0, 2.0)
+    near = for_distance("floating", FloatingThresholds(), 10.0, 1000.0, 2.0)
     assert len(detect_frame(next(iter(frames)), "floating", near)) == 0
 
 
@@ -237,3 +240,25 @@ def test_colours_are_found_by_the_same_command(tmp_path: Path) -> None:
     assert done.detections[["u_px", "v_px"]].to_numpy().tolist() == [[314.5, 204.5]]
     write_thresholds(tmp_path / "t.json", "colour", Colour(hue=(170.0, 10.0)))
     assert read_thresholds(tmp_path / "t.json", "colour") == Colour(hue=(170.0, 10.0))
+
+
+def test_the_command_offers_the_methods_that_there_are() -> None:
+    option = next(one for one in detect.params if one.name == "method")
+    assert isinstance(option.type, click.Choice)
+    assert list(option.type.choices) == list(METHODS)
+
+
+@pytest.mark.parametrize("method", ["shape", "colour"])
+def test_a_distance_is_refused_where_no_length_follows_from_it(method: str) -> None:
+    with pytest.raises(WildlabError, match=f"No length of the method '{method}'.*contrast, warm, floating"):
+        for_distance(method, METHODS[method].thresholds(), 60.0, 765.0, 1.5)
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_what_a_method_says_of_itself_holds(method: str) -> None:
+    """Thresholds for dark warmth and for a distance are of the same kind, and others than the defaults."""
+    how = METHODS[method]
+    defaults = how.thresholds()
+    changed = [how.black_hot(defaults)] if how.black_hot else []
+    changed += [how.for_distance(defaults, 30.0, 400.0, 3.0)] if how.for_distance else []
+    assert all(type(one) is how.thresholds and one != defaults for one in changed)

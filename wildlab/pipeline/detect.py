@@ -4,50 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from wildlab.detection.colour import Colour, find_coloured
-from wildlab.detection.contrast import Contrast, find_by_contrast
 from wildlab.detection.detections import Detections, no_detections
-from wildlab.detection.floating import detect_floating
-from wildlab.detection.shape import Shape, find_by_shape
-from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.detection.warm import Warm, block_from_distance, find_warm, gate_from_distance, to_grey
+from wildlab.detection.warm import to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.readers.frames import Frame, Frames
+from wildlab.pipeline.detection_methods import METHODS
 
-
-class Method(NamedTuple):
-    """A detector with its thresholds.
-
-    Attributes
-    ----------
-    thresholds
-        Frozen dataclass; made without arguments it holds the defaults.
-    find
-        Called with image, valid and thresholds.
-    """
-
-    thresholds: type[Any]
-    find: Callable[[Any, Any, Any], Detections]
-
-
-#: What `wildlab detect --method` offers.
-METHODS: dict[str, Method] = {
-    "contrast": Method(Contrast, find_by_contrast),
-    "warm": Method(Warm, find_warm),
-    "shape": Method(Shape, find_by_shape),
-    "floating": Method(FloatingThresholds, detect_floating),
-    "colour": Method(Colour, find_coloured),
-}
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25
 TABLE_COLUMNS = (
@@ -75,7 +47,7 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
     frame
         One with a problem has none.
     method
-        One of `METHODS`.
+        One of `wildlab.pipeline.detection_methods.METHODS`.
     thresholds
         Of that method.
 
@@ -92,20 +64,11 @@ def detect_frame(frame: Frame, method: str, thresholds: Any) -> Detections:
         raise WildlabError(f"there is no method {method!r}", f"take one of {', '.join(METHODS)}")
     if not frame.usable:
         return no_detections()
-    if method == "colour":
-        return find_coloured(frame.image, frame.valid, thresholds)
-    if frame.polarity == "black-hot":
-        thresholds = _for_black_hot(thresholds)
-    image = frame.image if frame.image.ndim == 2 else to_grey(frame.image)
-    return METHODS[method].find(image, frame.valid, thresholds)
-
-
-def _for_black_hot(thresholds: Any) -> Any:
-    if isinstance(thresholds, Shape):
-        return replace(thresholds, regions=replace(thresholds.regions, warm_is_bright=False))
-    if isinstance(thresholds, FloatingThresholds):
-        return replace(thresholds, warm=False)
-    return replace(thresholds, warm_is_bright=False)
+    how = METHODS[method]
+    if how.black_hot is not None and frame.polarity == "black-hot":
+        thresholds = how.black_hot(thresholds)
+    as_it_is = how.colours or frame.image.ndim == 2
+    return how.find(frame.image if as_it_is else to_grey(frame.image), frame.valid, thresholds)
 
 
 def detections_table(frame: Frame, found: Detections, source: str) -> pd.DataFrame:
@@ -325,54 +288,6 @@ def _parquet(table: pd.DataFrame) -> bytes:
 def _joined(tables: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
     some = [one for one in tables if len(one)]
     return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=list(columns))
-
-
-#: Of the square of an animal's length, what is seen of it at least and at most, and how many lengths the
-#: window of a background is wide. Chosen, not fitted: a thin leg to a stout body seen from above.
-SMALLEST_PART, LARGEST_PART, WINDOW_LENGTHS = 0.03, 1.0, 4.0
-
-
-def for_distance(thresholds: Any, distance_m: float, focal_px: float, animal_m: float) -> Any:
-    """Thresholds whose lengths and areas are those of an animal at that distance (F 3.2, 8.1.1, 8.4).
-
-    Parameters
-    ----------
-    thresholds
-        `Warm`, `Contrast`, `FloatingThresholds`, or another, which stays as it is.
-    distance_m
-        From the camera to the ground along the middle of the image, m.
-    focal_px
-        Focal length, px.
-    animal_m
-        Length of what is looked for, m.
-
-    Returns
-    -------
-    object
-        Of the same kind.
-
-    Raises
-    ------
-    WildlabError
-        Where a length is not above zero.
-
-    Examples
-    --------
-    >>> near, far = (for_distance(Contrast(), distance, 1000.0, 1.5) for distance in (50.0, 100.0))
-    >>> near.window_px, far.window_px, near.largest_px, far.largest_px
-    (121, 61, 900.0, 225.0)
-    """
-    seen = animal_m**2
-    smallest, largest = gate_from_distance(distance_m, focal_px, SMALLEST_PART * seen, LARGEST_PART * seen)
-    if isinstance(thresholds, Warm):
-        block = block_from_distance(distance_m, focal_px, animal_m)
-        return replace(thresholds, smallest_px=smallest, largest_px=largest, block_px=block)
-    if isinstance(thresholds, Contrast):
-        window = block_from_distance(distance_m, focal_px, animal_m, WINDOW_LENGTHS)
-        return replace(thresholds, smallest_px=smallest, largest_px=largest, window_px=window)
-    if isinstance(thresholds, FloatingThresholds):
-        return replace(thresholds, smallest_area=smallest, largest_area=largest, area_of="filled")
-    return thresholds
 
 
 def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:

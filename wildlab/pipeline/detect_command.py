@@ -22,9 +22,10 @@ from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
-from wildlab.pipeline.detect import METHODS, Detected, for_distance, run_detection, thresholds_from
+from wildlab.pipeline.detect import Detected, run_detection, thresholds_from
 from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
+from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_pictures import write_pictures
 from wildlab.pipeline.detection_shape_fit import fit_shapes
 
@@ -41,7 +42,7 @@ class Wanted:
     images, into
         Where frames are, and where what comes out goes.
     method
-        One of `wildlab.pipeline.detect.METHODS`.
+        One of `wildlab.pipeline.detection_methods.METHODS`.
     labels
         By which the detections are judged.
     fit
@@ -114,7 +115,9 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             raise WildlabError(
                 "lengths come from a distance and from a fit", "leave --distance or the other out"
             )
-        thresholds = for_distance(thresholds, wanted.distance_m, wanted.focal_px, wanted.animal_m)
+        thresholds = for_distance(
+            wanted.method, thresholds, wanted.distance_m, wanted.focal_px, wanted.animal_m
+        )
     if wanted.thresholds:
         thresholds = read_thresholds(wanted.thresholds, wanted.method)
     wanted.into.mkdir(parents=True, exist_ok=True)

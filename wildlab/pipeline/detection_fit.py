@@ -15,7 +15,8 @@ from wildlab.detection.warm import Warm
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.flight.readers.frames import Frame
-from wildlab.pipeline.detect import METHODS, detect_frame
+from wildlab.pipeline.detect import detect_frame
+from wildlab.pipeline.detection_methods import METHODS
 
 Array = NDArray[np.float64]
 
@@ -115,7 +116,7 @@ def candidates(method: str, count: int = TRIED, seed: int = 1) -> list[Any]:
     Parameters
     ----------
     method
-        One of `wildlab.pipeline.detect.METHODS`.
+        One of `wildlab.pipeline.detection_methods.METHODS`.
     count
         How many at most.
     seed
