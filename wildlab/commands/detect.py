@@ -26,16 +26,30 @@ ABOVE_ZERO = click.FloatRange(0, min_open=True)
     show_default=True,
 )
 @click.option(
-    "--labels", type=FILE, help="CSV of boxes or points in these images: what was missed, what invented?"
+    "--labels",
+    type=ANY,
+    help="Boxes or points in these images (CSV, COCO, MegaDetector, folder of YOLO): what was missed, what "
+    "invented?",
 )
 @click.option(
-    "--fit", type=FILE, help="CSV likewise: choose the thresholds by it, and judge them where not chosen."
+    "--fit", type=ANY, help="Labels likewise: choose the thresholds by them, and judge them where not chosen."
+)
+@click.option(
+    "--also",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    help="Boxes of another detector, with scores or without: judged beside ours by the same labels.",
+)
+@click.option(
+    "--also-class", "also_classes", multiple=True, help="Class of the other detectors that is looked for."
 )
 @click.option("--thresholds", type=FILE, help="thresholds.json of another run, in place of the defaults.")
 @click.option(
     "--class", "classes", multiple=True, help="Class of labels that is looked for; others are not judged."
 )
-@click.option("--group", help="Column of the labels that says which frames belong together.")
+@click.option(
+    "--group", help="Column of the labels (field of COCO's images) that says which frames belong together."
+)
 @click.option("--polarity", type=click.Choice(["white-hot", "black-hot", "unknown"]), default="unknown")
 @click.option(
     "--overlays", type=click.IntRange(0, 100_000), default=40, show_default=True, help="How many pictures."
@@ -52,6 +66,8 @@ def detect(
     method: str,
     labels: Path | None,
     fit: Path | None,
+    also: tuple[str, ...],
+    also_classes: tuple[str, ...],
     thresholds: Path | None,
     classes: tuple[str, ...],
     group: str | None,
@@ -70,7 +86,8 @@ def detect(
     colour the blue tarpaulin of H 4.4.2 in colour images.
 
     Leaves report.html, detections.csv and .parquet, frames.csv, thresholds.json, pictures in overlays, and
-    with labels what was missed and invented. A run that was broken off goes on where it stopped.
+    with labels what was missed and invented. With --also, compared.csv has precision and recall of each
+    detector along its score. A run that was broken off goes on where it stopped.
 
     \b
     Examples:
@@ -78,6 +95,7 @@ def detect(
       wildlab detect clip.mp4 --method warm --into found
       wildlab detect images --distance 60 --focal 765 --animal 1.5 --into found
       wildlab detect images --fit labels.csv --class Person --into found
+      wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --into found
       wildlab detect sea --method floating --into found
     """
     from wildlab.pipeline.detect_command import Wanted, detect_images
@@ -96,6 +114,8 @@ def detect(
         distance,
         focal,
         animal,
+        also,
+        also_classes,
     )
     result = detect_images(wanted, terminal_console())
     write_page(into, images.resolve().name, result)

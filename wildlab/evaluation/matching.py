@@ -174,22 +174,13 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
     >>> round(rates([[8, 2, 2], [8, 2, 2]]).f1.estimate, 2)
     0.8
     """
-    table = np.asarray(counts, float).reshape(-1, 3)
-    names = list(range(len(table))) if groups is None else list(groups)
-    if len(names) != len(table):
-        raise WildlabError(
-            f"{len(table)} frames have counts and {len(names)} have a clip", "give one clip for each frame"
-        )
-    place = {name: row for row, name in enumerate(dict.fromkeys(names))}
-    sums = np.zeros((len(place), 3))
-    np.add.at(sums, [place[name] for name in names], table)
-    of_all = _shares(sums.sum(axis=0))
-    if len(sums) >= FEWEST:
-        rng = np.random.default_rng(seed)
-        weights = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), DRAWS)
-        drawn = _shares(weights @ sums)
+    sums = group_sums(np.asarray(counts, float).reshape(-1, 3), groups)
+    of_all = shares(sums.sum(axis=0))
+    weights = group_draws(len(sums), seed)
+    if weights is not None:
+        drawn = shares(weights @ sums)
         with np.errstate(invalid="ignore"):
-            low, high = (np.array([_percentile(column, at) for column in drawn.T]) for at in (2.5, 97.5))
+            low, high = (np.array([percentile(column, at) for column in drawn.T]) for at in (2.5, 97.5))
     else:
         low = high = np.full(3, np.nan)
     one = [Interval(float(e), float(a), float(b)) for e, a, b in zip(of_all, low, high, strict=True)]
@@ -197,13 +188,94 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
     return Rates(one[0], one[1], one[2], found, invented, missed, len(sums))
 
 
-def _percentile(values: Array, at: float) -> float:
+def group_sums(counts: Array, groups: Sequence[object] | None = None) -> Array:
+    """Counts of frames summed over the clips that they belong to.
+
+    Parameters
+    ----------
+    counts
+        (F, ...) of each frame.
+    groups
+        (F,) to which clip a frame belongs; None takes each for its own.
+
+    Returns
+    -------
+    (G, ...)
+
+    Raises
+    ------
+    WildlabError
+        Where there is not one group for each frame.
+    """
+    names = list(range(len(counts))) if groups is None else list(groups)
+    if len(names) != len(counts):
+        raise WildlabError(
+            f"{len(counts)} frames have counts and {len(names)} have a clip", "give one clip for each frame"
+        )
+    place = {name: row for row, name in enumerate(dict.fromkeys(names))}
+    sums = np.zeros((len(place), *counts.shape[1:]))
+    np.add.at(sums, [place[name] for name in names], counts)
+    return sums
+
+
+def group_draws(groups: int, seed: int = 1) -> Array | None:
+    """How often each clip is in each draw with replacement, the same for the same number of clips.
+
+    Parameters
+    ----------
+    groups
+        How many clips there are.
+    seed
+        Of the draws.
+
+    Returns
+    -------
+    (DRAWS, G) or None
+        None below `FEWEST` clips.
+    """
+    if groups < FEWEST:
+        return None
+    rng = np.random.default_rng(seed)
+    return rng.multinomial(groups, np.full(groups, 1 / groups), DRAWS).astype(float)
+
+
+def percentile(values: Array, at: float) -> float:
+    """Percentile of what is finite.
+
+    Parameters
+    ----------
+    values
+        (N,).
+    at
+        0 to 100.
+
+    Returns
+    -------
+    float
+        NaN where nothing is finite.
+    """
     some = values[np.isfinite(values)]
     return float(np.percentile(some, at)) if len(some) else float("nan")
 
 
-def _shares(sums: Array) -> Array:
-    """(..., 3) precision, recall and F1 of (..., 3) found, invented and missed."""
+def shares(sums: Array) -> Array:
+    """Precision, recall and F1 of counts.
+
+    Parameters
+    ----------
+    sums
+        (..., 3) found, invented and missed.
+
+    Returns
+    -------
+    (..., 3)
+        NaN where there is nothing to divide by.
+
+    Examples
+    --------
+    >>> shares(np.array([3.0, 1.0, 2.0])).round(2).tolist()
+    [0.75, 0.6, 0.67]
+    """
     found, invented, missed = np.moveaxis(np.asarray(sums, float), -1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.stack(

@@ -16,15 +16,27 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_json
+from wildlab.files import write_atomic, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 from wildlab.pipeline.detect import Detected, run_detection, thresholds_from
+from wildlab.pipeline.detection_compared import (
+    compare_detectors,
+    compared_sentences,
+    curve_table,
+    read_others,
+)
 from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
-from wildlab.pipeline.detection_judged import Judged, judge_detections, plain_rates
+from wildlab.pipeline.detection_judged import (
+    Judged,
+    judge_detections,
+    labels_sentences,
+    plain_rates,
+    rates_sentence,
+)
 from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_pictures import write_pictures
 from wildlab.pipeline.detection_shape_fit import fit_shapes
@@ -58,6 +70,10 @@ class Wanted:
     distance_m, focal_px, animal_m
         From the camera to the ground, focal length, and length of what is looked for: they give the
         thresholds their lengths. None where that is not known.
+    also
+        Files of other detectors, ``name=file`` or a file alone, that are judged beside ours.
+    also_classes
+        Which of their classes are meant; empty takes those of the labels' names, or all.
     """
 
     images: Path
@@ -73,6 +89,8 @@ class Wanted:
     distance_m: float | None = None
     focal_px: float | None = None
     animal_m: float = 1.5
+    also: tuple[str, ...] = ()
+    also_classes: tuple[str, ...] = ()
 
 
 def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
@@ -102,6 +120,12 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             "a classifier of shapes has to be learnt first",
             "give --fit with labels, or --thresholds of such a run",
         )
+    if wanted.also and not wanted.labels:
+        raise WildlabError(
+            "another detector can be judged by labels only", "give --labels, or leave --also out"
+        )
+    if wanted.also_classes and not wanted.also:
+        raise WildlabError("there is no other detector whose classes these are", "give its file with --also")
     if (wanted.distance_m is None) is not (wanted.focal_px is None):
         raise WildlabError(
             "the distance to the ground and the focal length are of use together", "give both, or neither"
@@ -109,6 +133,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     frames = _open(wanted)
     labels = _labels(wanted.labels, wanted)
     to_fit = _labels(wanted.fit, wanted)
+    others = [] if labels is None else read_others(wanted.also, labels, wanted.classes, wanted.also_classes)
     thresholds = METHODS[wanted.method].thresholds()
     if wanted.distance_m is not None and wanted.focal_px is not None:
         if wanted.fit or wanted.thresholds:
@@ -144,7 +169,13 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         pictures = write_pictures(
             frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
         )
-    result = _result(wanted, thresholds, detected, judged, fitted, pictures)
+    result = _result(wanted, thresholds, detected, judged, fitted, pictures, labels)
+    if others and labels is not None:
+        ours = f"wildlab {wanted.method}"
+        compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
+        result["compared"] = [one.as_plain() for one in compared]
+        result["sentences"] += [line for one in compared for line in compared_sentences(one, compared[0])]
+        write_atomic(wanted.into / "compared.csv", curve_table(compared).to_csv(index=False))
     write_json(wanted.into / "result.json", result)
     return result
 
@@ -193,7 +224,9 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
         seen += 1
         if (seen - 1) % step:
             continue
-        found.append(Sample(frame, labels.boxes[name], labels.ignore[name], labels.group[name]))
+        height, width = frame.image.shape[:2]
+        boxes, ignore = labels.boxes_of(frame.name, name, width, height)
+        found.append(Sample(frame, boxes, ignore, labels.group[name]))
     return found
 
 
@@ -284,6 +317,7 @@ def _result(
     judged: Judged | None,
     fitted: Fitted | None,
     pictures: dict[str, int],
+    labels: Labels | None,
 ) -> dict[str, Any]:
     problems = detected.frames[detected.frames["problem"].fillna("") != ""]
     result: dict[str, Any] = {
@@ -311,12 +345,12 @@ def _result(
             "defaults": plain_rates(fitted.defaults),
         }
         say.append(
-            f"On frames that thresholds were not chosen from: {_rates_sentence(result['fit']['held_out'])}"
+            f"On frames that thresholds were not chosen from: {rates_sentence(result['fit']['held_out'])}"
         )
-        say.append(f"Where they were chosen: {_rates_sentence(result['fit']['where_chosen'])}")
+        say.append(f"Where they were chosen: {rates_sentence(result['fit']['where_chosen'])}")
         without = "Without a classifier" if wanted.method == "shape" else "With the defaults"
-        say.append(f"{without}: {_rates_sentence(result['fit']['defaults'])}")
-    if judged is not None:
+        say.append(f"{without}: {rates_sentence(result['fit']['defaults'])}")
+    if judged is not None and labels is not None:
         result["judged"] = judged.as_plain()
         chosen_here = fitted is not None and wanted.labels == wanted.fit
         result["chosen_here"] = chosen_here
@@ -325,25 +359,14 @@ def _result(
             if chosen_here
             else "Beside the labels"
         )
-        say.append(f"{where}: {_rates_sentence(result['judged'])}")
+        say.append(f"{where}: {rates_sentence(result['judged'])}")
+        say += labels_sentences(labels)
         if judged.without_labels or judged.unusable or judged.absent:
             say.append(
                 f"Frames that the labels do not name: {judged.without_labels}; labelled and unusable: "
                 f"{judged.unusable}; labelled and not here: {len(judged.absent)}."
             )
     return result
-
-
-def _rates_sentence(rates: dict[str, Any]) -> str:
-    def shown(name: str) -> str:
-        one = rates[name]
-        if one["estimate"] is None:
-            return f"{name} not defined"
-        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
-        return f"{name} {one['estimate']:.2f}{span}"
-
-    counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
-    return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")
 
 
 @contextmanager

@@ -77,6 +77,53 @@ def plain_rates(given: Rates) -> dict[str, Any]:
     return found
 
 
+def rates_sentence(rates: dict[str, Any]) -> str:
+    """Rates as a line that is printed.
+
+    Parameters
+    ----------
+    rates
+        From `plain_rates`.
+
+    Returns
+    -------
+    str
+    """
+
+    def shown(name: str) -> str:
+        one = rates[name]
+        if one["estimate"] is None:
+            return f"{name} not defined"
+        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
+        return f"{name} {one['estimate']:.2f}{span}"
+
+    counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
+    return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")
+
+
+def labels_sentences(labels: Labels) -> list[str]:
+    """What of a file of labels is not used, and what it says that truth does not have.
+
+    Parameters
+    ----------
+    labels
+        The truth.
+
+    Returns
+    -------
+    list of str
+    """
+    said = [f"{count} x {reason}" for reason, count in labels.marked.left_out.items()]
+    found = [f"Left out of the labels: {'; '.join(said)}."] if said else []
+    scores = np.concatenate([np.zeros(0), *labels.scores.values()])
+    scores = scores[np.isfinite(scores)]
+    if len(scores):
+        found.append(
+            f"The labels have scores ({scores.min():.2g} to {scores.max():.2g}), and all are taken for true."
+        )
+    return found
+
+
 def judge_detections(
     detections: pd.DataFrame, frames: pd.DataFrame, labels: Labels, rule: Rule | None = None
 ) -> Judged:
@@ -106,7 +153,8 @@ def judge_detections(
     rows: list[tuple[Any, ...]] = []
     named = set()
     unusable = 0
-    for frame, problem in zip(frames["frame_id"], frames["problem"].fillna(""), strict=True):
+    columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
+    for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
         name = labels.name_of(str(frame))
         if name is None:
             continue
@@ -116,12 +164,13 @@ def judge_detections(
         boxes = np.zeros((0, 4)) if own is None else own[_BOX].to_numpy(float)
         scores = [] if own is None else own["score"].tolist()
         centred = boxes if own is None else _about(own, boxes)
-        found = match(centred, labels.boxes[name], rule, labels.ignore[name])
+        true, ignore = labels.boxes_of(str(frame), name, int(width), int(height))
+        found = match(centred, true, rule, ignore)
         counts.append(found.counts)
         groups.append(labels.group[name])
         verdicts = (("found", found.pairs[:, 0]), ("invented", found.invented), ("not judged", found.ignored))
         rows += [(frame, word, *boxes[row], scores[row]) for word, which in verdicts for row in which]
-        rows += [(frame, "missed", *labels.boxes[name][row], np.nan) for row in found.missed]
+        rows += [(frame, "missed", *true[row], np.nan) for row in found.missed]
     if not counts:
         raise WildlabError(
             f"the labels name {len(labels.boxes)} frames, and none of them is here",
@@ -132,6 +181,29 @@ def judge_detections(
     return Judged(
         rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent
     )
+
+
+def boxes_by_frame(
+    detections: pd.DataFrame,
+) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Boxes about the centroids, and scores, by the name of the frame.
+
+    Parameters
+    ----------
+    detections
+        As `wildlab.pipeline.detect.Detected` has them.
+
+    Returns
+    -------
+    dict
+        (N, 4) left, top, width, height, px, and (N,).
+    """
+    if not len(detections):
+        return {}
+    return {
+        str(frame): (_about(own, own[_BOX].to_numpy(float)), own["score"].to_numpy(float))
+        for frame, own in detections.groupby("frame_id", sort=False)
+    }
 
 
 def _about(own: pd.DataFrame, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
