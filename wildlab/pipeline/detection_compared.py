@@ -219,7 +219,7 @@ def compare_detectors(
     result: list[Compared] = []
     first = None
     for called, found, told in sets:
-        scored = [ScoredFrame(*a, *b) for a, b in zip(found, truth, strict=True)]
+        scored = [ScoredFrame(a[0], a[1], b[0], b[1]) for a, b in zip(found, truth, strict=True)]
         counts = np.array([match(one.boxes, one.labels, rule, one.ignore).counts for one in scored])
         first = counts if first is None else first
         scores = np.concatenate([np.zeros(0), *(one.scores for one in scored)])
