@@ -130,6 +130,18 @@ def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) ->
     assert faults(folder / "report.html") == []
 
 
+def test_a_tarpaulin_is_looked_for_on_one_flight(reports: Path, faults: Faults) -> None:
+    folder = run("precision-drop", reports, seeds=1)
+    found = values(folder)
+    assert found["detections", "mean"]["value"] == 75
+    assert 0 < found["error", "mean"]["value"] < 15
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 1, 6)
+    for figure in ("found", "horizon", "mean", "scatter"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_survey_markers_beside_the_published_accuracy(
     reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:

@@ -2,8 +2,9 @@
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
 against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and animals,
-`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults. All of it
-is chosen; nothing in it knows of a detector.
+`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults; `coloured`
+is the ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows of a
+detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
@@ -22,6 +23,7 @@ from wildlab.simulation.scene.bodies import (
     rectangle,
     vessel,
 )
+from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
 from wildlab.simulation.scene.render import Scene, Seen, View, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,
@@ -42,12 +44,15 @@ __all__ = [
     "KINDS",
     "Body",
     "CameraResponse",
+    "ColourView",
+    "Ground",
     "Hot",
     "Layer",
     "Scene",
     "Sea",
     "Seen",
     "Sensor",
+    "Tarpaulin",
     "View",
     "Wake",
     "boat",
@@ -60,6 +65,7 @@ __all__ = [
     "person",
     "rectangle",
     "render",
+    "render_colour",
     "sensor_of",
     "shutter_image",
     "to_kelvin",

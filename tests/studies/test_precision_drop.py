@@ -1,0 +1,158 @@
+"""What the study of the precision drop computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.detection.colour import Colour
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import decide
+from wildlab.geometry.camera import Camera
+from wildlab.reporting.published import load_claims
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.coloured import Ground
+from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.studies.precision_drop import STUDY, charts, text
+from wildlab.studies.precision_drop.trial import (
+    COUNTS,
+    FOUND,
+    HORIZON,
+    MEAN,
+    SINGLE,
+    Drop,
+    alarms,
+    check_claims,
+    flown,
+    horizon_views,
+    look_of,
+    numbers_of,
+    search,
+    view_of,
+)
+
+CAMERA = Camera(640, 360, 532.0, 532.0, 319.5, 179.5)
+
+
+@pytest.fixture(scope="module")
+def few():
+    return flown(1, "precision-drop", 12, 2)
+
+
+def test_what_is_found_is_the_tarpaulin_and_is_put_beside_the_truth(few):
+    drop, errors, numbers = few
+    assert len(drop.uv) == len(errors) == 12 and drop.false == 0 and drop.right == drop.should
+    assert np.abs(drop.uv - drop.true).max() < 1.0
+    # With the autopilot's poses a position is metres off, and with the pixel alone it would be centimetres.
+    assert 0.2 < np.hypot(*errors.T).mean() < 15
+    assert numbers[MEAN, "error"] == pytest.approx(np.hypot(*errors.mean(axis=0)))
+    assert numbers[MEAN, "after_10"] == pytest.approx(np.hypot(*errors[:10].mean(axis=0)))
+    assert np.isnan(numbers[MEAN, "after_75"])
+    assert {subject for subject, _ in numbers} <= set(STUDY.subjects)
+
+
+def test_the_printed_limits_find_it_and_others_do_not(few):
+    drop = few[0]
+    flight = SceneFlight(load_twin("precision-drop"), 1)
+    view = view_of(flight, drop.look, int(drop.exposures[0]), 1)
+    assert view.share > 0.99
+    # Only images with it in the middle rows, for these are few.
+    red = search(flight, drop.look, 1, 1, 0, Colour(hue=(170.0, 10.0), border_px=(30.0, 170.0)))
+    assert len(red.uv) == 0 and red.right == 0 and red.should > 5
+
+
+def test_borders_keep_out_a_blue_sky_only_where_it_is_thin():
+    look = look_of(1)
+    blue = look._replace(ground=replace(look.ground, sky=(10.0, 115.0, 240.0), sky_from=0.01, light=1.0))
+    pale = look._replace(ground=Ground(sky=(180.0, 200.0, 250.0)))
+    assert alarms(horizon_views(CAMERA, pale, 1, 6)) == (0, 0)
+    views = horizon_views(CAMERA, blue, 1, 6)
+    kept, every = alarms(views)
+    # The middle of a sky that is more than twice 60 px deep lies inside the borders.
+    assert every == 6 and kept == sum(view.sky.sum() > 122 * 640 for view in views)
+
+
+def test_numbers_by_hand():
+    one = Drop(
+        look_of(1), np.arange(2), np.array([[10.0, 10], [20, 20]]), np.array([[10.0, 13], [20, 16]]),
+        np.array([True, False]), np.array([0.5, 0.7]), 5, 4, 2, 1, 3,
+    )  # fmt: skip
+    found = numbers_of(one, np.array([[3.0, 4], [-3, 2]]), CAMERA, 106.4)
+    assert (found[FOUND, "detection_rate"], found[FOUND, "false_alarms_per_image"]) == (0.5, 1 / 8)
+    assert (found[FOUND, "pixel_error"], found[FOUND, "off_centre"]) == (3.5, 0.5)
+    assert (found[MEAN, "error"], found[MEAN, "after_1"], found[MEAN, "after_2"]) == (3.0, 5.0, 3.0)
+    assert found[FOUND, "few_pixels"] == pytest.approx(0.6)
+    assert found[SINGLE, "rms_error"] == pytest.approx(np.sqrt((25 + 13) / 2))
+
+
+def test_a_twin_without_a_find_is_refused(monkeypatch):
+    from wildlab.studies.precision_drop import trial
+
+    empty = Drop(look_of(1), *[np.zeros((0, 2))] * 5, 1, 1, 0, 0, 0)
+    monkeypatch.setattr(trial, "search", lambda *_: empty)
+    with pytest.raises(WildlabError, match="seed 1 nothing was found"):
+        flown(1, "precision-drop", 5, 1)
+
+
+def table(**changed):
+    """Two flights; ``name=value`` or ``subject_name=value`` changes a number of both."""
+    base = {
+        (FOUND, "right"): 75, (FOUND, "should"): 75, (FOUND, "false"): 0, (FOUND, "images"): 90,
+        (FOUND, "false_alarms_per_image"): 0, (FOUND, "pixel_error"): 0.1, (FOUND, "off_centre"): 0.05,
+        (FOUND, "few_pixels"): 0.6, (FOUND, "area_share"): 0.7, (FOUND, "ellipse_coverage_90"): 0.9,
+        (SINGLE, "median_error"): 3.0, (SINGLE, "rms_error"): 4.0, (MEAN, "error"): 2.0,
+        (MEAN, "detections"): 75, (HORIZON, "images"): 12, (HORIZON, "alarms_with_borders"): 0,
+        (HORIZON, "alarms_without_borders"): 0.5,
+    }  # fmt: skip
+    base |= {(MEAN, f"after_{count}"): 3.0 for count in COUNTS}
+    for name, value in changed.items():
+        key = next(key for key in base if f"{key[0]}_{key[1]}" == name)
+        base[key] = value
+    return pd.DataFrame([base, base], dtype=float)
+
+
+def test_words_turn_with_the_numbers():
+    alike = text.summary(table())
+    assert "nothing else was found" in alike[0] and "100 %" in alike[0]
+    assert alike[2] == "The errors of 75 detections are alike: their mean is worth about 4 independent ones."
+    other = text.summary(table(tarpaulin_right=60, tarpaulin_false=3, mean_error=0.4))
+    assert "something else was found in 6" in other[0] and "80.0 %" in other[0]
+    assert "much better" in other[1] and "as independent errors are" in other[2]
+    assert "no better" in text.summary(table(mean_error=3.5))[1]
+    assert text.summary(table(mean_error=4.0))[2].endswith("worth about 1 independent one.")
+    assert "independent, 75 would lower it to 0.3 m" in text.mean_words(table())
+    assert "That is what independent errors would give" in text.mean_words(table(mean_error=0.4))
+    assert "too narrow" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=0.5))
+    assert "wider than" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=1.0))
+    assert "All of the tarpaulin" in text.pixel_words(table(tarpaulin_area_share=1.02))
+    assert "12 have a sky" in text.horizon_words(table()) and "let 0 of these" in text.horizon_words(table())
+    assert "let 6 of these" in text.horizon_words(table(horizon_alarms_with_borders=0.25))
+    assert "is blue enough" in text.horizon_words(table(horizon_alarms_without_borders=0))
+
+
+def test_claims_turn_with_the_numbers():
+    claims = {one["id"]: one for one in load_claims("precision-drop")}
+    good, bad = check_claims(table()), check_claims(
+        table(
+            tarpaulin_false_alarms_per_image=0.1, tarpaulin_off_centre=2, tarpaulin_few_pixels=2,
+            mean_error=5, horizon_alarms_with_borders=0.4,
+        )
+    )  # fmt: skip
+    assert set(good) == set(claims)
+    for name, claim in claims.items():
+        assert good[name].holds(claim.get("threshold")).all(), name
+        assert not bad[name].holds(claim.get("threshold")).any(), name
+    none = check_claims(table(horizon_alarms_without_borders=0))["horizon-near-the-border"]
+    assert decide(none.holds(0.1), none.premise).met == 0
+
+
+def test_pictures_say_what_they_show(few):
+    flight = SceneFlight(load_twin("precision-drop"), 1)
+    view = view_of(flight, few[0].look, int(few[0].exposures[0]), 1)
+    shown = charts.image_shown(view, Colour(), "found", "with the tarpaulin", "")
+    assert "one region is accepted" in shown[2]
+    assert "nothing is accepted" in charts.image_shown(view, Colour(smallest_px=1e6), "x", "y", "")[2]
+    assert "3.0 m after 75" in charts.mean_shown(table())[2]

@@ -1,0 +1,14 @@
+"""Finding a tarpaulin by its colour, and the mean of many positions: H 4.4.2."""
+
+from __future__ import annotations
+
+from wildlab.studies.precision_drop import trial
+from wildlab.studies.protocol import Metric, Study
+
+
+def _metric(subject: str, name: str) -> Metric | None:
+    unit = trial.RECORDED.get(name)
+    return None if unit is None else Metric(name, subject, unit)
+
+
+STUDY = Study("precision-drop", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)

@@ -1,0 +1,142 @@
+"""What the report on the precision drop says, as the computed numbers have it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.studies.precision_drop.trial import COUNTS, FEW_PX, FOUND, HORIZON, MEAN, SINGLE
+
+METHOD = r"""The six steps of H 4.4.2 on images of 640 x 360 pixels, with the printed limits of hue,
+saturation and value, the printed smallest area of 50 pixels, and the printed borders of 30 pixels at the
+sides and 60 above and below. Of each image the largest region is taken.
+
+Each flight is that of the twin. Ground and tarpaulin are rendered in colour from its true poses, one image
+after the other, until enough was found; images in which the tarpaulin lies further than ten pixels beyond the
+borders are left out, for nothing of it could be accepted. Its middle is known exactly. What was found is put
+on the ground by H (5.13), with the poses that the autopilot states at the computer's stamps; the mean of the
+positions is where one would drop. A detection whose pixel is not on the tarpaulin is a false alarm, and so is
+one in an image without it.
+
+Images with the horizon are rendered apart: the twin's camera never sees it. They show ground and sky from
+100 m, the horizon level and anywhere in the upper half, and no tarpaulin."""
+#: From which share of the detections on their mean is worth about as many independent ones.
+NEARLY_ALL = 0.7
+
+
+def pooled(spread: pd.DataFrame, count: str, of: str) -> Interval:
+    """Share of images over all flights, with its interval; both are names of numbers of what was found."""
+    numbers = (round(float(spread[FOUND, name].sum())) for name in (count, of))
+    return share_interval(*numbers)
+
+
+def percent(share: float) -> str:
+    """A share in per cent; never rounded to all or to none."""
+    if share in (0.0, 1.0):
+        return f"{100 * share:.0f} %"
+    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
+
+
+def with_interval(share: Interval) -> str:
+    """A share in per cent, and its 95 % interval."""
+    return f"{percent(share.estimate)} ({percent(share.low)} to {percent(share.high)})"
+
+
+def worth(spread: pd.DataFrame) -> float:
+    """How many independent detections the mean of a flight is worth: mean squares of errors, divided."""
+    single, mean = (spread[one].to_numpy(float) for one in ((SINGLE, "rms_error"), (MEAN, "error")))
+    return float((single**2).mean() / (mean**2).mean())
+
+
+def summary(spread: pd.DataFrame) -> list[str]:
+    """Three sentences on what the trial gives, one row for each flight."""
+    rate = pooled(spread, "right", "should")
+    false = round(float(spread[FOUND, "false"].sum()))
+    images = round(float(spread[FOUND, "images"].sum()))
+    single, mean = float(spread[SINGLE, "median_error"].median()), float(spread[MEAN, "error"].median())
+    count = float(spread[MEAN, "detections"].median())
+    alarms = "nothing else was found" if not false else f"something else was found in {false}"
+    much = "much better" if mean < single / 2 else "better" if mean < 0.9 * single else "hardly better"
+    many = worth(spread)
+    shared = (
+        "as independent errors are: their mean is worth about that many."
+        if many > NEARLY_ALL * count
+        else f"alike: their mean is worth about {max(many, 1):.0f} independent one{'s' * (many >= 1.5)}."
+    )
+    return [
+        f"By its colour the tarpaulin is found in {with_interval(rate)} of the images that have it inside "
+        f"the borders. In the {images} images that were looked at, {alarms}.",
+        f"A single position is typically {single:.1f} metres off, the mean of {count:.0f} is {mean:.1f} "
+        f"metres off, which is {much if mean < single else 'no better'}.",
+        f"The errors of {count:.0f} detections are {shared}",
+    ]
+
+
+def mean_words(spread: pd.DataFrame) -> str:
+    """How the error of the mean falls with more detections, beside what independent ones would give."""
+    known = [count for count in COUNTS if spread[MEAN, f"after_{count}"].notna().all()]
+    first, last = known[0], known[-1]
+    error = {count: float(spread[MEAN, f"after_{count}"].median()) for count in (first, last)}
+    errors = mean_interval(spread[MEAN, "error"]) if len(spread) > 1 else None
+    over = "" if errors is None else f" (mean over flights {_span(errors)})"
+    if worth(spread) > NEARLY_ALL * last:
+        why = "That is what independent errors would give"
+    else:
+        why = (
+            f"Were their errors independent, {last} would lower it to "
+            f"{error[first] / np.sqrt(last / first):.1f} m. The images of one pass share what the "
+            "autopilot has wrong, and what is left of the mount's angles stays in all of them"
+        )
+    return (
+        f"After {first} detection{'s' * (first > 1)} the median flight is {error[first]:.1f} m off, after "
+        f"{last} {error[last]:.1f} m{over}. {why}."
+    )
+
+
+def _span(found: Interval) -> str:
+    return f"{found.estimate:.1f} m, {found.low:.1f} to {found.high:.1f} m"
+
+
+def pixel_words(spread: pd.DataFrame) -> str:
+    """How well the centre is found, what that is on the ground, and whether the ellipses know it."""
+    error, off = (float(spread[FOUND, name].median()) for name in ("pixel_error", "off_centre"))
+    few = float(spread[FOUND, "few_pixels"].median())
+    share, coverage = (float(spread[FOUND, name].median()) for name in ("area_share", "ellipse_coverage_90"))
+    seen = (
+        f"What is found covers {percent(share)} of the tarpaulin on the median flight (its rim is too pale); "
+        if share < 1
+        else "All of the tarpaulin is found; "
+    )
+    known = (
+        "wider than the errors ask for: they allow for a part that is missed on one side only"
+        if coverage > 0.95
+        else "about right"
+        if coverage >= 0.85
+        else "too narrow"
+    )
+    return (
+        f"{seen}its centre is {error:.2f} px from that of the tarpaulin on average, and the mean of these "
+        f"differences is {off:.2f} px. {FEW_PX:.0f} px are {few:.1f} m on the ground. The detector's own "
+        f"ellipses (90 %) hold the true centre in {percent(coverage)} of the images of the median flight: "
+        f"they are {known}."
+    )
+
+
+def horizon_words(spread: pd.DataFrame) -> str:
+    """What the borders do against a blue sky."""
+    images = float(spread[HORIZON, "images"].sum())
+    count = {
+        name: round(float((spread[HORIZON, name] * spread[HORIZON, "images"]).sum()))
+        for name in ("alarms_with_borders", "alarms_without_borders")
+    }
+    every, kept = count["alarms_without_borders"], count["alarms_with_borders"]
+    if not every:
+        return f"No sky of {images:.0f} images with the horizon is blue enough to be found."
+    flights = int((spread[HORIZON, "alarms_without_borders"] > 0).sum())
+    share = share_interval(kept, every)
+    return (
+        f"Of {images:.0f} images with the horizon, {every} have a sky that is as blue as the tarpaulin "
+        f"({flights} of {len(spread)} flights; how blue skies are is chosen). The borders let {kept} of "
+        f"these through, {with_interval(share)}."
+    )

@@ -1,0 +1,338 @@
+"""A flight over a tarpaulin, rendered in colour: what H 4.4.2 finds in it, and where the mean of it lies.
+
+The images are rendered from the twin's true poses, and what is found in them is put on the ground with the
+poses that its autopilot states. How the tarpaulin looks is not printed: `look_of` draws it for each flight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.detection.colour import Colour, find_coloured
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.pipeline.evaluate import errors_of, score_points
+from wildlab.pipeline.georeference import georeference, observe
+from wildlab.simulation.camera_view import marks, numbered
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
+from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.simulation.twins import simulate_twin
+
+#: What is found in the images, single positions, their mean, and images that show the horizon.
+FOUND, SINGLE, MEAN, HORIZON = "tarpaulin", "single", "mean", "horizon"
+SUBJECTS = (FOUND, SINGLE, MEAN, HORIZON)
+#: Names of the numbers that are recorded, and their units.
+RECORDED = {
+    "detection_rate": "1",
+    "false_alarms_per_image": "1",
+    "pixel_error": "px",
+    "ellipse_coverage_90": "1",
+    "area_share": "1",
+    "median_error": "m",
+    "error": "m",
+    "detections": "1",
+    "alarms_with_borders": "1",
+    "alarms_without_borders": "1",
+}
+#: After how many detections the mean is looked at.
+COUNTS = (1, 2, 5, 10, 20, 40, 75)
+#: Pixels that "a few pixels" are read as.
+FEW_PX = 3.0
+#: How far the tarpaulin's middle lies outside of an image at least that shows nothing of it; and how far
+#: outside the borders at most in images that are looked at: further out nothing of it can be accepted.
+MARGIN_PX, NEAR_PX = 60.0, 10.0
+
+
+class Look(NamedTuple):
+    """How ground and tarpaulin look, as `look_of` draws it."""
+
+    ground: Ground
+    tarpaulin: Tarpaulin
+
+
+class Drop(NamedTuple):
+    """What a flight gave until enough was found.
+
+    Attributes
+    ----------
+    look
+        Of ground and tarpaulin.
+    exposures
+        (K,) numbers of the images in which something was accepted.
+    uv
+        (K, 2) what was accepted, px.
+    true
+        (K, 2) where the tarpaulin's middle is in these images, px.
+    within
+        (K,) whether the ellipse (90 %) about the detection holds that.
+    area_share
+        (K,) area of what was found over that of the tarpaulin in the image.
+    looked_at, should
+        How many images with the tarpaulin were looked at, and in how many the middle lies inside the borders.
+    right
+        In how many of the latter the tarpaulin was found.
+    false
+        How many images gave something that is not the tarpaulin, of all and of `empty` without it.
+    empty
+        How many images without the tarpaulin were looked at, too.
+    """
+
+    look: Look
+    exposures: NDArray[np.intp]
+    uv: Array
+    true: Array
+    within: NDArray[np.bool_]
+    area_share: Array
+    looked_at: int
+    should: int
+    right: int
+    false: int
+    empty: int
+
+
+def look_of(seed: int) -> Look:
+    """How ground, sky and tarpaulin look on the flight of a seed. All chosen; nothing of it is printed.
+
+    The tarpaulin is of a blue within the printed limits and fades towards its rim (H 4.4.2), a few metres
+    large; the ground is a dull green or brown; the light differs by a tenth.
+    """
+    rng = stream(seed, "look")
+    tarpaulin = Tarpaulin(
+        length=float(rng.uniform(3.0, 5.0)),
+        width=float(rng.uniform(2.5, 4.0)),
+        colour=(float(rng.uniform(5, 30)), float(rng.uniform(105, 130)), float(rng.uniform(232, 250))),
+        rim=float(rng.uniform(0.2, 0.5)),
+        course=float(rng.uniform(-np.pi, np.pi)),
+    )
+    red, green, blue = rng.uniform([90, 95, 60], [130, 130, 95])
+    # How blue the sky is says whether it is taken for the tarpaulin: from pale to deep.
+    ground = Ground(
+        colour=(float(red), float(green), float(blue)),
+        sky=(float(rng.uniform(15, 110)), float(rng.uniform(110, 140)), float(rng.uniform(215, 250))),
+        light=float(rng.uniform(0.9, 1.0)),
+        seed=int(rng.integers(2**31)),
+    )
+    return Look(ground, tarpaulin)
+
+
+def view_of(flight: SceneFlight, look: Look, exposure: int, seed: int, *, shown: bool = True) -> ColourView:
+    """The image of an exposure, without the tarpaulin where it is not `shown`."""
+    pose, rng = flight.poses.take(exposure), stream(seed, f"noise of image {exposure}")
+    tarpaulin = look.tarpaulin if shown else None
+    return render_colour(look.ground, tarpaulin, flight.poses.camera, pose.p_nc, pose.R_nc, rng)
+
+
+def search(
+    flight: SceneFlight, look: Look, seed: int, wanted: int, empty: int, thresholds: Colour | None = None
+) -> Drop:
+    """Look through the images as they come until enough was found.
+
+    Parameters
+    ----------
+    flight
+        Whose images are rendered.
+    look
+        Of ground and tarpaulin.
+    seed
+        Of the camera's noise.
+    wanted
+        Detections that are gathered.
+    empty
+        Images without the tarpaulin that are looked at besides.
+    thresholds
+        Of the detector; None takes those of H 4.4.2.
+
+    Returns
+    -------
+    Drop
+    """
+    limits = thresholds or Colour()
+    camera = flight.poses.camera
+    size = np.array([camera.width, camera.height])
+    middle = np.array([look.tarpaulin.north, look.tarpaulin.east, 0.0])
+    uv = ground_to_pixel(
+        camera, np.tile(middle, (len(flight.times), 1)), flight.poses.p_nc, flight.poses.R_nc
+    )
+    with np.errstate(invalid="ignore"):
+        shown = ((uv > -MARGIN_PX) & (uv < size + MARGIN_PX)).all(axis=1)
+        beyond = np.maximum(limits.border_px - uv, uv - (size - 1 - limits.border_px)).max(axis=1)
+    rows: list[tuple[int, Array, Array, bool, float]] = []
+    looked_at = should = right = false = 0
+    valid = np.ones((camera.height, camera.width), bool)
+    for exposure in map(int, np.flatnonzero(beyond < NEAR_PX)):
+        view = view_of(flight, look, exposure, seed)
+        looked_at += 1
+        should += bool(beyond[exposure] <= 0)
+        found = find_coloured(view.image, valid, limits)
+        if not len(found):
+            continue
+        column, row = np.clip(np.rint(found.uv[0]).astype(int), 0, size - 1)
+        on_it = bool(view.labels[row, column])
+        false += not on_it
+        right += on_it and bool(beyond[exposure] <= 0)
+        held = inside_ellipse(found.uv[:1] - view.centre, found.covariance[:1], 0.9)[0]
+        share = float(found.area[0] / max(view.labels.sum(), 1))
+        rows.append((exposure, found.uv[0], view.centre, bool(held), share))
+        if len(rows) == wanted:
+            break
+    away = stream(seed, "images without").permutation(np.flatnonzero(~shown))[:empty]
+    for exposure in map(int, away):
+        view = view_of(flight, look, exposure, seed, shown=False)
+        false += bool(len(find_coloured(view.image, valid, limits)))
+    return Drop(
+        look,
+        np.array([row[0] for row in rows], np.intp),
+        np.array([row[1] for row in rows]).reshape(-1, 2),
+        np.array([row[2] for row in rows]).reshape(-1, 2),
+        np.array([row[3] for row in rows], bool),
+        np.array([row[4] for row in rows]),
+        looked_at,
+        should,
+        right,
+        false,
+        len(away),
+    )
+
+
+def with_detections(flight: Flight, drop: Drop) -> Flight:
+    """The flight with what was found in its rendered images in place of the detections that it came with."""
+    target = str(flight.table("truth")["target_id"].iloc[0])
+    table = numbered([marks(flight.table("frames"), drop.exposures, drop.uv, "detector", target, 0.0)])
+    return Flight(flight.manifest, flight.nav, flight.tables | {"detections": table}, flight.folder)
+
+
+def horizon_views(camera: Camera, look: Look, seed: int, images: int) -> list[ColourView]:
+    """Images without the tarpaulin, from 100 m, of a camera that is turned up until it sees the horizon.
+
+    The horizon lies in the upper half of the image, anywhere with equal chance, and level.
+    """
+    rng = stream(seed, "horizon")
+    views = []
+    for _ in range(images):
+        row = rng.uniform(0.0, camera.height / 2)
+        tilt = np.pi / 2 - np.arctan2(camera.cy - row, camera.fy)
+        turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+        views.append(render_colour(look.ground, None, camera, [0.0, 0.0, -100.0], turn @ R_MC_DOWN, rng))
+    return views
+
+
+def alarms(views: list[ColourView], thresholds: Colour | None = None) -> tuple[int, int]:
+    """In how many images something is found: with the borders that keep the horizon out, and without."""
+    limits = thresholds or Colour()
+    open_limits = replace(limits, border_px=(0.0, 0.0))
+    valid = [np.ones(view.labels.shape, bool) for view in views]
+    kept = sum(bool(len(find_coloured(v.image, m, limits))) for v, m in zip(views, valid, strict=True))
+    every = sum(bool(len(find_coloured(v.image, m, open_limits))) for v, m in zip(views, valid, strict=True))
+    return kept, every
+
+
+def numbers_of(drop: Drop, errors: Array, camera: Camera, height: float) -> dict[tuple[str, str], float]:
+    """What is compared over flights, by (subject, name).
+
+    Parameters
+    ----------
+    drop
+        From `search`.
+    errors
+        (K, 2) north and east of each detection's position from the truth, m.
+    camera, height
+        Of the images, and how high they were taken, m.
+    """
+    distance = np.hypot(*errors.T)
+    means = np.cumsum(errors, axis=0) / np.arange(1, len(errors) + 1)[:, None]
+    off = drop.uv - drop.true
+    numbers = {
+        (FOUND, "detection_rate"): drop.right / drop.should if drop.should else np.nan,
+        (FOUND, "false_alarms_per_image"): drop.false / (drop.looked_at + drop.empty),
+        (FOUND, "right"): float(drop.right),
+        (FOUND, "should"): float(drop.should),
+        (FOUND, "false"): float(drop.false),
+        (FOUND, "images"): float(drop.looked_at + drop.empty),
+        (FOUND, "pixel_error"): float(np.hypot(*off.T).mean()),
+        (FOUND, "off_centre"): float(np.hypot(*off.mean(axis=0))),
+        (FOUND, "ellipse_coverage_90"): float(drop.within.mean()),
+        (FOUND, "area_share"): float(drop.area_share.mean()),
+        (FOUND, "few_pixels"): FEW_PX * height / camera.fx,
+        (SINGLE, "median_error"): float(np.median(distance)),
+        (SINGLE, "rms_error"): float(np.sqrt((distance**2).mean())),
+        (MEAN, "error"): float(np.hypot(*means[-1])),
+        (MEAN, "detections"): float(len(errors)),
+    }
+    for count in COUNTS:
+        at = float(np.hypot(*means[count - 1])) if count <= len(means) else np.nan
+        numbers[MEAN, f"after_{count}"] = at
+    return numbers
+
+
+def trial(seed: int, *, twin: str, detections: int, images: int) -> dict[tuple[str, str], float]:
+    """One simulated flight until the target was found often enough, by `numbers_of`.
+
+    Raises
+    ------
+    WildlabError
+        If there is no such twin, or nothing is found on it.
+    """
+    return flown(seed, twin, detections, images)[2]
+
+
+def flown(
+    seed: int, twin: str, detections: int, images: int
+) -> tuple[Drop, Array, dict[tuple[str, str], float]]:
+    """What was found, the errors (K, 2) of its positions in m, and the numbers of `trial`."""
+    parameters = load_twin(twin)
+    scene = SceneFlight(parameters, seed)
+    look = look_of(seed)
+    drop = search(scene, look, seed, detections, images)
+    if not len(drop.uv):
+        raise WildlabError(
+            f"on the flight of seed {seed} nothing was found", "look at the twin and its images", file=twin
+        )
+    flight = with_detections(simulate_twin(twin, seed), drop)
+    points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(seed))
+    errors = errors_of(score_points(flight, points))
+    camera = scene.poses.camera
+    numbers = numbers_of(drop, errors, camera, parameters.flight.altitude.si)
+    kept, every = alarms(horizon_views(camera, look, seed, images))
+    numbers[HORIZON, "images"] = float(images)
+    numbers[HORIZON, "alarms_with_borders"] = kept / images
+    numbers[HORIZON, "alarms_without_borders"] = every / images
+    return drop, errors, numbers
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the flights give for each claim of H 4.4.2, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+    """
+
+    def of(subject: str, name: str) -> NDArray[np.float64]:
+        return spread[subject, name].to_numpy(float)
+
+    mean, single = of(MEAN, "error"), of(SINGLE, "median_error")
+    every = of(HORIZON, "alarms_without_borders")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        accepted = of(HORIZON, "alarms_with_borders") / every
+    return {
+        "easy-to-separate": Check(true=of(FOUND, "false_alarms_per_image") == 0),
+        "centred-without-rim": Check(measured=of(FOUND, "off_centre"), premise=of(FOUND, "area_share") < 1),
+        "few-pixels-are-little": Check(measured=of(FOUND, "few_pixels")),
+        "horizon-near-the-border": Check(measured=accepted, premise=every > 0),
+        "single-is-inaccurate": Check(true=mean < single, first=single, second=mean, unit="m"),
+        "within-a-few-metres": Check(measured=mean),
+    }
