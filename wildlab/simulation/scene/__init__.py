@@ -2,9 +2,9 @@
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
 against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and animals,
-`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults; `coloured`
-is the ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows of a
-detector.
+`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults; and
+`coloured` the ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows
+of a detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
