@@ -8,7 +8,6 @@ from typing import Any
 import click
 
 from wildlab.commands.shared import FILE, FOLDER, terminal_console
-from wildlab.flight.files import printable
 from wildlab.terminal import count, print_json, sentence, shown
 
 ANY = click.Path(path_type=Path)
@@ -86,6 +85,7 @@ def detect(
       wildlab detect sea --method floating --into found
       wildlab detect trap.cptv --method warm --even --into found
     """
+    from wildlab.flight.files import printable
     from wildlab.pipeline.detect_command import Wanted, detect_images
 
     wanted = Wanted(
