@@ -13,6 +13,8 @@ from wildlab.terminal import count, print_json, sentence, shown
 ANY = click.Path(path_type=Path)
 #: Overlays that the page shows, evenly over the run.
 ON_PAGE = 8
+#: Frames that cannot be used of which the terminal tells.
+SHOWN = 10
 ABOVE_ZERO = click.FloatRange(0, min_open=True)
 
 
@@ -59,6 +61,9 @@ ABOVE_ZERO = click.FloatRange(0, min_open=True)
 @click.option(
     "--animal", type=ABOVE_ZERO, default=1.5, show_default=True, help="Length of what is looked for, m."
 )
+@click.option(
+    "--even", is_flag=True, help="Take off first that corners are darker, as far as the frames tell."
+)
 @click.option("--json", "as_json", is_flag=True, help="What came out, as JSON.")
 def detect(
     images: Path,
@@ -76,10 +81,11 @@ def detect(
     distance: float | None,
     focal: float | None,
     animal: float,
+    even: bool,
     as_json: bool,
 ) -> None:
-    """Find warm or floating things in IMAGES: a folder of images, one image, a video, or a flight with a
-    folder images.
+    """Find warm or floating things in IMAGES: a folder of images, one image, a video (MP4, MOV, AVI, MKV,
+    CPTV), or a flight with a folder images.
 
     contrast takes what stands out from what lies about it, warm is the chain of F 3.2, shape a classifier
     that has to be learnt with --fit first, floating the chain of H 4.3 for what floats on an even sea, and
@@ -97,7 +103,9 @@ def detect(
       wildlab detect images --fit labels.csv --class Person --into found
       wildlab detect images --labels coco.json --also megadetector=batch.json --also yolo=labels --into found
       wildlab detect sea --method floating --into found
+      wildlab detect trap.cptv --method warm --even --into found
     """
+    from wildlab.flight.files import printable
     from wildlab.pipeline.detect_command import Wanted, detect_images
 
     wanted = Wanted(
@@ -116,6 +124,7 @@ def detect(
         animal,
         also,
         also_classes,
+        even,
     )
     result = detect_images(wanted, terminal_console())
     write_page(into, images.resolve().name, result)
@@ -125,8 +134,12 @@ def detect(
     of = result["frames"]
     said = f"{count(result['detections'], 'detection')} in {count(of['usable'], 'frame')} of {of['all']}"
     click.echo(sentence(said))
-    for name, problem in result["problems"][:10]:
-        click.echo(f"{name}: {problem}", err=True)
+    problems = result["problems"]
+    for name, problem in problems[:SHOWN]:
+        click.echo(f"{printable(name)}: {problem}", err=True)
+    if len(problems) > SHOWN:
+        more = count(len(problems) - SHOWN, "frame")
+        click.echo(f"{more} more cannot be used; frames.csv says why of each.", err=True)
     for line in result["sentences"]:
         click.echo(line)
     click.echo(shown(into / "report.html"))

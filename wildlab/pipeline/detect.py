@@ -222,7 +222,7 @@ def settings_digest(frames: Frames, method: str, thresholds: Any) -> str:
     """
     paths = frames.files or (frames.path,)
     looks = [(one.name, one.stat().st_size, one.stat().st_mtime_ns) for one in paths if one.exists()]
-    said = [str(frames.path.resolve()), looks, frames.polarity, method, asdict(thresholds), PART]
+    said = [str(frames.path.resolve()), looks, frames.polarity, frames.even, method, asdict(thresholds), PART]
     return sha256(json.dumps(said, default=str).encode()).hexdigest()
 
 

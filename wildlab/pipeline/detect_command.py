@@ -20,6 +20,7 @@ from wildlab.files import write_atomic, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
+from wildlab.flight.readers.frames.shutter import CORRECTIONS
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 from wildlab.pipeline.detect import Detected, run_detection, thresholds_from
@@ -74,6 +75,8 @@ class Wanted:
         Files of other detectors, ``name=file`` or a file alone, that are judged beside ours.
     also_classes
         Which of their classes are meant; empty takes those of the labels' names, or all.
+    even
+        Whether the fall of brightness towards the corners is taken off first.
     """
 
     images: Path
@@ -91,6 +94,7 @@ class Wanted:
     animal_m: float = 1.5
     also: tuple[str, ...] = ()
     also_classes: tuple[str, ...] = ()
+    even: bool = False
 
 
 def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
@@ -170,6 +174,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
         )
     result = _result(wanted, thresholds, detected, judged, fitted, pictures, labels)
+    result["sentences"] = [*frames_said(frames, detected), *result["sentences"]]
     if others and labels is not None:
         ours = f"wildlab {wanted.method}"
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
@@ -183,7 +188,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
 def _open(wanted: Wanted) -> Frames:
     """Frames; with flight times where they are those of a flight folder, whose images lie in ``images``."""
     if not (wanted.images / "flight.toml").is_file():
-        return open_frames(wanted.images, polarity=wanted.polarity)
+        return open_frames(wanted.images, polarity=wanted.polarity, even=wanted.even)
     inside = wanted.images / "images"
     if not inside.is_dir():
         raise WildlabError(
@@ -192,7 +197,7 @@ def _open(wanted: Wanted) -> Frames:
             file=inside,
         )
     flight = load_flight(wanted.images)
-    frames = open_frames(inside, polarity=wanted.polarity)
+    frames = open_frames(inside, polarity=wanted.polarity, even=wanted.even)
     if flight.frames is None:
         return frames
     known = dict(zip(flight.frames["frame_id"].astype(str), frame_times(flight), strict=True))
@@ -367,6 +372,43 @@ def _result(
                 f"{judged.unusable}; labelled and not here: {len(judged.absent)}."
             )
     return result
+
+
+def frames_said(frames: Frames, detected: Detected) -> list[str]:
+    """Sentences on what was found of the camera itself: its shutter, its pixels, its corners.
+
+    Parameters
+    ----------
+    frames
+        That were looked at.
+    detected
+        What came out of them.
+
+    Returns
+    -------
+    list of str
+        None of them where there is nothing to be said.
+    """
+    kept = frames.kept
+    said = [f"{note[0].upper()}{note[1:]}." for note in kept.notes]
+    problems = detected.frames["problem"].fillna("").astype(str)
+    corrections = problems.str.contains("|".join(CORRECTIONS)).sum()
+    if corrections:
+        said.append(f"{corrections} of {len(problems)} frames were taken during a flat-field correction.")
+    if kept.dead is not None and kept.dead.any():
+        number = int(kept.dead.sum())
+        word = "1 pixel does not" if number == 1 else f"{number} pixels do not"
+        said.append(f"{word} see the scene and {'is' if number == 1 else 'are'} masked.")
+    if frames.even and kept.vignetting is None:
+        said.append("No fall of brightness towards the corners could be measured, and none is taken off.")
+    elif kept.vignetting is not None:
+        corner, sd = kept.vignetting.corner, kept.vignetting.sd
+        word = "darker" if corner < 0 else "brighter"
+        said.append(
+            f"The corners are {abs(corner):.3g} (standard deviation {sd:.2g}) {word} than the middle, by "
+            f"{kept.vignetting.images} frames; that is taken off."
+        )
+    return said
 
 
 @contextmanager

@@ -299,3 +299,26 @@ def test_polarity_is_the_callers_unless_the_file_knows(tmp_path: Path) -> None:
     (tmp_path / "b.fff").write_bytes(fff(np.full((96, 128), 3000, np.uint16) + scene(), PLANCK))
     grey, kelvin = open_frames(tmp_path, polarity="black-hot")
     assert (grey.polarity, kelvin.polarity) == ("black-hot", "white-hot")
+
+
+def dji_jpeg(counts: np.ndarray, size: tuple[int, int], make: bytes = b"Exif\0\0DJI") -> bytes:
+    """A JPEG with a preview of that size and raw numbers in APP3, as DJI's own cameras write them."""
+    preview = cv2.imencode(".jpg", scene(3, size))[1].tobytes()
+    raw = counts.astype("<u2").tobytes()
+    parts = [(0xE1, make), *((0xE3, raw[at : at + 65_533]) for at in range(0, len(raw), 65_533))]
+    head = b"".join(b"\xff" + bytes([kind]) + struct.pack(">H", len(part) + 2) + part for kind, part in parts)
+    return preview[:2] + head + preview[2:]
+
+
+def test_djis_own_thermal_data_are_counts_or_the_preview_and_it_is_said_which(tmp_path: Path) -> None:
+    counts = (20_000 + 4 * scene(4, (200, 256)).astype(np.int64)).astype(np.uint16)
+    (tmp_path / "a.jpg").write_bytes(dji_jpeg(counts, (200, 256)))
+    (tmp_path / "b.jpg").write_bytes(dji_jpeg(counts, (100, 128)))
+    (tmp_path / "c.jpg").write_bytes(dji_jpeg(counts, (200, 256), make=b"Exif\0\0other"))
+    raw, preview, other = (read_image(tmp_path / f"{name}.jpg") for name in "abc")
+    assert raw.unit == "counts" and np.array_equal(raw.image, counts) and raw.polarity == "white-hot"
+    assert "read as counts" in raw.note and "preview picture is not used" in raw.note
+    assert preview.unit == "grey" and preview.image.shape == (100, 128)
+    assert "are not read" in preview.note and "the preview picture is used" in preview.note
+    assert other.unit == "grey" and other.note == ""
+    assert open_frames(tmp_path / "a.jpg").kept.notes == (raw.note,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -33,6 +34,8 @@ class Frame:
         (H, W) bool: False where there is no scene, or nothing can be told of it.
     problem
         "" where the frame can be used, else a sentence; the image is then of size (0, 0).
+    note
+        What is to be known of how it was read, as a clause; "" where there is nothing.
 
     Examples
     --------
@@ -47,6 +50,7 @@ class Frame:
     polarity: Polarity
     valid: NDArray[np.bool_]
     problem: str = ""
+    note: str = ""
 
     @property
     def usable(self) -> bool:
@@ -71,3 +75,25 @@ def spoilt(name: str, problem: str, time: float | None = None) -> Frame:
     """
     said = problem[:1].upper() + problem[1:].rstrip(".") + "."
     return Frame(name, time, np.zeros((0, 0), np.uint8), "grey", "unknown", np.zeros((0, 0), bool), said)
+
+
+def frame_name(path: Path, number: int) -> str:
+    """What a frame of a clip is called.
+
+    Parameters
+    ----------
+    path
+        Of the clip.
+    number
+        Of the frame, from 0.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> frame_name(Path("flights/a.mp4"), 12)
+    'a#000012'
+    """
+    return f"{path.stem}#{number:06d}"

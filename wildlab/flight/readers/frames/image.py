@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames.decoding import decode_image
+from wildlab.flight.readers.frames.dji import AS_COUNTS, read_dji
 from wildlab.flight.readers.frames.flir import gather_pieces, read_records, to_kelvin
 from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, spoilt
 from wildlab.flight.readers.frames.headers import Header, read_header
@@ -57,16 +58,17 @@ def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
     found = decode(data)
     if isinstance(found, str):
         return spoilt(name, found)
-    image, unit = found
+    image, unit, note = found
     valid = ~find_no_data(image) & ~find_clipped(image)
     problem = problem_of(image, valid)
     if problem:
         return spoilt(name, problem)
-    return Frame(name, None, image, unit, "white-hot" if unit == "kelvin" else polarity, valid)
+    warm = unit == "kelvin" or note == AS_COUNTS
+    return Frame(name, None, image, unit, "white-hot" if warm else polarity, valid, note=note)
 
 
-def decode(data: bytes) -> tuple[NDArray[Any], Unit] | str:
-    """Bytes of an image file as numbers with their unit, or a clause that says why not.
+def decode(data: bytes) -> tuple[NDArray[Any], Unit, str] | str:
+    """Bytes of an image file as numbers with their unit and a note, or a clause that says why not.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit] | str:
 
     Returns
     -------
-    (image, unit) or str
+    (image, unit, note) or str
         As `Frame` has them.
 
     Examples
@@ -84,24 +86,30 @@ def decode(data: bytes) -> tuple[NDArray[Any], Unit] | str:
     'the file is empty'
     """
     if data[:4] in (b"FFF\0", b"AFF\0"):
-        return _radiometric(data)
+        records = _radiometric(data)
+        return records if isinstance(records, str) else (*records, "")
     header = read_header(data)
     if not isinstance(header, Header):
         return header
     if header.problem:
         return header.problem
+    note = ""
     if header.kind == "jpeg":
-        records = gather_pieces(data)
-        found = _radiometric(records) if records else ""
+        pieces = gather_pieces(data)
+        found = _radiometric(pieces) if pieces else ""
         if not isinstance(found, str):
-            return found
+            return (*found, "")
         # Records without a raw image: the picture is still a picture.
+        counts, note = read_dji(data, header.width, header.height)
+        if counts is not None:
+            return counts, "counts", note
     image = decode_image(data)
     if image is None:
         return f"its content cannot be decoded as {header.kind.upper()}"
     if image.shape[:2] != (header.height, header.width):
         return f"its header claims {header.width} x {header.height} pixels and it holds other ones"
-    return as_grey_or_colour(image)
+    picture = as_grey_or_colour(image)
+    return picture if isinstance(picture, str) else (*picture, note)
 
 
 def as_grey_or_colour(image: NDArray[Any]) -> tuple[NDArray[Any], Unit] | str:

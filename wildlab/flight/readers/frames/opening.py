@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import compress, islice
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,50 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import image as images
 from wildlab.flight.readers.frames import video as videos
-from wildlab.flight.readers.frames.frame import Frame, Polarity, spoilt
+from wildlab.flight.readers.frames.cptv import SUFFIX, open_cptv, read_cptv
+from wildlab.flight.readers.frames.frame import Frame, Polarity, frame_name, spoilt
 from wildlab.flight.readers.frames.image import read_image
+from wildlab.flight.readers.frames.pixels import (
+    Vignetting,
+    find_dead,
+    measure_vignetting,
+    without_vignetting,
+)
+from wildlab.flight.readers.frames.shutter import HELD, MOST_ALIKE, are_alike, is_shutter, mark_shutter
 from wildlab.flight.readers.frames.valid import find_overlay
-from wildlab.flight.readers.frames.video import frame_name, open_video, read_video
+from wildlab.flight.readers.frames.video import open_video, read_video
 
-#: Images of a folder that are looked at, and those that are read to find burnt-in text.
+#: Images of a folder that are looked at, and those that are read, each with the next one, to find what stays:
+#: burnt-in text, dead pixels, dark corners.
 MOST_FILES, SAMPLE = 1_000_000, 12
+#: Frames of a CPTV file among which that sample is taken: they come one after another.
+FIRST = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What stays from frame to frame, as far as the sample tells it.
+
+    Attributes
+    ----------
+    size
+        Height and width of most frames, px; () where no size has a majority.
+    overlay, dead
+        (H, W) bool: burnt-in text, and pixels that do not see the scene. None where it cannot be told.
+    vignetting
+        None where none was asked for, or none is measured.
+    held_can_be_told
+        Whether neighbouring frames differ as a rule.
+    notes
+        Clauses on how they were read.
+    """
+
+    size: tuple[int, ...] = ()
+    overlay: NDArray[np.bool_] | None = None
+    dead: NDArray[np.bool_] | None = None
+    vignetting: Vignetting | None = None
+    held_can_be_told: bool = False
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,6 +78,8 @@ class Frames:
         What the caller said of the camera.
     known
         By the name of the file: name and time (s) that the frame has in a flight.
+    even
+        Whether the fall of brightness towards the corners is to be taken off, where it can be measured.
     """
 
     path: Path
@@ -47,8 +87,8 @@ class Frames:
     count: int | None
     polarity: Polarity = "unknown"
     known: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-    _overlay: list[NDArray[np.bool_] | None] = field(default_factory=list, repr=False)
-    _size: list[tuple[int, ...]] = field(default_factory=list, repr=False)
+    even: bool = False
+    _kept: list[Kept] = field(default_factory=list, repr=False)
 
     def __len__(self) -> int:
         if self.count is None:
@@ -72,12 +112,9 @@ class Frames:
             With burnt-in overlays taken out of what is valid, and a problem where it is of another size than
             most.
         """
-        found: Iterator[Frame]
-        if self.files:
-            found = (read_image(path, polarity=self.polarity) for path in self.files[first:])
-        else:
-            found = read_video(self.path, lambda number: number >= first, polarity=self.polarity)
-        yield from self._checked(found)
+        # A picture that is held is told by those before it.
+        early = max(first - HELD + 1, 0)
+        yield from islice(self._checked(self._read(lambda number: number >= early)), first - early, None)
 
     def some(self, numbers: Collection[int]) -> Iterator[Frame]:
         """Some of the frames; the others are not decoded.
@@ -93,16 +130,26 @@ class Frames:
             As of `starting_at`, in their order.
         """
         wanted = set(numbers)
-        found: Iterator[Frame]
+        needed = {number - back for number in wanted for back in range(HELD) if number >= back}
+        order = (number in wanted for number in sorted(needed))
+        yield from compress(self._checked(self._read(needed.__contains__)), order)
+
+    def _read(self, wanted: Callable[[int], bool]) -> Iterator[Frame]:
         if self.files:
-            files = (path for number, path in enumerate(self.files) if number in wanted)
-            found = (read_image(path, polarity=self.polarity) for path in files)
+            for number, path in enumerate(self.files):
+                if wanted(number):
+                    yield read_image(path, polarity=self.polarity)
+        elif self.path.suffix.lower() == SUFFIX:
+            yield from read_cptv(self.path, wanted, polarity=self.polarity)
         else:
-            found = read_video(self.path, wanted.__contains__, polarity=self.polarity)
-        yield from self._checked(found)
+            yield from read_video(self.path, wanted, polarity=self.polarity)
 
     def _checked(self, found: Iterator[Frame]) -> Iterator[Frame]:
-        overlay, size = self.overlay, self.size
+        for one in mark_shutter(self._of_size(found), self.kept.held_can_be_told):
+            yield self._cleaned(one) if one.usable else one
+
+    def _of_size(self, found: Iterator[Frame]) -> Iterator[Frame]:
+        size = self.kept.size
         for one in found:
             name, time = self.known.get(one.name, (one.name, one.time))
             frame = replace(one, name=name, time=time)
@@ -110,54 +157,99 @@ class Frames:
                 wanted, got = ("{1} x {0}".format(*shape) for shape in (size, frame.image.shape))
                 said = f"it has {got} pixels, and most of these frames have {wanted}"
                 yield spoilt(frame.name, said, frame.time)
-            elif frame.usable and overlay is not None and overlay.shape == frame.valid.shape:
-                yield replace(frame, valid=frame.valid & ~overlay)
             else:
                 yield frame
+
+    def _cleaned(self, frame: Frame) -> Frame:
+        """Without overlay, dead pixels and, where that is wanted, dark corners."""
+        image, valid, kept = frame.image, frame.valid, self.kept
+        if kept.vignetting is not None and kept.vignetting.offset.shape == image.shape:
+            image = without_vignetting(image, kept.vignetting.offset)
+        if kept.overlay is not None and kept.overlay.shape == valid.shape:
+            valid = valid & ~kept.overlay
+        if kept.dead is not None and kept.dead.any() and kept.dead.shape == valid.shape:
+            # No filter is to spread them, so they get a number of their neighbours besides.
+            image, valid = filled(image, kept.dead), valid & ~kept.dead
+        return replace(frame, image=image, valid=valid)
 
     @property
     def overlay(self) -> NDArray[np.bool_] | None:
         """(H, W) where text is burnt in; None where it cannot be told."""
-        self._sample()
-        return self._overlay[0]
+        return self.kept.overlay
 
     @property
     def size(self) -> tuple[int, ...]:
         """Height and width of most frames, px; () where no size has a majority."""
-        self._sample()
-        return self._size[0]
+        return self.kept.size
 
-    def _sample(self) -> None:
+    @property
+    def kept(self) -> Kept:
+        """What stays from frame to frame; looked for once, in a sample."""
+        if not self._kept:
+            self._kept.append(self._sample())
+        return self._kept[0]
+
+    def _sample(self) -> Kept:
         """Looks at some frames, once: reading all of a long flight twice would take as long as detecting."""
-        if self._overlay:
-            return
-        some = [one for one in self._some() if one.usable]
+        pairs = [(one, two) for one, two in self._some() if one.usable]
+        some = [one for one, _ in pairs]
         sizes = Counter(one.image.shape[:2] for one in some).most_common(1)
         # Where no size has a majority there is none that others fall short of.
         size = sizes[0][0] if sizes and 2 * sizes[0][1] > len(some) else ()
+        alike = [are_alike(one.image, two.image) for one, two in pairs if two is not None and two.usable]
+        told = bool(alike) and sum(alike) <= MOST_ALIKE * len(alike)
+        like = [one for one in some if one.image.shape[:2] == size and not is_shutter(one.image, one.valid)]
         # Counts and temperatures are taken before anything is written into a picture.
-        seen = [one for one in some if one.unit in ("grey", "colour") and one.image.shape[:2] == size]
-        greys = [_grey(one.image) for one in seen]
-        self._overlay.append(find_overlay(greys))
-        self._size.append(size)
+        overlay = find_overlay([_grey(one.image) for one in like if one.unit in ("grey", "colour")])
+        notes = tuple(dict.fromkeys(one.note for one in some if one.note))
+        if not like:
+            return Kept(size, overlay, held_can_be_told=told, notes=notes)
+        unit = Counter(one.unit for one in like).most_common(1)[0][0]
+        like = [one for one in like if one.unit == unit]
+        valid = np.logical_and.reduce([one.valid for one in like])
+        if overlay is not None:
+            valid &= ~overlay
+        greys = [_grey(one.image) for one in like]
+        dead = find_dead(greys, valid)
+        vignetting = measure_vignetting(greys, valid) if self.even and unit != "colour" else None
+        return Kept(size, overlay, dead, vignetting, told, notes)
 
-    def _some(self) -> Iterator[Frame]:
-        numbers = np.unique(np.linspace(0, max((self.count or 1) - 1, 0), SAMPLE).round().astype(int))
+    def _some(self) -> Iterator[tuple[Frame, Frame | None]]:
+        """Some frames, each with the one after it."""
+        count = self.count or 1
+        if self.path.suffix.lower() == SUFFIX and not self.files:
+            count = min(self.count or FIRST, FIRST)
+        numbers = np.unique(np.linspace(0, max(count - 1, 0), SAMPLE).round().astype(int)).tolist()
         if self.files:
-            yield from (read_image(self.files[number], polarity=self.polarity) for number in numbers)
+            for number in numbers:
+                after = self.files[number + 1 : number + 2]
+                yield (
+                    read_image(self.files[number], polarity=self.polarity),
+                    next((read_image(path, polarity=self.polarity) for path in after), None),
+                )
+            return
+        if self.path.suffix.lower() == SUFFIX:
+            found = list(islice(read_cptv(self.path, lambda number: number < count), count))
+            for number in numbers:
+                if number < len(found):
+                    yield found[number], next(iter(found[number + 1 : number + 2]), None)
             return
         capture = open_video(self.path)
         try:
             for number in numbers:
                 capture.set(cv2.CAP_PROP_POS_FRAMES, float(number))
-                done, picture = capture.read()
-                if done:
-                    yield videos.as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
+                two = [
+                    videos.as_frame(frame_name(self.path, int(number)), None, picture, self.polarity)
+                    for done, picture in (capture.read(), capture.read())
+                    if done
+                ]
+                if two:
+                    yield two[0], next(iter(two[1:]), None)
         finally:
             capture.release()
 
 
-def open_frames(path: Path, *, polarity: Polarity = "unknown") -> Frames:
+def open_frames(path: Path, *, polarity: Polarity = "unknown", even: bool = False) -> Frames:
     """Open a folder of images, one image, or a video.
 
     Parameters
@@ -166,6 +258,8 @@ def open_frames(path: Path, *, polarity: Polarity = "unknown") -> Frames:
         Folder: its images in the order of their names, no folders below it.
     polarity
         Of the camera, where its files do not say it.
+    even
+        Whether to take off that corners are darker, where the frames tell by how much (`measure_vignetting`).
 
     Returns
     -------
@@ -177,28 +271,32 @@ def open_frames(path: Path, *, polarity: Polarity = "unknown") -> Frames:
     WildlabError
         Where there is nothing, or nothing that is an image or a video.
     """
-    kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES))
+    kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES | {SUFFIX}))
     if path.is_dir():
         found = sorted(one for one in path.iterdir() if one.suffix.lower() in images.SUFFIXES)[:MOST_FILES]
         if not found:
-            clips = sorted(one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES)
+            clips = sorted(
+                one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES | {SUFFIX}
+            )
             fix = (
                 f"name one of its videos, {clips[0]} for instance"
                 if clips
                 else f"images end in one of {kinds}"
             )
             raise WildlabError("this folder has no images", fix, file=path)
-        return Frames(path, tuple(found), len(found), polarity)
+        return Frames(path, tuple(found), len(found), polarity, even=even)
     if not path.exists():
         raise WildlabError("there is no such file or folder", "check the path", file=path)
     if path.suffix.lower() in images.SUFFIXES:
-        return Frames(path, (path,), 1, polarity)
+        return Frames(path, (path,), 1, polarity, even=even)
     if path.suffix.lower() in videos.SUFFIXES:
         capture = open_video(path)
         claimed = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         capture.release()
         known = np.isfinite(claimed) and 0 < claimed <= videos.MOST_FRAMES
-        return Frames(path, (), int(claimed) if known else None, polarity)
+        return Frames(path, (), int(claimed) if known else None, polarity, even=even)
+    if path.suffix.lower() == SUFFIX:
+        return Frames(path, (), open_cptv(path).frames, polarity, even=even)
     raise WildlabError(
         f"the name ends in {path.suffix!r}", f"give a folder, or a file in one of {kinds}", file=path
     )
@@ -206,3 +304,12 @@ def open_frames(path: Path, *, polarity: Polarity = "unknown") -> Frames:
 
 def _grey(image: NDArray[Any]) -> NDArray[Any]:
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+
+
+def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
+    """An image whose dead pixels have the median of the 3 x 3 about them; colour stays as it is."""
+    if image.ndim != 2:
+        return image
+    whole = image.copy()
+    whole[dead] = cv2.medianBlur(image, 3)[dead]
+    return whole

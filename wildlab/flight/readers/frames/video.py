@@ -13,7 +13,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.files import regular_size
 from wildlab.flight.readers.frames.decoding import quiet
-from wildlab.flight.readers.frames.frame import Frame, Polarity, spoilt
+from wildlab.flight.readers.frames.frame import Frame, Polarity, frame_name, spoilt
 from wildlab.flight.readers.frames.headers import MOST_PIXELS
 from wildlab.flight.readers.frames.image import as_grey_or_colour
 from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, problem_of
@@ -115,28 +115,6 @@ def read_video(
             yield as_frame(name, time, picture, polarity)
     finally:
         capture.release()
-
-
-def frame_name(path: Path, number: int) -> str:
-    """What a frame of a clip is called.
-
-    Parameters
-    ----------
-    path
-        Of the clip.
-    number
-        Of the frame, from 0.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> frame_name(Path("flights/a.mp4"), 12)
-    'a#000012'
-    """
-    return f"{path.stem}#{number:06d}"
 
 
 def as_frame(name: str, time: float | None, picture: Any, polarity: Polarity) -> Frame:
