@@ -11,6 +11,7 @@ import pytest
 from wildlab.detection.flow import (
     FlowThresholds,
     agreeing,
+    filled_outlines,
     likely_speed,
     match_features,
     moved_together,
@@ -97,6 +98,24 @@ def test_something_else_that_moves_otherwise_is_left_out():
     assert 0.1 < found.sd < 0.35
 
 
+def test_what_turns_or_grows_too_much_is_chance():
+    here = np.random.default_rng(9).uniform(0, 60, (12, 2))
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    assert len(agreeing(here, here @ turn.T, FlowThresholds())) == 0
+    assert len(agreeing(here, 1.3 * here, FlowThresholds())) == 0
+    assert len(agreeing(here, here @ turn.T, FlowThresholds(largest_turn=0.4))) == 12
+
+
+def test_an_open_contour_is_filled_by_its_convex_outline():
+    labels = np.zeros((40, 60), np.int32)
+    labels[10, 10:50] = labels[10:30, 10] = labels[29, 10:50] = 1  # open to the right
+    labels[35:38, 2:5] = 2
+    inside = filled_outlines(labels)
+    assert inside[10:30, 10:50].all() and inside[35:38, 2:5].all()
+    assert inside.sum() == 20 * 40 + 9
+    assert not filled_outlines(np.zeros((4, 4), np.int32)).any()
+
+
 def test_what_turns_and_grows_moves_together():
     here = np.random.default_rng(5).uniform(0, 50, (8, 2))
     turn = 1.2 * np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
@@ -130,8 +149,8 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(WildlabError, match="images and masks of the shapes"):
         match_features(np.zeros((4, 4)), np.zeros((4, 4)), EVERYWHERE, EVERYWHERE)
     for field, value in (
-        ("contrast", 0), ("ratio", 1.2), ("agreement", 0), ("fewest", 2), ("largest_gimbal_rate", 0),
-        ("largest_speed", -1), ("smallest_sd", 0),
+        ("contrast", 0), ("ratio", 1.2), ("agreement", 0), ("largest_turn", 0), ("fewest", 2),
+        ("largest_gimbal_rate", 0), ("largest_speed", -1), ("smallest_sd", 0),
     ):  # fmt: skip
         with pytest.raises(WildlabError, match=f"{field} is"):
             FlowThresholds(**{field: value})

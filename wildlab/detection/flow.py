@@ -36,8 +36,12 @@ class FlowThresholds:
         has 0.8.
     agreement
         How far, px, a feature may lie from where the motion of the whole (shift, turn and scale) has it.
+    largest_turn
+        Of that motion, how far it may turn (rad) and scale (share) from one image to the next: any two pairs
+        make some motion, but a camera seldom turns by more than 60 deg/s.
     fewest
-        Features that must be left: with three, the scatter about a motion of four numbers is known.
+        Features that must be left; with more than two the scatter about a motion of four numbers is known,
+        and of few that fit each other some do so by chance.
     largest_gimbal_rate
         Pairs of images between which the gimbal turned faster than that are dropped, rad/s (H 5.6.3 proposes
         such a limit and does not apply it).
@@ -50,7 +54,8 @@ class FlowThresholds:
     contrast: float = 0.02
     ratio: float = 0.8
     agreement: float = 2.0
-    fewest: int = 3
+    largest_turn: float = 0.15
+    fewest: int = 4
     largest_gimbal_rate: float = float(np.radians(3.0))
     largest_speed: float = 25.0
     smallest_sd: float = 0.1
@@ -60,6 +65,7 @@ class FlowThresholds:
             ("contrast", self.contrast > 0, "give a share above 0"),
             ("ratio", 0 < self.ratio <= 1, "give a share from above 0 to 1"),
             ("agreement", self.agreement > 0, "give one above 0, in pixels"),
+            ("largest_turn", self.largest_turn > 0, "give an angle above 0, in rad"),
             ("fewest", self.fewest >= 3, "give at least 3 features"),
             ("largest_gimbal_rate", self.largest_gimbal_rate > 0, "give one above 0, in rad/s"),
             ("largest_speed", self.largest_speed > 0, "give one above 0, in m/s"),
@@ -135,6 +141,33 @@ def match_features(
     return agreeing(one[0][here], two[0][there], given)
 
 
+def filled_outlines(labels: NDArray[np.integer]) -> Mask:
+    """Where things are, by the convex outline of each: what H 4.3 does not fill has an open contour.
+
+    Parameters
+    ----------
+    labels
+        (H, W), 0 for nothing: as `wildlab.detection.floating.find_objects` gives them.
+
+    Returns
+    -------
+    (H, W) bool.
+
+    Examples
+    --------
+    >>> labels = np.zeros((5, 5), np.int32)
+    >>> labels[1:4, 1], labels[3, 1:4] = 1, 1
+    >>> print(filled_outlines(labels).sum())
+    6
+    """
+    inside = np.zeros(labels.shape, np.uint8)
+    for number in range(1, int(labels.max(initial=0)) + 1):
+        places = cv2.findNonZero((labels == number).astype(np.uint8))
+        if places is not None:
+            cv2.fillConvexPoly(inside, cv2.convexHull(places), 1)
+    return inside > 0
+
+
 def nearest_by_ratio(
     first: NDArray[np.float32], second: NDArray[np.float32], ratio: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -182,11 +215,15 @@ def agreeing(first: ArrayLike, second: ArrayLike, thresholds: FlowThresholds) ->
     here, there = np.asarray(first, float), np.asarray(second, float)
     if len(here) < thresholds.fewest:
         return _none()
-    _, kept = cv2.estimateAffinePartial2D(
+    motion, kept = cv2.estimateAffinePartial2D(
         here, there, method=cv2.RANSAC, ransacReprojThreshold=thresholds.agreement, maxIters=500
     )
     rows = np.zeros(len(here), bool) if kept is None else np.asarray(kept).ravel() > 0
-    if rows.sum() < thresholds.fewest:
+    if motion is None or rows.sum() < thresholds.fewest:
+        return _none()
+    along, across = float(motion[0, 0]), float(motion[1, 0])
+    turned, scaled = np.arctan2(across, along), np.hypot(along, across) - 1
+    if max(abs(turned), abs(scaled)) > thresholds.largest_turn:
         return _none()
     here, there = here[rows], there[rows]
     left = there - moved_together(here, there)
