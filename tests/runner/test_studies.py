@@ -111,6 +111,20 @@ def test_static_point_over_a_few_flights(reports: Path, faults: Faults) -> None:
     assert faults(folder / "report.html") == []
 
 
+def test_the_velocity_of_a_ship_at_rest_comes_out_of_flow(reports: Path, faults: Faults) -> None:
+    folder = run("optical-flow-velocity", reports, seeds=2, first_look=True)
+    found = values(folder)
+    assert found["feature_rate", "images"]["published"] is not None
+    for axis in ("north", "east"):
+        assert abs(found[f"mean_{axis}", "true-poses"]["value"]) < 1.0
+        assert found[f"sd_{axis}", "true-poses"]["value"] < found[f"sd_{axis}", "logged"]["value"]
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 6)
+    for figure in ("path", "gimbal", "features", "flow", "velocity", "readings"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) -> None:
     folder = run("vessel-detection", reports, seeds=2)
     found = values(folder)

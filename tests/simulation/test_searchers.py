@@ -187,6 +187,20 @@ def test_a_gimbal_swings_evenly_between_its_limits():
     assert np.abs(np.diff(pace)).max() < 1.0  # and no jolt
 
 
+def test_a_gimbal_that_follows_tilts_from_ahead_to_behind():
+    gimbal = load_twin("gimballed-ship").gimbal
+    t = np.arange(0, 60, 0.01)
+    pan, tilt = (np.degrees(angle) for angle in true_angles(gimbal, t))
+    middle = gimbal.tilt_middle.number
+    assert np.interp(middle, t, tilt) == pytest.approx(gimbal.tilt.number, abs=1e-6)
+    assert (np.diff(tilt[np.abs(t - middle) < 9]) < 0).all()
+    assert np.ptp(tilt) == pytest.approx(2 * gimbal.tilt_limit.number, abs=0.01)
+    assert pan == pytest.approx(0.0)
+    lacking = gimbal.model_dump() | {"tilt_middle": None}
+    with pytest.raises(ValueError, match="belong together"):
+        type(gimbal).model_validate(lacking)
+
+
 def test_pan_of_a_gimbal_hung_by_its_back_rolls_the_camera():
     """Level and northbound: straight down at zero, east with the right side's pan, image top ahead."""
     mount = true_mount(load_twin("gondola"))

@@ -9,7 +9,8 @@ of Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `wildlab.detection.contrast`, `warm`: warm things by local contrast, and animals as F finds them.
 - `wildlab.detection.floating`: whatever floats on a homogeneous sea, by its edges (H 4.3); `border`: what the
   border of the image cuts (H 4.7); `features`: shape of a region by its moments (H 4.5, 4.6).
-- `wildlab.detection.colour`: something of one colour in a colour image (H 4.4.2); `boards`: what calibrates.
+- `wildlab.detection.colour`: something of one colour in a colour image (H 4.4.2); `boards`: what calibrates;
+  `flow`: the same features in two images (H 5.4).
 
 >>> import numpy as np
 >>> from wildlab.detection import find_by_contrast

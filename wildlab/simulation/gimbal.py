@@ -1,4 +1,4 @@
-"""A gimbal that swings the camera from side to side while the airframe flies on (F 5.4.1)."""
+"""A gimbal that swings the camera while the airframe flies on: to the sides (F 5.4.1), or to and fro."""
 
 from __future__ import annotations
 
@@ -19,11 +19,20 @@ def gimbal_angles(gimbal: Gimbal, times: Array) -> tuple[Array, Array]:
 
     Pan goes to and fro at an even pace but for the ends, where it turns round smoothly; at time 0 it passes
     the middle. Which way that turns the camera is the mount's matter: about the vertical for one that looks
-    forward (yaw rotation), about the airframe's length for one hung by its back (roll rotation).
+    forward (yaw rotation), about the airframe's length for one hung by its back (roll rotation). Tilt, where
+    it moves, does alike; at ``tilt_middle`` it passes its middle on the way back.
     """
-    phase = 2 * math.pi * np.asarray(times, float) / gimbal.period.si
-    pan = gimbal.limit.si * np.arcsin(_SHARPNESS * np.sin(phase)) / math.asin(_SHARPNESS)
-    return pan, np.full(len(phase), gimbal.tilt.si)
+    t = np.asarray(times, float)
+    pan = gimbal.limit.si * _swing(t / gimbal.period.si)
+    tilt = np.full(len(t), gimbal.tilt.si)
+    if gimbal.tilt_limit is not None and gimbal.tilt_period is not None and gimbal.tilt_middle is not None:
+        tilt -= gimbal.tilt_limit.si * _swing((t - gimbal.tilt_middle.si) / gimbal.tilt_period.si)
+    return pan, tilt
+
+
+def _swing(periods: Array) -> Array:
+    """A triangle of height one with rounded corners, zero and rising at zero; (N,) periods -> (N,)."""
+    return np.asarray(np.arcsin(_SHARPNESS * np.sin(2 * math.pi * periods)) / math.asin(_SHARPNESS))
 
 
 def gimbal_table(gimbal: Gimbal, duration: float, seed: int) -> pd.DataFrame:

@@ -68,13 +68,26 @@ class TwinMount(Strict):
 
 
 class Gimbal(Strict):
-    """A gimbal whose pan swings from side to side, and what it says about its angles (F 5.4.1)."""
+    """A gimbal that swings, and what it says about its angles.
+
+    Pan goes from side to side (F 5.4.1). Where the ``tilt_`` parameters are given, tilt goes to and fro about
+    ``tilt`` too, from ahead to behind at ``tilt_middle``, as one that follows what is flown over.
+    """
 
     limit: Annotated[Parameter, quantity("deg", 0, 180)]
     period: Duration
     tilt: Angle
     rate: Rate
     noise: AngleSpread
+    tilt_limit: Annotated[Parameter, quantity("deg", 0, 90)] | None = None
+    tilt_period: Duration | None = None
+    tilt_middle: Annotated[Parameter, quantity("s", 0, 7200)] | None = None
+
+    @model_validator(mode="after")
+    def _tilts(self) -> Gimbal:
+        if len({part is None for part in (self.tilt_limit, self.tilt_period, self.tilt_middle)}) > 1:
+            raise ValueError("tilt_limit, tilt_period and tilt_middle belong together; give all or none")
+        return self
 
 
 class OnboardClock(Strict):

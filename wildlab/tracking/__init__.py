@@ -25,6 +25,7 @@ from wildlab.tracking.measurement import (
     bearings,
     pixels,
     positions,
+    positions_or_velocities,
     ranges_bearings,
 )
 from wildlab.tracking.motion import (
@@ -63,6 +64,7 @@ __all__ = [
     "noise_by_direction",
     "pixels",
     "positions",
+    "positions_or_velocities",
     "random_walk",
     "ranges_bearings",
     "rest",

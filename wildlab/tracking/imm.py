@@ -17,7 +17,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Prediction, Sensor, difference, on_state
+from wildlab.tracking.measurement import Prediction, Sensor, check_states, difference, on_state
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import (
     Start,
@@ -57,7 +57,7 @@ class _Mode:
 
     def evaluate(self, row: int, z: Array, R: Array, sensor: Sensor) -> bool:
         """Whether this mode's target would be seen; then innovation and ``S`` are there."""
-        expected = sensor.predict(row, self.x[:2])
+        expected = sensor.predict(row, self.x[: sensor.states])
         self.expected, self.R = expected, R
         if not (np.isfinite(expected.z).all() and np.isfinite(expected.H_position).all()):
             return False
@@ -132,6 +132,7 @@ def run_imm(
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")
+    check_states(sensor, len(start.x))
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(

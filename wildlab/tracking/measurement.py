@@ -1,10 +1,10 @@
 """What a sensor should see of a target on a horizontal plane, and how that changes with target and pose.
 
 A `Sensor` belongs to one run: it knows the pose of every row, and takes a row and a position of the target
-to a `Prediction`. Derivatives are taken with respect to the target's position (north, east; no sensor here
-sees velocity, H 6.7) and to the six errors of the pose: ``dp`` in n and ``da`` in b with
-``p = p_hat + dp``, ``q = q_hat * dq(da)``, ``da`` four times the modified Rodrigues parameters (H 7.15-7.17,
-7.44-7.45), which is a rotation vector to first order.
+to a `Prediction`. Derivatives are taken with respect to the target's position (north, east; the sensors of H
+6.7 see no velocity, but `positions_or_velocities` does) and to the six errors of the pose: ``dp`` in n and
+``da`` in b with ``p = p_hat + dp``, ``q = q_hat * dq(da)``, ``da`` four times the modified Rodrigues
+parameters (H 7.15-7.17, 7.44-7.45), which is a rotation vector to first order.
 
 A target that a sensor cannot see (in or behind the plane of the lens, or where an angle is not defined) has a
 prediction of NaN, and a filter leaves the measurement out. There is no mirror image.
@@ -28,7 +28,7 @@ class Prediction(NamedTuple):
     """Expected measurement and its derivatives; leading axes as the input's."""
 
     z: Array  # (..., m)
-    H_position: Array  # (..., m, 2) with respect to north and east of the target
+    H_position: Array  # (..., m, 2) north and east of the target; (..., m, 4) where velocity is seen too
     H_pose: Array  # (..., m, 6) with respect to the errors of the pose
 
 
@@ -36,12 +36,14 @@ class Sensor(NamedTuple):
     """A sensor on its way: ``predict(row, position)`` for a row of the run and the target's (2,) north, east.
 
     ``angles`` (m,) says which elements are angles, whose differences are wrapped. ``rows`` is for how many
-    rows it was made; None: for any number.
+    rows it was made; None: for any number. ``states`` is how many of the first states it is given: 4 are
+    position and velocity.
     """
 
     predict: Callable[[int, Array], Prediction]
     angles: tuple[bool, ...]
     rows: int | None = None
+    states: int = 2
 
 
 def difference(z: ArrayLike, predicted: ArrayLike, angles: tuple[bool, ...]) -> Array:
@@ -51,10 +53,20 @@ def difference(z: ArrayLike, predicted: ArrayLike, angles: tuple[bool, ...]) -> 
 
 
 def on_state(H_position: Array, n: int) -> Array:
-    """Derivative with respect to all ``n`` states: zeros behind the position, H (6.7)."""
+    """Derivative with respect to all ``n`` states: zeros behind those that the sensor sees, H (6.7)."""
     H = np.zeros((*H_position.shape[:-1], n))
-    H[..., :2] = H_position
+    H[..., : H_position.shape[-1]] = H_position
     return H
+
+
+def check_states(sensor: Sensor, n: int) -> None:
+    """Refuse a sensor that sees more than the ``n`` states of a motion model."""
+    if sensor.states > n:
+        raise WildlabError(
+            f"a sensor of {sensor.states} states for a motion model of {n}",
+            "use a model with velocity, as constant_velocity",
+            field="sensor",
+        )
 
 
 # --- what is seen, for any number of poses
@@ -177,6 +189,46 @@ def positions() -> Sensor:
         return Prediction(np.array(position, float), np.eye(2), np.zeros((2, 6)))
 
     return Sensor(predict, (False, False))
+
+
+def positions_or_velocities(is_velocity: ArrayLike) -> Sensor:
+    """Positions in some rows, velocities in others: what optical flow gives (H 5.30) feeds a track.
+
+    Parameters
+    ----------
+    is_velocity
+        (N,) bool: which rows are velocities.
+
+    Returns
+    -------
+    Sensor
+        Of (2,) north and east in n, metres or metres a second; for N rows, and for motion models with
+        velocity. What the pose does to a velocity is in the covariance that comes with it
+        (`wildlab.geometry.flow_uncertainty`), so derivatives for the pose are zero.
+
+    Raises
+    ------
+    WildlabError
+        Where there is not one value for each row.
+
+    Examples
+    --------
+    >>> sensor = positions_or_velocities([False, True])
+    >>> sensor.predict(1, np.array([10.0, 20.0, 3.0, -1.0])).z.tolist()
+    [3.0, -1.0]
+    """
+    kinds = np.asarray(is_velocity, bool)
+    if kinds.ndim != 1:
+        raise WildlabError(
+            f"kinds of the shape {kinds.shape}", "give one for each row, (N,)", field="is_velocity"
+        )
+
+    def predict(row: int, state: Array) -> Prediction:
+        first = 2 if kinds[row] else 0
+        H = np.eye(4)[first : first + 2]
+        return Prediction(np.array(state[first : first + 2], float), H, np.zeros((2, 6)))
+
+    return Sensor(predict, (False, False), len(kinds), states=4)
 
 
 def _row(values: ArrayLike, row: int, base: int) -> Array:

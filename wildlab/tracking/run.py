@@ -19,7 +19,7 @@ from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Sensor, on_state
+from wildlab.tracking.measurement import Sensor, check_states, on_state
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.schmidt import PoseUncertainty
 
@@ -189,7 +189,8 @@ def run_filter(
     WildlabError
         Naming field and row: shapes that do not fit each other, times missing or out of order, an ``R`` or
         an ``S`` that is not positive definite, a start that is not finite or whose ``P`` is no covariance,
-        poses of another length than the measurements, a ``gate_probability`` outside (0, 1].
+        poses of another length than the measurements, a sensor that sees more states than there are, a
+        ``gate_probability`` outside (0, 1].
 
     Examples
     --------
@@ -206,6 +207,7 @@ def run_filter(
     given = checked(times, measurements, R, gate_probability, output_times)
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")
+    check_states(sensor, len(start.x))
     if pose is not None and np.shape(pose.covariance) != (len(given.times), 6, 6):
         raise WildlabError(
             f"shape {np.shape(pose.covariance)} for {len(given.times)} rows of measurements",
@@ -227,7 +229,7 @@ def run_filter(
             C = F @ C @ transitions[row].T * schmidt.fade(dt, pose.correlation_time)
         if not np.isfinite(given.z[row]).all(axis=-1).any():
             return given.times[row], x, P
-        expected = sensor.predict(row, x[:2])
+        expected = sensor.predict(row, x[: sensor.states])
         P_pose = covariances[row]
         H = on_state(expected.H_position, n)
         if not (np.isfinite(expected.z).all() and np.isfinite(H).all() and np.isfinite(P_pose).all()):

@@ -11,7 +11,7 @@ from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.tracking.measurement import Sensor, difference
+from wildlab.tracking.measurement import Sensor, check_states, difference
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import (
     Start,
@@ -81,6 +81,7 @@ def run_unscented(
     given = single_detection(checked(times, measurements, R, gate_probability, output_times))
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")
+    check_states(sensor, len(start.x))
     n, m = len(start.x), given.z.shape[2]
     angles = np.array(sensor.angles)
 
@@ -103,7 +104,7 @@ def run_unscented(
         prior = given.times[row], ukf.x.copy(), (ukf.P + ukf.P.T) / 2
         if not np.isfinite(given.z[row, 0]).all():
             return prior
-        seen = np.array([sensor.predict(row, point[:2]).z for point in ukf.sigmas_f])
+        seen = np.array([sensor.predict(row, point[: sensor.states]).z for point in ukf.sigmas_f])
         if not np.isfinite(seen).all():
             return prior
         points = iter(seen)

@@ -224,6 +224,34 @@ def vessel(
     return Body("vessel", (*levels, deck, top), speed=speed, wake=wake, texture_seed=seed)
 
 
+def fitted_out(body: Body, count: int, excess: float, rng: np.random.Generator) -> Body:
+    """The same body with small things, warm and cold, on its deck, the layer below the uppermost one.
+
+    Parameters
+    ----------
+    body
+        With two layers or more.
+    count
+        How many.
+    excess
+        Standard deviation of what they have over the deck, K.
+    rng
+        Of where they are and how warm.
+
+    Returns
+    -------
+    Body
+    """
+    deck = body.layers[-2]
+    corners = np.array(deck.outline)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    places = low + (high - low) * rng.uniform(0.05, 0.95, (count, 2))
+    warmer = excess * rng.standard_normal(count)
+    width = float(high[0] - low[0]) / 100
+    hot = tuple(Hot(float(x), float(y), width, float(k)) for (x, y), k in zip(places, warmer, strict=True))
+    return replace(body, layers=(*body.layers[:-2], replace(deck, hot=(*deck.hot, *hot)), body.layers[-1]))
+
+
 def boat(seed: int = 0) -> Body:
     """An open boat of five metres with an outboard engine."""
     outline = hull(5.0, 2.0)

@@ -17,7 +17,7 @@ from wildlab.simulation.camera_view import Exposures
 from wildlab.simulation.clipped_outlines import visible_part
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
-from wildlab.simulation.scene.bodies import Body, vessel
+from wildlab.simulation.scene.bodies import Body, fitted_out, vessel
 from wildlab.simulation.scene.render import Scene, View, outline_of, render
 from wildlab.simulation.scene.sea import Sea
 from wildlab.simulation.target_motion import target_path
@@ -36,6 +36,9 @@ class Look:
         Of decks and engines over the sea, K.
     glint_share
         Of the flights, how many have the sun out.
+    fittings
+        How many small things, warm and cold, are on each deck: hatches, vents, winches; up to
+        ``fitting_excess`` K (SD) from the deck, a hundredth of its length wide.
     """
 
     lengths: tuple[float, ...] = (11.0, 7.0)
@@ -43,6 +46,8 @@ class Look:
     excess: float = 8.0
     engine: float = 15.0
     glint_share: float = 0.5
+    fittings: int = 0
+    fitting_excess: float = 5.0
 
 
 class SceneFlight:
@@ -72,11 +77,13 @@ class SceneFlight:
             if target.outline is not None:
                 length, beam = target.outline.length.si, target.outline.beam.si
             speed = 0.0 if target.motion is None else target.motion.speed.si
-            self._vessels.append(
-                vessel(
-                    length, beam, look.excess, speed=speed, engine=look.engine, seed=int(rng.integers(2**31))
-                )
+            body = vessel(
+                length, beam, look.excess, speed=speed, engine=look.engine, seed=int(rng.integers(2**31))
             )
+            if look.fittings:
+                own = stream(seed, f"fittings of {target.identifier.text}")
+                body = fitted_out(body, look.fittings, look.fitting_excess, own)
+            self._vessels.append(body)
             self._courses.append(0.0 if target.motion is None else target.motion.course.si)
         sun = float(np.radians(rng.uniform(10, 50))) if rng.random() < look.glint_share else None
         self.sea = Sea(

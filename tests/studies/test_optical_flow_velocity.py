@@ -1,0 +1,189 @@
+"""What the study of velocity from flow computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.detection.flow import FlowThresholds
+from wildlab.errors import WildlabError
+from wildlab.reporting.published import load_claims, load_published
+from wildlab.studies.optical_flow_velocity import STUDY, charts, text
+from wildlab.studies.optical_flow_velocity import trial as study
+from wildlab.studies.optical_flow_velocity.trial import (
+    CALIBRATED,
+    IMAGES,
+    LIKELY,
+    LOGGED,
+    READINGS,
+    RECORDED,
+    SLOW,
+    STAMPS,
+    STILL,
+    SYNCHRONISED,
+    TRUE,
+    check_claims,
+    look,
+    numbers_of,
+    readings,
+    stretches,
+    velocity_numbers,
+)
+
+TWIN = "gimballed-ship"
+
+
+@pytest.fixture(scope="module")
+def looked():
+    return look(TWIN, 2, 8)
+
+
+@pytest.fixture(scope="module")
+def tables(looked):
+    return readings(looked)
+
+
+def test_pairs_are_looked_at_in_stretches_over_the_whole_flight():
+    usable = np.zeros(600, bool)
+    usable[:170], usable[350:540] = True, True
+    chosen = stretches(usable, 60)
+    assert usable[chosen].all() and len(chosen) == 60
+    assert (np.diff(chosen) == 1).sum() == 58
+    assert chosen[0] < 170 and chosen[-1] > 350
+    assert np.array_equal(stretches(usable, 360), np.flatnonzero(usable))
+    assert len(stretches(np.zeros(5, bool), 3)) == 0
+
+
+def test_with_exact_poses_the_images_give_the_velocity_of_the_ship(looked, tables):
+    """The ship is at rest but for what it moves on its anchor, some centimetres a second."""
+    v = tables[TRUE][["v_north_m_s", "v_east_m_s"]].to_numpy()
+    assert len(v) == len(looked.pairs) >= 5
+    assert np.abs(v.mean(axis=0)).max() < 1.0
+    assert v.std(axis=0).max() < 1.0
+    logged = tables[LOGGED][["v_north_m_s", "v_east_m_s"]].to_numpy()
+    assert logged.std() > 2 * v.std()
+    flow = tables[TRUE]
+    assert np.allclose(flow["flow_u"], flow["camera_u"], atol=6)
+    assert np.abs(flow["flow_v"]).max() > 10
+
+
+def test_features_lie_on_the_ship(looked):
+    pair = looked.pairs[0]
+    labels = looked.scene.view(pair.first, waves_move=False).labels
+    u, v = np.rint(pair.matches.first).astype(int).T
+    assert (labels[v, u] > 0).mean() > 0.7
+
+
+def test_a_flight_gives_a_number_for_everything_that_is_recorded(looked, tables):
+    numbers = numbers_of(looked, tables)
+    assert {name for _, name in numbers} == set(RECORDED)
+    assert {subject for subject, _ in numbers} == set(STUDY.subjects)
+    assert numbers[IMAGES, "in_view_share"] > numbers[IMAGES, "whole_share"] > 0
+    assert numbers[LOGGED, "pairs"] == len(looked.pairs)
+    shares = looked.shares
+    expected = len(looked.pairs) / looked.tried * ((shares[:-1] > 0) & (shares[1:] > 0)).mean() * 599 / 600
+    assert numbers[IMAGES, "feature_rate"] == pytest.approx(expected)
+
+
+def test_means_deviations_and_intervals_are_those_of_the_table():
+    table = pd.DataFrame(
+        {
+            "v_north_m_s": [1.0, 3.0, np.nan], "v_east_m_s": [-1.0, 1.0, np.nan],
+            "cov_nn": [1.0, 1.0, np.nan], "cov_ee": [1.0, 0.01, np.nan],
+        }
+    )  # fmt: skip
+    found = velocity_numbers(table)
+    assert (found["pairs"], found["mean_north"], found["mean_east"]) == (2, 2, 0)
+    assert found["sd_north"] == pytest.approx(np.sqrt(2))
+    assert found["interval_share_95"] == 0.5
+    assert np.isnan(velocity_numbers(table.iloc[2:])["mean_north"])
+
+
+def test_a_flight_without_features_says_so(monkeypatch):
+    monkeypatch.setattr(study, "match_features", lambda *images: ())
+    with pytest.raises(WildlabError, match="0 of 2 pairs of images have features"):
+        look(TWIN, 2, 2)
+
+
+def spread_of(count=40, **changes):
+    numbers = {(IMAGES, name): 0.5 for name in ("in_view_share", "whole_share", "feature_rate")}
+    for subject in (*READINGS, SLOW, LIKELY):
+        values = {
+            "mean_north": 0.2, "mean_east": -0.3, "sd_north": 6.0, "sd_east": 5.0, "pairs": 50.0,
+            "interval_share_95": 0.95,
+        }  # fmt: skip
+        numbers |= {(subject, name): value for name, value in values.items()}
+    for one, sd in ((SYNCHRONISED, 4.0), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5), (STAMPS, 90.0)):
+        numbers[one, "sd_north"] = numbers[one, "sd_east"] = sd
+    numbers[LOGGED, "correlation_u"], numbers[LOGGED, "correlation_v"] = 0.9, 0.8
+    for key, value in changes.items():
+        subject, name = key.split("__")
+        numbers[subject.replace("_", "-"), name] = value
+    return pd.DataFrame([numbers] * count)
+
+
+@pytest.mark.parametrize(
+    ("claim", "changes"),
+    [
+        ("mean-within-one", {"logged__mean_east": -1.1}),
+        ("very-large-variance", {"logged__sd_east": 0.5}),
+        ("flows-correlate", {"logged__correlation_v": 0.3}),
+        ("better-synchronised", {"synchronised__sd_north": 9.0}),
+        ("better-with-a-still-gimbal", {"still_gimbal__sd_north": 9.0}),
+        ("own-motion-dominates", {"true_poses__sd_east": 9.0}),
+    ],
+)
+def test_each_claim_turns_with_its_numbers(claim, changes):
+    stated = {one["id"]: one for one in load_claims("optical-flow-velocity")}
+    assert set(stated) == set(check_claims(spread_of()))
+    threshold = stated[claim].get("threshold")
+    threshold = None if threshold is None else float(threshold)
+    assert check_claims(spread_of())[claim].holds(threshold).all()
+    assert not check_claims(spread_of(**changes))[claim].holds(threshold).any()
+
+
+def test_the_sentences_turn_with_the_numbers():
+    good = " ".join(text.summary(spread_of()))
+    assert "On 40 of 40 flights" in good and "says little" in good
+    assert "Most of it comes from the poses: with all of them exact 0.5 m/s are left" in good
+    other = spread_of(1, logged__mean_north=2.5, logged__sd_north=0.4, logged__sd_east=0.4)
+    bad = " ".join(text.summary(other))
+    assert "On 0 of 1 flight " in bad and "largest mean is 2.50 m/s off" in bad
+    assert "says much" in bad and "Much of it comes from the images themselves" in bad
+
+
+def test_intervals_are_called_what_they_are():
+    for share, word in ((0.7, "too sure"), (0.95, "about right"), (1.0, "too cautious")):
+        assert text.interval_words(spread_of(logged__interval_share_95=share)).endswith(f"{word}.")
+
+
+def test_stamps_and_limits_say_what_they_do():
+    assert "busy now and then" in text.stamps_words(spread_of())
+    assert "busy" not in text.stamps_words(spread_of(stamps__sd_north=5.0, stamps__sd_east=5.0))
+    words = text.gimbal_words(spread_of(slow_gimbal__pairs=10.0, likely_speed__sd_north=2.0))
+    assert "20 % of the pairs pass the first limit" in words and "100 % the second" in words
+    assert "nan" not in text.gimbal_words(spread_of(slow_gimbal__sd_north=np.nan))
+
+
+def test_tables_have_a_row_for_everything():
+    assert set(text.readings_table(spread_of())["reading"]) == {
+        text.NAMES[one] for one in (*READINGS, SLOW, LIKELY)
+    }
+    assert len(text.thresholds_table(FlowThresholds())) == len(text.REASONS)
+    for row in load_published("optical-flow-velocity").itertuples():
+        assert row.subject in STUDY.subjects and row.name in RECORDED
+
+
+def test_charts_say_what_they_show(looked, tables):
+    shown = [
+        charts.path_shown(looked), charts.gimbal_shown(looked), charts.features_shown(looked),
+        charts.flow_shown(tables[LOGGED]), charts.velocity_shown(tables[LOGGED]),
+        charts.readings_shown(spread_of()),
+    ]  # fmt: skip
+    assert len({name for _, name, _, _ in shown}) == len(shown)
+    assert all(alt and caption for _, _, alt, caption in shown)
+    assert f"{int((looked.shares > 0).sum())} of 600 images" in shown[1][2]
+    mean = tables[LOGGED]["v_north_m_s"].mean()
+    assert f"{mean:.1f} m/s north" in shown[4][2]
+    assert "all poses exact 0.5 m/s" in shown[5][2]

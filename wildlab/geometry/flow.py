@@ -1,0 +1,378 @@
+"""Optical flow of what lies on a plane, of the camera's own motion, and the target's velocity: H 5.4.
+
+Flow is in px/s: H's definition 5.2 has it as a displacement in px, and (5.18) as a derivative. Taken by the
+letter, (5.30) would give metres an image and not metres a second; `flow_between` divides by the time between
+the images. Where on the way from one image to the other pixel and pose belong, H does not say (but for the
+gimbal: its mean orientation); here it is half way, for pixel and pose, which leaves an error of second order
+in that time. `velocity_from_pair` has none: it is the finite form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import normalise_jacobian
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import (
+    Array,
+    euler_to_matrix,
+    matrix_to_rotation_vector,
+    rotation_vector_to_matrix,
+    skew,
+    wrap,
+)
+from wildlab.geometry.georeference import georeference_pixels, matching
+from wildlab.geometry.mount import Mount
+
+
+class CameraMotion(NamedTuple):
+    """How the airframe moves, and its gimbal. One row for each pose, or one for all.
+
+    Attributes
+    ----------
+    velocity
+        (N, 3) of b over the ground, in n, m/s.
+    rates
+        (N, 3) angular velocity of b against n, in b, rad/s.
+    gimbal_rates
+        (N, 2) of pan and tilt, rad/s; None where the gimbal stands still.
+    """
+
+    velocity: Array
+    rates: Array
+    gimbal_rates: Array | None = None
+
+
+class Twist(NamedTuple):
+    """Velocity (N, 3) m/s and angular velocity (N, 3) rad/s of n against c, in c: `v_cn` and `w_cn` of H."""
+
+    velocity: Array
+    rates: Array
+
+
+def gimbal_axes(mount: Mount, pan: ArrayLike | None = None) -> Array:
+    """Axes in b about which pan and tilt turn the camera, H (5.27).
+
+    The base of the gimbal is turned against b by the mount's misalignment, which (5.27) leaves out.
+
+    Parameters
+    ----------
+    mount
+        Of the camera.
+    pan
+        (N,) rad, in place of the mount's own where the gimbal moves.
+
+    Returns
+    -------
+    (3, 2), or (N, 3, 2): multiplied by the rates of pan and tilt, the angular velocity of m against b, in b.
+
+    Examples
+    --------
+    >>> gimbal_axes(Mount("down")).tolist()
+    [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+    """
+    roll, lean, turn = mount.misalignment
+    base = euler_to_matrix(roll, lean, turn)
+    panned = base @ euler_to_matrix(0.0, 0.0, mount.pan if pan is None else pan)
+    about_z = np.broadcast_to(base[:, 2], panned.shape[:-1])
+    return np.stack([about_z, panned[..., :, 1]], axis=-1)
+
+
+def camera_rates(poses: CameraPoses, motion: CameraMotion) -> Array:
+    """Angular velocity of the camera against n, in b: `w_nb + w_bc` of H (5.26). (N, 3) or (3,) rad/s."""
+    rates = np.asarray(motion.rates, float)
+    if motion.gimbal_rates is None:
+        return rates
+    axes = gimbal_axes(poses.mount, poses.pan)
+    return np.asarray(rates + np.einsum("...ij,...j->...i", axes, np.asarray(motion.gimbal_rates, float)))
+
+
+def lens_velocity(poses: CameraPoses, motion: CameraMotion) -> Array:
+    """Velocity of the lens over the ground, in n, (N, 3) or (3,) m/s.
+
+    H (5.25) takes that of b; where the lens is elsewhere, the airframe's turning moves it too.
+    """
+    around = np.cross(np.asarray(motion.rates, float), poses.lever_arm)
+    turned = np.einsum("...ij,...j->...i", poses.R_nb, around)
+    return np.asarray(np.asarray(motion.velocity, float) + turned)
+
+
+def camera_twist(poses: CameraPoses, motion: CameraMotion) -> Twist:
+    """Motion of n as the camera has it, H (5.25), (5.26).
+
+    Parameters
+    ----------
+    poses
+        Of the camera.
+    motion
+        Of the airframe and the gimbal.
+
+    Returns
+    -------
+    Twist
+    """
+    velocity = np.einsum("...ji,...j->...i", poses.R_nc, lens_velocity(poses, motion))
+    rates = np.einsum("...ji,...j->...i", poses.R_bc, camera_rates(poses, motion))
+    return Twist(-velocity, -rates)
+
+
+def flow_matrix(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> Array:
+    """How a pixel moves as the point that it shows moves and turns about the camera: H (5.21), (5.22).
+
+    The print has one focal length and counts pixels from the principal point. Here the camera has its own
+    two, its skew and its distortion.
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    uv
+        (N, 2) pixels.
+    plane_down
+        Down coordinate of the plane that they show, m, scalar or (N,).
+
+    Returns
+    -------
+    (N, 2, 6), px/m and px/rad: multiplied by linear and angular velocity in c, the flow in px/s. NaN where
+    the ray does not meet the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
+
+    Examples
+    --------
+    Below a camera with a focal length of 1000 px, 100 m high, 1 m/s is 10 px/s:
+
+    >>> from wildlab.geometry.camera import Camera
+    >>> camera = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
+    >>> poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
+    >>> print(flow_matrix(poses, [[320.0, 256.0]], 0.0)[0].round(6) + 0.0)
+    [[   10.     0.     0.     0.  1000.     0.]
+     [    0.    10.     0. -1000.     0.     0.]]
+    """
+    point = _seen_points(poses, uv, plane_down)
+    z = point[..., 2]
+    xy = point[..., :2] / z[..., None]
+    B = np.concatenate([np.broadcast_to(np.eye(2), (*xy.shape, 2)), -xy[..., None]], axis=-1)
+    by_xy = np.concatenate([B, -B @ skew(point)], axis=-1) / z[..., None, None]
+    return np.asarray(np.linalg.solve(normalise_jacobian(poses.camera, xy), by_xy))
+
+
+def _seen_points(poses: CameraPoses, uv: ArrayLike, plane_down: ArrayLike) -> Array:
+    """Points on the plane as the camera has them, (N, 3) m in c."""
+    ground = georeference_pixels(poses, uv, plane_down)
+    return np.asarray(np.einsum("...ji,...j->...i", poses.R_nc, ground - poses.p_nc))
+
+
+def camera_flow(poses: CameraPoses, motion: CameraMotion, uv: ArrayLike, plane_down: ArrayLike) -> Array:
+    """Flow that the camera's own motion makes of what lies still on a plane: H (5.24).
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    motion
+        Of airframe and gimbal at these poses.
+    uv
+        (N, 2) pixels.
+    plane_down
+        Down coordinate of the plane, m, scalar or (N,).
+
+    Returns
+    -------
+    (N, 2) px/s; NaN where the ray does not meet the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, or of planes, than of pixels.
+    """
+    twist = np.concatenate(camera_twist(poses, motion), axis=-1)
+    return np.asarray(np.einsum("...ij,...j->...i", flow_matrix(poses, uv, plane_down), twist))
+
+
+def target_velocity(
+    poses: CameraPoses, motion: CameraMotion, uv: ArrayLike, flow: ArrayLike, plane_down: ArrayLike
+) -> Array:
+    """Velocity over a horizontal plane of what has that flow: H (5.30).
+
+    Parameters
+    ----------
+    poses
+        The camera half way between two images, for each pixel or one for all.
+    motion
+        Of airframe and gimbal there.
+    uv
+        (N, 2) pixels, half way too.
+    flow
+        (N, 2) px/s, as it was measured.
+    plane_down
+        Down coordinate of the plane that the target moves on, m, scalar or (N,).
+
+    Returns
+    -------
+    (N, 2) north and east, m/s; NaN where the ray does not meet the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where there is another number of poses, of planes or of flows than of pixels.
+
+    Examples
+    --------
+    What does not move in the image moves with the camera:
+
+    >>> from wildlab.geometry.camera import Camera
+    >>> camera = Camera(640, 512, 1000.0, 1000.0, 320.0, 256.0)
+    >>> poses = CameraPoses(camera, Mount("down"), np.array([0.0, 0.0, -100.0]), np.eye(3))
+    >>> motion = CameraMotion(np.array([18.0, 1.0, 0.0]), np.zeros(3))
+    >>> print(target_velocity(poses, motion, [[320.0, 256.0]], [[0.0, 0.0]], 0.0).round(6))
+    [[18.  1.]]
+    """
+    pixels, _ = matching(poses, uv, plane_down)
+    measured = np.asarray(flow, float)
+    if measured.shape != pixels.shape:
+        raise WildlabError(
+            f"flow of the shape {measured.shape} for pixels of the shape {pixels.shape}",
+            "give one flow for each pixel",
+            field="flow",
+        )
+    own = measured - camera_flow(poses, motion, pixels, plane_down)
+    # The third column, of the velocity downward, is discarded: the target stays on the plane (H 5.29, 5.30).
+    R_cn = np.swapaxes(poses.R_nc, -1, -2)
+    A = flow_matrix(poses, pixels, plane_down)[..., :3] @ R_cn[..., :, :2]
+    return np.asarray(np.linalg.solve(A, own[..., None])[..., 0])
+
+
+def velocity_from_pair(
+    first: CameraPoses,
+    second: CameraPoses,
+    uv_first: ArrayLike,
+    uv_second: ArrayLike,
+    interval: float,
+    plane_down: ArrayLike,
+) -> Array:
+    """Mean velocity over a plane between two images, exactly: two ground points and the time between them.
+
+    Parameters
+    ----------
+    first, second
+        The camera at either image, for each pixel or one for all.
+    uv_first, uv_second
+        (N, 2) pixels of the same points in both.
+    interval
+        From the first to the second, s.
+    plane_down
+        Down coordinate of the plane, m, scalar or (N,).
+
+    Returns
+    -------
+    (N, 2) north and east, m/s; NaN where a ray does not meet the plane.
+
+    Raises
+    ------
+    WildlabError
+        Where the interval is not above zero, or there is another number of poses than of pixels.
+    """
+    seconds = positive_interval(interval)
+    there = georeference_pixels(second, uv_second, plane_down)
+    here = georeference_pixels(first, uv_first, plane_down)
+    return np.asarray((there - here)[..., :2] / seconds)
+
+
+def positive_interval(interval: float) -> float:
+    """The time between two images, s.
+
+    Raises
+    ------
+    WildlabError
+        Where it is not above zero.
+    """
+    if not (np.isfinite(interval) and interval > 0):
+        raise WildlabError(
+            f"{interval} s between two images", "give two images in order, with their times", field="interval"
+        )
+    return float(interval)
+
+
+def flow_between(uv_first: ArrayLike, uv_second: ArrayLike, interval: float) -> tuple[Array, Array]:
+    """Pixels half way between two images, (N, 2), and their flow, (N, 2) px/s.
+
+    Parameters
+    ----------
+    uv_first, uv_second
+        (N, 2) pixels of the same points in both.
+    interval
+        From the first to the second, s.
+
+    Returns
+    -------
+    (middle, flow)
+
+    Raises
+    ------
+    WildlabError
+        Where the interval is not above zero.
+
+    Examples
+    --------
+    >>> middle, flow = flow_between([[10.0, 20.0]], [[12.0, 20.0]], 0.1)
+    >>> print(middle, flow)
+    [[11. 20.]] [[20.  0.]]
+    """
+    seconds = positive_interval(interval)
+    here, there = np.asarray(uv_first, float), np.asarray(uv_second, float)
+    return (here + there) / 2, (there - here) / seconds
+
+
+def motion_between(
+    first: CameraPoses, second: CameraPoses, interval: float, velocity: ArrayLike | None = None
+) -> tuple[CameraPoses, CameraMotion]:
+    """Pose half way between two images, and the motion from the one to the other.
+
+    Parameters
+    ----------
+    first, second
+        One camera at either image: as many rows, or none.
+    interval
+        From the first to the second, s.
+    velocity
+        (N, 3) of b in n, m/s, where it is known better than from two positions.
+
+    Returns
+    -------
+    (poses, motion)
+        Means of positions and gimbal angles, half of the rotation between the attitudes; differences over
+        the interval. The covariance is the first's.
+
+    Raises
+    ------
+    WildlabError
+        Where the interval is not above zero, or mounts or numbers of rows differ.
+    """
+    seconds = positive_interval(interval)
+    if first.mount != second.mount or first.rows != second.rows:
+        raise WildlabError(
+            f"poses of the rows {first.rows} and {second.rows}, or of two mounts",
+            "give poses of one camera, a pair in each row",
+            field="second",
+        )
+    turn = matrix_to_rotation_vector(np.swapaxes(first.R_nb, -1, -2) @ second.R_nb)
+    half = first.R_nb @ rotation_vector_to_matrix(turn / 2)
+    rates = np.zeros((*first.rows, 2))
+    angles: list[Array | None] = [None, None]
+    for column, (before, after) in enumerate(((first.pan, second.pan), (first.tilt, second.tilt))):
+        if before is not None and after is not None:
+            change = wrap(after - before)
+            angles[column] = np.asarray(before + change / 2)
+            rates[..., column] = change / seconds
+    moved = (second.p_nb - first.p_nb) / seconds if velocity is None else np.asarray(velocity, float)
+    poses = replace(first, p_nb=(first.p_nb + second.p_nb) / 2, R_nb=half, pan=angles[0], tilt=angles[1])
+    return poses, CameraMotion(moved, turn / seconds, rates)

@@ -1,0 +1,14 @@
+"""A target's velocity from optical flow: H 5.4, 5.6.3."""
+
+from __future__ import annotations
+
+from wildlab.studies.optical_flow_velocity import trial
+from wildlab.studies.protocol import Metric, Study
+
+
+def _metric(subject: str, name: str) -> Metric | None:
+    unit = trial.RECORDED.get(name)
+    return None if unit is None else Metric(name, subject, unit)
+
+
+STUDY = Study("optical-flow-velocity", trial.SUBJECTS, trial.trial, trial.check_claims, _metric)

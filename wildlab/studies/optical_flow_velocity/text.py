@@ -1,0 +1,202 @@
+"""What the report on velocity from optical flow says, as the computed numbers have it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pandas as pd
+
+from wildlab.detection.flow import FlowThresholds
+from wildlab.studies.optical_flow_velocity.trial import (
+    CALIBRATED,
+    DECK,
+    IMAGES,
+    LIKELY,
+    LOGGED,
+    READINGS,
+    SLOW,
+    STAMPS,
+    STILL,
+    SYNCHRONISED,
+    TRUE,
+)
+
+NAMES = {
+    IMAGES: "images",
+    LOGGED: "as logged",
+    STAMPS: "intervals by the stamps",
+    SYNCHRONISED: "synchronised",
+    STILL: "synchronised, gimbal's angles exact",
+    CALIBRATED: "mount calibrated",
+    DECK: "features taken as high as the deck",
+    TRUE: "all poses exact",
+    SLOW: "as logged, gimbal slow",
+    LIKELY: "as logged, likely speeds",
+}
+#: What each way of reading the log changes.
+EXPLAINED = {
+    LOGGED: "the autopilot's pose and velocity, stamps of a computer, the camera's pace as the interval",
+    STAMPS: "the same, the interval between two images by their own two stamps",
+    SYNCHRONISED: "as logged, but each image has the time at which it was taken",
+    STILL: "synchronised, with the gimbal's true angles: as sure as those of a gimbal that stands still",
+    CALIBRATED: "as logged, with the mount as it is",
+    DECK: "as logged, with the plane as high as the deck, not the sea",
+    TRUE: "true poses, velocities, times, mount and camera: what is left comes from the images",
+    SLOW: "as logged, pairs between which the gimbal hardly moved",
+    LIKELY: "as logged, without velocities that no ship has",
+}
+#: Names of the thresholds' reasons: H prints none of them.
+REASONS = {
+    "contrast": "half of OpenCV's own 0.04: thermal images have few levels",
+    "ratio": "Lowe (2004)",
+    "agreement": "px about one motion of all",
+    "largest_turn": "between two images; rad, and share of the size",
+    "fewest": "fewer fit each other by chance",
+    "largest_gimbal_rate": "rad/s; H 5.6.3 proposes a limit without a number",
+    "largest_speed": "m/s, 49 kn; H 5.6.3 proposes a limit without a number",
+    "smallest_sd": "px; no feature is found better than that",
+}
+
+METHOD = r"""Each flight is that of the twin. Its images are rendered from the true poses, in kelvin, blurred,
+and counted by a camera with noise, a fixed pattern, vignetting and dead pixels. The detector of H 4.3 finds
+what floats, and SIFT features are sought within its convex outline only. FLANN pairs them between two images
+that follow each other; a pair is kept if the nearest descriptor is clearly nearer than the second nearest,
+and if it moved with most of the others.
+
+Pose and gimbal's angles are interpolated in the log at the times of both images. Half way between lies the
+pose of (5.22), rates are differences over the interval, and the velocity is the log's. The displacement of
+each feature over the interval less the flow of the camera's own motion, (5.24), gives a velocity over the sea
+by (5.30); that of a pair of images is the mean over its features. The definition of flow in H is a
+displacement in pixels, and (5.18) a derivative: taken by the letter, (5.30) would be metres an image.
+
+The covariance carries the errors of pixel, pose, mount, velocity, rates, gimbal and plane to the velocity.
+What all features of a pair have in common does not average out. Standard deviations are the manifest's, and
+those of rates usual ones: nobody told them what the simulation has.
+
+Pairs are looked at in stretches without gaps, spread over both passes: an error of one attitude spoils the
+pair before it and that after it in opposite ways, and a mean over neighbours is better than one over pairs
+here and there."""
+
+
+def axes(spread: pd.DataFrame, subject: str, name: str) -> tuple[float, float]:
+    """Medians over flights of a number north and east (``name`` is ``"mean"`` or ``"sd"``)."""
+    north, east = (float(spread[subject, f"{name}_{axis}"].median()) for axis in ("north", "east"))
+    return north, east
+
+
+def size(spread: pd.DataFrame, subject: str) -> float:
+    """Standard deviation along any axis, the median over flights, m/s."""
+    north, east = (spread[subject, f"sd_{axis}"].to_numpy(float) for axis in ("north", "east"))
+    sizes = np.sqrt((north**2 + east**2) / 2)
+    known = sizes[np.isfinite(sizes)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def largest_mean(spread: pd.DataFrame) -> pd.Series:
+    """Of each flight the larger of the two means by size, m/s."""
+    both = [spread[LOGGED, f"mean_{axis}"].abs() for axis in ("north", "east")]
+    return pd.concat(both, axis=1).max(axis=1)
+
+
+def flights(count: int) -> str:
+    """So many flights, in words that fit one."""
+    return f"{count} flight{'s' * (count != 1)}"
+
+
+def summary(spread: pd.DataFrame) -> list[str]:
+    """Three sentences on what the flights give."""
+    means = largest_mean(spread)
+    within = int((means <= 1.0).sum())
+    sd = size(spread, LOGGED)
+    return [
+        f"On {within} of {flights(len(spread))} the mean velocity of a ship at rest comes out within 1 m/s "
+        f"north and east; the largest mean is {means.max():.2f} m/s off.",
+        f"A single pair of images says {'little' if sd > 1.0 else 'much'}: its velocity has a standard "
+        f"deviation of {sd:.1f} m/s along an axis.",
+        cause_words(spread),
+    ]
+
+
+def cause_words(spread: pd.DataFrame) -> str:
+    """What the scatter comes from: how much of it is left with each thing as it truly was."""
+    whole = size(spread, LOGGED)
+    left = {one: size(spread, one) for one in (SYNCHRONISED, STILL, CALIBRATED)}
+    parts = ", ".join(f"{value:.1f} m/s {_WITH[one]}" for one, value in left.items())
+    image = size(spread, TRUE)
+    from_poses = (
+        "Most of it comes from the poses"
+        if image < 0.5 * whole
+        else "Much of it comes from the images themselves"
+    )
+    return f"{from_poses}: with all of them exact {image:.1f} m/s are left; {parts}."
+
+
+_WITH = {
+    SYNCHRONISED: "with exact times alone",
+    STILL: "with exact times and gimbal angles",
+    CALIBRATED: "with a calibrated mount alone",
+}
+
+
+def readings_table(spread: pd.DataFrame) -> pd.DataFrame:
+    """A row for each way of reading the same features: medians over flights."""
+    rows = []
+    for subject in (*READINGS, SLOW, LIKELY):
+        mean, sd = axes(spread, subject, "mean"), axes(spread, subject, "sd")
+        rows.append(
+            {
+                "reading": NAMES[subject], "mean_north": mean[0], "mean_east": mean[1], "sd_north": sd[0],
+                "sd_east": sd[1], "inside": 100 * float(spread[subject, "interval_share_95"].median()),
+                "pairs": float(spread[subject, "pairs"].sum()), "what": EXPLAINED[subject],
+            }
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def interval_words(spread: pd.DataFrame) -> str:
+    """How often the stated 95 % interval of a pair's velocity holds the true one."""
+    shares = spread[LOGGED, "interval_share_95"]
+    share = float(np.average(shares, weights=spread[LOGGED, "pairs"]))
+    word = "too sure" if share < 0.9 else "too cautious" if share > 0.985 else "about right"
+    return (
+        f"The 95 % interval that goes with a pair's velocity holds the true one in {100 * share:.0f} % "
+        f"of all {int(spread[LOGGED, 'pairs'].sum())} pairs, north and east counted apart: {word}."
+    )
+
+
+def stamps_words(spread: pd.DataFrame) -> str:
+    """What the stamps' own intervals would do."""
+    stamped, steady = size(spread, STAMPS), size(spread, LOGGED)
+    busy = "a computer that is busy now and then" if stamped > 2 * steady else "the computer"
+    return (
+        f"H does not say which interval a displacement is divided by. By the two stamps of {busy} the "
+        f"standard deviation is {stamped:.3g} m/s; by the camera's own pace, which is taken here, it is "
+        f"{steady:.1f} m/s."
+    )
+
+
+def gimbal_words(spread: pd.DataFrame) -> str:
+    """What dropping pairs with a moving gimbal, or with unlikely speeds, leaves and gains."""
+    pairs = spread[LOGGED, "pairs"].sum()
+    slow, likely = (100 * spread[one, "pairs"].sum() / pairs for one in (SLOW, LIKELY))
+    scatter = size(spread, SLOW)
+    slow_words = f" with a standard deviation of {scatter:.1f} m/s" if np.isfinite(scatter) else ""
+    return (
+        "H 5.6.3 proposes to drop pairs between which the gimbal moved, or whose velocity is unlikely. "
+        f"{slow:.0f} % of the pairs pass the first limit{slow_words}, {likely:.0f} % the second with "
+        f"{size(spread, LIKELY):.1f} m/s, beside {size(spread, LOGGED):.1f} m/s of all."
+    )
+
+
+def thresholds_table(thresholds: FlowThresholds) -> pd.DataFrame:
+    """Every threshold with its value and why it is so."""
+    return pd.DataFrame(
+        [
+            {
+                "name": one.name.replace("_", " "), "value": f"{getattr(thresholds, one.name):.3g}",
+                "status": "chosen", "reason": REASONS[one.name],
+            }
+            for one in fields(thresholds)
+        ]
+    )  # fmt: skip

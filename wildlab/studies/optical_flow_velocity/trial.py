@@ -1,0 +1,261 @@
+"""Rendered images of a ship at rest, features on it in pairs of images, and the velocity that they give.
+
+The ship, its images and the flight's logs are simulated; detector, features, flow and poses are the code
+that any flight goes through. The same features are read in several ways: as they were logged, and with one
+thing after the other as it truly was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.detection.floating import find_objects
+from wildlab.detection.flow import filled_outlines, match_features
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.flight.store import Flight
+from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.flights import Look, SceneFlight
+from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
+
+#: Images of the flight.
+IMAGES = "images"
+#: Ways to read the same features; the first is what the judged claims are about.
+LOGGED, STAMPS, SYNCHRONISED, CALIBRATED = "logged", "stamps", "synchronised", "calibrated"
+STILL, DECK, TRUE = "still-gimbal", "deck", "true-poses"
+#: Some of the pairs of the first reading alone.
+SLOW, LIKELY = "slow-gimbal", "likely-speed"
+READINGS = (LOGGED, STAMPS, SYNCHRONISED, STILL, CALIBRATED, DECK, TRUE)
+SUBJECTS = (IMAGES, *READINGS, SLOW, LIKELY)
+#: Names of the numbers that are recorded, and their units.
+RECORDED = {
+    "in_view_share": "1",
+    "whole_share": "1",
+    "feature_rate": "1",
+    "mean_north": "m/s",
+    "mean_east": "m/s",
+    "sd_north": "m/s",
+    "sd_east": "m/s",
+    "pairs": "1",
+    "interval_share_95": "1",
+    "correlation_u": "1",
+    "correlation_v": "1",
+}
+#: Pairs that follow each other without a gap: errors of one attitude spoil two of them in opposite ways.
+STRETCH = 30
+#: The ship: as long as the one of H 6.4.1, the only large one whose size H prints, and five times its beam.
+#: What is on its deck is chosen: without anything no feature detector would find more than corners.
+SHIP = Look(lengths=(70.0,), slender=5.0, fittings=30)
+
+
+class Looked(NamedTuple):
+    """One flight, the features found in its images, and what there was to see.
+
+    Attributes
+    ----------
+    flight, scene
+        Its logs, and the truth behind them.
+    pairs
+        Those with features.
+    tried
+        How many pairs were rendered.
+    shares
+        (frames,) which share of the ship's outline lies in each image.
+    """
+
+    flight: Flight
+    scene: SceneFlight
+    pairs: list[FramePair]
+    tried: int
+    shares: NDArray[np.float64]
+
+    @property
+    def deck(self) -> float:
+        """Height of the ship's deck above the sea, m."""
+        return max(layer.height for layer in self.scene.bodies(0)[0].layers[:-1])
+
+
+def stretches(usable: NDArray[np.bool_], pairs: int) -> NDArray[np.intp]:
+    """Which pairs are looked at: evenly spread stretches of neighbours, or all where these are fewer.
+
+    Parameters
+    ----------
+    usable
+        (N,) bool, of each pair (its first image's row) whether both images show some of the ship.
+    pairs
+        About how many are wanted.
+
+    Returns
+    -------
+    (K,) rows of the first images, in order.
+
+    Examples
+    --------
+    >>> stretches(np.ones(12, bool), 4).tolist()
+    [2, 3, 8, 9]
+    """
+    rows = np.flatnonzero(usable)
+    if len(rows) <= pairs:
+        return rows
+    size = min(STRETCH, max(-(-pairs // 2), 1))  # two stretches or more: one for each pass
+    blocks = [rows[start : start + size] for start in range(0, len(rows), size)]
+    count = min(-(-pairs // size), len(blocks))
+    chosen = (np.arange(count) + 0.5) * len(blocks) / count  # each in the middle of its part
+    return np.asarray(np.concatenate([blocks[int(one)] for one in chosen]))
+
+
+def look(twin: str, seed: int, pairs: int) -> Looked:
+    """Render stretches of a flight, and find features on the ship in both images of each pair.
+
+    Parameters
+    ----------
+    twin
+        With one target.
+    seed
+        Of the flight, the scene and the camera.
+    pairs
+        About how many pairs are looked at.
+
+    Raises
+    ------
+    WildlabError
+        If there is no such twin, or too few pairs have features.
+    """
+    scene = SceneFlight(load_twin(twin), seed, SHIP)
+    flight = simulate_twin(twin, seed)
+    near = np.flatnonzero(scene.near().any(axis=1))
+    shares = np.zeros(len(scene.times))
+    shares[near] = [scene.shares(int(row))[0] for row in near]
+    rows = stretches((shares[:-1] > 0) & (shares[1:] > 0), pairs)
+    camera, response = scene.poses.camera, CameraResponse()
+    sensor = sensor_of(response, (camera.height, camera.width), stream(seed, f"sensor of {twin}"))
+    seen: dict[int, tuple[NDArray[np.uint16], NDArray[np.bool_]]] = {}
+
+    def image(row: int) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+        """Counts, and where the detector has anything that floats; kept until the next pair."""
+        if row not in seen:
+            kelvin = scene.view(row, waves_move=False).kelvin
+            counts = expose(kelvin, response, sensor, stream(seed, f"image {row} of {twin}"))
+            seen[row] = counts, filled_outlines(find_objects(counts).labels)
+        return seen[row]
+
+    found = []
+    for row in rows:
+        (one, inside_one), (two, inside_two) = image(int(row)), image(int(row) + 1)
+        seen.pop(int(row))
+        found.append(FramePair(int(row), int(row) + 1, match_features(one, two, inside_one, inside_two)))
+    with_some = [pair for pair in found if len(pair.matches)]
+    if len(with_some) < 5:
+        raise WildlabError(
+            f"on the flight of seed {seed} {len(with_some)} of {len(found)} pairs of images have features",
+            "look at more pairs, or at the twin",
+            file=twin,
+        )
+    return Looked(flight, scene, with_some, len(found), shares)
+
+
+def readings(looked: Looked) -> dict[str, pd.DataFrame]:
+    """Velocities by each of `READINGS`, as `wildlab.pipeline.flow.pair_velocities` gives them."""
+    times, poses = looked.scene.times, looked.scene.poses
+    exact = pd.DataFrame({"time_s": times, "pan_rad": poses.pan, "tilt_rad": poses.tilt})
+    known = replace(looked.flight, tables=looked.flight.tables | {"gimbal": exact})
+    logged = Reading(AUTOPILOT)
+    ways = {
+        LOGGED: (looked.flight, logged),
+        STAMPS: (looked.flight, replace(logged, interval="stamps")),
+        SYNCHRONISED: (looked.flight, replace(logged, times=times)),
+        STILL: (known, replace(logged, times=times)),
+        CALIBRATED: (looked.flight, replace(logged, mount=poses.mount)),
+        DECK: (looked.flight, replace(logged, plane_down=-looked.deck)),
+        TRUE: (known, Reading(TRUTH, times=times, camera=poses.camera, mount=poses.mount)),
+    }
+    return {name: pair_velocities(flight, looked.pairs, way) for name, (flight, way) in ways.items()}
+
+
+def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
+    """Means and standard deviations of the velocities of a ship at rest, and whether intervals hold zero."""
+    known = table.dropna(subset=["v_north_m_s", "v_east_m_s"])
+    numbers: dict[str, float] = {"pairs": float(len(known))}
+    inside = []
+    for axis, variance in (("north", "cov_nn"), ("east", "cov_ee")):
+        v = known[f"v_{axis}_m_s"].to_numpy(float)
+        numbers[f"mean_{axis}"] = float(v.mean()) if len(v) else np.nan
+        numbers[f"sd_{axis}"] = float(v.std(ddof=1)) if len(v) > 1 else np.nan
+        inside.append(np.abs(v) <= 1.96 * np.sqrt(known[variance].to_numpy(float)))
+    numbers["interval_share_95"] = float(np.mean(inside)) if len(known) else np.nan
+    return numbers
+
+
+def numbers_of(looked: Looked, tables: dict[str, pd.DataFrame]) -> dict[tuple[str, str], float]:
+    """What a flight gives, by (subject, name): see `RECORDED`."""
+    count, shares = len(looked.shares), looked.shares
+    usable = int(((shares[:-1] > 0) & (shares[1:] > 0)).sum())
+    numbers = {
+        (IMAGES, "in_view_share"): float((shares > 0).sum() / count),
+        (IMAGES, "whole_share"): float((shares > 1 - 1e-9).sum() / count),
+        # Of all images of the flight, as if the pairs not looked at were like those that were.
+        (IMAGES, "feature_rate"): len(looked.pairs) / looked.tried * usable / count,
+    }
+    for name, table in tables.items():
+        numbers |= {(name, key): value for key, value in velocity_numbers(table).items()}
+    logged = tables[LOGGED]
+    for name, chosen in ((SLOW, logged["slow_gimbal"]), (LIKELY, logged["likely_speed"])):
+        numbers |= {(name, key): value for key, value in velocity_numbers(logged[chosen]).items()}
+    for axis in "uv":
+        pair = logged[[f"flow_{axis}", f"camera_{axis}"]].dropna().to_numpy(float)
+        numbers[LOGGED, f"correlation_{axis}"] = float(np.corrcoef(pair.T)[0, 1])
+    return numbers
+
+
+def trial(seed: int, *, twin: str, pairs: int) -> dict[tuple[str, str], float]:
+    """One simulated flight over the ship, by `numbers_of`.
+
+    Raises
+    ------
+    WildlabError
+        As `look`.
+    """
+    looked = look(twin, seed, pairs)
+    return numbers_of(looked, readings(looked))
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the flights give for each claim of H 5.4 and 5.6.3, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+    """
+
+    def of(subject: str, name: str) -> NDArray[np.float64]:
+        return spread[subject, name].to_numpy(float)
+
+    def size(subject: str) -> NDArray[np.float64]:
+        """Standard deviation of the velocity along any axis."""
+        return np.sqrt((of(subject, "sd_north") ** 2 + of(subject, "sd_east") ** 2) / 2)
+
+    means = np.maximum(np.abs(of(LOGGED, "mean_north")), np.abs(of(LOGGED, "mean_east")))
+    correlation = np.minimum(of(LOGGED, "correlation_u"), of(LOGGED, "correlation_v"))
+    return {
+        "mean-within-one": Check(true=means <= 1.0),
+        "very-large-variance": Check(
+            measured=np.minimum(of(LOGGED, "sd_north"), of(LOGGED, "sd_east")), above=True
+        ),
+        "flows-correlate": Check(measured=correlation, above=True),
+        "better-synchronised": Check(
+            true=size(SYNCHRONISED) < size(LOGGED), first=size(SYNCHRONISED), second=size(LOGGED), unit="m/s"
+        ),
+        "better-with-a-still-gimbal": Check(
+            true=size(STILL) < size(LOGGED), first=size(STILL), second=size(LOGGED), unit="m/s"
+        ),
+        "own-motion-dominates": Check(measured=size(TRUE) / size(LOGGED)),
+    }
