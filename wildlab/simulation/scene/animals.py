@@ -7,7 +7,7 @@ kind, temperatures are chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,7 +64,7 @@ def _oval(
 
 
 def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
-    """An animal: a trunk, warmest over the shoulders, with a cooler head, ears and tail.
+    """An animal: a trunk, warmest over the shoulders, with a cooler head and tail.
 
     Parameters
     ----------
@@ -91,18 +91,15 @@ def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
     sun = SUNNED * float(weather.kept(0.3)[2]) * (1 - SHADOW_DEPTH * weather.clouds)
     skin = k.bare * (BLOOD - weather.air) + sun
     uneven = 0.06 * k.bare * (BLOOD - weather.air)
-    trunk = _oval(k.length, k.width)
     front = k.length / 2
-    head = _oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.3 * k.head * k.length)
-    ears = _oval(0.08 * k.length, 0.7 * k.width, ahead=front + 0.1 * k.head * k.length, corners=6)
-    tail = _oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.06 * k.length, corners=6)
+    trunk = _oval(k.length, k.width)
+    head = _oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.3 * k.head * k.length, corners=8)
+    tail = _oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.06 * k.length, corners=4)
     shoulders = Hot(0.2 * k.length, 0.0, 0.3 * k.width, 0.12 * skin)
     layers = (
-        Layer(trunk, 0.4 * k.height, 0.85 * skin, uneven, 0.2 * k.length),
-        Layer(trunk, 0.75 * k.height, 0.95 * skin, uneven, 0.2 * k.length),
+        Layer(trunk, 0.6 * k.height, 0.9 * skin, uneven, 0.2 * k.length),
         Layer(tail, 0.8 * k.height, 0.5 * skin),
-        Layer(ears, 0.85 * k.height, 0.6 * skin),
-        Layer(head, 0.9 * k.height, 0.8 * skin, uneven, 0.1 * k.length),
+        Layer(head, 0.9 * k.height, 0.75 * skin, uneven, 0.1 * k.length),
         Layer(_oval(0.9 * k.length, 0.7 * k.width), k.height, skin, uneven, 0.2 * k.length, (shoulders,)),
     )
     return Body(kind, layers, texture_seed=seed)
@@ -176,8 +173,8 @@ def tree(crown: float, weather: Weather, seed: int = 0) -> Body:
     """
     excess = weather.level(LEAVES) - weather.air
     layers = tuple(
-        Layer(_oval(share * crown, share * crown, corners=16), high * crown, excess, 0.5, 0.15 * crown)
-        for share, high in ((0.8, 0.4), (1.0, 0.65), (0.7, 0.9))
+        Layer(_oval(share * crown, share * crown), high * crown, excess, 0.5, 0.15 * crown)
+        for share, high in ((1.0, 0.5), (0.7, 0.85))
     )
     return Body("tree", layers, texture_seed=seed)
 
@@ -185,41 +182,39 @@ def tree(crown: float, weather: Weather, seed: int = 0) -> Body:
 def scatter(
     rng: np.random.Generator,
     bodies: Sequence[Body],
-    place: Callable[[np.random.Generator], Array],
+    places: Array,
     apart: float,
     taken: Sequence[Array] = (),
-    tries: int = 200,
 ) -> tuple[Body, ...]:
-    """Bodies at random places that keep their distance.
+    """Bodies at places that keep their distance, with courses at random.
 
     Parameters
     ----------
     rng
-        Of places and courses.
+        Of the courses.
     bodies
         To be placed, in this order.
-    place
-        Draws a place, (2,) or (3,) north and east first, m.
+    places
+        (N, 2) or (N, 3) m, north and east first; NaN for none. They are tried in their order.
     apart
         Distance of centres at least, m.
     taken
         Places that are kept free too.
-    tries
-        For each; a body without a place is left out.
 
     Returns
     -------
     tuple of Body
+        Those for which there was a place.
     """
     kept = [np.asarray(one, float)[:2] for one in taken]
-    put: list[Body] = []
-    for body in bodies:
-        for _ in range(tries):
-            at = np.asarray(place(rng), float)[:2]
-            if np.isfinite(at).all() and all(np.linalg.norm(at - one) >= apart for one in kept):
-                kept.append(at)
-                put.append(body.at(float(at[0]), float(at[1]), float(rng.uniform(-np.pi, np.pi))))
-                break
+    waiting, put = list(bodies), []
+    for place in np.asarray(places, float):
+        if not waiting:
+            break
+        at = place[:2]
+        if np.isfinite(at).all() and all(np.hypot(*(at - one)) >= apart for one in kept):
+            kept.append(at)
+            put.append(waiting.pop(0).at(float(at[0]), float(at[1]), float(rng.uniform(-np.pi, np.pi))))
     return tuple(put)
 
 
@@ -248,4 +243,5 @@ def group(
     """
     bodies = [animal(kind, weather, int(rng.integers(2**31))) for kind in kinds]
     apart = 1.2 * max((ANIMALS[kind].length for kind in kinds), default=0.0)
-    return scatter(rng, bodies, lambda r: np.asarray(middle)[:2] + r.normal(0, spread, 2), apart)
+    places = np.asarray(middle)[:2] + rng.normal(0, spread, (100 * max(len(bodies), 1), 2))
+    return scatter(rng, bodies, places, apart)

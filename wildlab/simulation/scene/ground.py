@@ -98,15 +98,15 @@ class Weather:
     @property
     def sun(self) -> Array:
         """Unit vector towards the sun, (3,) north, east, up; below the horizon at night."""
-        return _sun(np.array([self.hour]), self.noon_elevation)[0]
+        return np.asarray(_sun(np.array([self.hour]), self.noon_elevation)[0])
 
     def kept(self, lag: float) -> Array:
         """The sun's vector averaged over the past with that lag (h), (3,); zero while it is below."""
-        return _kept(self.hour, self.noon_elevation, lag)
+        return np.asarray(_kept(self.hour, self.noon_elevation, lag))
 
     def heat(self, cover: Cover) -> Array:
         """What the sun gives level ground of a cover, and slopes by their normal: (3,) K."""
-        return cover.heating * self.kept(cover.lag)
+        return np.asarray(cover.heating * self.kept(cover.lag))
 
     def loss(self, cover: Cover) -> float:
         """What a cover loses to the sky, K."""

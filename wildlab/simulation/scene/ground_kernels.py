@@ -64,8 +64,8 @@ def meet(
 ) -> float:
     """Where along a unit vector a ray meets the ground, m; negative where it does not.
 
-    It goes by half cells of the relief, as long as it is between the highest and the lowest ground, and
-    halves the step in which it came under it.
+    It goes by cells of the relief, as long as it is between the highest and the lowest ground, and looks for
+    the place in the step in which it came under it; a crest that a ray only just touches may be passed over.
     """
     if dd <= 1e-4:
         return -1.0
@@ -74,16 +74,16 @@ def meet(
     level = np.sqrt(dn * dn + de * de)
     step = last - first
     if level > 1e-9:
-        step = min(step, 0.5 / per_metre / level)
-    before = first
-    if above_ground(relief, per_metre, p, dn, de, dd, before) < 0:
-        return -1.0
+        step = min(step, 1.0 / per_metre / level)
+    before, over = first, above_ground(relief, per_metre, p, dn, de, dd, first)
+    if over < 0:
+        return -1.0 if first <= 0 else first
     for _ in range(MOST_STEPS):
         now = min(before + step, last)
-        if above_ground(relief, per_metre, p, dn, de, dd, now) <= 0 or now >= last:
+        under = above_ground(relief, per_metre, p, dn, de, dd, now)
+        if under <= 0 or now >= last:
+            under = min(under, -1e-12)
             # Within a patch the height is smooth along the ray: false position, halved where it is slow.
-            over = above_ground(relief, per_metre, p, dn, de, dd, before)
-            under = min(above_ground(relief, per_metre, p, dn, de, dd, now), -1e-12)
             for turn in range(REFINEMENTS):
                 share = over / (over - under) if turn % 3 < 2 else 0.5
                 middle = before + share * (now - before)
@@ -95,7 +95,7 @@ def meet(
                 else:
                     now, under = middle, left
             return float(0.5 * (before + now))
-        before = now
+        before, over = now, under
     return -1.0
 
 

@@ -155,7 +155,8 @@ def ground_points(land: Land, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, 
     rays = np.concatenate([xy, np.ones((len(xy), 1))], axis=1) @ np.asarray(R_nc, float).T
     found = np.empty((len(rays), 3))
     scale = len(land.heights) / land.side
+    lowest, highest = (float(one) for one in _limits(land))
     kernels.meet_all(
-        land.relief, scale, *_limits(land), np.asarray(p_nc, float), np.ascontiguousarray(rays), found
+        land.relief, scale, lowest, highest, np.asarray(p_nc, float), np.ascontiguousarray(rays), found
     )
     return found
