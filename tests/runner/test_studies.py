@@ -152,6 +152,15 @@ def test_a_tarpaulin_is_looked_for_on_one_flight(reports: Path, faults: Faults) 
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 1, 6)
     for figure in ("found", "horizon", "mean", "scatter"):
+def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: Faults) -> None:
+    folder = run("wildlife-detection", reports, seeds=2)
+    found = values(folder)
+    for weather in ("night", "morning", "noon", "cloudy"):
+        metric = found[f"recall_{weather}", "subtracted"]
+        assert metric["low"] <= metric["value"] <= metric["high"] and metric["n"] == 6
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 16)
+    for figure in ("methods-cloudy", "methods-noon", "sequence", "blocks-150", "weather-recall", "heights"):
         assert (folder / "figures" / f"{figure}.png").is_file()
     assert faults(folder / "report.html") == []
 

@@ -1,15 +1,20 @@
-"""Scenes: what a thermal camera would see of a sea and of what floats on it, with exact labels.
+"""Scenes: what a thermal camera would see of sea and land and of what is on them, with exact labels.
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
 against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and animals,
 `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults; and
 `coloured` the ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows
 of a detector.
+against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales,
+`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults. On land
+`ground` has covers under the sun of a day, `animals` what stands there, and `land` renders it. All of it is
+chosen; nothing in it knows of a detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
 """
 
+from wildlab.simulation.scene.animals import ANIMALS, Kind, animal, group, scatter, slab, stone, tree
 from wildlab.simulation.scene.bodies import (
     KINDS,
     Body,
@@ -24,6 +29,17 @@ from wildlab.simulation.scene.bodies import (
     vessel,
 )
 from wildlab.simulation.scene.coloured import ColourView, Ground, Tarpaulin, render_colour
+from wildlab.simulation.scene.ground import (
+    EVEN_LAND,
+    GRASS,
+    ROCK,
+    SAND,
+    Cover,
+    Land,
+    Weather,
+    rolling_land,
+)
+from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, render_land
 from wildlab.simulation.scene.render import Scene, Seen, View, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,
@@ -39,14 +55,24 @@ from wildlab.simulation.scene.response import (
 from wildlab.simulation.scene.sea import EVEN, Sea
 
 __all__ = [
+    "ANIMALS",
     "EVEN",
+    "EVEN_LAND",
+    "GRASS",
     "IDEAL",
     "KINDS",
+    "ROCK",
+    "SAND",
     "Body",
     "CameraResponse",
     "ColourView",
     "Ground",
+    "Cover",
     "Hot",
+    "Kind",
+    "Land",
+    "LandScene",
+    "LandView",
     "Layer",
     "Scene",
     "Sea",
@@ -55,10 +81,15 @@ __all__ = [
     "Tarpaulin",
     "View",
     "Wake",
+    "Weather",
+    "animal",
     "boat",
     "buoy",
     "expose",
     "gain_control",
+    "ground_points",
+    "group",
+    "height_at",
     "in_shutter",
     "mammal",
     "outline_of",
@@ -66,8 +97,14 @@ __all__ = [
     "rectangle",
     "render",
     "render_colour",
+    "render_land",
+    "rolling_land",
+    "scatter",
     "sensor_of",
     "shutter_image",
+    "slab",
+    "stone",
     "to_kelvin",
+    "tree",
     "vessel",
 ]

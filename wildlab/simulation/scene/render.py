@@ -6,6 +6,7 @@ Pixels are squares about their centres, the upper left one's at (0, 0), as in Op
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -149,18 +150,55 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
         rays, p, R, focal, *tiles_at(sea, float(time)), scales, weather, _sun(sea), kelvin, water
     )
     labels = np.zeros(kelvin.shape, np.int16)
+    places = [p] * len(scene.bodies)
+    seen = draw_bodies(scene.bodies, camera, places, R, time, sea.temperature, kelvin, labels)
+    return View(kelvin, labels, water, seen)
+
+
+def draw_bodies(
+    bodies: tuple[Body, ...],
+    camera: Camera,
+    places: Sequence[Array],
+    R: Array,
+    time: float,
+    temperature: float,
+    kelvin: NDArray[np.float32],
+    labels: NDArray[np.int16],
+) -> tuple[Seen, ...]:
+    """Draws bodies over an image, the farther ones first.
+
+    Parameters
+    ----------
+    bodies
+        Numbered from 1.
+    camera
+        Intrinsic parameters.
+    places
+        Of the camera, (3,) m for each body: from where it is seen, if its ground is at zero down.
+    R
+        (3, 3) attitude of the camera.
+    time
+        s.
+    temperature
+        What excesses are over, K.
+    kelvin, labels
+        (H, W), drawn on.
+
+    Returns
+    -------
+    tuple of Seen
+    """
     seen = []
     # Those whose tops are further away first, so that nearer ones hide them.
-    order = sorted(
-        range(len(scene.bodies)), key=lambda k: -float(np.linalg.norm(scene.bodies[k].top(time) - p))
-    )
+    order = sorted(range(len(bodies)), key=lambda k: -float(np.linalg.norm(bodies[k].top(time) - places[k])))
+    rays = pixel_coordinates(camera)
     for k in order:
-        body = scene.bodies[k]
+        body, p = bodies[k], places[k]
         found = outline_of(body, camera, p, R, time)
         if found is None:
             continue
         _draw_wake(body, camera, rays, p, R, time, kelvin)
-        covered = _draw(body, camera, rays, p, R, time, found, k + 1, sea, kelvin, labels)
+        covered = _draw(body, camera, rays, p, R, time, found, k + 1, temperature, kelvin, labels)
         size = visible_part(found + 0.5, camera.width, camera.height)  # a pixel reaches half a pixel around
         if not size.area > 0:
             continue
@@ -172,7 +210,7 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
                 min(size.area / whole.area, 1.0), covered,
             )
         )  # fmt: skip
-    return View(kelvin, labels, water, tuple(seen))
+    return tuple(seen)
 
 
 def outline_of(body: Body, camera: Camera, p: Array, R: Array, time: float = 0.0) -> Array | None:
@@ -269,7 +307,7 @@ def _draw(
     time: float,
     outline: Array,
     number: int,
-    sea: Sea,
+    temperature: float,
     kelvin: NDArray[np.float32],
     labels: NDArray[np.int16],
 ) -> float:
@@ -298,7 +336,7 @@ def _draw(
         kernels.render_body(
             rays, step, p, R, box, _frame(body, time), np.array(edges), np.array(spans, np.int64),
             np.array([layer.height for layer in body.layers], float), values,
-            np.array(hot, float).reshape(-1, 5), _texture(body.texture_seed), sea.temperature, metres, number,
+            np.array(hot, float).reshape(-1, 5), _texture(body.texture_seed), temperature, metres, number,
             kelvin, labels,
         )
     )  # fmt: skip

@@ -1,0 +1,229 @@
+"""Scenes on land against what is known otherwise: closed forms, the surface itself, and the sun's way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import R_MC_DOWN, Mount
+from wildlab.simulation.scene import (
+    ANIMALS,
+    EVEN_LAND,
+    GRASS,
+    ROCK,
+    SAND,
+    Cover,
+    Land,
+    LandScene,
+    Weather,
+    animal,
+    ground_points,
+    group,
+    height_at,
+    render_land,
+    rolling_land,
+    slab,
+    stone,
+    tree,
+)
+from wildlab.simulation.scene.ground import CLOUD_BLANKET, SHADOW_DEPTH
+
+CAMERA = Camera(160, 128, 290.0, 292.0, 78.0, 66.0)
+SMOOTH = Cover(heating=20.0, cooling=0.0, lag=0.0, texture_sd=0.0)
+
+
+def pose(height, roll=0.0, pitch=0.0, yaw=0.0):
+    R_nb = euler_to_matrix(*np.radians([roll, pitch, yaw]))
+    at = CameraPoses(CAMERA, Mount("down"), np.array([3.0, -7.0, -height]), R_nb)
+    return at.p_nc, at.R_nc
+
+
+def hilly(cells=64, side=128.0, high=4.0):
+    north, east = np.meshgrid(*[np.arange(cells) / cells * 2 * np.pi] * 2, indexing="ij")
+    return Land(high * np.sin(north) * np.cos(2 * east), side=side, covers=(SMOOTH,))
+
+
+def test_a_slab_straight_below_has_its_size_and_its_warmth_in_closed_form():
+    view = render_land(
+        LandScene(EVEN_LAND, (slab(18.0, 6.0, 8.0).at(2.0, -3.0),)), CAMERA, [0, 0, -60.0], R_MC_DOWN
+    )
+    seen, air = view.seen[0], EVEN_LAND.weather.air
+    assert np.allclose(seen.uv, [78 - 290 * 3 / 60, 66 - 292 * 2 / 60])
+    assert np.isclose(seen.area, 18 * 6 * 290 * 292 / 60**2)
+    assert np.isclose((view.kelvin.astype(float) - air).sum() / 8.0, seen.area, rtol=0.01)
+    assert np.isclose(view.kelvin[0, 0], air, atol=1e-4)
+    assert view.ground.all()
+    assert view.visible(1) == pytest.approx(1.0, abs=0.02)
+    assert view.visible(2) == 0.0
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0, 0), (25, -20), (10, 55)])
+def test_rays_end_on_the_ground_and_project_back(roll, pitch):
+    land, (p, R) = hilly(), pose(40.0, roll, pitch, 30.0)
+    uv = np.stack(np.meshgrid([0.0, 60.0, 159.0], [0.0, 70.0, 127.0]), axis=-1).reshape(-1, 2)
+    points = ground_points(land, CAMERA, p, R, uv)
+    met = np.isfinite(points[:, 0])
+    assert met[:6].any()
+    heights = [height_at(land, point[:2]) for point in points[met]]
+    assert np.allclose(-points[met, 2], heights, atol=1e-5)
+    assert np.allclose(ground_to_pixel(CAMERA, points[met], p, R), uv[met], atol=1e-6)
+    # No ground lies between: along the way the ray is above it.
+    for point in points[met]:
+        way = p + np.linspace(0, 0.999, 400)[:, None] * (point - p)
+        assert all(-w[2] > height_at(land, w[:2]) - 1e-6 for w in way)
+
+
+def test_heights_are_bilinear_and_repeat():
+    land = Land(np.array([[0.0, 2.0], [4.0, 6.0]]), side=8.0)
+    assert height_at(land, [2.0, 2.0]) == pytest.approx(3.0)
+    assert height_at(land, [2.0 + 8.0, 2.0 - 16.0]) == pytest.approx(3.0)
+
+
+def test_a_slope_has_the_heat_of_its_angle_to_the_sun():
+    land = replace(hilly(), weather=Weather(hour=9.0))
+    p, R = pose(50.0)
+    view = render_land(LandScene(land), CAMERA, p, R)
+    sun = land.weather.sun
+    for u, v in ((20, 20), (80, 64), (140, 100)):
+        north, east, _ = ground_points(land, CAMERA, p, R, [[u, v]])[0]
+        k, high = 2 * np.pi / 128, 4.0
+        slopes = (
+            high * k * np.cos(k * north) * np.cos(2 * k * east),
+            -2 * high * k * np.sin(k * north) * np.sin(2 * k * east),
+        )
+        normal = np.array([-slopes[0], -slopes[1], 1.0]) / np.sqrt(1 + slopes[0] ** 2 + slopes[1] ** 2)
+        # The unevenness of sunlit ground is the only other thing: none here, as no cover has a texture.
+        heat = 20.0 * max(float(normal @ sun), 0.0)
+        assert view.kelvin[v, u] - land.weather.air == pytest.approx(heat, abs=0.15)
+
+
+def test_the_sun_rises_in_the_east_and_is_highest_at_noon():
+    rise, noon = Weather(hour=6.0).sun, Weather(hour=12.0)
+    assert np.allclose(rise, [0, 1, 0], atol=1e-12)
+    assert np.arcsin(noon.sun[2]) == pytest.approx(noon.noon_elevation)
+    assert noon.sun[0] < 0
+    assert np.isclose(np.linalg.norm(Weather(hour=9.7).sun), 1)
+
+
+def test_heat_that_is_kept_fades_by_its_lag_at_night():
+    one, other = Weather(hour=20.0).kept(2.0), Weather(hour=23.0).kept(2.0)
+    assert np.allclose(other, one * np.exp(-3 / 2), rtol=1e-3)
+    assert np.allclose(Weather(hour=11.0).kept(0.01), Weather(hour=11.0).sun, atol=0.01)
+    assert np.allclose(Weather(hour=2.0).kept(0.0), 0)
+
+
+def test_covers_are_ordered_as_they_are_known_to_be():
+    noon, night = Weather(hour=13.0), Weather(hour=2.0)
+    assert noon.level(SAND) > noon.level(ROCK) > noon.level(GRASS) > noon.air
+    assert night.level(ROCK) > night.level(SAND) and night.level(GRASS) < night.air
+
+
+def test_clouds_take_heat_and_keep_the_night_warm():
+    clear, closed = Weather(hour=13.0), Weather(hour=13.0, clouds=1.0)
+    heat = clear.heat(SAND)[2]
+    assert closed.level(SAND) - closed.air == pytest.approx(
+        heat * (1 - SHADOW_DEPTH) - SAND.cooling * (1 - CLOUD_BLANKET)
+    )
+    assert Weather(hour=2.0, clouds=1.0).level(GRASS) > Weather(hour=2.0).level(GRASS)
+    half = rolling_land(Weather(hour=13.0, clouds=0.5), seed=2).shadow
+    assert half.mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_cloud_shadows_cool_the_ground_under_them():
+    still = replace(EVEN_LAND, covers=(SMOOTH,), weather=Weather(hour=12.0))
+    p, R = pose(50.0)
+    sunny = render_land(LandScene(still), CAMERA, p, R).kelvin
+    shaded = render_land(
+        LandScene(replace(still, weather=Weather(hour=12.0, clouds=1.0))), CAMERA, p, R
+    ).kelvin
+    air = still.weather.air
+    assert np.allclose(shaded - air, (1 - SHADOW_DEPTH) * (sunny - air), atol=1e-3)
+
+
+def test_a_body_stands_on_the_height_of_the_ground():
+    land, (p, R) = hilly(), pose(50.0, 8.0, -5.0)
+    at = ground_points(land, CAMERA, p, R, [[140.0, 100.0]])[0]
+    view = render_land(LandScene(land, (slab(4.0, 4.0, 30.0).at(*at[:2]),)), CAMERA, p, R)
+    assert abs(at[2]) > 0.3
+    assert np.allclose(view.seen[0].uv, [140.0, 100.0], atol=1e-3)
+    depth = ((at - p) @ R)[2]
+    assert view.seen[0].area == pytest.approx(16 * 290 * 292 / depth**2, rel=0.05)
+
+
+def test_a_tree_hides_what_is_under_it():
+    weather = EVEN_LAND.weather
+    under = animal("antelope", weather).at(0.0, 0.0)
+    beside = animal("antelope", weather).at(0.0, 8.0)
+    scene = LandScene(EVEN_LAND, (under, beside, tree(5.0, weather).at(0.0, 0.0)))
+    view = render_land(scene, CAMERA, [0, 0, -40.0], R_MC_DOWN)
+    assert view.visible(1) < 0.05
+    assert view.visible(2) == pytest.approx(1.0, abs=0.05)
+    assert (view.labels == 3).any()
+
+
+def test_animals_are_warmer_than_air_and_cooler_at_their_ends():
+    night = Weather(hour=2.0)
+    for kind, size in ANIMALS.items():
+        body = animal(kind, night)
+        trunk = max(layer.excess for layer in body.layers)
+        ends = min(layer.excess for layer in body.layers)
+        assert 0 < ends < 0.7 * trunk
+        reach = np.ptp([x for layer in body.layers for x, _ in layer.outline])
+        assert size.length < reach < 1.8 * size.length
+    assert animal("rhinoceros", night).layers[-1].excess > animal("antelope", night).layers[-1].excess
+
+
+def test_stones_are_as_warm_as_rock_and_trees_near_the_air():
+    for weather in (Weather(hour=2.0), Weather(hour=13.0), Weather(hour=13.0, clouds=1.0)):
+        top = stone(1.0, weather, 3).layers[-1]
+        assert weather.air + top.excess == pytest.approx(weather.level(ROCK))
+        assert abs(tree(4.0, weather).layers[0].excess) < 5
+
+
+def test_a_group_keeps_its_distance_and_its_kinds():
+    rng = np.random.default_rng(2)
+    bodies = group(rng, ["calf"] * 6, np.array([10.0, 20.0]), 3.0, Weather())
+    places = np.array([body.centre(0.0)[:2] for body in bodies])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 1e9 * np.eye(len(places))
+    assert len(bodies) == 6 and apart.min() >= 1.2 * ANIMALS["calf"].length
+    crowd = group(rng, ["rhinoceros"] * 50, np.zeros(2), 0.5, Weather())
+    assert len(crowd) < 50  # those without a place are left out
+
+
+def test_the_sky_is_no_ground():
+    p, R = pose(30.0, 0.0, 80.0)
+    view = render_land(LandScene(EVEN_LAND), CAMERA, p, R)
+    assert view.ground.any() and not view.ground.all()
+    assert view.kelvin[~view.ground].max() < EVEN_LAND.weather.air - 20
+
+
+def test_the_same_seed_is_the_same_land():
+    one, other = (rolling_land(Weather(), seed=5) for _ in range(2))
+    assert np.array_equal(one.heights, other.heights) and np.array_equal(one.cover, other.cover)
+    assert not np.array_equal(one.heights, rolling_land(Weather(), seed=6).heights)
+    assert np.isclose(one.heights.std(), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Weather(clouds=1.5), "share from 0 to 1"),
+        (lambda: Weather(hour=25.0), "from 0 to below 24"),
+        (lambda: Land(np.zeros((3, 3))), "a power of two"),
+        (lambda: Land(np.full((2, 2), np.nan)), "heights in metres"),
+        (lambda: Land(cover=np.full((2, 2), 7)), "number them from 0"),
+        (lambda: rolling_land(Weather(), shares=(0.5, 0.6, 0.1)), "three that sum to one"),
+        (lambda: animal("whale", Weather()), "use one of: rhinoceros"),
+        (lambda: render_land(LandScene(EVEN_LAND), CAMERA, [0, 0, 1.0], R_MC_DOWN), "raise the camera"),
+    ],
+)
+def test_what_cannot_be_is_refused(make, words):
+    with pytest.raises(WildlabError, match=f"(?i){words}"):
+        make()

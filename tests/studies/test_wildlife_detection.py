@@ -1,0 +1,326 @@
+"""What the study of warm animals computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.detection.warm import Warm
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.reporting.published import load_claims
+from wildlab.simulation.scene import (
+    EVEN_LAND,
+    IDEAL,
+    CameraResponse,
+    LandScene,
+    Weather,
+    animal,
+    render_land,
+    sensor_of,
+    slab,
+    tree,
+)
+from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
+from wildlab.simulation.scene.response import expose
+from wildlab.studies.wildlife_detection import STUDY, charts, claims, text, trial
+from wildlab.studies.wildlife_detection.trial import (
+    ADAPTIVE,
+    BY_MEAN,
+    BY_MEDIAN,
+    CLOUDY,
+    CONSTANT,
+    COUNTS,
+    ENHANCED,
+    LARGE,
+    METHODS,
+    NIGHT,
+    NOON,
+    PRINTED,
+    PROPOSED,
+    READINGS,
+    SMALL,
+    SUBTRACTED,
+    Operator,
+    Picture,
+    find,
+    judge,
+    read_as,
+)
+
+CAMERA = Camera(180, 120, 320.0, 320.0, 89.5, 59.5)
+DARK = Weather(hour=2.0)
+
+
+def picture_of(*bodies, height=30.0, weather=DARK, window=(-5.0, 20.0)):
+    """Over even ground as warm as the air; the window in K about it."""
+    land = replace(EVEN_LAND, weather=weather)
+    view = render_land(LandScene(land, bodies), CAMERA, [0.0, 0.0, -height], R_MC_DOWN)
+    counts = expose(view.kelvin, IDEAL, sensor_of(IDEAL, (120, 180), np.random.default_rng(1)), None)
+    low, high = (trial.to_counts(weather.air + one, IDEAL) for one in window)
+    return Picture(view, counts, (low, high), height)
+
+
+def rhino(north=0.0, east=0.0, course=0.0):
+    return animal("rhinoceros", DARK, 1).at(north, east, course)
+
+
+def test_animals_in_the_open_are_found_and_nothing_else():
+    picture = picture_of(rhino(0, -4), rhino(0, 4, 1.0))
+    judged = judge(picture, find(picture, METHODS[CONSTANT]))
+    assert judged.counts.tolist() == [2, 0, 0]
+
+
+def test_a_warm_slab_is_a_false_alarm_and_a_missed_animal_is_missed():
+    picture = picture_of(rhino(0, -4), slab(2.0, 2.0, 14.0).at(0.0, 4.0))
+    judged = judge(picture, find(picture, METHODS[CONSTANT]))
+    assert judged.counts.tolist() == [1, 1, 0]
+    deaf = judge(picture, find(picture, replace(METHODS[CONSTANT], level=254.0)))
+    assert deaf.counts.tolist() == [0, 0, 1]
+
+
+def test_an_animal_under_a_tree_counts_neither_way():
+    under = replace(tree(3.6, DARK), texture_seed=4).at(0.9, 0.0)
+    picture = picture_of(rhino(), under)
+    assert picture.view.visible(1) < trial.SHOWN
+    assert picture.animals == {}
+    judged = judge(picture, find(picture, replace(METHODS[CONSTANT], smallest_px=3.0)))
+    assert judged.counts.tolist() == [0, 0, 0]
+
+
+def test_pieces_of_one_animal_are_found_once_and_invented_for_the_rest():
+    picture = picture_of(rhino())
+    found = find(picture, METHODS[CONSTANT])
+    twice = found.select(np.array([0, 0]))
+    assert judge(picture, twice).counts.tolist() == [1, 1, 0]
+    assert len(judge(picture, twice).rows[1]) == 2
+
+
+def test_a_detection_much_larger_than_the_animal_is_not_of_it():
+    picture = picture_of(rhino())
+    found = find(picture, METHODS[CONSTANT])
+    assert judge(picture, replace(found, area=found.area * 5)).counts.tolist() == [0, 1, 1]
+
+
+def test_readings_are_what_they_are_called():
+    base = METHODS[SUBTRACTED]
+    assert read_as(base, "floor") == base
+    assert read_as(base, "offset").level_is == "offset"
+    assert read_as(base, "white").level == 0
+    assert read_as(base, "off-mean").level == -65
+    # Taken off the mean, everything is above.
+    picture = picture_of(rhino())
+    assert charts.above(picture, read_as(METHODS[ADAPTIVE], "off-mean")).all()
+    assert not charts.above(picture, METHODS[ADAPTIVE]).all()
+
+
+def test_what_is_proposed_follows_from_the_ground():
+    picture = picture_of(rhino())
+    sized = trial.proposed(trial.BY_SIZE, picture, CAMERA, IDEAL)
+    assert sized.smallest_px == pytest.approx(0.2 * (320 / 30) ** 2)
+    near = replace(picture, distance=15.0)
+    assert (
+        trial.proposed(trial.BY_BLOCK, near, CAMERA, IDEAL).block_px
+        > trial.proposed(trial.BY_BLOCK, picture, CAMERA, IDEAL).block_px
+    )
+    cold = trial.proposed(trial.NOT_HOT, picture, CAMERA, IDEAL)
+    oven = picture_of(rhino(0, -4), slab(2.0, 2.0, 60.0).at(0.0, 4.0))
+    assert judge(oven, find(oven, METHODS[SUBTRACTED])).counts.tolist() == [1, 1, 0]
+    assert judge(oven, find(oven, cold)).counts.tolist() == [1, 0, 0]
+
+
+def test_how_much_ground_is_as_warm_as_animals():
+    assert trial.as_warm(picture_of(rhino())) == 0
+    hot = trial.as_warm(picture_of(rhino(0, -4), slab(3.0, 4.0, 30.0).at(0.0, 4.0)))
+    own = (picture_of(rhino(0, -4)).view.labels == 1).sum()
+    assert hot == pytest.approx(12 * (320 / 30) ** 2 / own, rel=0.05)
+    assert np.isnan(trial.as_warm(picture_of()))
+
+
+def test_enhancement_leaves_the_ground_black_unless_it_is_above_half_of_the_brightest():
+    dark = trial.background_left(picture_of(rhino()))
+    assert dark[1] < 0.05  # the rim of the animal
+    bright = trial.background_left(picture_of(rhino(), window=(-60.0, 20.0)))
+    assert bright[1] > bright[0]
+
+
+def test_a_layout_is_the_same_place_in_any_weather():
+    layout = draw_layout(np.random.default_rng(3), CAMERA, LandDraw(animals=(4, 4), stones=(2, 2)))
+    night, noon = (layout.scene(weather) for weather in (DARK, Weather(hour=13.0)))
+    assert [body.kind for body in night.bodies] == [body.kind for body in noon.bodies]
+    assert all(
+        np.allclose(one.centre(0), other.centre(0))
+        for one, other in zip(night.bodies, noon.bodies, strict=True)
+    )
+    assert np.array_equal(night.land.cover, noon.land.cover)
+    assert layout.scene(DARK, with_animals=False).bodies[0].kind == "stone"
+    view = render_land(night, CAMERA, layout.p_nc, layout.R_nc)
+    uv = [one.uv for one in view.seen if one.kind in trial.ANIMALS]
+    assert len(uv) == 4
+    assert (np.array(uv) > 25).all() and (np.array(uv) < [155, 95]).all()
+
+
+@pytest.fixture(scope="module")
+def numbers():
+    """Of one seed, by a small camera."""
+    response = CameraResponse()
+    sensor = sensor_of(response, (120, 180), np.random.default_rng(1))
+    operator = Operator(CAMERA, response, sensor, np.random.default_rng(2))
+    return trial.numbers_of(operator, trial.take_pictures(operator, 4))
+
+
+def test_a_seed_has_all_numbers(numbers):
+    spread = pd.DataFrame([numbers] * 3)
+    assert {claim["id"] for claim in load_claims("wildlife-detection")} == set(claims.check_claims(spread))
+    for subject in (*METHODS, *PROPOSED):
+        at = claims.places([CLOUDY])
+        assert claims.counts_of(spread, subject, at).shape == (9, 3)
+    assert not claims.counts_of(spread, SMALL, claims.places([NIGHT])).size
+    assert STUDY.metric_of("herd", "mean_rise") is not None
+    assert STUDY.metric_of(CONSTANT, "found_night_15") is None
+
+
+def test_the_sun_makes_ground_as_warm_as_animals(numbers):
+    at = {weather: [numbers["ground", f"as_warm_{one}"] for one in claims.places([weather])] for weather in
+          (NIGHT, NOON)}  # fmt: skip
+    assert np.nanmean(at[NIGHT]) < 0.1 < np.nanmean(at[NOON])
+    assert numbers["herd", "mean_rise"] > 0
+    assert numbers["ground", "level_after"] > numbers["ground", "level_before"]
+
+
+def spread_of(numbers, **changes):
+    """Twelve seeds alike; everything found and nothing invented, but for what is changed (``__`` for /)."""
+    plain = dict(numbers)
+    for (subject, name), value in plain.items():
+        kind = name.split("_")[0]
+        if kind in COUNTS:
+            plain[subject, name] = {"found": 4.0, "invented": 0.0, "missed": 0.0}[kind]
+        elif kind == "as" or name.startswith("pieces"):
+            plain[subject, name] = {"as": 0.0}.get(kind, 1.0)
+        else:
+            plain[subject, name] = value
+    plain["ground", "level_before"], plain["ground", "level_after"] = 60.0, 100.0
+    plain["herd", "mean_rise"], plain["herd", "median_rise"] = 20.0, 2.0
+    for key, value in changes.items():
+        subject, name = key.split("__")
+        for one in plain:
+            if one[0] == subject.replace("_", "-") and one[1].startswith(name):
+                plain[one] = value
+    return pd.DataFrame([plain] * 12)
+
+
+def test_claims_turn(numbers):
+    thresholds = {c["id"]: c.get("threshold") for c in load_claims("wildlife-detection")}
+
+    def true(spread):
+        found = claims.check_claims(spread)
+        return {key: bool(check.holds(thresholds[key]).all()) for key, check in found.items()}
+
+    good = true(spread_of(numbers))
+    assert not good["constant-fails"] and good["adaptive-copes"]
+    assert not good["small-block-splits"] and good["large-block-whole"]
+    assert not good["combinations-best"] and good["subtraction-and-constant-good"]
+    assert good["herd-biases-mean"] and good["median-rises-less"] and not good["median-finds-more"]
+    assert not good["sun-breaks"] and good["night-keeps"]
+    assert not good["too-hot"] and not good["size-from-ground"] and not good["block-from-distance"]
+    assert not good["enhancement-misses"]
+    bad = true(
+        spread_of(
+            numbers, constant__invented=5.0, adaptive__invented=5.0, constant__invented_before=0.0,
+            adaptive__invented_before=0.0, adaptive_51__pieces=2.0, adaptive_251__pieces=2.0,
+            mean_constant__found=0.0, mean_constant__missed=4.0, herd__mean=1.0, herd__median=3.0,
+            ground__as_warm=4.0, subtracted__invented=3.0, enhanced__missed=2.0, enhanced__background=9.0,
+        )
+    )  # fmt: skip
+    assert bad["constant-fails"] and not bad["adaptive-copes"]
+    assert bad["small-block-splits"] and not bad["large-block-whole"]
+    assert bad["enhancement-misses"] and bad["enhancement-takes-background"]
+    assert not bad["subtraction-and-constant-good"] and not bad["herd-biases-mean"]
+    assert not bad["median-rises-less"] and bad["median-finds-more"]
+    assert bad["sun-breaks"] and not bad["night-keeps"]
+    assert bad["too-hot"] and bad["size-from-ground"] and bad["block-from-distance"]
+    clear = true(spread_of(numbers, constant__invented=9.0, adaptive__invented=9.0))
+    assert clear["combinations-best"]
+
+
+def test_a_premise_that_is_not_met_decides_nothing(numbers):
+    still = spread_of(numbers, ground__level_after=62.0)
+    assert not claims.check_claims(still)["constant-fails"].premise.any()
+    none = spread_of(numbers, adaptive_51__pieces=np.nan)
+    assert not claims.check_claims(none)["small-block-splits"].premise.any()
+
+
+def test_the_summary_turns_with_the_numbers(numbers):
+    good = " ".join(text.summary(spread_of(numbers)))
+    assert "F1 of 1.00" in good and "a sunny noon is no worse" in good
+    assert "rises by 40 grey levels" in good and "copes no better" in good
+    every = {f"{one}__invented_noon": 20.0 for one in (CONSTANT, ADAPTIVE, SUBTRACTED, ENHANCED)}
+    bad = " ".join(text.summary(spread_of(numbers, constant__invented_after=9.0, **every)))
+    assert "at a sunny noon the best comes to 0.29" in bad
+    assert "the adaptive threshold copes better" in bad
+
+
+def test_the_reading_is_that_with_the_largest_rates(numbers):
+    spread = spread_of(numbers)
+    for method in PRINTED:
+        for one in READINGS:
+            for height in trial.READ_AT:
+                spread[f"{method}-{one}", f"missed_{height}"] = 0.0 if one == "offset" else 9.0
+    assert text.best_reading(spread) == ("offset", 1.0)
+    assert text.readings_words(spread).count("above the mean of its block by the level") == 3
+    assert len(text.readings_table(spread)) == 4
+
+
+def test_words_on_pieces_herd_and_sun_turn(numbers):
+    whole = text.pieces_words(spread_of(numbers))
+    assert "1.0 detections an animal, more than one on 0 of 12" in whole
+    split = text.pieces_words(spread_of(numbers, adaptive_51__pieces=2.5, adaptive_251__pieces=np.nan))
+    assert "2.5 detections an animal, more than one on 12 of 12" in split
+    assert "no such animal found" in split
+    assert "the median finds no more" in text.herd_words(spread_of(numbers))
+    blind = spread_of(numbers, mean_constant__missed_herd=4.0)
+    assert "the median finds 50 in a hundred more" in text.herd_words(blind)
+    assert "sunny noon 3" in text.sun_words(spread_of(numbers, ground__as_warm_noon=3.0))
+
+
+def test_tables_have_a_row_for_each_method_and_weather(numbers):
+    table = text.rates_table(spread_of(numbers), (CONSTANT, SMALL), text.by_weather())
+    assert len(table) == 5  # without a level only under clouds
+    assert set(table["images"]) == {36}
+    assert len(text.rates_table(spread_of(numbers), (BY_MEDIAN, BY_MEAN), text.by_height())) == 6
+    assert text.chosen_table()["reason"].str.len().min() > 10
+    assert [text.percent(one) for one in (0.0, 0.001, 0.5, 0.999, 1.0, np.nan)] == [
+        "0 %", "1 %", "50 %", "99 %", "100 %", "none",
+    ]  # fmt: skip
+
+
+def test_charts_say_what_they_show(numbers):
+    picture = picture_of(rhino(0, -4), rhino(0, 4))
+    _, name, alt, _ = charts.methods_shown(picture, "methods-here", "clear night")
+    assert name == "methods-here" and "constant 150: 2 of 2 found, 0 false" in alt
+    assert (
+        "sun out: 0 of 2 found"
+        in charts.sequence_shown(picture, picture_of(rhino(0, -4), rhino(0, 4), window=(50.0, 90.0)))[2]
+    )
+    assert "detection" in charts.blocks_shown(picture, 150.0)[2]
+    bad = spread_of(numbers, constant__missed_noon=12.0, constant__invented_morning=7.0)
+    recall, false = charts.by_weather_shown(bad)
+    assert "constant 150 100 %, 100 %, 25 %, 100 %" in recall[2]
+    assert recall[0].axes[0].get_title(loc="left") == "Fewest animals are found at a sunny noon"
+    assert false[0].axes[0].get_title(loc="left") == "Most false alarms come on a clear morning"
+    assert "15 m constant 150 (1.00)" in charts.heights_shown(spread_of(numbers))[2]
+
+
+def test_printed_settings_are_the_theses():
+    assert (METHODS[CONSTANT].level, METHODS[ADAPTIVE].block_px, METHODS[ADAPTIVE].level) == (150, 451, 150)
+    assert (METHODS[SMALL].block_px, METHODS[LARGE].block_px) == (51, 251)
+    assert (METHODS[SUBTRACTED].background, METHODS[SUBTRACTED].block_px, METHODS[SUBTRACTED].level) == (
+        "mean", 251, 65,
+    )  # fmt: skip
+    assert (METHODS[ENHANCED].background, METHODS[ENHANCED].block_px, METHODS[ENHANCED].level) == (
+        "enhance", 251, 160,
+    )  # fmt: skip
+    assert all(isinstance(one, Warm) and one.smallest_px == trial.SMALLEST for one in METHODS.values())

@@ -1,0 +1,295 @@
+"""Ground as a thermal camera sees it: covers that the sun heats and a clear night cools, by the time of day.
+
+A cover's temperature is that of the air, less what it radiates away, plus what the sun gave it. The sun's
+heat is kept for a while: a vector towards the sun, averaged over the past with an exponential weight, whose
+product with the normal of the ground is the heat that a slope has. All numbers are chosen; covers differ by
+what is known of them: dry sand becomes hottest, grass cools itself, rock keeps its warmth into the night.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+
+Tile = NDArray[np.float32]
+
+#: Side (m) and cells along it of the tiles of unevenness and of cloud shadows.
+UNEVEN, CLOUDS = (64.0, 1024), (512.0, 128)
+#: What a cloud takes of the sun's heat: the rest is diffuse, or was kept from before.
+SHADOW_DEPTH = 0.75
+#: What clouds take of the night's cooling: they radiate nearly as the ground does.
+CLOUD_BLANKET = 0.8
+#: How uneven sunlit ground is, as a share of its heat: tufts and stones throw shadows.
+SUNLIT_UNEVEN = 0.08
+#: Of a day's average for the sun's heat, minutes.
+_STEP = 2.0
+
+
+@dataclass(frozen=True)
+class Cover:
+    """What lies on the ground.
+
+    Attributes
+    ----------
+    heating
+        How much warmer than the air it would become under a sun straight above its surface, K.
+    cooling
+        How much colder than the air a clear sky makes it, K.
+    lag
+        How long it keeps its heat, h.
+    texture_sd
+        Of what is uneven on it without sun, K.
+    """
+
+    heating: float
+    cooling: float
+    lag: float
+    texture_sd: float
+
+
+#: Grass evaporates water and keeps little heat; sand heats most; rock keeps it for hours.
+GRASS = Cover(heating=12.0, cooling=4.0, lag=0.5, texture_sd=0.5)
+SAND = Cover(heating=26.0, cooling=3.0, lag=1.0, texture_sd=0.3)
+ROCK = Cover(heating=24.0, cooling=0.5, lag=4.0, texture_sd=0.4)
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Time of day, clouds, and air.
+
+    Attributes
+    ----------
+    hour
+        Local solar time: the sun rises at 6, is highest at 12, and sets at 18.
+    clouds
+        Share of the sky and of the ground that clouds cover.
+    noon_elevation
+        Of the sun at 12, rad.
+    air_mean, air_swing
+        Over the day, K; warmest at 15.
+    """
+
+    hour: float = 12.0
+    clouds: float = 0.0
+    noon_elevation: float = float(np.radians(55.0))
+    air_mean: float = 288.0
+    air_swing: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.clouds <= 1:
+            raise WildlabError(
+                f"clouds over {self.clouds:g} of the sky", "give a share from 0 to 1", field="clouds"
+            )
+        if not 0 <= self.hour < 24:
+            raise WildlabError(f"an hour of {self.hour:g}", "give one from 0 to below 24", field="hour")
+
+    @property
+    def air(self) -> float:
+        """Temperature of the air, K."""
+        return self.air_mean + self.air_swing * float(np.cos(2 * np.pi * (self.hour - 15) / 24))
+
+    @property
+    def sun(self) -> Array:
+        """Unit vector towards the sun, (3,) north, east, up; below the horizon at night."""
+        return np.asarray(_sun(np.array([self.hour]), self.noon_elevation)[0])
+
+    def kept(self, lag: float) -> Array:
+        """The sun's vector averaged over the past with that lag (h), (3,); zero while it is below."""
+        return np.asarray(_kept(self.hour, self.noon_elevation, lag))
+
+    def heat(self, cover: Cover) -> Array:
+        """What the sun gives level ground of a cover, and slopes by their normal: (3,) K."""
+        return np.asarray(cover.heating * self.kept(cover.lag))
+
+    def loss(self, cover: Cover) -> float:
+        """What a cover loses to the sky, K."""
+        return cover.cooling * (1 - CLOUD_BLANKET * self.clouds)
+
+    def level(self, cover: Cover) -> float:
+        """Temperature of level ground of a cover, as an average over what clouds shade, K."""
+        lit = 1 - SHADOW_DEPTH * self.clouds
+        return self.air - self.loss(cover) + float(self.heat(cover)[2]) * lit
+
+
+def _sun(hours: Array, noon_elevation: float) -> Array:
+    """(N, 3) north, east, up: the way of the sun at an equinox."""
+    angle = np.pi * (np.asarray(hours, float) - 6) / 12
+    high = np.sin(angle)
+    return np.stack([-np.cos(noon_elevation) * high, np.cos(angle), np.sin(noon_elevation) * high], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _kept(hour: float, noon_elevation: float, lag: float) -> Array:
+    if lag <= 0:
+        sun = _sun(np.array([hour]), noon_elevation)[0]
+        return sun if sun[2] > 0 else np.zeros(3)
+    back = (np.arange(0, 72 * 60, _STEP) + _STEP / 2) / 60
+    sun = _sun(hour - back, noon_elevation)
+    weight = np.exp(-back / lag)
+    weight /= weight.sum()
+    return np.asarray((weight * (sun[:, 2] > 0)) @ sun)
+
+
+@dataclass(frozen=True, eq=False)
+class Land:
+    """Ground with relief and covers, that repeats every `side` metres both ways.
+
+    Attributes
+    ----------
+    heights
+        (n, n) m above zero, first axis north, second east; n a power of two. The plane is zeros.
+    cover
+        (m, m), number of the cover in ``covers``; m a power of two.
+    side
+        m.
+    covers
+        By number.
+    weather
+        Time of day, clouds, air.
+    seed
+        Of unevenness and clouds.
+    """
+
+    heights: Array = field(default_factory=lambda: np.zeros((4, 4)))
+    cover: NDArray[np.integer] = field(default_factory=lambda: np.zeros((4, 4), np.int64))
+    side: float = 256.0
+    covers: tuple[Cover, ...] = (GRASS, SAND, ROCK)
+    weather: Weather = field(default_factory=Weather)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("heights", "cover"):
+            shape = np.shape(getattr(self, name))
+            if len(shape) != 2 or shape[0] != shape[1] or shape[0] < 2 or shape[0] & (shape[0] - 1):
+                raise WildlabError(
+                    f"{name} of the shape {shape}", "give a square array, its side a power of two", field=name
+                )
+        if not np.isfinite(self.heights).all():
+            raise WildlabError("a height is no number", "give heights in metres", field="heights")
+        if np.min(self.cover) < 0 or np.max(self.cover) >= len(self.covers):
+            raise WildlabError(
+                f"covers from {np.min(self.cover)} to {np.max(self.cover)}, of {len(self.covers)}",
+                "number them from 0",
+                field="cover",
+            )
+
+    @cached_property
+    def relief(self) -> Tile:
+        """(n, n, 3) height and slopes to the north and east, by central differences."""
+        cell = self.side / len(self.heights)
+        high = np.asarray(self.heights, float)
+        north, east = (
+            (np.roll(high, -1, axis) - np.roll(high, 1, axis)) / (2 * cell) for axis in (0, 1)
+        )  # the tile repeats
+        return np.stack([high, north, east], axis=-1).astype(np.float32)
+
+    @cached_property
+    def warmth(self) -> Tile:
+        """(m, m, 5) by place: K over the air without sun, the sun's heat (3), and unevenness (K)."""
+        values = [[-self.weather.loss(one), *self.weather.heat(one), one.texture_sd] for one in self.covers]
+        return np.asarray(np.array(values, np.float32)[np.asarray(self.cover)])
+
+    @cached_property
+    def shadow(self) -> Tile:
+        """(k, k) from 0 in the sun to 1 under clouds; a tile of `CLOUDS`."""
+        share = self.weather.clouds
+        if share in (0.0, 1.0):
+            return np.full((2, 2), share, np.float32)
+        smooth = smooth_tile(CLOUDS[1], 12.0, self.seed)
+        edge = np.quantile(smooth, share)
+        return np.asarray(np.clip(0.5 + (edge - smooth) / 0.3, 0, 1), np.float32)
+
+    @property
+    def uneven(self) -> Tile:
+        """(k, k) of unit deviation; a tile of `UNEVEN`."""
+        if all(one.texture_sd == 0 for one in self.covers):
+            return np.zeros((2, 2), np.float32)
+        return smooth_tile(UNEVEN[1], 1.5 * UNEVEN[1] / UNEVEN[0], self.seed % 8)
+
+
+#: Even ground as warm as the air, flat: what stands on it is known in closed form.
+EVEN_LAND = Land(covers=(Cover(heating=0.0, cooling=0.0, lag=1.0, texture_sd=0.0),))
+
+
+@lru_cache(maxsize=8)
+def smooth_tile(cells: int, coarse: float, seed: int) -> Tile:
+    """A random tile (cells, cells) that repeats, of zero mean and unit deviation; small things are weaker.
+
+    Parameters
+    ----------
+    cells
+        Along a side.
+    coarse
+        Above so many cells things are equally strong.
+    seed
+        Of it.
+
+    Returns
+    -------
+    (cells, cells) float32
+    """
+    k = fft.fftfreq(cells)
+    size2 = (k[:, None] ** 2 + k[None, : cells // 2 + 1] ** 2) * (2 * np.pi * coarse) ** 2
+    noise = np.random.default_rng([seed, cells]).standard_normal((cells, cells), np.float32)
+    spectrum = fft.rfft2(noise) * (1 / (1 + size2) ** 0.75).astype(np.float32)
+    spectrum[0, 0] = 0
+    made = fft.irfft2(spectrum, (cells, cells))
+    return np.asarray(made / made.std(), np.float32)
+
+
+def rolling_land(
+    weather: Weather,
+    seed: int = 0,
+    *,
+    relief: float = 2.0,
+    shares: tuple[float, ...] = (0.7, 0.2, 0.1),
+    side: float = 256.0,
+) -> Land:
+    """Gently rolling ground with patches of grass, sand and rock.
+
+    Parameters
+    ----------
+    weather
+        Time of day, clouds, air.
+    seed
+        Of its forms and patches.
+    relief
+        Standard deviation of the heights, m, over hills some 60 m long.
+    shares
+        Of the covers, in their order; those of sand and rock lie together where a smooth random field is
+        highest.
+    side
+        After which it repeats, m.
+
+    Returns
+    -------
+    Land
+
+    Raises
+    ------
+    WildlabError
+        Where there are not three shares that sum to one.
+
+    Examples
+    --------
+    >>> land = rolling_land(Weather(hour=13.0), seed=3)
+    >>> [round(float((land.cover == one).mean()), 1) for one in range(3)]
+    [0.7, 0.2, 0.1]
+    """
+    if len(shares) != 3 or min(shares) < 0 or not np.isclose(sum(shares), 1):
+        raise WildlabError(f"shares of {shares}", "give three that sum to one", field="shares")
+    k = fft.fftfreq(64) * 64
+    size2 = k[:, None] ** 2 + k[None, :] ** 2
+    noise = np.random.default_rng([seed, 1]).standard_normal((64, 64))
+    high = fft.ifft2(np.exp(-size2 / (2 * 2.5**2)) * (size2 > 0) * fft.fft2(noise)).real
+    field_of_patches = smooth_tile(512, 20.0, seed + 1000)
+    edges = np.quantile(field_of_patches, np.clip(np.cumsum(shares)[:2], 0, 1))
+    cover = np.searchsorted(edges, field_of_patches)
+    return Land(relief * high / high.std(), cover, side, weather=weather, seed=seed)

@@ -1,0 +1,372 @@
+"""Rendered images of animals in four kinds of weather, and what F finds in them (F 3.2, 7.4, 8.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.detection.detections import Detections
+from wildlab.detection.warm import (
+    Warm,
+    block_from_distance,
+    enhance,
+    find_warm,
+    gate_from_distance,
+    subtract_background,
+    to_grey,
+)
+from wildlab.geometry.camera import Camera
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.manifest import twin_manifest
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.animals import ANIMALS, animal
+from wildlab.simulation.scene.drawn_land import LandDraw, Layout, draw_layout
+from wildlab.simulation.scene.ground import Weather
+from wildlab.simulation.scene.land import LandView, render_land
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
+
+#: When images are taken. F's were mostly taken under clouds, some in sunlight (F 7.4).
+NIGHT, MORNING, NOON, CLOUDY = "night", "morning", "noon", "cloudy"
+WEATHERS = {
+    NIGHT: Weather(hour=2.0),
+    MORNING: Weather(hour=8.0),
+    NOON: Weather(hour=13.0),
+    CLOUDY: Weather(hour=13.0, clouds=1.0),
+}
+#: Where from: the gondola, 3 to 20 m above the ground, looking aside (F 8.2), and the two heights of F 7.5.1.
+VIEWS = {
+    15: LandDraw(height=15.0, tilt=float(np.radians(50.0)), spread=float(np.radians(6.0)), animals=(1, 3),
+                 stones=(1, 4), trees=(0, 0), border=60.0),
+    30: LandDraw(height=30.0, animals=(2, 5)),
+    60: LandDraw(height=60.0, animals=(3, 8), stones=(5, 12), trees=(1, 3)),
+}  # fmt: skip
+#: A herd, for what many animals do to the mean (F 8.1.1).
+HERD = replace(VIEWS[30], animals=(14, 20), kinds=("rhinoceros",))
+
+#: F's methods with F's numbers (figures 7.5 to 7.11); a level that is not printed is zero.
+CONSTANT, ADAPTIVE, SMALL, LARGE = "constant", "adaptive", "adaptive-51", "adaptive-251"
+SUBTRACTED, ENHANCED = "subtracted", "enhanced"
+#: F 8.1.1: background subtraction and a constant threshold, by the mean, and by the median as F proposes.
+BY_MEAN, BY_MEDIAN = "mean-constant", "median-constant"
+#: F 3.2, 8.4: `SUBTRACTED` with what F proposes: sizes and blocks from the ground, and nothing too hot.
+BY_SIZE, BY_BLOCK, NOT_HOT = "sized", "block", "not-hot"
+#: The smallest contour, px^2; F prints none.
+SMALLEST = 50.0
+_PLAIN = Warm(background="none", smallest_px=SMALLEST, largest_px=float("inf"))
+METHODS = {
+    CONSTANT: replace(_PLAIN, threshold="constant", level=150.0),
+    ADAPTIVE: replace(_PLAIN, threshold="adaptive", level=150.0, block_px=451),
+    SMALL: replace(_PLAIN, threshold="adaptive", level=0.0, block_px=51),
+    LARGE: replace(_PLAIN, threshold="adaptive", level=0.0, block_px=251),
+    SUBTRACTED: replace(_PLAIN, background="mean", threshold="adaptive", level=65.0, block_px=251),
+    ENHANCED: replace(_PLAIN, background="enhance", threshold="adaptive", level=160.0, block_px=251),
+    BY_MEAN: replace(_PLAIN, background="mean", threshold="constant", level=65.0),
+    BY_MEDIAN: replace(_PLAIN, background="median", threshold="constant", level=65.0),
+}
+PROPOSED = (BY_SIZE, BY_BLOCK, NOT_HOT)
+SUBJECTS = (*METHODS, *PROPOSED)
+#: What the three images with a printed level are, for the readings of that level.
+PRINTED = (ADAPTIVE, SUBTRACTED, ENHANCED)
+#: What the level of an adaptive threshold may be: beside `Warm.level_is`, the number that white gets in
+#: OpenCV (``maxValue``, of no effect), and what OpenCV takes off the mean (``C``).
+READINGS = ("floor", "offset", "white", "off-mean")
+#: At which heights they are tried, under clouds.
+READ_AT = (15, 30)
+
+#: Area of an animal from above, m^2: half a small antelope's, twice a rhinoceros'.
+AREA = (0.2, 8.0)
+#: The hottest that the mean of an animal can be, K: that of its blood.
+HOTTEST = 310.15
+#: How wide the operator's window is, as a multiple of what animals have over the ground, and at least, K.
+WINDOW, LEAST_WINDOW = 2.0, 8.0
+#: Of an animal that is to be found this share must show.
+SHOWN = 0.25
+#: A detection is no animal's that is so many times larger, or further from it than so many px.
+TOO_LARGE, NEAR = 3.0, 3
+#: The animal is larger than the block by its major axis, px: F's small block has 51.
+LARGER_THAN = 51.0
+COUNTS = ("found", "invented", "missed")
+#: Names of the numbers of one seed that are recorded, and their units; rates are those of all images.
+RECORDED = {
+    "pieces_level_0": "1",
+    "pieces_level_150": "1",
+    "mean_rise": "1",
+    "median_rise": "1",
+    "level_before": "1",
+    "level_after": "1",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An image with what it shows.
+
+    Attributes
+    ----------
+    view
+        Temperatures and labels.
+    counts
+        Of the camera, 14 bits.
+    window
+        What the operator makes black and white, counts (F 3.1).
+    distance
+        To the ground along the middle of the image, m.
+    """
+
+    view: LandView
+    counts: NDArray[np.uint16]
+    window: tuple[float, float]
+    distance: float
+
+    @cached_property
+    def grey(self) -> NDArray[np.uint8]:
+        """In 256 grey levels."""
+        return to_grey(self.counts, self.window)
+
+    @cached_property
+    def animals(self) -> dict[int, int]:
+        """Pixels by number of the animals that can be found."""
+        return {
+            seen.number: int((self.view.labels == seen.number).sum())
+            for seen in self.view.seen
+            if seen.kind in ANIMALS and self.view.visible(seen.number) >= SHOWN
+        }
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What detections are worth: rows by animal, and how many are of nothing."""
+
+    rows: dict[int, list[int]]
+    false: int
+
+    @property
+    def counts(self) -> NDArray[np.float64]:
+        """(3,) found, invented and missed; a second piece of an animal is invented."""
+        found = sum(bool(one) for one in self.rows.values())
+        extra = sum(max(len(one) - 1, 0) for one in self.rows.values())
+        return np.array([found, self.false + extra, len(self.rows) - found], float)
+
+
+def judge(picture: Picture, found: Detections) -> Judged:
+    """Which detection is of which animal: that on whose pixels, or near them, its centroid lies.
+
+    Detections of animals that hardly show count neither way.
+    """
+    labels, targets = picture.view.labels, picture.animals
+    hidden = {seen.number for seen in picture.view.seen if seen.kind in ANIMALS} - set(targets)
+    rows: dict[int, list[int]] = {number: [] for number in targets}
+    false = 0
+    for row in range(len(found)):
+        u, v = np.rint(found.uv[row]).astype(int)
+        part = labels[max(v - NEAR, 0) : v + NEAR + 1, max(u - NEAR, 0) : u + NEAR + 1]
+        near = np.bincount(part[part > 0], minlength=1)
+        best = int(near.argmax()) if near.any() else 0
+        if best in rows and found.area[row] <= TOO_LARGE * targets[best]:
+            rows[best].append(row)
+        elif best not in hidden:
+            false += 1
+    return Judged(rows, false)
+
+
+def find(picture: Picture, thresholds: Warm) -> Detections:
+    """What a method finds in a picture."""
+    # What is too hot is said in counts; for the rest the grey image is all that F had.
+    if np.isinf(thresholds.hottest):
+        return find_warm(picture.grey, picture.view.ground, thresholds)
+    return find_warm(picture.counts, picture.view.ground, replace(thresholds, window=picture.window))
+
+
+def proposed(name: str, picture: Picture, camera: Camera, response: CameraResponse) -> Warm:
+    """One of `PROPOSED` for a picture."""
+    base, focal = METHODS[SUBTRACTED], float(np.sqrt(camera.fx * camera.fy))
+    if name == BY_SIZE:
+        smallest, largest = gate_from_distance(picture.distance, focal, *AREA)
+        return replace(base, smallest_px=smallest, largest_px=largest)
+    if name == BY_BLOCK:
+        return replace(base, block_px=block_from_distance(picture.distance, focal))
+    return replace(base, hottest=to_counts(HOTTEST, response))
+
+
+def to_counts(kelvin: float, response: CameraResponse) -> float:
+    """Counts of a temperature."""
+    return response.counts_level + (kelvin - response.counts_at) * response.counts_per_kelvin
+
+
+def read_as(thresholds: Warm, reading: str) -> Warm:
+    """The same with its level read as one of `READINGS`."""
+    if reading == "white":
+        return replace(thresholds, level=0.0, level_is="floor")
+    if reading == "off-mean":
+        return replace(thresholds, level=-thresholds.level, level_is="offset")
+    kind: Literal["floor", "offset"] = "offset" if reading == "offset" else "floor"
+    return replace(thresholds, level_is=kind)
+
+
+class Operator(NamedTuple):
+    """Who takes the pictures: a camera, and the response and the sensor that it has."""
+
+    camera: Camera
+    response: CameraResponse
+    sensor: Sensor
+    rng: np.random.Generator
+
+    def window(self, view: LandView, weather: Weather) -> tuple[float, float]:
+        """The middle between ground and animals, and about as wide as twice what is between (F 3.1)."""
+        ground = float(np.median(view.kelvin[view.labels == 0]))
+        skins = [animal(kind, weather).layers[-1].excess for kind in ANIMALS]
+        warm = weather.air + float(np.mean(skins))
+        half = max(WINDOW * abs(warm - ground), LEAST_WINDOW) / 2
+        middle = (warm + ground) / 2
+        return to_counts(middle - half, self.response), to_counts(middle + half, self.response)
+
+    def take(
+        self,
+        layout: Layout,
+        weather: Weather,
+        window: tuple[float, float] | None = None,
+        with_animals: bool = True,
+    ) -> Picture:
+        """A picture of a place; the window is set for it where none is given."""
+        view = render_land(layout.scene(weather, with_animals), self.camera, layout.p_nc, layout.R_nc)
+        counts = expose(view.kelvin, self.response, self.sensor, self.rng)
+        return Picture(view, counts, window or self.window(view, weather), layout.distance)
+
+
+def operator_of(twin: str, seed: int) -> Operator:
+    """F's camera, as the twin has it."""
+    camera = twin_manifest(load_twin(twin), 0).geometry_camera()
+    response = CameraResponse()
+    sensor = sensor_of(response, (camera.height, camera.width), stream(seed, "sensor"))
+    return Operator(camera, response, sensor, stream(seed, "exposures"))
+
+
+class Pictures(NamedTuple):
+    """All of one seed: by weather and height; a sequence over which the sun comes out; a herd."""
+
+    plain: dict[tuple[str, int], Picture]
+    sequence: tuple[Picture, Picture]
+    herd: Picture
+    no_herd: Picture
+
+
+def take_pictures(operator: Operator, seed: int) -> Pictures:
+    """The pictures of one seed.
+
+    The window is set once for each weather and height. In the sequence it is set under clouds; then the sun
+    has come out over the same place, some time between nine and noon: high enough to change the ground.
+    """
+    camera = operator.camera
+    plain = {}
+    for height, draw in VIEWS.items():
+        for name, weather in WEATHERS.items():
+            layout = draw_layout(stream(seed, f"{name} {height}"), camera, draw)
+            plain[name, height] = operator.take(layout, weather)
+    rng = stream(seed, "sequence")
+    layout, hour = draw_layout(rng, camera, VIEWS[30]), float(rng.uniform(9.0, 12.0))
+    before = operator.take(layout, Weather(hour=hour, clouds=1.0))
+    after = operator.take(layout, Weather(hour=hour), before.window)
+    layout = draw_layout(stream(seed, "herd"), camera, HERD)
+    alone = operator.take(layout, WEATHERS[CLOUDY], with_animals=False)
+    herd = operator.take(layout, WEATHERS[CLOUDY], alone.window)
+    return Pictures(plain, (before, after), herd, alone)
+
+
+def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
+    """Counts and levels of the pictures of one seed.
+
+    Parameters
+    ----------
+    seed
+        Of places, animals, camera.
+    twin
+        Whose camera it is.
+
+    Returns
+    -------
+    dict
+        By (method, ``found_WEATHER_HEIGHT``) and so on; readings are subjects of their own.
+    """
+    operator = operator_of(twin, seed)
+    return numbers_of(operator, take_pictures(operator, seed))
+
+
+def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], float]:
+    """What `trial` gives, from pictures."""
+    numbers: dict[tuple[str, str], float] = {}
+
+    def tally(subject: str, at: str, picture: Picture, thresholds: Warm) -> Judged:
+        judged = judge(picture, find(picture, thresholds))
+        for name, value in zip(COUNTS, judged.counts, strict=True):
+            numbers[subject, f"{name}_{at}"] = float(value)
+        return judged
+
+    for (weather, height), picture in pictures.plain.items():
+        at = f"{weather}_{height}"
+        for method, thresholds in METHODS.items():
+            # Without a level half of the ground is above the mean of its block: slow, and once is enough.
+            if method not in (SMALL, LARGE) or weather == CLOUDY:
+                tally(method, at, picture, thresholds)
+        for method in PROPOSED:
+            tally(method, at, picture, proposed(method, picture, operator.camera, operator.response))
+        numbers["ground", f"as_warm_{at}"] = as_warm(picture)
+        left = background_left(picture)
+        numbers[SUBTRACTED, f"background_{at}"], numbers[ENHANCED, f"background_{at}"] = left
+    for name, picture in zip(("before", "after"), pictures.sequence, strict=True):
+        for method in (CONSTANT, *PRINTED, BY_MEAN, BY_MEDIAN):
+            tally(method, name, picture, METHODS[method])
+        for reading in READINGS:
+            tally(f"{ADAPTIVE}-{reading}", name, picture, read_as(METHODS[ADAPTIVE], reading))
+        numbers["ground", f"level_{name}"] = float(np.median(picture.grey[picture.view.labels == 0]))
+    for method in PRINTED:
+        for reading in READINGS:
+            thresholds = read_as(METHODS[method], reading)
+            for height in READ_AT:
+                tally(f"{method}-{reading}", f"{height}", pictures.plain[CLOUDY, height], thresholds)
+    near = pictures.plain[CLOUDY, min(VIEWS)]
+    for method in (SMALL, LARGE):
+        for level in (0.0, 150.0):
+            pieces = pieces_of(near, replace(METHODS[method], level=level))
+            numbers[method, f"pieces_level_{level:g}"] = pieces
+    for method in (BY_MEAN, BY_MEDIAN):
+        tally(method, "herd", pictures.herd, METHODS[method])
+    for name, middle in (("mean", np.mean), ("median", np.median)):
+        numbers["herd", f"{name}_rise"] = float(middle(pictures.herd.grey) - middle(pictures.no_herd.grey))
+    numbers["herd", "share"] = float((pictures.herd.view.labels > 0).mean())
+    return numbers
+
+
+def as_warm(picture: Picture) -> float:
+    """How many pixels without an animal are as warm as animals' middle one, for each pixel of an animal."""
+    kelvin, labels = picture.view.kelvin, picture.view.labels
+    own = np.isin(labels, list(picture.animals))
+    every = [seen.number for seen in picture.view.seen if seen.kind in ANIMALS]
+    if not own.any():
+        return float("nan")
+    return float((kelvin[~np.isin(labels, every)] >= np.median(kelvin[own])).sum() / own.sum())
+
+
+def background_left(picture: Picture) -> tuple[float, float]:
+    """Mean grey level that ground has after background subtraction, and after enhancement (F 7.4.3)."""
+    grey, ground = picture.grey, picture.view.labels == 0
+    whole = np.ones(grey.shape, bool)
+    return (
+        float(subtract_background(grey, whole, "mean")[ground].mean()),
+        float(enhance(grey)[ground].mean()),
+    )
+
+
+def pieces_of(picture: Picture, thresholds: Warm) -> float:
+    """Detections for each animal that is found and longer than F's small block; NaN for none."""
+    judged = judge(picture, find(picture, thresholds))
+    long = {
+        seen.number
+        for seen in picture.view.seen
+        if np.linalg.norm(np.ptp(seen.outline, axis=0)) > LARGER_THAN
+    }
+    pieces = [len(rows) for number, rows in judged.rows.items() if rows and number in long]
+    return float(np.mean(pieces)) if pieces else float("nan")
