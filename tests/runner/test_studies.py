@@ -161,6 +161,18 @@ def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: 
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 16)
     for figure in ("methods-cloudy", "methods-noon", "sequence", "blocks-150", "weather-recall", "heights"):
+def test_a_large_ship_is_tracked_on_two_flights(reports: Path, faults: Faults) -> None:
+    folder = run("large-ship", reports, seeds=2)
+    found = values(folder)
+    for subject in ("with-adjustment", "without-adjustment"):
+        for name in ("mean_north", "mean_east", "sd_north", "sd_east", "mae", "mae_after_start"):
+            metric = found[name, subject]
+            assert metric["low"] <= metric["value"] <= metric["high"]
+            assert metric["published"] is not None
+    assert found["detection_rate", "detector"]["published"] == 0.993
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 11)
+    for figure in ("fig-6-2", "fig-6-3", "fig-6-4"):
         assert (folder / "figures" / f"{figure}.png").is_file()
     assert faults(folder / "report.html") == []
 

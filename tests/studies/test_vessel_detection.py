@@ -10,6 +10,7 @@ from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import CHOSEN, PUBLISHED, FloatingThresholds
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.pipeline.rendered import judge
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
@@ -23,7 +24,6 @@ from wildlab.studies.vessel_detection.trial import (
     WHOLE,
     Image,
     check_claims,
-    judge,
     numbers_of,
     tally,
     trial,

@@ -11,9 +11,10 @@ from matplotlib.patches import Rectangle
 from wildlab.detection.floating import find_edges, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
+from wildlab.pipeline.rendered import judge
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
 from wildlab.studies.vessel_detection import text as words
-from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image, judge
+from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]

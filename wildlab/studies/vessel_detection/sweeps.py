@@ -14,12 +14,13 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.mount import Mount
+from wildlab.pipeline.rendered import judge
 from wildlab.simulation.scene.bodies import KINDS
 from wildlab.simulation.scene.drawn import Draw, Drawn, draw_scene
 from wildlab.simulation.scene.render import Scene, render
 from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
 from wildlab.simulation.scene.sea import Sea
-from wildlab.studies.vessel_detection.trial import SHIP, WHOLE, Image, judge, numbers_of, tally
+from wildlab.studies.vessel_detection.trial import SHIP, WHOLE, Image, numbers_of, tally
 
 #: Heights of the sweep over kinds, m, and for which of them the smallest area of 50 px is.
 HEIGHTS = (25.0, 50.0, 100.0, 150.0, 200.0, 300.0, 400.0)

@@ -18,6 +18,7 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.pipeline.rendered import judge
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
@@ -38,8 +39,6 @@ RECORDED = {
     "smallest_share_found": "1",
     "images": "1",
 }
-#: Of the pixels of a detection, the share on an object from which on it is one of that object.
-OVERLAP = 0.25
 
 
 class Image(NamedTuple):
@@ -48,41 +47,6 @@ class Image(NamedTuple):
     subject: str
     view: View
     counts: NDArray[np.uint16]
-
-
-class Judged(NamedTuple):
-    """What detections of an image are worth.
-
-    Attributes
-    ----------
-    found
-        By the number of each body in view: the rows of its detections, the largest first.
-    merged
-        Numbers of bodies without their own that lie in the detection of another.
-    false
-        How many detections are of nothing.
-    """
-
-    found: dict[int, list[int]]
-    merged: set[int]
-    false: int
-
-
-def judge(view: View, objects: FloatingObjects) -> Judged:
-    """Which detection is of which body, by the pixels that they share."""
-    found: dict[int, list[int]] = {seen.number: [] for seen in view.seen}
-    inside: set[int] = set()
-    false = 0
-    for row in range(len(objects.detections)):
-        under = view.labels[objects.labels == row + 1]
-        count = np.bincount(under[under > 0], minlength=1)
-        best = int(count.argmax()) if len(count) else 0
-        if count.sum() >= OVERLAP * len(under) and best in found:
-            found[best].append(row)
-            inside |= {n for n in found if n < len(count) and 2 * count[n] > (view.labels == n).sum()}
-        else:
-            false += 1
-    return Judged(found, {n for n in inside if not found[n]}, false)
 
 
 def choose(flight: SceneFlight, images: int, rng: np.random.Generator) -> dict[str, list[int]]:

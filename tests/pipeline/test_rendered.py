@@ -1,0 +1,107 @@
+"""Detections out of rendered images: which exposure is which frame, what is moved, what takes whose place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wildlab.detection.detections import no_detections
+from wildlab.errors import WildlabError
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.pipeline.rendered import Judged, Photographer, Shot, exposures_of, marks_of, with_detections
+from wildlab.simulation.twins import simulate_twin
+
+TWIN, SEED = "large-ship", 2
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate_twin(TWIN, SEED)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    return Photographer(TWIN, SEED)
+
+
+@pytest.fixture(scope="module")
+def shots(flight, camera):
+    return list(camera.shoot(exposures_of(flight.frames)[20:120:33]))
+
+
+def shape_of(camera):
+    return camera.flight.poses.camera.height, camera.flight.poses.camera.width
+
+
+def test_the_same_exposure_is_the_same_image_whichever_came_before(camera, shots):
+    last = shots[-1].exposure
+    again = next(Photographer(TWIN, SEED).shoot([last]))
+    assert np.array_equal(again.detections.uv, shots[-1].detections.uv)
+    other = next(Photographer(TWIN, SEED + 1).shoot([last]))
+    assert len(other.detections) != len(again.detections) or not np.array_equal(
+        other.detections.uv, again.detections.uv
+    )
+
+
+def test_images_are_those_of_the_twins_own_frames(flight, camera, shots):
+    # What the twin marks in a frame, the middle of the visible part, is where the rendered ship is in it.
+    drawn = flight.detections.set_index("frame_id")
+    for shot in shots:
+        row = drawn.loc[f"f{shot.exposure + 1:06d}"]
+        # The drawn ship is a flat rectangle, the rendered one has a bow and freeboard.
+        assert np.hypot(*(shot.seen[0].middle - row[["u_px", "v_px"]].to_numpy(float))) < 40
+
+
+def test_the_stated_centre_is_the_target_seen_through_the_true_pose(camera, shots):
+    for shot in shots:
+        pose = camera.flight.poses.take(shot.exposure)
+        body = camera.flight.bodies(shot.exposure)[0]
+        uv = ground_to_pixel(pose.camera, body.centre(0.0)[None], pose.p_nc, pose.R_nc)[0]
+        assert np.allclose(uv, shot.seen[0].uv)
+
+
+def test_without_a_length_nothing_is_moved(camera, shots):
+    plain = marks_of(shots, shape_of(camera))
+    assert not plain.moved.any()
+    for k, shot in enumerate(shots):
+        assert np.array_equal(plain.uv[k], shot.detections.uv[shot.judged.found[1][0]])
+
+
+def test_centres_of_what_the_border_cuts_are_moved(camera, shots):
+    plain = marks_of(shots, shape_of(camera))
+    moved = marks_of(shots, shape_of(camera), length=535.0)
+    assert moved.moved.any()
+    assert (moved.uv[~moved.moved] == plain.uv[~moved.moved]).all()
+    assert (plain.share[moved.moved] < 1).all()
+    assert (np.hypot(*(moved.uv - plain.uv)[moved.moved].T) > 0).all()
+
+
+def test_an_image_without_the_target_has_no_mark(camera, shots):
+    none = Shot(3, (), no_detections(), Judged({}, set(), 2))
+    marks = marks_of([none, shots[0]], shape_of(camera))
+    assert marks.found.tolist() == [False, True]
+    assert marks.share[0] == 0
+    assert marks.false[0] == 2
+    assert np.isnan(marks.centre[0]).all()
+
+
+def test_rendered_detections_take_the_place_of_the_drawn_ones(flight, camera, shots):
+    marks = marks_of(shots, shape_of(camera))
+    made = with_detections(flight, marks, "ship")
+    assert made.frames["frame_id"].tolist() == [f"f{shot.exposure + 1:06d}" for shot in shots]
+    assert np.array_equal(made.detections[["u_px", "v_px"]].to_numpy(), marks.uv)
+    assert set(made.detections["target_id"]) == {"ship"}
+    assert len(flight.detections) == 438, "the flight itself stays as it is"
+    assert made.nav is flight.nav
+
+
+def test_a_target_that_is_found_nowhere_is_said(flight, camera, shots):
+    nothing = [replace_found(shot) for shot in shots]
+    with pytest.raises(WildlabError, match=r"in none of 4 images 'ship' is found\. Render more"):
+        with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
+
+
+def replace_found(shot):
+    return shot._replace(judged=Judged({1: []}, set(), 0), detections=replace(no_detections()))

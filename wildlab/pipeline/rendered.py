@@ -1,0 +1,310 @@
+"""A twin's images, rendered from its true poses, and what the detector of H 4.3 finds in them.
+
+What a twin's ``detections`` hold is drawn: the true pixel and noise. Here a camera looks at the scene, and a
+detector that knows nothing of it looks for what floats; the labels of the scene only say afterwards which
+of its detections are of which target.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.detection.border import adjust_at_border
+from wildlab.detection.detections import Detections
+from wildlab.detection.floating import FloatingObjects, find_objects
+from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import load_twin
+from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.simulation.scene.render import Seen, View
+from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+
+#: Of the pixels of a detection, the share on an object from which on it is one of that object.
+OVERLAP = 0.25
+
+
+class Judged(NamedTuple):
+    """What detections of an image are worth.
+
+    Attributes
+    ----------
+    found
+        By the number of each body in view: the rows of its detections, the largest first.
+    merged
+        Numbers of bodies without their own that lie in the detection of another.
+    false
+        How many detections are of nothing.
+    """
+
+    found: dict[int, list[int]]
+    merged: set[int]
+    false: int
+
+
+def judge(view: View, objects: FloatingObjects) -> Judged:
+    """Which detection is of which body, by the pixels that they share.
+
+    Parameters
+    ----------
+    view
+        A rendered image with its labels.
+    objects
+        What was found in it.
+
+    Returns
+    -------
+    Judged
+    """
+    found: dict[int, list[int]] = {seen.number: [] for seen in view.seen}
+    inside: set[int] = set()
+    false = 0
+    for row in range(len(objects.detections)):
+        under = view.labels[objects.labels == row + 1]
+        count = np.bincount(under[under > 0], minlength=1)
+        best = int(count.argmax()) if len(count) else 0
+        if count.sum() >= OVERLAP * len(under) and best in found:
+            found[best].append(row)
+            inside |= {n for n in found if n < len(count) and 2 * count[n] > (view.labels == n).sum()}
+        else:
+            false += 1
+    return Judged(found, {n for n in inside if not found[n]}, false)
+
+
+class Shot(NamedTuple):
+    """An image and what was found in it.
+
+    Attributes
+    ----------
+    exposure
+        Its number among the exposures of the flight.
+    seen
+        What there is to see, one for each body in view.
+    detections
+        All that was found, the largest first.
+    judged
+        Which of these is what.
+    """
+
+    exposure: int
+    seen: tuple[Seen, ...]
+    detections: Detections
+    judged: Judged
+
+
+class Photographer:
+    """A camera along the flight of a twin: the same seed gives the same images, whichever are asked for.
+
+    Attributes
+    ----------
+    flight
+        The flight as scenes, with the camera's true poses.
+    """
+
+    def __init__(self, twin: str, seed: int, response: CameraResponse | None = None) -> None:
+        self.flight = SceneFlight(load_twin(twin), seed)
+        self.response = response or CameraResponse()
+        camera = self.flight.poses.camera
+        self._seed = seed
+        self._sensor = sensor_of(self.response, (camera.height, camera.width), stream(seed, "thermal sensor"))
+
+    def image(self, exposure: int) -> tuple[View, NDArray[np.uint16]]:
+        """The scene with its labels, and the counts of the camera (H, W).
+
+        Parameters
+        ----------
+        exposure
+            Number of the exposure.
+
+        Returns
+        -------
+        (view, counts)
+        """
+        view = self.flight.view(exposure, waves_move=False)
+        rng = stream(self._seed, f"thermal image {exposure}")
+        return view, expose(view.kelvin, self.response, self._sensor, rng)
+
+    def shoot(self, exposures: Iterable[int], thresholds: FloatingThresholds | None = None) -> Iterator[Shot]:
+        """Take images, and look for what floats.
+
+        Parameters
+        ----------
+        exposures
+            Their numbers.
+        thresholds
+            Of the detector; those of H 4.4.1 by default.
+
+        Yields
+        ------
+        Shot
+        """
+        for exposure in exposures:
+            view, counts = self.image(int(exposure))
+            objects = find_objects(counts, thresholds=thresholds)
+            yield Shot(int(exposure), view.seen, objects.detections, judge(view, objects))
+
+
+def exposures_of(frames: pd.DataFrame) -> NDArray[np.intp]:
+    """Numbers of the exposures, (N,), that the frames of a twin are.
+
+    Parameters
+    ----------
+    frames
+        Of a twin, with ``frame_id``.
+
+    Returns
+    -------
+    (N,)
+
+    Examples
+    --------
+    >>> exposures_of(pd.DataFrame({"frame_id": ["f000001", "f000012"]})).tolist()
+    [0, 11]
+    """
+    return np.asarray(frames["frame_id"].str[1:].astype(int).to_numpy() - 1, np.intp)
+
+
+class Marks(NamedTuple):
+    """One target in K images that may show it.
+
+    Attributes
+    ----------
+    exposure
+        (K,) numbers of the exposures.
+    uv, covariance
+        (K, 2) px and (K, 2, 2) px^2 of the largest detection that is the target's; NaN where there is none.
+    centre
+        (K, 2) px where the centre of its whole outline is; NaN where none of it is in view.
+    share
+        (K,) of its outline in view.
+    moved
+        (K,) whether the centre was moved by H (4.7).
+    pieces, false
+        (K,) how many detections are the target's, and how many are of nothing.
+    """
+
+    exposure: NDArray[np.intp]
+    uv: Array
+    covariance: Array
+    centre: Array
+    share: Array
+    moved: NDArray[np.bool_]
+    pieces: NDArray[np.intp]
+    false: NDArray[np.intp]
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """(K,) whether the target was detected."""
+        return np.asarray(np.isfinite(self.uv).all(axis=1))
+
+    def take(self, rows: slice) -> Marks:
+        """The marks of some of the images."""
+        return Marks(
+            self.exposure[rows], self.uv[rows], self.covariance[rows], self.centre[rows], self.share[rows],
+            self.moved[rows], self.pieces[rows], self.false[rows],
+        )  # fmt: skip
+
+
+def marks_of(
+    shots: Iterable[Shot],
+    shape: tuple[int, int],
+    number: int = 1,
+    length: float = np.nan,
+    **adjustment: float | bool,
+) -> Marks:
+    """What images give of one target.
+
+    Parameters
+    ----------
+    shots
+        From `Photographer.shoot`.
+    shape
+        Rows and columns of the images.
+    number
+        Of the target's body, from 1.
+    length
+        Of the target, px: then centres are moved where the border cuts it, H (4.7); NaN moves none.
+    adjustment
+        ``axis_ratio``, ``full_axis``, ``length_sd`` of `wildlab.detection.border.adjust_at_border`.
+
+    Returns
+    -------
+    Marks
+    """
+    taken = list(shots)
+    n = len(taken)
+    uv, centre, covariance = np.full((n, 2), np.nan), np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan)
+    share, moved = np.zeros(n), np.zeros(n, bool)
+    pieces, false = np.zeros(n, np.intp), np.zeros(n, np.intp)
+    for k, shot in enumerate(taken):
+        false[k] = shot.judged.false
+        for seen in shot.seen:
+            if seen.number == number:
+                centre[k], share[k] = seen.centre, seen.share
+        rows = shot.judged.found.get(number, [])
+        pieces[k] = len(rows)
+        if not rows:
+            continue
+        one = shot.detections.select(rows[:1])
+        found = adjust_at_border(one, shape, length, **adjustment) if np.isfinite(length) else one  # type: ignore[arg-type]
+        uv[k], covariance[k] = found.uv[0], found.covariance[0]
+        moved[k] = bool((found.uv[0] != one.uv[0]).any())
+    exposure = np.array([shot.exposure for shot in taken], np.intp)
+    return Marks(exposure, uv, covariance, centre, share, moved, pieces, false)
+
+
+def with_detections(flight: Flight, marks: Marks, target: str, plane_down: float = 0.0) -> Flight:
+    """A twin's flight with the detections of rendered images in place of the drawn ones, and their frames.
+
+    Parameters
+    ----------
+    flight
+        From `wildlab.simulation.twins.simulate_twin`.
+    marks
+        From `marks_of`, of images of the same twin and seed.
+    target
+        Its name.
+    plane_down
+        Down coordinate of the water, m.
+
+    Returns
+    -------
+    Flight
+        The frames are those of the marks alone.
+
+    Raises
+    ------
+    WildlabError
+        Where none of the images shows the target.
+    """
+    if not marks.found.any():
+        raise WildlabError(
+            f"in none of {len(marks.exposure)} images {target!r} is found",
+            "render more of them, or lower the thresholds",
+            field="detections",
+        )
+    frames = flight.table("frames")
+    place = pd.Index(exposures_of(frames)).get_indexer(pd.Index(marks.exposure))
+    kept = frames.iloc[place].reset_index(drop=True)
+    rows = np.flatnonzero(marks.found)
+    table = pd.DataFrame(
+        {
+            "detection_id": [f"r{number:06d}" for number in range(1, len(rows) + 1)],
+            "frame_id": kept["frame_id"].to_numpy()[rows],
+            "source": "detector",
+            "kind": "pixel",
+            "u_px": marks.uv[rows, 0],
+            "v_px": marks.uv[rows, 1],
+            "target_id": target,
+            "plane_down_m": plane_down,
+        }
+    )
+    return replace(flight, tables=flight.tables | {"frames": kept, "detections": table})
