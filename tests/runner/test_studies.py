@@ -152,6 +152,10 @@ def test_a_tarpaulin_is_looked_for_on_one_flight(reports: Path, faults: Faults) 
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 1, 6)
     for figure in ("found", "horizon", "mean", "scatter"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: Faults) -> None:
     folder = run("wildlife-detection", reports, seeds=2)
     found = values(folder)
@@ -161,6 +165,10 @@ def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: 
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 16)
     for figure in ("methods-cloudy", "methods-noon", "sequence", "blocks-150", "weather-recall", "heights"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_a_large_ship_is_tracked_on_two_flights(reports: Path, faults: Faults) -> None:
     folder = run("large-ship", reports, seeds=2)
     found = values(folder)
