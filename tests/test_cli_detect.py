@@ -4,8 +4,10 @@ import json
 import os
 
 import cv2
+import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from tests.pipeline.test_detect import folder, picture
 from wildlab import cli
@@ -28,9 +30,49 @@ def test_a_folder_with_bad_images_leaves_tables_pictures_and_sentences(capsys, t
     assert "cut.png: The file is cut off" in err and "pipe.jpg: It is a named pipe" in err
     assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 6
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/jpeg") == 6 and str(tmp_path) not in page
+    assert page.count("data:image/jpeg") == 7 and str(tmp_path) not in page
     assert cv2.imread(str(tmp_path / "out" / "overlays" / "000.jpg")).shape == (96, 128, 3)
     assert len(pd.read_csv(tmp_path / "out" / "detections.csv")) == 12
+
+
+def test_results_go_neither_among_the_images_nor_over_those_of_others(capsys, tmp_path):
+    path, other = folder(tmp_path / "in"), folder(tmp_path / "other")
+    code, _, err = call(capsys, "detect", path, "--into", path)
+    assert code == 2 and "would lie among the images" in err
+    assert not (path / "detections.csv").exists()
+    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    before = (tmp_path / "out" / "detections.csv").read_bytes()
+    assert str(tmp_path) not in (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
+    code, _, err = call(capsys, "detect", other, "--into", tmp_path / "out")
+    assert code == 2 and "holds what was found in another folder, in" in err
+    assert (tmp_path / "out" / "detections.csv").read_bytes() == before
+
+
+def test_images_that_are_dark_where_it_is_warm_are_asked_about(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    for one in path.glob("*.png"):
+        cv2.imwrite(str(one), 255 - cv2.imread(str(one), cv2.IMREAD_GRAYSCALE))
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
+    assert code == 0 and "--polarity black-hot" in out
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--polarity", "black-hot")
+    assert code == 0 and out.startswith("12 detections") and "black-hot" not in out
+
+
+def test_more_than_anyone_looks_through_is_said(capsys, tmp_path):
+    path = tmp_path / "in"
+    path.mkdir()
+    image = np.random.default_rng(1).normal(100, 2, (96, 128))
+    for row in range(8, 90, 12):
+        for column in range(8, 120, 12):
+            image[row : row + 4, column : column + 4] += 60
+    cv2.imwrite(str(path / "a.png"), image.clip(0, 255).astype(np.uint8))
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
+    number = int(out.split()[0])
+    assert code == 0 and number > 20 and f"That is {number} an image" in out
+    assert (
+        "an image"
+        not in call(capsys, "detect", path, "--into", tmp_path / "b", "--distance", 60, "--focal", 700)[1]
+    )
 
 
 def test_what_was_missed_and_invented_is_on_sheets(capsys, tmp_path):
@@ -40,7 +82,7 @@ def test_what_was_missed_and_invented_is_on_sheets(capsys, tmp_path):
                         "--json", "--overlays", 2)  # fmt: skip
     assert code == 0
     result = json.loads(out)
-    assert result["pictures"] == {"overlays": 2, "missed": 1, "invented": 1}
+    assert result["pictures"] == {"overlays": 2, "found": 11, "missed": 1, "invented": 1}
     assert (result["judged"]["found"], result["judged"]["f1"]["estimate"]) == (11, round(22 / 24, 4))
     assert (tmp_path / "out" / "missed.jpg").is_file() and (tmp_path / "out" / "invented.jpg").is_file()
 
@@ -64,7 +106,7 @@ def test_a_second_run_computes_nothing_again(capsys, tmp_path, monkeypatch):
     path = folder(tmp_path / "in")
     assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
     code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
-    assert code == 0 and "6 frames were there" in out
+    assert code == 0 and "6 frames are kept" in out
 
 
 def test_lengths_come_from_the_distance(capsys, tmp_path):
@@ -120,3 +162,43 @@ def test_wrong_use_is_a_sentence(capsys, tmp_path):
     assert code == 2 and "leave --fit or --thresholds out" in err.lower()
     code, out, _ = call(capsys, "detect", "--help")
     assert code == 0 and "wildlab detect images --fit labels.csv" in out
+
+
+def test_labels_that_cannot_be_of_these_images_are_told(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    rows = (path / "labels.csv").read_text(encoding="utf-8").splitlines()
+    rows += ["000.png,900,900,5,5,far", "gone.png,1,2,3,4,far"]
+    (tmp_path / "l.csv").write_text("\n".join(rows), encoding="utf-8")
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", tmp_path / "l.csv")
+    assert code == 0 and "1 labels lie wholly outside their image" in out and "1 missed" in out
+    assert "1 labelled frames are not here and count nowhere: gone.png." in out
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "b", "--class", "deer")
+    assert code == 2 and "there are no labels whose classes or groups are meant" in err.lower()
+
+
+def test_classes_that_count_alike_are_told(capsys, tmp_path):
+    path = folder(tmp_path / "in")
+    table = pd.read_csv(path / "labels.csv")
+    table["class"] = ["deer", "Person"] * 6
+    table.to_csv(path / "labels.csv", index=False)
+    said = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", path / "labels.csv")[1]
+    assert "Labels of 2 classes count alike (deer, Person); --class chooses." in said
+
+
+def test_a_turn_that_viewers_make_is_told(capsys, tmp_path):
+    path = tmp_path / "in"
+    path.mkdir()
+    for number in range(2):
+        seen = picture([(40, 30)], number)
+        exif = Image.Exif()
+        exif[0x0112] = 6
+        Image.fromarray(seen).save(path / f"{number}.jpg", exif=exif, quality=98)
+    code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out")
+    assert code == 0 and "EXIF orientation 6" in out
+    assert pd.read_csv(tmp_path / "out" / "frames.csv")["width_px"].tolist() == [128, 128]
+
+
+def test_folders_of_folders_name_those_with_images(capsys, tmp_path):
+    folder(tmp_path / "day 1")
+    code, _, err = call(capsys, "detect", tmp_path, "--into", tmp_path / "out")
+    assert code == 2 and "this folder itself has no images" in err.lower() and "day 1" in err

@@ -72,7 +72,10 @@ def test_numbers_of_a_clip_and_names_without_ending(tmp_path: Path) -> None:
         ("image,x,y,w,h\na.png,1,2,3,4\na.png,1,2,-3,4\n", "line 3 has no box"),
         ("image,x,y,w,h\na.png,1,?,3,4\n", "line 2 has no box"),
         ("frame0,x,y,w,h\na,1,2,3,4\n", "line 2 has no number"),
-        ("", "no table of comma-separated values"),
+        ("", "has no row"),
+        ("image,x,y,w,h\na.png,1,2,3,4,5,6\n", "line 2 has 7 values, and there are 5 columns"),
+        ("image,x,y,w,h\na.png,.1,.2,.3,.4\n", "x, y, w, h: the boxes are shares of the image"),
+        ("image,x_min,y_min,x_max,y_max\na.png,5,2,3,4\n", "line 2 has no box: x_min 5, y_min 2, x_max 3"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, text: str, word: str) -> None:
@@ -89,3 +92,36 @@ def test_unknown_class_group_and_file_are_named(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="no such file"):
         read_labels(tmp_path / "none.csv")
     assert np.isfinite(read_labels(path).boxes["a.png"]).all()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "image;x;y;w;h\na.png;1,5;2;3;4\n",
+        "image\tx\ty\tw\th\na.png\t1.5\t2\t3\t4\n",
+        "# drawn by hand\n\nimage, x, y, w, h\na.png, 1.5, 2, 3, 4\n",
+        "Image,X,Y,W,H\na.png,1.5,2,3,4\n",
+        "\ufeffimage,xmin,ymin,xmax,ymax\r\na.png,1.5,2,4.5,6\r\n",
+        "image,x,y,w,h\nC:\\day 1\\a.png,1.5,2,3,4\n",
+    ],
+)
+def test_tables_as_other_programs_write_them(tmp_path: Path, text: str) -> None:
+    labels = read_labels(table(tmp_path / "l.csv", text))
+    name = labels.name_of("a.png")
+    assert name is not None
+    assert labels.boxes[name].tolist() == [[1.5, 2, 3, 4]]
+
+
+def test_text_that_is_not_utf_8_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "l.csv"
+    path.write_bytes("image,x,y,w,h\na.png,1,2,3,4\nr\u00f6d.png,1,2,3,4\n".encode("latin-1"))
+    with pytest.raises(WildlabError, match=r"line 3 is not text in UTF-8\. Save it as CSV in UTF-8"):
+        read_labels(path)
+
+
+def test_a_row_that_stands_twice_counts_once_and_is_told(tmp_path: Path) -> None:
+    labels = read_labels(
+        table(tmp_path / "l.csv", "image,x,y,w,h\n" + 2 * "a.png,1,2,3,4\n" + "a.png,1,2,3,5\n")
+    )
+    assert len(labels.boxes["a.png"]) == 2
+    assert labels.marked.left_out == {"a row that stands in the file twice": 1}

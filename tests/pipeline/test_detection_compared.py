@@ -60,7 +60,7 @@ def test_a_batch_is_judged_beside_ours(capsys, tmp_path):
     assert other["average_precision"]["estimate"] == round(51 / 101, 4)
     assert other["f1_beyond_ours"] == {"estimate": -0.5, "low": -0.5, "high": -0.5}
     assert other["told"] == ["Not judged: 2 boxes on 1 images that are not among the 6 judged."]
-    assert "md, all its boxes: F1 0.50 (0.50 to 0.50)" in "\n".join(result["sentences"])
+    assert "md, all its boxes: F1 0.50 (0.25 to 0.75)" in "\n".join(result["sentences"])
     table = pd.read_csv(tmp_path / "out" / "compared.csv")
     rows = table[table["detector"] == "md"]
     assert rows[["score", "found", "invented", "missed"]].to_numpy().tolist() == [
@@ -80,6 +80,7 @@ def test_our_own_table_as_another_detector_is_ours(capsys, tmp_path):
     assert code == 0, err
     ours, other = json.loads(out)["compared"]
     assert other.pop("name") == "detections" and ours.pop("name")
+    assert ours.pop("lowest_score") == pytest.approx(other.pop("lowest_score"))
     assert ours == other
 
 

@@ -59,7 +59,7 @@ def test_without_labels_nothing_is_called_right():
 def test_with_labels_the_counts_come_first():
     judged = rates(found=6, invented=2, missed=3)
     page, words = shown(run(judged=judged, pictures={"missed": 3, "invented": 2}), {"missed": JPEG})
-    assert "Of 9 labelled, 6 are found; 2 of 8 detections are none of them." in words
+    assert "6 of 9 labelled are found; 2 of 8 detections are not labelled." in words
     assert "2 detections of 10 are not judged" in words  # 10 - 6 - 2
     assert "0.67 (0.10 to 0.90)" in words and "0.75 (0.10 to 0.90)" in words
     assert "Labelled, and not found: 3" in words and "Found, and not labelled" not in words
@@ -70,7 +70,7 @@ def test_what_was_chosen_here_does_not_come_first():
     fit = {"held_out": rates(5, 5, 4), "where_chosen": rates(8, 1, 1), "defaults": rates(2, 9, 7)}
     result = run(judged=rates(8, 1, 1), fit=fit, chosen_here=True, detections=9)
     _, words = shown(result)
-    assert "On images that thresholds were not chosen from: of 9 labelled, 5 are found; 5 of 10" in words
+    assert "On images that thresholds were not chosen from: 5 of 9 labelled are found; 5 of 10" in words
     table = words[words.index("Rates") :]
     assert table.index("0.56") < table.index("too good") < table.index("with the defaults")
     assert "beside the labels" not in table

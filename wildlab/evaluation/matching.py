@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.runs import Interval
+from wildlab.evaluation.runs import Interval, share_interval
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -151,6 +151,10 @@ class Rates(NamedTuple):
 def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int = 1) -> Rates:
     """Precision, recall and F1 over frames, with intervals by drawing clips with replacement.
 
+    Draws know nothing of an error that has not been seen yet: of 16 found of 16 they give 1 to 1. So an
+    interval is never narrower than Wilson's of as many independent things; F1 is the share of found in
+    found and half of the errors.
+
     Parameters
     ----------
     counts
@@ -183,8 +187,13 @@ def rates(counts: ArrayLike, groups: Sequence[object] | None = None, seed: int =
             low, high = (np.array([percentile(column, at) for column in drawn.T]) for at in (2.5, 97.5))
     else:
         low = high = np.full(3, np.nan)
-    one = [Interval(float(e), float(a), float(b)) for e, a, b in zip(of_all, low, high, strict=True)]
     found, invented, missed = (int(one) for one in sums.sum(axis=0))
+    of = (found + invented, found + missed, found + (invented + missed) / 2)
+    if weights is not None:
+        at_least = [share_interval(found, max(n, 1)) if n else (np.nan,) * 3 for n in of]
+        low = np.fmin(low, [one[1] for one in at_least])
+        high = np.fmax(high, [one[2] for one in at_least])
+    one = [Interval(float(e), float(a), float(b)) for e, a, b in zip(of_all, low, high, strict=True)]
     return Rates(one[0], one[1], one[2], found, invented, missed, len(sums))
 
 

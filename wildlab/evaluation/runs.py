@@ -58,7 +58,7 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
-def share_interval(count: int, runs: int, probability: float = 0.95) -> Interval:
+def share_interval(count: float, runs: float, probability: float = 0.95) -> Interval:
     """Share of independent runs of which something is true, with Wilson's score interval.
 
     It holds the share of all such runs with about that probability, also for few runs and for shares near

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +17,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.clocks import frame_times
-from wildlab.flight.files import read_regular
+from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
 from wildlab.flight.readers.frames.shutter import CORRECTIONS
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
-from wildlab.pipeline.detect import Detected, run_detection, thresholds_from
+from wildlab.pipeline.detect import Detected, run_detection
 from wildlab.pipeline.detection_compared import (
     compare_detectors,
     compared_sentences,
@@ -41,9 +40,12 @@ from wildlab.pipeline.detection_judged import (
 from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_pictures import write_pictures
 from wildlab.pipeline.detection_shape_fit import fit_shapes
+from wildlab.pipeline.detection_thresholds import read_thresholds, write_thresholds
 
-#: The most bytes of a file with thresholds.
-MOST_BYTES = 1_000_000
+#: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
+MANY = 10
+#: Bytes of an earlier run's result.json at most.
+MOST_BYTES = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,10 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             "a classifier of shapes has to be learnt first",
             "give --fit with labels, or --thresholds of such a run",
         )
+    if (wanted.classes or wanted.group) and not (wanted.labels or wanted.fit):
+        raise WildlabError(
+            "there are no labels whose classes or groups are meant", "give --labels or --fit, or leave it out"
+        )
     if wanted.also and not wanted.labels:
         raise WildlabError(
             "another detector can be judged by labels only", "give --labels, or leave --also out"
@@ -134,6 +140,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         raise WildlabError(
             "the distance to the ground and the focal length are of use together", "give both, or neither"
         )
+    _refuse_folder(wanted)
     frames = _open(wanted)
     labels = _labels(wanted.labels, wanted)
     to_fit = _labels(wanted.fit, wanted)
@@ -174,7 +181,9 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
             frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
         )
     result = _result(wanted, thresholds, detected, judged, fitted, pictures, labels)
-    result["sentences"] = [*frames_said(frames, detected), *result["sentences"]]
+    usable = result["frames"]["usable"]
+    result["notes"] = [*frames_said(frames, detected), *_too_few_or_many(wanted, detected, usable)]
+    result["sentences"] = [*result["notes"], *result["sentences"]]
     if others and labels is not None:
         ours = f"wildlab {wanted.method}"
         compared = compare_detectors(ours, detected.detections, others, detected.frames, labels)
@@ -183,6 +192,34 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         write_atomic(wanted.into / "compared.csv", curve_table(compared).to_csv(index=False))
     write_json(wanted.into / "result.json", result)
     return result
+
+
+def _refuse_folder(wanted: Wanted) -> None:
+    """Results neither among the images, where the next run would read them, nor over another folder's."""
+    images = wanted.images.resolve()
+    if wanted.into.resolve() in (images, images / "images"):
+        raise WildlabError(
+            "the results would lie among the images, and count as images the next time",
+            "name another folder with --into",
+            file=wanted.into,
+        )
+    earlier = wanted.into / "result.json"
+    try:
+        given = json.loads(read_regular(earlier, MOST_BYTES))
+        before = given.get("of") if isinstance(given, dict) else None
+    except (FileNotFoundError, ValueError, WildlabError):
+        return
+    if isinstance(before, str) and before != _place(images):
+        raise WildlabError(
+            f"the folder holds what was found in another folder, {printable(str(given.get('images')))}",
+            "name another folder with --into, or remove this one",
+            file=wanted.into,
+        )
+
+
+def _place(images: Path) -> str:
+    """By which a folder is known again, without its path being told to whoever gets the results."""
+    return sha256(str(images.resolve()).encode("utf-8", "surrogateescape")).hexdigest()[:16]
 
 
 def _open(wanted: Wanted) -> Frames:
@@ -235,77 +272,6 @@ def samples_of(frames: Frames, labels: Labels) -> list[Sample]:
     return found
 
 
-def write_thresholds(path: Path, method: str, thresholds: Any) -> None:
-    """Write thresholds as JSON; infinity is null.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    method, thresholds
-        Which detector's.
-    """
-    write_json(path, {"method": method, "thresholds": _plain(asdict(thresholds))})
-
-
-def _plain(value: Any) -> Any:
-    """Without infinity, for which JSON has no word."""
-    if isinstance(value, dict):
-        return {name: _plain(one) for name, one in value.items()}
-    return None if value == math.inf else value
-
-
-def read_thresholds(path: Path, method: str) -> Any:
-    """Thresholds that `write_thresholds` wrote.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    method
-        Whose they have to be.
-
-    Returns
-    -------
-    object
-        Of ``METHODS[method].thresholds``.
-
-    Raises
-    ------
-    WildlabError
-        Where it is no such file, or another method's.
-    """
-    try:
-        given = json.loads(read_regular(path, MOST_BYTES))
-        named, values = given["method"], dict(given["thresholds"])
-    except FileNotFoundError:
-        raise WildlabError("there is no such file", "check the path", file=path) from None
-    except (ValueError, TypeError, KeyError):
-        raise WildlabError(
-            "holds no thresholds", "name the thresholds.json of an earlier run", file=path
-        ) from None
-    if named != method:
-        raise WildlabError(
-            f"holds thresholds of {named!r}", f"say --method {named}, or leave it out", file=path
-        )
-    return _thresholds(METHODS[method].thresholds, method, values)
-
-
-def _thresholds(kind: type[Any], method: str, values: dict[str, Any]) -> Any:
-    """Plain values as a dataclass: null is infinity where the default is, a list a tuple."""
-    defaults = {one.name: one.default for one in dataclasses.fields(kind)}
-    made: dict[str, Any] = {}
-    for name, value in values.items():
-        default = defaults.get(name)
-        if dataclasses.is_dataclass(default) and isinstance(value, dict):
-            made[name] = _thresholds(type(default), method, value)
-        elif value is None and default == math.inf:
-            made[name] = math.inf
-        else:
-            made[name] = tuple(value) if isinstance(value, list) else value
-    return thresholds_from(kind, made)
-
-
 def _labels(path: Path | None, wanted: Wanted) -> Labels | None:
     return None if path is None else read_labels(path, classes=wanted.classes, group=wanted.group)
 
@@ -327,6 +293,8 @@ def _result(
     problems = detected.frames[detected.frames["problem"].fillna("") != ""]
     result: dict[str, Any] = {
         "method": wanted.method,
+        "images": wanted.images.resolve().name,
+        "of": _place(wanted.images),
         "frames": {
             "all": len(detected.frames),
             "usable": len(detected.frames) - len(problems),
@@ -341,7 +309,7 @@ def _result(
     }
     say = result["sentences"]
     if detected.kept:
-        say.append(f"{detected.kept} frames were there from a run that was broken off.")
+        say.append(f"{detected.kept} frames are kept from an earlier run with the same settings.")
     if fitted is not None:
         result["fit"] = {
             "sets_tried": fitted.tried,
@@ -366,12 +334,51 @@ def _result(
         )
         say.append(f"{where}: {rates_sentence(result['judged'])}")
         say += labels_sentences(labels)
+        kinds = labels.marked.known_kinds
+        if len(kinds) > 1 and not wanted.classes:
+            some = ", ".join(printable(one) for one in kinds[:5])
+            say.append(f"Labels of {len(kinds)} classes count alike ({some}); --class chooses.")
         if judged.without_labels or judged.unusable or judged.absent:
-            say.append(
-                f"Frames that the labels do not name: {judged.without_labels}; labelled and unusable: "
-                f"{judged.unusable}; labelled and not here: {len(judged.absent)}."
-            )
+            say += _not_judged(judged)
     return result
+
+
+def _not_judged(judged: Judged) -> list[str]:
+    """Which frames and labels say nothing, or count as missed for a reason of their own."""
+    said = []
+    if judged.without_labels:
+        said.append(f"{judged.without_labels} of the frames are not judged: the labels do not name them.")
+    if judged.outside:
+        said.append(
+            f"{judged.outside} labels lie wholly outside their image and count as missed: are they of these "
+            "images, at this size?"
+        )
+    if judged.unusable:
+        said.append(f"{judged.unusable} labelled frames could not be used; what is labelled there is missed.")
+    if judged.absent:
+        first = ", ".join(printable(one) for one in judged.absent[:3])
+        more = len(judged.absent) - 3
+        said.append(
+            f"{len(judged.absent)} labelled frames are not here and count nowhere: {first}"
+            + (f" and {more} more." if more > 0 else ".")
+        )
+    return said
+
+
+def _too_few_or_many(wanted: Wanted, detected: Detected, usable: int) -> list[str]:
+    """What may be wrong where nothing is found, or more than can be looked through."""
+    number = len(detected.detections)
+    if not usable:
+        return []
+    if not number and wanted.method != "colour" and wanted.polarity != "black-hot":
+        return ["Nothing stands out as warm. Where what is warm looks dark, say --polarity black-hot."]
+    chosen = wanted.fit or wanted.thresholds or wanted.distance_m is not None
+    if number > MANY * usable and not chosen:
+        return [
+            f"That is {number / usable:.0f} an image: the defaults fit no camera in particular. Sizes follow "
+            "from --distance and --focal, and --fit chooses thresholds from labels."
+        ]
+    return []
 
 
 def frames_said(frames: Frames, detected: Detected) -> list[str]:

@@ -36,6 +36,8 @@ class Judged:
         Frames that are labelled and could not be used; their labels count as missed.
     absent
         Names of labelled frames that the run does not have; their labels count nowhere.
+    outside
+        Labels that lie wholly outside their image.
     """
 
     rates: Rates
@@ -44,6 +46,7 @@ class Judged:
     without_labels: int
     unusable: int
     absent: tuple[str, ...]
+    outside: int
 
     def as_plain(self) -> dict[str, Any]:
         """Numbers for JSON, without those that are none.
@@ -152,7 +155,7 @@ def judge_detections(
     groups: list[str] = []
     rows: list[tuple[Any, ...]] = []
     named = set()
-    unusable = 0
+    unusable = outside = 0
     columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
     for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
         name = labels.name_of(str(frame))
@@ -165,6 +168,9 @@ def judge_detections(
         scores = [] if own is None else own["score"].tolist()
         centred = boxes if own is None else _about(own, boxes)
         true, ignore = labels.boxes_of(str(frame), name, int(width), int(height))
+        if width and height:
+            beyond = (true[:, :2] >= [width, height]) | (true[:, :2] + true[:, 2:] < 0)
+            outside += int(beyond.any(axis=1).sum())
         found = match(centred, true, rule, ignore)
         counts.append(found.counts)
         groups.append(labels.group[name])
@@ -179,8 +185,9 @@ def judge_detections(
     things = pd.DataFrame(rows, columns=["frame_id", "verdict", *_BOX, "score"])
     absent = tuple(sorted(set(labels.boxes) - named))
     return Judged(
-        rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent
-    )
+        rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent,
+        outside,
+    )  # fmt: skip
 
 
 def boxes_by_frame(

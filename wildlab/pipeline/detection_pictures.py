@@ -29,6 +29,8 @@ COLOURS = {
 AROUND, TILE, IN_A_ROW = 64, 160, 8
 #: Tiles on one sheet at most.
 MOST_TILES = 80
+#: Of what was found, fewer: these are looked through, not searched for a mistake.
+MOST_FOUND = 40
 _BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
@@ -52,7 +54,7 @@ def overlay_picture(frame: Frame, things: pd.DataFrame) -> Picture:
     picture[hatched] = (90, 60, 60)
     boxes = things[_BOX].to_numpy(float)
     for box, verdict in zip(boxes, things["verdict"], strict=True):
-        near, far = np.rint(box[:2] - 2).astype(int), np.rint(box[:2] + box[2:] + 2).astype(int)
+        near, far = np.rint(box[:2] - 5).astype(int), np.rint(box[:2] + box[2:] + 5).astype(int)
         cv2.rectangle(picture, near.tolist(), far.tolist(), COLOURS[str(verdict)], 1, cv2.LINE_AA)
     return picture
 
@@ -134,7 +136,8 @@ def write_pictures(
         ``frame_id``, ``verdict``, the box and ``score``; from `wildlab.pipeline.detection_judged.Judged`, or
         all ``detected``.
     into
-        Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``.
+        Folder: ``overlays/NAME.jpg``, ``missed.jpg``, ``invented.jpg``, and ``found.jpg``, or
+        ``detected.jpg`` where nothing is judged.
     most
         How many overlays.
     tell
@@ -150,9 +153,9 @@ def write_pictures(
     for name in names:
         # Of an earlier run: only what has a frame's name is taken away.
         (folder / f"{safe_stem(name)}.jpg").unlink(missing_ok=True)
-    step = max(1, -(-len(names) // max(most, 1)))
-    drawn = set(names[::step][:most])
-    chosen = {word: _most_telling(things, word) for word in ("missed", "invented")}
+    evenly = np.linspace(0, len(names) - 1, min(most, len(names))).round().astype(int) if names else ()
+    drawn = {names[number] for number in evenly}
+    chosen = {word: _most_telling(things, word) for word in ("found", "detected", "missed", "invented")}
     on_sheets = {str(one) for rows in chosen.values() for one in things.loc[rows, "frame_id"]}
     wanted = [number for number, name in enumerate(names) if name in drawn or name in on_sheets]
     by_frame = dict(tuple(things.groupby("frame_id", sort=False))) if len(things) else {}
@@ -184,9 +187,12 @@ def write_pictures(
 
 
 def _most_telling(things: pd.DataFrame, word: str) -> Any:
-    """Which rows go on a sheet: the surest of what was invented, the first of what was missed."""
-    some = things[things["verdict"] == word]
-    return some.sort_values("score", ascending=False, kind="stable").index[:MOST_TILES]
+    """Which rows go on a sheet: the surest of what was invented, the first of what was missed, and some of
+    all scores of what was found."""
+    some = things[things["verdict"] == word].sort_values("score", ascending=False, kind="stable").index
+    if word in ("found", "detected") and len(some) > MOST_FOUND:
+        return some[np.linspace(0, len(some) - 1, MOST_FOUND).round().astype(int)]
+    return some[:MOST_TILES]
 
 
 def safe_stem(name: str) -> str:

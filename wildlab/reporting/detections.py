@@ -22,6 +22,8 @@ LISTED = 20
 SHEETS = {
     "missed": "Labelled, and not found",
     "invented": "Found, and not labelled",
+    "found": "Found, and labelled",
+    "detected": "Detected",
 }
 _COLOURS = {
     "found": "green",
@@ -87,9 +89,10 @@ def detections_page(
         if key not in sheets:
             continue
         number = int(result["pictures"].get(key, 0))
-        total = int(judged[key]) if judged else number
+        total = int(judged[key]) if judged else int(result["detections"])
         left -= len(sheets[key])
-        more = f" The {number} that say most, of {total}." if number < total else ""
+        which = "of all scores, the surest first" if key in ("found", "detected") else "the surest first"
+        more = f" {number} of {total}, {which}." if number < total else ""
         parts.append(f"<h2>{heading}: {total}</h2>")
         alt = f"{_plural(number, 'cutting')} of what was {key}, each with the name of its image."
         parts.append(_picture(sheets[key], alt, f"Each with the name of its image.{more}", wide=True))
@@ -160,6 +163,8 @@ def _rates_shown(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
         rows["where they were chosen (too good)"] = fit["where_chosen"]
         what = "without a classifier" if result["method"] == "shape" else "with the defaults"
         rows[what] = fit["defaults"]
+    for other in result.get("compared", ())[1:]:
+        rows[f"{other['name']}, all its boxes, beside the labels"] = other
     return rows
 
 
@@ -170,13 +175,15 @@ def _summary(result: Mapping[str, Any]) -> str:
     if rows:
         where, best = next(iter(rows.items()))
         where = "" if where == "beside the labels" else "On images that thresholds were not chosen from: "
+        labelled, all_found = best["found"] + best["missed"], best["found"] + best["invented"]
         first = (
-            f"{where}of {best['found'] + best['missed']} labelled, {best['found']} are found; "
-            f"{best['invented']} of {best['found'] + best['invented']} detections are none of them."
+            f"{where}{best['found']} of {labelled} labelled {'is' if labelled == 1 else 'are'} found; "
+            f"{best['invented']} of {_plural(all_found, 'detection')} "
+            f"{'is' if best['invented'] == 1 else 'are'} not labelled."
         )
     else:
         first = f"{_plural(result['detections'], 'detection')}; without labels, none is judged."
-    then = []
+    then = [str(one) for one in result.get("notes", ())]
     judged = result.get("judged")
     if judged:
         aside = result["detections"] - judged["found"] - judged["invented"]

@@ -153,7 +153,7 @@ def test_what_is_not_packed_or_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="cut off or damaged inside its header"):
         open_frames(plain)
     (tmp_path / "d.cptv").mkdir()
-    with pytest.raises(WildlabError, match="this folder has no images"):
+    with pytest.raises(WildlabError, match="this folder itself has no images"):
         open_frames(tmp_path / "d.cptv")
     with pytest.raises(WildlabError, match="no such file"):
         next(read_cptv(tmp_path / "none.cptv"))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
@@ -21,6 +23,8 @@ from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, prob
 SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".fff"})
 #: The most bytes of an image file that are read.
 MOST_BYTES = 300_000_000
+#: The tag of EXIF that says how an image is to be turned.
+ORIENTATION = 0x0112
 #: Grey levels by which the colours of a grey JPEG differ.
 GREY = 6
 #: The most that a pixel may be read as, K: hotter than what a thermal camera measures is a broken constant.
@@ -64,7 +68,25 @@ def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
     if problem:
         return spoilt(name, problem)
     warm = unit == "kelvin" or note == AS_COUNTS
+    note = "; ".join(one for one in (note, _turn(data)) if one)
     return Frame(name, None, image, unit, "white-hot" if warm else polarity, valid, note=note)
+
+
+def _turn(data: bytes) -> str:
+    """What is said of an image that viewers show turned: its pixels stay those of the sensor."""
+    if data[:2] != b"\xff\xd8":
+        return ""
+    try:
+        with Image.open(io.BytesIO(data)) as opened:
+            orientation = opened.getexif().get(ORIENTATION, 1)
+    except Exception:  # whatever a broken EXIF gives: the picture itself was decoded
+        return ""
+    if orientation in (None, 1) or not isinstance(orientation, int):
+        return ""
+    return (
+        f"some images say that viewers are to show them turned (EXIF orientation {orientation}); pixels here "
+        "are counted in the image as it is stored, and labels have to be drawn in that"
+    )
 
 
 def decode(data: bytes) -> tuple[NDArray[Any], Unit, str] | str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import image as images
 from wildlab.flight.readers.frames import video as videos
 from wildlab.flight.readers.frames.cptv import SUFFIX, open_cptv, read_cptv
@@ -283,7 +284,10 @@ def open_frames(path: Path, *, polarity: Polarity = "unknown", even: bool = Fals
                 if clips
                 else f"images end in one of {kinds}"
             )
-            raise WildlabError("this folder has no images", fix, file=path)
+            inside = [] if clips else _folders_with_images(path)
+            if inside:
+                fix = f"name one of the folders in it: {', '.join(inside)}"
+            raise WildlabError("this folder itself has no images", fix, file=path)
         return Frames(path, tuple(found), len(found), polarity, even=even)
     if not path.exists():
         raise WildlabError("there is no such file or folder", "check the path", file=path)
@@ -313,3 +317,16 @@ def filled(image: NDArray[Any], dead: NDArray[np.bool_]) -> NDArray[Any]:
     whole = image.copy()
     whole[dead] = cv2.medianBlur(image, 3)[dead]
     return whole
+
+
+def _folders_with_images(path: Path) -> list[str]:
+    """Names of the first folders in a folder that have images."""
+
+    def has_images(folder: Path) -> bool:
+        try:
+            return any(one.suffix.lower() in images.SUFFIXES for one in islice(folder.iterdir(), 1000))
+        except OSError:  # a closed one
+            return False
+
+    folders = sorted(one for one in path.iterdir() if one.is_dir())[:50]
+    return [printable(one.name) for one in folders if has_images(one)][:3]

@@ -16,6 +16,8 @@ FEWEST, FAR = 5, 8.0
 #: A lens spreads a point over its neighbours, a dead pixel stands alone: by how much of its own distance the
 #: next of its eight neighbours may lie off.
 ALONE = 0.3
+#: Constant pixels that chance alone may give, where constant ones are called dead.
+CHANCE = 0.01
 #: The most of the pixels that are dead: above it something else is seen.
 MOST_DEAD = 0.01
 
@@ -37,9 +39,10 @@ def find_dead(images: Sequence[NDArray[Any]], valid: Mask) -> Mask | None:
 
     Notes
     -----
-    A pixel is constant where no frame changes it though the typical one changes. It is far where it lies on
-    the same side of the median of the 3 x 3 about it in each frame, by `FAR` standard deviations (robust, of
-    that difference over the frame) and more, and alone, as no point seen through a lens is.
+    A pixel is constant where no frame changes it though the typical one changes, if frames are enough for
+    none to be so by chance. It is far where it lies on the same side of the median of the 5 x 5 about it in
+    each frame, by `FAR` standard deviations (robust, of that difference over the frame) and more, and alone,
+    as no point seen through a lens is.
 
     Examples
     --------
@@ -59,8 +62,16 @@ def find_dead(images: Sequence[NDArray[Any]], valid: Mask) -> Mask | None:
         sides += _alone(_whole(image), valid)
     # Gain control sets many pixels to black and white; only one that stands alone there is dead.
     constant = (change == 0) & (cv2.blur((change == 0).astype(np.float32), (3, 3)) < 0.5)
+    if _by_chance(images, valid) > CHANCE:
+        constant[:] = False
     found = (constant | (np.abs(sides) == len(images))) & valid
     return found if found.mean() <= MOST_DEAD else np.zeros(found.shape, bool)
+
+
+def _by_chance(images: Sequence[NDArray[Any]], valid: Mask) -> float:
+    """How many pixels would be constant without a fault: of few grey levels some happen to repeat."""
+    same = float(np.mean([(image == images[0])[valid].mean() for image in images[1:]]))
+    return float(valid.sum()) * same ** (len(images) - 1)
 
 
 def _change(images: Sequence[NDArray[Any]], valid: Mask) -> tuple[NDArray[np.float32], bool]:
@@ -85,16 +96,17 @@ def _whole(image: NDArray[Any]) -> NDArray[np.float32]:
 
 def _alone(image: NDArray[np.float32], valid: Mask) -> NDArray[np.int16]:
     """(H, W) 1 where a pixel is far above its neighbours and alone, -1 where far below, else 0."""
-    # The ring without its middle: the middle one of eight sorted neighbours is what OpenCV's median of nine
-    # is but for the pixel itself, which an outlier moves by one rank.
-    apart = image - cv2.medianBlur(image, 3)
+    # Wide enough for a small warm body not to be its own background.
+    around = cv2.medianBlur(image, 5)
+    apart = image - around
     sd = 1.4826 * float(np.median(np.abs(apart[valid])))
     least = FAR * max(sd, 1e-6 * float(np.abs(image).max()) + 1e-12)
     found = np.zeros(image.shape, np.int16)
     ring = np.ones((3, 3), np.uint8)
     ring[1, 1] = 0
     for side in (1, -1):
-        others = cv2.dilate((side * apart).astype(np.float32), ring)
+        # Of the neighbours themselves: beside the corner of something sharp they are as bright as it is.
+        others = cv2.dilate((side * image).astype(np.float32), ring) - side * around
         found[(side * apart > least) & (others < ALONE * side * apart)] = side
     return found
 
