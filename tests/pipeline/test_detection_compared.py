@@ -61,6 +61,7 @@ def test_a_batch_is_judged_beside_ours(capsys, tmp_path):
     assert other["f1_beyond_ours"] == {"estimate": -0.5, "low": -0.5, "high": -0.5}
     assert other["told"] == ["Not judged: 2 boxes on 1 images that are not among the 6 judged."]
     assert "md, all its boxes: F1 0.50 (0.25 to 0.75)" in "\n".join(result["sentences"])
+    assert "Detectors beside one another" in (tmp_path / "out" / "report.html").read_text()
     table = pd.read_csv(tmp_path / "out" / "compared.csv")
     rows = table[table["detector"] == "md"]
     assert rows[["score", "found", "invented", "missed"]].to_numpy().tolist() == [

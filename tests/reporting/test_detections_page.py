@@ -40,13 +40,30 @@ def run(detections=10, usable=5, **more):
     return result | more
 
 
-def shown(result, sheets=None, overlays=(), frames=None, thresholds=None, name="images"):
+def shown(result, sheets=None, overlays=(), frames=None, thresholds=None, name="images", curves=None):
     counts = [result["detections"]] + [0] * (result["frames"]["usable"] - 1)
     rows = {"frame_id": [f"f{n}.png" for n in range(len(counts))], "detections": counts, "problem": None}
     if frames is None:
         frames = pd.DataFrame(rows)
-    page = detections_page(name, result, frames, sheets or {}, overlays, thresholds or {"level": 3})
+    page = detections_page(name, result, frames, sheets or {}, overlays, thresholds or {"level": 3}, curves)
     return page, re.sub(r"\s+", " ", unescape(re.sub(r"<style.*?</style>|<[^>]+>", " ", page, flags=re.S)))
+
+
+def test_other_detectors_stand_beside_ours_with_their_curves():
+    ours = {"name": "wildlab warm", "told": [], **rates(6, 2, 3)}
+    ours |= {"average_precision": rate(0.7, 0.6, 0.8), "f1_beyond_ours": rate(0, 0, 0)}
+    evil = '<script>alert("1")</script>'
+    other = {"name": evil, "told": ["It says nothing of 2 of the 6 judged frames."], **rates(3, 2, 6)}
+    other |= {"average_precision": None, "f1_beyond_ours": rate(-0.25, -0.4, 0.1)}
+    row = {"detector": "wildlab warm", "score": 1.0, "precision": 0.9, "recall": 0.5}
+    result = run(judged=rates(6, 2, 3), compared=[ours, other])
+    page, words = shown(result, curves=pd.DataFrame([row, row]))
+    assert "-0.25 (-0.40 to +0.10)" in words and "0.70 (0.60 to 0.80)" in words and "<script" not in page
+    assert "It says nothing of 2 of the 6" in words
+    assert "Average precision: wildlab warm 0.70." in page and page.count("data:image/png") == 2
+    without, _ = shown(result, curves=pd.DataFrame([row]).iloc[:0])
+    assert without.count("data:image/png") == 1
+    assert "Detectors beside" not in shown(run(judged=rates(6, 2, 3)))[1]
 
 
 def test_without_labels_nothing_is_called_right():

@@ -171,5 +171,6 @@ def write_page(into: Path, name: str, result: dict[str, Any]) -> None:
     step = max(1, -(-len(drawn) // ON_PAGE))
     overlays = [(one.stem, one.read_bytes()) for one in drawn[::step]]
     thresholds = json.loads((into / "thresholds.json").read_text(encoding="utf-8"))["thresholds"]
-    page = detections_page(name, result, frames, sheets, overlays, thresholds)
+    curves = pd.read_csv(into / "compared.csv", dtype={"detector": str}) if "compared" in result else None
+    page = detections_page(name, result, frames, sheets, overlays, thresholds, curves)
     write_atomic(into / "report.html", page)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
 from wildlab.reporting.html import examine
 from wildlab.reporting.page import page
@@ -41,6 +42,7 @@ def detections_page(
     sheets: Mapping[str, bytes],
     overlays: Sequence[tuple[str, bytes]],
     thresholds: Mapping[str, Any],
+    curves: pd.DataFrame | None = None,
 ) -> str:
     """The whole page, without anything that has to be fetched.
 
@@ -58,6 +60,9 @@ def detections_page(
         Name of a frame and its JPEG, in order.
     thresholds
         By name, as plain values.
+    curves
+        Of detectors that are compared, as of `wildlab.pipeline.detection_compared.curve_table`; None where
+        there is only ours.
 
     Returns
     -------
@@ -80,6 +85,8 @@ def detections_page(
         _tiles(result),
     ]
     parts.append(_rates_table(result))
+    if curves is not None:
+        parts.append(compared_section(result["compared"], curves))
     advice = advice_of(result)
     if advice:
         points = "".join(f"<li>{inline(one)}</li>" for one in advice)
