@@ -12,7 +12,9 @@ import pytest
 from tests.pipeline.test_detect import folder
 from tests.test_cli_detect import call
 from wildlab.errors import WildlabError
+from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
+from wildlab.pipeline.detect_command import samples_of
 from wildlab.pipeline.detection_compared import compare_detectors, named_file, read_others
 
 #: Of the frames of `folder`.
@@ -121,6 +123,14 @@ def test_labels_of_any_format_judge_alike(capsys, tmp_path):
     assert code == 2 and "says 256 x 96 pixels, and 002.png has 128 x 96" in err
 
 
+def test_a_fit_gets_the_same_boxes_from_shares_of_the_image(tmp_path: Path) -> None:
+    path = folder(tmp_path / "in")
+    images = open_frames(path)
+    relative = samples_of(images, read_labels(batch(tmp_path / "md.json"), classes=("animal",)))
+    assert len(relative) == 6 and np.allclose(relative[0].boxes[0], [97.5, 67.5, 5, 5])
+    assert len(relative[0].boxes) == 2 and len(relative[0].ignore) == 1
+
+
 def frames(count: int = 3, unusable: int = 0) -> pd.DataFrame:
     rows = [(f"{n}.png", WIDTH, HEIGHT, "") for n in range(count)]
     rows += [(f"{n}.png", 0, 0, "Cut off.") for n in range(count, count + unusable)]
@@ -161,6 +171,8 @@ def test_classes_of_another_detector(tmp_path: Path) -> None:
     assert len(every.boxes.boxes["cam/000.png"]) == 3
     chosen = read_others([md], labels, ("deer",), ("animal", "deer"))[0]
     assert len(chosen.boxes.boxes["cam/000.png"]) == 2 and chosen.told == ()
+    (tmp_path / "plain.csv").write_text("image,x,y,w,h\n0.png,1,2,3,4\n")
+    assert read_others([str(tmp_path / "plain.csv")], labels, ("deer",))[0].told == ()
     with pytest.raises(WildlabError, match=r"has none of the classes wolf\. There are animal, vehicle"):
         read_others([md], labels, (), ("wolf",))
     with pytest.raises(WildlabError, match="Two detectors are called 'md'"):

@@ -153,7 +153,7 @@ def read_others(
                 "name them, as in --also one=FILE",
             )
         every = read_labels(path, truth=labels)
-        known = every.marked.known_kinds
+        known = tuple(one for one in every.marked.known_kinds if one)
         taken = tuple(one for one in own or classes if one in known)
         if own and not taken:
             there = ", ".join(printable(one) for one in known[:20]) or "none"

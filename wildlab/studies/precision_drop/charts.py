@@ -32,7 +32,7 @@ def image_shown(view: ColourView, thresholds: Colour, name: str, what: str, coun
         ax.add_patch(frame)
         ax.set(xticks=[], yticks=[], title=title, xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
         ax.grid(False)
-    axes[0].plot(*found.uv.T, "o", mfc="none", mec="white", ms=11, mew=1.6)
+    axes[0].plot(*found.uv.T, "o", mfc="none", mec="white", ms=20, mew=1.6)
     said = f"{'one region is' if len(found) else 'nothing is'} accepted"
     return (
         fig, name,

@@ -20,7 +20,8 @@ positions is where one would drop. A detection whose pixel is not on the tarpaul
 one in an image without it.
 
 Images with the horizon are rendered apart: the twin's camera never sees it. They show ground and sky from
-100 m, the horizon level and anywhere in the upper half, and no tarpaulin."""
+100 m, the horizon level and anywhere in the upper half, and no tarpaulin. Intervals of shares of images take
+the images for independent, and those of one flight are alike: they are rather too narrow."""
 #: From which share of the detections on their mean is worth about as many independent ones.
 NEARLY_ALL = 0.7
 
