@@ -1,14 +1,11 @@
 """Scenes: what a thermal camera would see of sea and land and of what is on them, with exact labels.
 
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
-against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and animals,
-`sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults; and
-`coloured` the ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows
-of a detector.
 against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales,
 `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults. On land
-`ground` has covers under the sun of a day, `animals` what stands there, and `land` renders it. All of it is
-chosen; nothing in it knows of a detector.
+`ground` has covers under the sun of a day, `animals` what stands there, and `land` renders it. `coloured` is
+even ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows of a
+detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
