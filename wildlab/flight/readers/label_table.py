@@ -172,7 +172,12 @@ def _table(data: bytes, path: Path) -> pd.DataFrame:
     decimal = "," if sign == ";" else "."
     try:
         table = pd.read_csv(
-            io.StringIO(text), sep=sign, skiprows=before, skipinitialspace=True, decimal=decimal
+            io.StringIO(text),
+            sep=sign,
+            skiprows=before,
+            skipinitialspace=True,
+            decimal=decimal,
+            float_precision="round_trip",
         )
     except ValueError as error:
         said = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
