@@ -184,6 +184,9 @@ def difference_of_f1(
 ) -> Interval:
     """F1 of one detector minus that of another on the same frames, with an interval over the same draws.
 
+    Clips that are hard for one are hard for the other: the difference is better known than either. Draws know
+    nothing of what no clip shows yet; of few clips that all differ alike they give too narrow an interval.
+
     Parameters
     ----------
     counts, others

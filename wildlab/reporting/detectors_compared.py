@@ -46,7 +46,8 @@ def compared_section(compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame
         f"<tbody>{''.join(rows)}</tbody></table></div>",
         '<p class="note">Same images, same labels, same rule. F1, precision and recall are of all boxes that '
         "a detector gave; the average precision is the area below its curve. In brackets 95 % intervals; "
-        "those of the difference rest on the same draws for both.</p>",
+        "those of the difference rest on the same draws for both. Draws know only the images that are here: "
+        "of few images they say too little.</p>",
     ]
     if len(curves):
         figure, said = curves_shown(compared, curves)
