@@ -138,6 +138,8 @@ def test_thermal_and_colour_side_by_side() -> None:
     assert np.allclose(found.points, [seen[1], seen[2], seen[0], others[2]], atol=1e-6)
     assert np.allclose(found.distance2[:2], 0, atol=1e-9)
     assert (np.linalg.det(found.covariance[:2]) < np.linalg.det(P)).all()
+    exact = fuse_detections(first, second, homography(b, a))
+    assert np.allclose(found.covariance[3] - exact.covariance[3], 0.25 * np.eye(2))
     lonely = fuse_detections(first, no_detections(), np.eye(3))
     assert lonely.first.tolist() == [0, 1, 2] and (lonely.second == -1).all()
 
