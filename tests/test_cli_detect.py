@@ -2,6 +2,10 @@
 
 import json
 import os
+import signal
+import subprocess
+import sys
+import time
 
 import cv2
 import numpy as np
@@ -9,7 +13,9 @@ import pandas as pd
 import pytest
 from PIL import Image
 
+from tests.flight.frames.test_cptv import pictures, video, written
 from tests.pipeline.test_detect import folder, picture
+from tests.test_cli_camera import huge_png
 from wildlab import cli
 
 
@@ -202,3 +208,135 @@ def test_folders_of_folders_name_those_with_images(capsys, tmp_path):
     folder(tmp_path / "day 1")
     code, _, err = call(capsys, "detect", tmp_path, "--into", tmp_path / "out")
     assert code == 2 and "this folder itself has no images" in err.lower() and "day 1" in err
+
+
+def hostile(path):
+    """A folder of three sound images and of whatever else may lie there, and what is said of each of that."""
+    path.mkdir()
+    rng = np.random.default_rng(1)
+    ground = 20 * cv2.GaussianBlur(rng.normal(0, 1, (96, 400)), (0, 0), 9)
+    for number, name in enumerate(("000.png", "ünï – 鹿.png", "new\nline.png")):
+        at = 30 * number
+        image = picture([(30 + at, 60)], number) + 10 * ground[:, at : at + 128]
+        encoded = cv2.imencode(".png", np.clip(image, 1, 250).astype(np.uint8))[1].tobytes()
+        (path / name).write_bytes(encoded)
+        whole = encoded
+    jpeg = cv2.imencode(".jpg", image)[1].tobytes()
+    (path / "cut.png").write_bytes(whole[:200])
+    (path / "cut.jpg").write_bytes(jpeg[: len(jpeg) // 2])
+    (path / "zero.png").write_bytes(b"")
+    (path / "text.png").write_text("no image")
+    (path / "huge.png").write_bytes(huge_png())
+    cv2.imwrite(str(path / "black.png"), np.zeros((96, 128), np.uint8))
+    cv2.imwrite(str(path / "full.png"), np.where(rng.random((96, 128)) < 0.8, 255, 90).astype(np.uint8))
+    cv2.imwrite(str(path / "small.png"), image[:50, :60])
+    (path / "loop.png").symlink_to("loop.png")
+    (path / "gone.png").symlink_to("nowhere.png")
+    (path / "device.png").symlink_to("/dev/zero")
+    (path / "folder.png").mkdir()
+    os.mkfifo(path / "pipe.png")
+    (path / os.fsdecode(b"raw\xff\x1b.png")).write_bytes(whole[:99])
+    (path / "secret.png").write_bytes(whole)
+    (path / "secret.png").chmod(0)
+    said = {
+        "cut.png": "cut off before its end",
+        "cut.jpg": "cut off before its end",
+        "zero.png": "file is empty",
+        "text.png": "no PNG, JPEG or TIFF",
+        "huge.png": "pixels are the most that is decoded",
+        "black.png": "every pixel has the value 0",
+        "full.png": "saturated",
+        "small.png": "60 x 50 pixels, and most of these frames have 128 x 96",
+        "loop.png": "symbolic links",
+        "gone.png": "no such file",
+        "device.png": "is a device",
+        "folder.png": "is a folder",
+        "pipe.png": "named pipe",
+        "raw\\udcff\x1b.png": "cut off before its end",
+    }
+    if os.geteuid():  # nothing is secret from the superuser
+        return path, said | {"secret.png": "cannot be read"}
+    (path / "secret.png").unlink()
+    return path, said
+
+
+def test_whatever_lies_in_the_folder_each_is_a_sentence_and_is_counted(capsys, tmp_path):
+    path, said = hostile(tmp_path / "in")
+    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--json")
+    assert code == 0, err
+    result = json.loads(out)
+    assert result["frames"] == {"all": 3 + len(said), "usable": 3, "kept": 0}
+    problems = dict(result["problems"])
+    assert set(problems) == set(said)
+    for name, words in said.items():
+        assert words in problems[name] or words.capitalize() in problems[name].capitalize(), problems[name]
+        assert problems[name].endswith(".") and len(problems[name]) < 200
+    assert set(pd.read_csv(tmp_path / "out" / "frames.csv")["frame_id"]) >= {"ünï – 鹿.png", "new\nline.png"}
+    assert len(list((tmp_path / "out" / "overlays").glob("*.jpg"))) == 3
+    # In a terminal ten are told, with no sign in them that it would obey, and the others are counted.
+    code, _, err = call(capsys, "detect", path, "--into", tmp_path / "out")
+    lines = err.splitlines()
+    assert code == 0 and len(lines) == 11 and "\x1b" not in err
+    assert lines[-1] == f"{len(said) - 10} more frames cannot be used; frames.csv says why of each."
+
+
+def test_names_that_become_one_file_name_keep_a_picture_each(capsys, tmp_path):
+    path = folder(tmp_path / "in", 2)
+    for name in ("鹿.png", "猫.png", "000.jpg"):
+        cv2.imwrite(str(path / "x.png"), picture([(40, 40)], len(name)))
+        (path / "x.png").rename(path / name)
+    assert call(capsys, "detect", path, "--into", tmp_path / "out")[0] == 0
+    found = sorted(one.name for one in (tmp_path / "out" / "overlays").glob("*.jpg"))
+    assert found == ["000-2.jpg", "000.jpg", "001.jpg", "_-2.jpg", "_.jpg"]
+
+
+@pytest.mark.slow
+def test_control_c_in_the_middle_loses_nothing_that_was_finished(tmp_path):
+    path = folder(tmp_path / "in", 300)
+
+    def command(into):
+        arguments = ["detect", str(path), "--into", str(tmp_path / into), "--overlays", "0"]
+        return [sys.executable, "-m", "wildlab.cli", *arguments]
+
+    running = subprocess.Popen(command("out"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    parts = tmp_path / "out" / "parts"
+    while running.poll() is None and len(list(parts.glob("*.json"))) < 2:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 130 and "What was finished is kept" in err and "Traceback" not in err
+    kept = 25 * len(list(parts.glob("*.json")))
+    assert 50 <= kept < 300 and not (tmp_path / "out" / "detections.csv").exists()
+    again = subprocess.run(command("out"), capture_output=True, text=True, check=True)
+    assert f"{kept} frames were there" in again.stdout and "in 300 frames of 300" in again.stdout
+    subprocess.run(command("whole"), capture_output=True, check=True)
+    at_once, in_two = ((tmp_path / into / "detections.csv").read_bytes() for into in ("whole", "out"))
+    assert at_once == in_two
+
+
+def test_what_the_camera_does_is_said(capsys, tmp_path):
+    """A closed shutter, a dead pixel, dark corners, and frames of a trail camera."""
+    path = tmp_path / "in"
+    path.mkdir()
+    rng = np.random.default_rng(4)
+    ground = 25 * cv2.GaussianBlur(rng.normal(0, 1, (96, 600)), (0, 0), 5)
+    v, u = np.mgrid[-1:1:96j, -1:1:128j]
+    for number in range(12):
+        image = 7000 + 10 * ground[:, 35 * number : 35 * number + 128] - 30 * (u**2 + v**2)
+        if number == 5:
+            image = np.full((96, 128), 7300.0)
+        image = image + rng.normal(0, 1.5, image.shape)
+        image[20, 30] = 0
+        cv2.imwrite(str(path / f"{number:02d}.png"), image.astype(np.uint16))
+    code, out, err = call(capsys, "detect", path, "--into", tmp_path / "out", "--even")
+    assert code == 0 and "05.png: The shutter is closed" in err
+    assert "in 11 frames of 12" in out and "Taken during a flat-field correction: 1 of 12 frames." in out
+    assert "1 pixel does not see the scene and is masked." in out
+    assert "darker than the middle, by 11 frames; that is taken off." in out
+    code, out, _ = call(capsys, "detect", path / "00.png", "--into", tmp_path / "one", "--even")
+    assert code == 0 and "No fall of brightness towards the corners could be measured" in out
+    write_trail = written(tmp_path / "trap.cptv", video(pictures(3, (64, 80)), 12))
+    code, out, err = call(capsys, "detect", write_trail, "--into", tmp_path / "trap", "--method", "warm")
+    assert code == 0, err
+    assert "in 3 frames of 3" in out
+    assert pd.read_csv(tmp_path / "trap" / "frames.csv")["time_s"].tolist() == [0.0, 0.111, 0.222]

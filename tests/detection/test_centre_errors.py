@@ -44,6 +44,37 @@ def test_the_covariance_grows_with_what_it_is_made_of():
     )
 
 
+def test_the_covariance_of_a_centre_worked_by_hand():
+    """(edge blur)^2, of as many independent pieces as blurs go round, each with its lever over the area."""
+    boundary, region, whole = np.diag([900.0, 100.0]), np.diag([4.0, 1.0]), np.zeros(4, bool)
+    only_edge = CentreErrors(edge=0.5, shape=0.0, floor=0.0, broken=0.0, cut=0.0)
+    # A smoothing of 0.75 px and a pixel's own are 1.25 px together.
+    expected = (0.5 * 1.25) ** 2 * 2 * np.sqrt(np.pi) * 1.25 / 50.0**2 * boundary
+    assert np.allclose(centre_covariance(50.0, region, boundary, whole, 0.75, only_edge), expected)
+    # Major axis 4 sqrt(4) = 8 px: 16 times the region, and a quarter of 64 across the border that cuts.
+    only_cut = CentreErrors(edge=0.0, shape=0.0, floor=0.0, broken=0.0, cut=0.5)
+    left, below = np.array([True, False, False, False]), np.array([False, False, False, True])
+    assert np.allclose(hidden_part(region, left, only_cut), 0.25 * np.diag([64.0 + 16.0, 16.0]))
+    assert np.allclose(hidden_part(region, below, only_cut), 0.25 * np.diag([64.0, 16.0 + 16.0]))
+
+
+@pytest.mark.parametrize(
+    ("box", "sides"),
+    [
+        ((1, 40, 9, 9), "left"),
+        ((2, 2, 9, 9), ""),
+        ((40, 1, 9, 9), "top"),
+        ((90, 40, 9, 9), "right"),
+        ((89, 40, 9, 9), ""),
+        ((40, 50, 9, 9), "below"),
+        ((40, 49, 9, 9), ""),
+    ],
+)
+def test_which_sides_of_an_image_wider_than_high_cut(box, sides):
+    names = np.array(["left", "top", "right", "below"])
+    assert " ".join(names[cut_sides(np.array(box, float), (60, 100))]) == sides
+
+
 def seen_and_found(seeds, draw):
     """(seen, detections, row, pose, body) of the vessel of each scene that was found."""
     response = CameraResponse()

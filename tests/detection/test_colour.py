@@ -121,3 +121,37 @@ def test_mistakes_are_sentences() -> None:
         Colour(hue=(100, 250))
     with pytest.raises(WildlabError, match="below zero"):
         Colour(smallest_px=0)
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_an_image_of_larger_pixels_gives_all_lengths_times_their_size(factor: int) -> None:
+    """Each pixel made a block of pixels: what was found is the same, about the middle of the block."""
+    small = scene([(40.3, 30.2)], (9.0, 5.0), (60, 80))
+    large = np.repeat(np.repeat(small, factor, axis=0), factor, axis=1)
+    kinds = Colour(border_px=(0, 0), width_px=80)
+    one, other = (find_coloured(image, all_of(image), kinds) for image in (small, large))
+    assert len(one) == len(other) == 1
+    assert np.allclose(other.uv, factor * one.uv + (factor - 1) / 2)
+    assert np.allclose(other.covariance, factor**2 * one.covariance)
+    assert np.allclose(other.area, factor**2 * one.area) and np.allclose(other.score, factor**2 * one.score)
+    assert np.allclose(other.axes, factor * one.axes) and np.allclose(
+        other.box[:, 2:], factor * one.box[:, 2:]
+    )
+    # The left edge of a pixel is half a pixel before its middle, in both.
+    assert np.allclose(other.box[:, :2] + 0.5, factor * (one.box[:, :2] + 0.5))
+
+
+def test_a_centre_on_the_limit_of_the_border_is_inside() -> None:
+    kinds = Colour(border_px=(10, 6), width_px=80, smallest_px=20)
+    for u, v, found in (
+        (69, 30, 1),
+        (70, 30, 0),
+        (10, 30, 1),
+        (9, 30, 0),
+        (40, 53, 1),
+        (40, 54, 0),
+        (40, 6, 1),
+    ):
+        image = np.full((60, 80, 3), (60, 110, 70), np.uint8)
+        image[v - 2 : v + 3, u - 4 : u + 5] = BLUE
+        assert len(find_coloured(image, all_of(image), kinds)) == found, (u, v)

@@ -317,3 +317,65 @@ def test_noise_of_a_window_keeps_rough_ground_quiet() -> None:
     over_all = find_by_contrast(image, EVERYWHERE, Contrast(peak=7))
     by_window = find_by_contrast(image, EVERYWHERE, Contrast(peak=7, deviation="window"))
     assert len(by_window) < len(over_all) / 2 and np.abs(by_window.uv - [50, 80]).sum(axis=1).min() < 1
+
+
+def test_the_warmest_part_of_a_body_is_not_taken_for_all_of_it() -> None:
+    """A hot end: the centre is off by as much as all that stands out lies beside it; the ellipse says so."""
+    body, hot = ellipse(90, 80, 20, 6), ellipse(104, 80, 4, 4)
+    image = np.full((160, 200), 100.0) + np.random.default_rng(1).normal(0, 1, (160, 200))
+    image[body] += 40
+    even = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    image[hot] += 100
+    uneven = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    assert len(even) == len(uneven) == 1 and np.allclose(even.uv, [[90, 80]], atol=0.2)
+    off = uneven.uv[0] - [90, 80]
+    assert off[0] > 10
+    # Along the body by that much, across it no more than before.
+    assert np.isclose(np.sqrt(uneven.covariance[0, 0, 0]), off[0], rtol=0.1)
+    assert uneven.covariance[0, 1, 1] < 0.1 > even.covariance[0].max()
+    # Two hot ends: which of them all the rest belongs to is not known, and nothing is added.
+    image[ellipse(76, 80, 4, 4)] += 100
+    two = find_by_contrast(image, EVERYWHERE, Contrast(part=0.0))
+    assert len(two) == 2 and two.covariance.max() < 0.5
+
+
+def test_limits_of_the_area_are_themselves_allowed() -> None:
+    image = np.full((160, 200), 90, np.uint8)
+    image[60:66, 40:50] = 200
+    # A rectangle of 10 by 6 pixels has 60 of them, whatever its contour's polygon.
+    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=60, largest_px=60))) == 1
+    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=61, largest_px=900))) == 0
+    assert len(find_warm(image, EVERYWHERE, Warm(smallest_px=1, largest_px=59))) == 0
+    rough = ground(noise=1.0)
+    rough[ellipse(90, 80, 7, 5)] += 60
+    for of_peak in (0.0, 0.5):
+        one = find_by_contrast(rough, EVERYWHERE, Contrast(of_peak=of_peak))
+        area = float(one.area[0])
+        kept = Contrast(of_peak=of_peak, smallest_px=area, largest_px=area)
+        assert np.allclose(find_by_contrast(rough, EVERYWHERE, kept).uv, one.uv)
+
+
+@pytest.mark.parametrize("sd", [4.0, 9.0])
+def test_the_ellipse_of_a_warm_animal_grows_with_the_noise_as_it_is(sd: float) -> None:
+    """With all else as it is, what noise adds goes with its square."""
+    image = np.full((160, 200), 60, np.uint8)
+    image[ellipse(90, 80, 10, 6)] = 220
+    labels = np.asarray(ellipse(90, 80, 10, 6), np.int32)
+    noisy = np.clip(image + np.random.default_rng(3).normal(0, sd, image.shape), 0, 255).astype(np.uint8)
+    thresholds = Warm(background="none", level=150, part=0.0, window=(0.0, 255.0))
+    found = find_warm(noisy, EVERYWHERE, thresholds).covariance[0]
+    stated = describe(labels, noisy, EVERYWHERE, contrast=noisy, noise=sd, part=0.0).covariance[0]
+    assert np.allclose(np.diag(found), np.diag(stated), rtol=0.12)
+
+
+def test_what_touches_a_border_may_go_on_beyond_it_by_as_much_as_is_seen() -> None:
+    """Evenly spread over its own extent: a twelfth of its square, across the border that it touches."""
+    image = np.full((160, 200), 10.0)
+    covariances = []
+    for left in (90, 0):
+        labels = np.zeros((160, 200), np.int32)
+        labels[70:80, left : left + 24] = 1
+        found = describe(labels, image + 40 * labels, EVERYWHERE, noise=1.0, part=0.0)
+        covariances.append(found.covariance[0])
+    inside, cut = covariances
+    assert np.allclose(cut - inside, np.diag([24**2 / 12, 0.0]))

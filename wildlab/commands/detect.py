@@ -138,8 +138,8 @@ def detect(
     for name, problem in problems[:SHOWN]:
         click.echo(f"{printable(name)}: {problem}", err=True)
     if len(problems) > SHOWN:
-        more = count(len(problems) - SHOWN, "frame")
-        click.echo(f"{more} more cannot be used; frames.csv says why of each.", err=True)
+        more = count(len(problems) - SHOWN, "more frame")
+        click.echo(f"{more} cannot be used; frames.csv says why of each.", err=True)
     for line in result["sentences"]:
         click.echo(line)
     click.echo(shown(into / "report.html"))

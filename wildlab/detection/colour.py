@@ -141,7 +141,6 @@ def coloured(hsv: NDArray[np.uint8], t: Colour) -> Mask:
 def _regions(wanted: NDArray[np.uint8], t: Colour) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Labels (H, W) of what lies inside outer contours of sufficient area, the largest first, and areas."""
     outlines, _ = cv2.findContours(wanted, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    filled = np.zeros(wanted.shape, np.uint8)
     areas = []
     for outline in outlines:
         left, top, width, height = cv2.boundingRect(outline)
@@ -150,7 +149,7 @@ def _regions(wanted: NDArray[np.uint8], t: Colour) -> tuple[NDArray[np.int32], N
         areas.append(int(mask.sum()))
     order = [row for row in np.argsort(areas, kind="stable")[::-1] if areas[row] >= t.smallest_px]
     order = order[: 1 if t.only_largest else MOST_REGIONS]
-    labels = np.zeros(filled.shape, np.int32)
+    labels = np.zeros(wanted.shape, np.int32)
     for number, row in enumerate(order, start=1):
         cv2.drawContours(labels, outlines, int(row), number, cv2.FILLED)
     return labels, np.array([areas[row] for row in order], float)

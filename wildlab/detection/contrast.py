@@ -182,25 +182,41 @@ def propose(
     if t.of_image > 0:
         strong = float(np.percentile(ratio[::2, ::2][valid[::2, ::2]], 99.9))
         t = replace(t, peak=max(t.peak, t.of_image * strong))
-    labels, peaks = _regions(ratio, t)
+    labels, wholes, peaks = _regions(ratio, t)
     if not len(peaks):
         return Proposals(no_detections(), np.zeros((0, len(FEATURES) if with_features else 0)))
     blur = float(np.hypot(1.0, t.smooth_px))
     found = describe(
         labels, image, valid, contrast=contrast, noise=noise, blur_px=blur, part=t.part, score=peaks
     )
+    # What is warmer than half the peak may be the whole thing, or the warmest part of all that stands out.
+    # That blur moves the outline further out where a body is warmer is not in the ellipse.
+    apart = _centroids(wholes, len(found), found.uv) - found.uv
+    found = replace(found, covariance=found.covariance + apart[:, :, None] * apart[:, None, :])
     keep = found.axes[:, 0] <= t.longest * found.axes[:, 1]
     keep &= found.intensity <= t.hottest
     features = _features(labels, ratio, smooth, valid, found) if with_features else np.zeros((len(found), 0))
     return Proposals(found.select(keep), features[keep])
 
 
-def _regions(ratio: Image, t: Contrast) -> tuple[NDArray[np.int32], Array]:
-    """Labels (H, W) of regions that pass all but the gates of shape, and the largest ratio in each."""
+def _centroids(labels: NDArray[np.int32], count: int, instead: Array) -> Array:
+    """(N, 2) centroids of regions 1 to N, px; ``instead`` of those that have no pixel."""
+    where = np.flatnonzero(labels)
+    of = labels.ravel()[where] - 1
+    area = np.bincount(of, minlength=count)
+    place = np.stack([where % labels.shape[1], where // labels.shape[1]]).astype(float)
+    sums = np.stack([np.bincount(of, one, count) for one in place], axis=1)
+    return np.where(area[:, None] > 0, sums / np.maximum(area, 1)[:, None], instead)
+
+
+def _regions(ratio: Image, t: Contrast) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+    """Labels (H, W) of regions that pass all but the gates of shape, of all that stands out about each by
+    the same number where that has no other region in it, and the largest ratio in each."""
     above = ratio > min(t.edge, t.peak)
     count, labels = _components(above)
     where = np.flatnonzero(above.ravel())
     values, of = ratio.ravel()[where], labels.ravel()[where]
+    all_of, everywhere = of, where
     peaks = _largest(values, of, count, t.peak)
     area = np.bincount(of, minlength=count)
     good = (peaks >= t.peak) & (area >= t.smallest_px)
@@ -224,7 +240,21 @@ def _regions(ratio: Image, t: Contrast) -> tuple[NDArray[np.int32], Array]:
     # Few pixels are above a threshold: the others stay as they are.
     result = np.zeros(ratio.size, np.int32)
     result[where] = number[of]
-    return result.reshape(ratio.shape), peaks[good]
+    outer = np.zeros(ratio.size, np.int32)
+    outer[everywhere] = all_of
+    wholes = np.zeros(ratio.size, np.int32)
+    wholes[everywhere] = _alone_in(outer[where], number[of], int(all_of.max(initial=0)) + 1)[all_of]
+    return result.reshape(ratio.shape), wholes.reshape(ratio.shape), peaks[good]
+
+
+def _alone_in(outer: NDArray[np.int32], inner: NDArray[np.int32], count: int) -> NDArray[np.int32]:
+    """(count,) the number of the one region (P,) in each outer component (P,); 0 for none or several."""
+    least = np.full(count, np.iinfo(np.int32).max, np.int32)
+    most = np.zeros(len(least), np.int32)
+    chosen = inner > 0
+    np.minimum.at(least, outer[chosen], inner[chosen])
+    np.maximum.at(most, outer[chosen], inner[chosen])
+    return np.where(least == most, most, 0).astype(np.int32)
 
 
 def _components(mask: Mask) -> tuple[int, NDArray[np.int32]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_boar
 from wildlab.errors import WildlabError
 from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, ParameterPart, ViewPart
 from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.frames.frame import file_name
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.geometry.board_views import parameters_of
 from wildlab.geometry.frames import Array
@@ -130,7 +132,7 @@ def calibrate_images(
     WildlabError
         Where the images have several sizes, show a coded board, too few show the board, or no camera fits.
     """
-    unknown = sorted(set(leave_out) - {path.name for path in paths})
+    unknown = sorted(set(leave_out) - {file_name(path) for path in paths})
     if unknown:
         raise WildlabError(
             f"{unknown[0]!r} is to be left out, and is not among the images",
@@ -139,24 +141,30 @@ def calibrate_images(
         )
     images: list[BoardImage] = []
     sizes: dict[str, tuple[int, int]] = {}
-    coded: dict[str, int] = {}
-    for path in progress([one for one in paths if one.name not in leave_out]):
+    for path in progress([one for one in paths if file_name(one) not in leave_out]):
         frame = read_image(path)
         if frame.problem:
-            images.append(BoardImage(path.name, frame.problem))
+            images.append(BoardImage(frame.name, frame.problem))
             continue
         pixels = frame.image
-        sizes[path.name] = (pixels.shape[1], pixels.shape[0])
-        images.append(_look(path.name, pixels, board))
+        sizes[frame.name] = (pixels.shape[1], pixels.shape[0])
+        images.append(_look(frame.name, pixels, board))
         if len(sizes) <= LOOKED_AT or images[-1].uv is None:
-            coded[path.name] = count_codes(grey8(pixels))
-            if coded[path.name] >= FEWEST_CODES:
+            codes = count_codes(grey8(pixels))
+            if codes >= FEWEST_CODES:
                 raise WildlabError(
-                    f"shows a coded board ({coded[path.name]} codes were read), and such boards are not read",
+                    f"shows a coded board ({codes} codes were read), and such boards are not read",
                     "photograph a plain chessboard or a grid of circles",
                     file=path,
                 )
     width, height = _one_size(sizes)
+    wanted = f"most of the images have {width} x {height}"
+    images = [
+        BoardImage(one.name, "It has {} x {} pixels, and {}.".format(*sizes[one.name], wanted))
+        if sizes.get(one.name, (width, height)) != (width, height)
+        else one
+        for one in images
+    ]
     used = [one for one in images if one.uv is not None]
     if len(used) < FEWEST:
         _refuse_few(images, len(used), board)
@@ -330,18 +338,20 @@ def _look(name: str, pixels: NDArray[Any], board: Board) -> BoardImage:
 
 
 def _one_size(sizes: dict[str, tuple[int, int]]) -> tuple[int, int]:
+    """Width and height of most of the images; a camera has one size of image."""
     if not sizes:
         raise WildlabError("none of the images can be read", "name images of the board")
-    counts = {size: list(sizes.values()).count(size) for size in sizes.values()}
-    if len(counts) > 1:
-        usual = max(counts, key=lambda size: counts[size])
+    counts = Counter(sizes.values())
+    usual, most = counts.most_common(1)[0]
+    if 2 * most <= len(sizes):
         name, (width, height) = next((n, size) for n, size in sizes.items() if size != usual)
         raise WildlabError(
-            f"has {width} x {height} pixels, and {counts[usual]} other images have {usual[0]} x {usual[1]}",
-            "calibrate the images of each size by themselves, or leave it out with --without",
+            f"has {width} x {height} pixels, {most} of {len(sizes)} images have {usual[0]} x {usual[1]}, and "
+            "no size has more than half of them",
+            "calibrate the images of each size by themselves",
             file=name,
         )
-    return next(iter(counts))
+    return usual
 
 
 def _refuse_few(images: list[BoardImage], n: int, board: Board) -> None:

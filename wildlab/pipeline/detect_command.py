@@ -401,7 +401,7 @@ def frames_said(frames: Frames, detected: Detected) -> list[str]:
     problems = detected.frames["problem"].fillna("").astype(str)
     corrections = problems.str.contains("|".join(CORRECTIONS)).sum()
     if corrections:
-        said.append(f"{corrections} of {len(problems)} frames were taken during a flat-field correction.")
+        said.append(f"Taken during a flat-field correction: {corrections} of {len(problems)} frames.")
     if kept.dead is not None and kept.dead.any():
         number = int(kept.dead.sum())
         word = "1 pixel does not" if number == 1 else f"{number} pixels do not"

@@ -150,9 +150,10 @@ def write_pictures(
     """
     folder = into / "overlays"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in names:
+    files = picture_names(names)
+    for file in files.values():
         # Of an earlier run: only what has a frame's name is taken away.
-        (folder / f"{safe_stem(name)}.jpg").unlink(missing_ok=True)
+        (folder / file).unlink(missing_ok=True)
     evenly = np.linspace(0, len(names) - 1, min(most, len(names))).round().astype(int) if names else ()
     drawn = {names[number] for number in evenly}
     chosen = {word: _most_telling(things, word) for word in ("found", "detected", "missed", "invented")}
@@ -168,7 +169,7 @@ def write_pictures(
             continue
         own = by_frame.get(frame.name, things.iloc[:0])
         if frame.name in drawn:
-            write_atomic(folder / f"{safe_stem(frame.name)}.jpg", _jpeg(overlay_picture(frame, own)))
+            write_atomic(folder / files[frame.name], _jpeg(overlay_picture(frame, own)))
             overlays += 1
         for word, rows in chosen.items():
             some = own.loc[own.index.intersection(rows)]
@@ -193,6 +194,38 @@ def _most_telling(things: pd.DataFrame, word: str) -> Any:
     if word in ("found", "detected") and len(some) > MOST_FOUND:
         return some[np.linspace(0, len(some) - 1, MOST_FOUND).round().astype(int)]
     return some[:MOST_TILES]
+
+
+def picture_names(names: Sequence[str]) -> dict[str, str]:
+    """File names of the pictures of frames; a number tells those apart that would get the same.
+
+    Parameters
+    ----------
+    names
+        Of frames, in their order.
+
+    Returns
+    -------
+    dict
+        By the name of the frame.
+
+    Examples
+    --------
+    >>> list(picture_names(["a.png", "a.jpg", "b c.png"]).values())
+    ['a.jpg', 'a-2.jpg', 'b_c.jpg']
+    """
+    taken: set[str] = set()
+    found = {}
+    for name in dict.fromkeys(names):
+        stem = file = safe_stem(name)
+        number = 1
+        # Names that differ in their case alone are one file on some systems.
+        while file.lower() in taken:
+            number += 1
+            file = f"{stem}-{number}"
+        taken.add(file.lower())
+        found[name] = f"{file}.jpg"
+    return found
 
 
 def safe_stem(name: str) -> str:

@@ -145,6 +145,7 @@ def test_stuck_and_far_pixels_are_found_and_warm_points_are_not() -> None:
         blurred = np.zeros(SHAPE)
         blurred[100, 100] = 900
         image += cv2.GaussianBlur(blurred, (0, 0), 0.8)  # a point that stays, seen through a lens
+        image[80:84, 120:126] = 7900 + rng.normal(0, 1.25, (4, 6))  # a sharp body that stays, with corners
     dead = find_dead(images, WHOLE)
     assert dead is not None
     assert np.argwhere(dead).tolist() == [[10, 20], [30, 40], [50, 60]]

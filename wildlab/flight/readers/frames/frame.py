@@ -77,6 +77,26 @@ def spoilt(name: str, problem: str, time: float | None = None) -> Frame:
     return Frame(name, time, np.zeros((0, 0), np.uint8), "grey", "unknown", np.zeros((0, 0), bool), said)
 
 
+def file_name(path: Path) -> str:
+    """A file's name as text that can be written: what is no UTF-8 in it stands as ``\\udcff``.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> file_name(Path("flight/a\\udcff.png"))
+    'a\\\\udcff.png'
+    """
+    return path.name.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def frame_name(path: Path, number: int) -> str:
     """What a frame of a clip is called.
 
@@ -96,4 +116,4 @@ def frame_name(path: Path, number: int) -> str:
     >>> frame_name(Path("flights/a.mp4"), 12)
     'a#000012'
     """
-    return f"{path.stem}#{number:06d}"
+    return f"{Path(file_name(path)).stem}#{number:06d}"

@@ -15,7 +15,7 @@ from wildlab.flight.files import read_regular
 from wildlab.flight.readers.frames.decoding import decode_image
 from wildlab.flight.readers.frames.dji import AS_COUNTS, read_dji
 from wildlab.flight.readers.frames.flir import gather_pieces, read_records, to_kelvin
-from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, spoilt
+from wildlab.flight.readers.frames.frame import Frame, Polarity, Unit, file_name, spoilt
 from wildlab.flight.readers.frames.headers import Header, read_header
 from wildlab.flight.readers.frames.valid import find_clipped, find_no_data, problem_of
 
@@ -52,7 +52,7 @@ def read_image(path: Path, *, polarity: Polarity = "unknown") -> Frame:
     >>> read_image(Path("none.png")).problem
     'There is no such file.'
     """
-    name = path.name
+    name = file_name(path)
     try:
         data = read_regular(path, MOST_BYTES)
     except FileNotFoundError:

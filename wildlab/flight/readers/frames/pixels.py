@@ -13,9 +13,10 @@ from wildlab.flight.readers.frames.valid import MOVED, Mask
 
 #: Fewest frames, and standard deviations by which a dead pixel lies off its neighbours in each of them.
 FEWEST, FAR = 5, 8.0
-#: A lens spreads a point over its neighbours, a dead pixel stands alone: by how much of its own distance the
-#: next of its eight neighbours may lie off.
-ALONE = 0.3
+#: A lens spreads a point over its neighbours, a dead pixel stands alone: by what share of its own distance
+#: from the median the next of its eight neighbours may lie off, on the mean over the frames. A blur of 0.6 px
+#: gives 0.25.
+ALONE = 0.1
 #: Constant pixels that chance alone may give, where constant ones are called dead.
 CHANCE = 0.01
 #: The most of the pixels that are dead: above it something else is seen.
@@ -41,8 +42,8 @@ def find_dead(images: Sequence[NDArray[Any]], valid: Mask) -> Mask | None:
     -----
     A pixel is constant where no frame changes it though the typical one changes, if frames are enough for
     none to be so by chance. It is far where it lies on the same side of the median of the 5 x 5 about it in
-    each frame, by `FAR` standard deviations (robust, of that difference over the frame) and more, and alone,
-    as no point seen through a lens is.
+    each frame, by `FAR` standard deviations (robust, of that difference over the frame) and more, and alone:
+    a point seen through a lens is not.
 
     Examples
     --------
@@ -58,13 +59,18 @@ def find_dead(images: Sequence[NDArray[Any]], valid: Mask) -> Mask | None:
     if not moved:
         return None
     sides = np.zeros(change.shape, np.int16)
+    far, alone = np.zeros(change.shape, np.float32), np.zeros(change.shape, np.float32)
     for image in images:
-        sides += _alone(_whole(image), valid)
+        apart, beyond = _stand_out(_whole(image), valid)
+        sides += np.sign(apart).astype(np.int16)
+        far += apart
+        alone += beyond
     # Gain control sets many pixels to black and white; only one that stands alone there is dead.
     constant = (change == 0) & (cv2.blur((change == 0).astype(np.float32), (3, 3)) < 0.5)
     if _by_chance(images, valid) > CHANCE:
         constant[:] = False
-    found = (constant | (np.abs(sides) == len(images))) & valid
+    stuck = (np.abs(sides) == len(images)) & (np.sign(far) * alone > (1 - ALONE) * np.abs(far))
+    found = (constant | stuck) & valid
     return found if found.mean() <= MOST_DEAD else np.zeros(found.shape, bool)
 
 
@@ -94,21 +100,16 @@ def _whole(image: NDArray[Any]) -> NDArray[np.float32]:
     return np.nan_to_num(seen, nan=float(np.nanmedian(seen))) if image.dtype.kind == "f" else seen
 
 
-def _alone(image: NDArray[np.float32], valid: Mask) -> NDArray[np.int16]:
-    """(H, W) 1 where a pixel is far above its neighbours and alone, -1 where far below, else 0."""
-    # Wide enough for a small warm body not to be its own background.
-    around = cv2.medianBlur(image, 5)
-    apart = image - around
+def _stand_out(image: NDArray[np.float32], valid: Mask) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(H, W) of how far off the median of the 5 x 5, 0 where not far, and off the next of the others."""
+    apart = image - cv2.medianBlur(image, 5)
     sd = 1.4826 * float(np.median(np.abs(apart[valid])))
-    least = FAR * max(sd, 1e-6 * float(np.abs(image).max()) + 1e-12)
-    found = np.zeros(image.shape, np.int16)
+    apart[np.abs(apart) <= FAR * max(sd, 1e-6 * float(np.abs(image).max()) + 1e-12)] = 0
     ring = np.ones((3, 3), np.uint8)
     ring[1, 1] = 0
-    for side in (1, -1):
-        # Of the neighbours themselves: beside the corner of something sharp they are as bright as it is.
-        others = cv2.dilate((side * image).astype(np.float32), ring) - side * around
-        found[(side * apart > least) & (others < ALONE * side * apart)] = side
-    return found
+    # The corner of something sharp is far from the median too, but not from what is beside it.
+    above, below = image - cv2.dilate(image, ring), image - cv2.erode(image, ring)
+    return apart, np.where(apart > 0, above, below).astype(np.float32)
 
 
 class Vignetting(NamedTuple):

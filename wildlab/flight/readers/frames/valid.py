@@ -22,6 +22,8 @@ ALONG = 0.2
 #: Overlays: how much a pixel may change from frame to frame, what the median pixel must change by at least,
 #: both as shares of the range of the numbers, and the most of the image that text covers.
 STILL, MOVED, MOST_TEXT = 0.012, 0.03, 0.25
+#: Share of the 7 x 7 pixels about one of an overlay that belong to it, at least.
+DENSE = 3 / 49
 
 
 def find_no_data(image: NDArray[Any]) -> Mask:
@@ -125,6 +127,8 @@ def find_overlay(images: Sequence[NDArray[Any]]) -> Mask | None:
     middle = np.median(stack, axis=0)
     apart = np.abs(middle - cv2.medianBlur(_as_bytes(middle), 31).astype(np.float32) * span / 255 - low.min())
     still = (change <= STILL * span) & (apart > 0.2 * span)
+    # Strokes lie beside strokes: single pixels that noise happens to leave alone are none.
+    still &= cv2.blur(still.astype(np.float32), (7, 7)) >= DENSE - 1e-6
     # Letters are thin and lie close together: what is between them belongs to them.
     marks = cv2.morphologyEx(still.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8)) > 0
     return _wider(marks, BESIDE) if 0 < marks.mean() < MOST_TEXT else np.zeros(marks.shape, bool)
