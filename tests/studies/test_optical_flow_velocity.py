@@ -100,7 +100,9 @@ def test_means_deviations_and_intervals_are_those_of_the_table():
     assert np.isnan(velocity_numbers(table.iloc[2:])["mean_north"])
 
 
-def test_a_flight_without_features_says_so(monkeypatch):
+def test_a_flight_without_features_says_so(monkeypatch, looked):
+    monkeypatch.setattr(study, "simulate_twin", lambda name, seed: looked.flight)
+    monkeypatch.setattr(study, "SceneFlight", lambda *given: looked.scene)
     monkeypatch.setattr(study, "match_features", lambda *images: ())
     with pytest.raises(WildlabError, match="0 of 2 pairs of images have features"):
         look(TWIN, 2, 2)
