@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from wildlab.detection.flow import FlowThresholds, Matches
 from wildlab.errors import WildlabError
+from wildlab.flight.store import load_flight, save_flight
 from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
+from wildlab.pipeline.flow import (
+    FramePair,
+    Reading,
+    pair_velocities,
+    velocity_detections,
+    velocity_measurements,
+)
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.measurement import positions_or_velocities
+from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.run import Start, run_filter
 
 TWIN = "gimballed-ship"
 SHIP = np.array([[20.0, 4.0, 0.0], [-20.0, 3.0, 0.0], [0.0, -6.0, 0.0], [10.0, 0.0, 0.0]])
@@ -109,6 +121,40 @@ def test_no_row_is_left_out_and_each_says_whether_it_would_pass(flight, seen):
     outside = pair_velocities(flight, pairs, Reading("autopilot", times=seen.times + 1000.0))
     assert np.isnan(speeds(outside)).all()
     assert pair_velocities(flight, [], Reading("autopilot")).empty
+
+
+def test_velocities_are_detections_of_their_own_kind_and_feed_a_track(flight, seen, tmp_path):
+    velocity = np.array([4.0, -3.0])
+    quiet_flight = quiet(flight, seen)
+    table = pair_velocities(quiet_flight, pairs_of(seen, velocity), true_reading(seen))
+    rows = velocity_detections(flight, table, target="ship")
+    both = pd.concat([flight.detections, rows.sample(frac=1, random_state=1)], ignore_index=True)
+    save_flight(replace(flight, tables=flight.tables | {"detections": both}), tmp_path / "flight")
+    loaded = load_flight(tmp_path / "flight")
+    times, v, R = velocity_measurements(loaded)
+    assert np.allclose(v, speeds(table)) and (np.diff(times) > 0).all()
+    assert np.allclose(R[:, 0, 1], table["cov_ne"]) and np.allclose(R[:, 1, 1], table["cov_ee"])
+    # Started without any idea of its speed, and with no position at all, a track knows it.
+    start = Start(times[0], np.zeros(4), np.diag([1e4, 1e4, 100.0, 100.0]))
+    motion = partial(constant_velocity, sd_acceleration=0.05)
+    track = run_filter(times, v, R, positions_or_velocities(np.ones(len(times), bool)), motion, start)
+    assert track.used.all()
+    assert np.allclose(track.x[-1, 2:], velocity, atol=0.3)
+    assert np.sqrt(track.P[-1, 2, 2]) < np.sqrt(R[:, 0, 0]).min()
+
+
+def test_without_velocities_there_is_nothing_to_feed(flight):
+    times, v, R = velocity_measurements(flight)
+    assert (times.shape, v.shape, R.shape) == ((0,), (0, 2), (0, 2, 2))
+    rows = pd.DataFrame(
+        {"detection_id": ["a"], "frame_id": ["f000003"], "source": ["radar"], "kind": ["velocity"],
+         "v_north_m_s": [1.0], "v_east_m_s": [2.0]}
+    )  # fmt: skip
+    alone = replace(flight, tables=flight.tables | {"detections": rows})
+    times, v, R = velocity_measurements(alone)
+    assert v.tolist() == [[1.0, 2.0]] and np.isnan(R).all()
+    lost = replace(flight, tables=flight.tables | {"detections": rows.assign(frame_id="nowhere")})
+    assert len(velocity_measurements(lost)[0]) == 0
 
 
 def test_what_does_not_fit_is_refused(flight, seen):

@@ -55,6 +55,16 @@ def test_pairs_are_looked_at_in_stretches_over_the_whole_flight():
     assert len(stretches(np.zeros(5, bool), 3)) == 0
 
 
+def test_the_ship_is_in_view_when_the_thesis_says(looked):
+    """Out of view from 20 s to 50 s and from 72 s to 80 s, H 5.6.3; to a few seconds."""
+    times, seen = looked.scene.times, looked.shares > 0
+    assert seen[times < 20].all()
+    assert not seen[(times > 25) & (times < 45)].any()
+    assert seen[(times > 50) & (times < 62)].all()
+    assert not seen[times > 75].any()
+    assert 280 < seen.sum() < 400
+
+
 def test_with_exact_poses_the_images_give_the_velocity_of_the_ship(looked, tables):
     """The ship is at rest but for what it moves on its anchor, some centimetres a second."""
     v = tables[TRUE][["v_north_m_s", "v_east_m_s"]].to_numpy()
@@ -100,7 +110,9 @@ def test_means_deviations_and_intervals_are_those_of_the_table():
     assert np.isnan(velocity_numbers(table.iloc[2:])["mean_north"])
 
 
-def test_a_flight_without_features_says_so(monkeypatch):
+def test_a_flight_without_features_says_so(monkeypatch, looked):
+    monkeypatch.setattr(study, "simulate_twin", lambda name, seed: looked.flight)
+    monkeypatch.setattr(study, "SceneFlight", lambda *given: looked.scene)
     monkeypatch.setattr(study, "match_features", lambda *images: ())
     with pytest.raises(WildlabError, match="0 of 2 pairs of images have features"):
         look(TWIN, 2, 2)

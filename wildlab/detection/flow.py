@@ -7,7 +7,7 @@ paired by a FLANN nearest-neighbour search. What H does not print is chosen: see
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -76,7 +76,8 @@ class FlowThresholds:
                 raise WildlabError(f"{field} is {getattr(self, field)!r}", fix, field=field)
 
 
-class Matches(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Matches:
     """The same features in two images.
 
     Attributes
@@ -96,21 +97,76 @@ class Matches(NamedTuple):
         return len(self.first)
 
 
-def match_features(
-    first: NDArray[Any],
-    second: NDArray[Any],
-    inside_first: Mask,
-    inside_second: Mask,
-    thresholds: FlowThresholds | None = None,
-) -> Matches:
-    """Features of one thing, found in two images.
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Features of one image: where, (N, 2) px, and their descriptors, (N, 128)."""
+
+    uv: Array
+    descriptors: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.uv)
+
+
+def find_features(image: NDArray[Any], inside: Mask, thresholds: FlowThresholds | None = None) -> Features:
+    """SIFT features of one thing in one image.
+
+    Parameters
+    ----------
+    image
+        (H, W) grey levels, counts or kelvin. They become 256 levels over the range of what is inside.
+    inside
+        (H, W) where the thing is: the filled object of a detector.
+    thresholds
+        None takes the default ones.
+
+    Returns
+    -------
+    Features
+        Each place once, also where a feature has two directions.
+
+    Raises
+    ------
+    WildlabError
+        Where the image is no grey image, or the mask has another size.
+    """
+    given = thresholds or FlowThresholds()
+    seen, mask = np.asarray(image), np.asarray(inside, bool)
+    if seen.ndim != 2 or seen.dtype.kind not in "uif":
+        raise WildlabError(
+            f"an image of the shape {seen.shape} and type {seen.dtype}",
+            "give a grey image: rows by columns of grey levels, counts or kelvin",
+            field="image",
+        )
+    if mask.shape != seen.shape:
+        raise WildlabError(
+            f"a mask of the shape {mask.shape} for an image of the shape {seen.shape}",
+            "give one value for each pixel",
+            field="inside",
+        )
+    none = Features(np.zeros((0, 2)), np.zeros((0, 128), np.float32))
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return none
+    top, left = max(int(rows[0]) - _MARGIN, 0), max(int(columns[0]) - _MARGIN, 0)
+    here = slice(top, int(rows[-1]) + _MARGIN + 1), slice(left, int(columns[-1]) + _MARGIN + 1)
+    sift = cv2.SIFT.create(contrastThreshold=given.contrast)
+    points, descriptors = sift.detectAndCompute(_grey(seen[here], mask[here]), mask[here].astype(np.uint8))
+    if not points:
+        return none
+    uv = np.array([point.pt for point in points], float)
+    _, once = np.unique(uv, axis=0, return_index=True)
+    once.sort()
+    return Features(uv[once] + [left, top], np.asarray(descriptors, np.float32)[once])
+
+
+def match_features(first: Features, second: Features, thresholds: FlowThresholds | None = None) -> Matches:
+    """The same features in two images.
 
     Parameters
     ----------
     first, second
-        (H, W) grey levels, counts or kelvin, alike in both.
-    inside_first, inside_second
-        (H, W) where the thing is: the filled objects of a detector.
+        From `find_features`.
     thresholds
         None takes the default ones.
 
@@ -119,26 +175,16 @@ def match_features(
     Matches
         None at all where fewer than ``fewest`` are left.
 
-    Raises
-    ------
-    WildlabError
-        Where an image is no grey image, or the sizes differ.
-
     Notes
     -----
     The search among the descriptors visits every leaf of the tree: the same pairs as by comparing all with
     all, and the same each time.
     """
     given = thresholds or FlowThresholds()
-    images = _checked(first, second, inside_first, inside_second)
-    grey = _grey(*images)
-    if grey is None:
+    if min(len(first), len(second)) < max(given.fewest, 2):
         return _none()
-    one, two = (_features(image, inside, given) for image, inside in zip(grey, images[2:], strict=True))
-    if min(len(one[0]), len(two[0])) < max(given.fewest, 2):
-        return _none()
-    here, there = nearest_by_ratio(one[1], two[1], given.ratio)
-    return agreeing(one[0][here], two[0][there], given)
+    here, there = nearest_by_ratio(first.descriptors, second.descriptors, given.ratio)
+    return agreeing(first.uv[here], second.uv[there], given)
 
 
 def filled_outlines(labels: NDArray[np.integer]) -> Mask:
@@ -268,62 +314,10 @@ def _none() -> Matches:
     return Matches(np.zeros((0, 2)), np.zeros((0, 2)), float("nan"))
 
 
-def _checked(
-    first: NDArray[Any], second: NDArray[Any], inside_first: Mask, inside_second: Mask
-) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask]:
-    images = np.asarray(first), np.asarray(second)
-    masks = np.asarray(inside_first, bool), np.asarray(inside_second, bool)
-    for image in images:
-        if image.ndim != 2 or image.dtype.kind not in "uif":
-            raise WildlabError(
-                f"an image of the shape {image.shape} and type {image.dtype}",
-                "give a grey image: rows by columns of grey levels, counts or kelvin",
-                field="image",
-            )
-    shapes = {one.shape for one in (*images, *masks)}
-    if len(shapes) > 1:
-        raise WildlabError(
-            f"images and masks of the shapes {', '.join(map(str, sorted(shapes)))}",
-            "give two images of one size, and masks that go with them",
-            field="inside",
-        )
-    return *images, *masks
-
-
-def _grey(
-    first: NDArray[Any], second: NDArray[Any], inside_first: Mask, inside_second: Mask
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]] | None:
-    """Both in the same 256 levels, over the range of what is inside; None where nothing is."""
-    if not (inside_first.any() and inside_second.any()):
-        return None
-    shown = np.concatenate([first[inside_first].ravel(), second[inside_second].ravel()]).astype(float)
-    shown = shown[np.isfinite(shown)]
-    if not len(shown):
-        return None
-    low, high = np.quantile(shown, [0.01, 0.99])
-    gain = 255.0 / max(high - low, 1e-6)
-    one, two = (
-        np.clip(np.rint((np.nan_to_num(image.astype(np.float32), nan=low) - low) * gain), 0, 255)
-        for image in (first, second)
-    )
-    return one.astype(np.uint8), two.astype(np.uint8)
-
-
-def _features(
-    image: NDArray[np.uint8], inside: Mask, thresholds: FlowThresholds
-) -> tuple[Array, NDArray[np.float32]]:
-    """SIFT features (N, 2) px within a mask, and their descriptors (N, 128)."""
-    rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-    top, left = max(int(rows[0]) - _MARGIN, 0), max(int(columns[0]) - _MARGIN, 0)
-    here = slice(top, int(rows[-1]) + _MARGIN + 1), slice(left, int(columns[-1]) + _MARGIN + 1)
-    sift = cv2.SIFT.create(contrastThreshold=thresholds.contrast)
-    points, descriptors = sift.detectAndCompute(
-        np.ascontiguousarray(image[here]), inside[here].astype(np.uint8)
-    )
-    if not points:
-        return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
-    # A feature with two directions comes twice, at the same place: once is enough.
-    uv = np.array([point.pt for point in points], float)
-    _, once = np.unique(uv, axis=0, return_index=True)
-    once.sort()
-    return uv[once] + [left, top], np.asarray(descriptors, np.float32)[once]
+def _grey(image: NDArray[Any], inside: Mask) -> NDArray[np.uint8]:
+    """In 256 levels, over the range of what is inside."""
+    values = image.astype(np.float32)
+    shown = values[inside & np.isfinite(values)]
+    low, high = np.quantile(shown, [0.01, 0.99]) if len(shown) else (0.0, 1.0)
+    grey = (np.nan_to_num(values, nan=float(low)) - low) * (255.0 / max(high - low, 1e-6))
+    return np.ascontiguousarray(np.clip(np.rint(grey), 0, 255).astype(np.uint8))

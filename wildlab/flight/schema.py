@@ -23,6 +23,8 @@ DETECTION_KINDS: dict[str, tuple[str, ...]] = {
     "bearing": ("azimuth_rad",),
     "range-bearing": ("azimuth_rad", "elevation_rad", "range_m"),
     "position": ("north_m", "east_m", "down_m"),
+    # From optical flow, between the image before and this one.
+    "velocity": ("v_north_m_s", "v_east_m_s"),
 }
 
 #: Upper triangle of the 6x6 pose covariance, row by row: cov_00, cov_01, ..., cov_55.
@@ -245,6 +247,11 @@ TABLES: dict[str, Table] = {
                 Column("elevation_rad", "float", "rad", "above the horizon", False, True, AROUND),
                 Column("range_m", "float", "m", "slant range", False, True, RANGE),
                 *_position("the detection", required=False, may_be_nan=True),
+                Column("v_north_m_s", "float", "m/s", "its velocity towards north", False, True, SPEED),
+                Column("v_east_m_s", "float", "m/s", "its velocity towards east", False, True, SPEED),
+                Column("v_cov_nn", "float", "m^2/s^2", "variance of that towards north", False, True),
+                Column("v_cov_ne", "float", "m^2/s^2", "covariance of both", False, True),
+                Column("v_cov_ee", "float", "m^2/s^2", "variance of that towards east", False, True),
                 Column("target_id", "text", "", "target it is of, empty = not known", False),
                 Column(
                     "plane_down_m", "float", "m", "down coordinate of the ground there", False, True, DOWN
@@ -255,6 +262,7 @@ TABLES: dict[str, Table] = {
                 Column("angle_rad", "float", "rad", "of the longer axis, from u towards v", False, True),
                 Column("touches_border", "float", "1", "1 if the image's edge cuts it, else 0", False, True),
             ),
+            (("v_cov_nn", "v_cov_ne", "v_cov_ee"),),
         ),
         Table(
             "truth",

@@ -235,3 +235,75 @@ def flow_errors(
         gimbal_rates=np.eye(2) * (np.radians(usual["gimbal_rate_deg_s"]) if moving else 0.0) ** 2,
         plane=stated["plane_height_m"] ** 2,
     )
+
+
+def velocity_detections(
+    flight: Flight, velocities: pd.DataFrame, source: str = "flow", target: str = ""
+) -> pd.DataFrame:
+    """Velocities as rows of a flight's table ``detections``, of the kind ``velocity``.
+
+    Parameters
+    ----------
+    flight
+        With the frames.
+    velocities
+        From `pair_velocities`; rows without a velocity are left out.
+    source
+        Who says so.
+    target
+        What it is of; empty is not known.
+
+    Returns
+    -------
+    DataFrame
+        Each belongs to the second image of its pair, with which it is known.
+    """
+    known = velocities.dropna(subset=["v_north_m_s", "v_east_m_s"])
+    names = flight.table("frames")["frame_id"].to_numpy()[known["second"].to_numpy(int)]
+    return pd.DataFrame(
+        {
+            "detection_id": [f"{source}-{name}" for name in names],
+            "frame_id": names,
+            "source": source,
+            "kind": "velocity",
+            "target_id": target,
+            "v_north_m_s": known["v_north_m_s"].to_numpy(float),
+            "v_east_m_s": known["v_east_m_s"].to_numpy(float),
+            "v_cov_nn": known["cov_nn"].to_numpy(float),
+            "v_cov_ne": known["cov_ne"].to_numpy(float),
+            "v_cov_ee": known["cov_ee"].to_numpy(float),
+        }
+    )
+
+
+def velocity_measurements(flight: Flight) -> tuple[Array, Array, Array]:
+    """The velocities among a flight's detections, for `wildlab.tracking.positions_or_velocities`.
+
+    Parameters
+    ----------
+    flight
+        With frames and detections.
+
+    Returns
+    -------
+    (times, velocities, R)
+        (N,) s in order, (N, 2) m/s and (N, 2, 2); none where there is no detection of that kind.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight has no frames or detections.
+    """
+    detections = flight.table("detections")
+    rows = detections[detections["kind"] == "velocity"]
+    if rows.empty:
+        return np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2))
+    at = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
+    times = np.where(at < 0, np.nan, frame_times(flight)[at])
+    order = np.argsort(times, kind="stable")[: int(np.isfinite(times).sum())]
+    rows = rows.iloc[order]
+    R = np.full((len(rows), 2, 2), np.nan)
+    if "v_cov_nn" in rows:
+        R[:, 0, 0], R[:, 1, 1] = rows["v_cov_nn"], rows["v_cov_ee"]
+        R[:, 0, 1] = R[:, 1, 0] = rows["v_cov_ne"]
+    return times[order], rows[["v_north_m_s", "v_east_m_s"]].to_numpy(float), R

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
@@ -48,6 +50,14 @@ class Look:
     glint_share: float = 0.5
     fittings: int = 0
     fitting_excess: float = 5.0
+
+
+class Window(NamedTuple):
+    """A part of an image: a camera that sees just that, and which rows and columns of the whole it is."""
+
+    camera: Camera
+    rows: slice
+    columns: slice
 
 
 class SceneFlight:
@@ -133,13 +143,46 @@ class SceneFlight:
             found.append(visible_part(outline + 0.5, camera.width, camera.height).area / whole)
         return np.array(found)
 
-    def view(self, exposure: int, *, waves_move: bool = True) -> View:
+    def view(self, exposure: int, *, waves_move: bool = True, camera: Camera | None = None) -> View:
         """The image of an exposure in kelvin, with its labels.
 
-        Waves that stand still are quicker, and as good for single images: each shows another place.
+        Waves that stand still are quicker, and as good for single images: each shows another place. With a
+        ``camera`` in place of the flight's, as `window` gives one, a part of the image.
         """
         pose, time = self.poses.take(exposure), float(self.times[exposure])
         # The vessels are where they are already: their own motion from time zero on must not be added.
         bodies = tuple(replace(body, speed=0.0) for body in self.bodies(exposure))
         scene = Scene(self.sea, bodies)
-        return render(scene, self.poses.camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
+        seen_by = camera or self.poses.camera
+        return render(scene, seen_by, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
+
+    def window(self, exposure: int, margin: int = 40) -> Window:
+        """The part of an image about all targets in it, which takes less time to render than the whole.
+
+        Parameters
+        ----------
+        exposure
+            Its number.
+        margin
+            How much of what is around is in it too, px.
+
+        Returns
+        -------
+        Window
+            The whole image where no target is in view.
+        """
+        pose, camera = self.poses.take(exposure), self.poses.camera
+        outlines = [outline_of(body, camera, pose.p_nc, pose.R_nc) for body in self.bodies(exposure)]
+        corners = np.concatenate([one for one in outlines if one is not None] or [np.zeros((0, 2))])
+        limits = np.array([camera.width, camera.height])
+        if not len(corners):
+            return Window(camera, slice(0, camera.height), slice(0, camera.width))
+        low = np.clip(np.floor(corners.min(axis=0)).astype(int) - margin, 0, limits)
+        high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + margin + 1, 0, limits)
+        if (low >= high).any():
+            low, high = np.zeros(2, int), limits
+        (left, top), (right, bottom) = low.tolist(), high.tolist()
+        part = replace(
+            camera, width=right - left, height=bottom - top, cx=camera.cx - left, cy=camera.cy - top
+        )
+        return Window(part, slice(top, bottom), slice(left, right))

@@ -87,21 +87,22 @@ def _over_time(ax: Axes, table: pd.DataFrame, column: str, colour: str, label: s
     times, values = table["time_s"].to_numpy(float), table[column].to_numpy(float)
     gaps = np.flatnonzero(np.diff(times) > 1.0) + 1
     broken = np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)
-    ax.plot(*broken, ".-", color=colour, label=label, lw=1.2, ms=3.5)
+    ax.plot(*broken, color=colour, label=label, lw=1.4)
 
 
 def flow_shown(table: pd.DataFrame) -> Shown:
     """Flow by the camera's motion beside measured flow: H figure 5.15."""
     fig, axes = new_figure(5.8, 4.8, rows=2, sharex=True)
-    said = []
+    said, sizes = [], []
     for ax, axis, name in zip(axes, "uv", ("horizontal", "vertical"), strict=True):
-        _over_time(ax, table, f"flow_{axis}", BLUE, "measured")
         _over_time(ax, table, f"camera_{axis}", VERMILLION, "by the camera's motion")
+        ax.plot(table["time_s"], table[f"flow_{axis}"], ".", color=BLUE, ms=4, label="measured")
         ax.set(ylabel=f"{name} (px/s)")
         both = table[[f"flow_{axis}", f"camera_{axis}"]].dropna().to_numpy(float)
-        said.append(f"{np.corrcoef(both.T)[0, 1]:.2f} {name}ly")
+        sizes.append(f"{np.corrcoef(both.T)[0, 1]:.2f}")
+        said.append(f"{sizes[-1]} {name}ly")
     axes[1].set(xlabel="time (s)")
-    axes[0].set_title("Measured flow and that of the camera correlate by " + " and ".join(said), fontsize=10)
+    axes[0].set_title(f"The two correlate by {' and '.join(sizes)}")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=2)
     return (
         fig, "flow", f"Flow over time, measured and by the camera's motion; correlations {', '.join(said)}.",
@@ -124,7 +125,7 @@ def velocity_shown(table: pd.DataFrame) -> Shown:
         ax.set(ylabel=f"{axis} (m/s)")
         said.append(f"{np.nanmean(v):.1f} m/s {axis} (SD {np.nanstd(v, ddof=1):.1f})")
     axes[1].set(xlabel="time (s)")
-    axes[0].set_title("Mean " + ", ".join(said), fontsize=10)
+    axes[0].set_title("Mean " + ", ".join(one.partition(" (")[0] for one in said))
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return (
         fig, "velocity", f"Velocities of single pairs over time; means {', '.join(said)}.",
@@ -143,6 +144,6 @@ def readings_shown(spread: pd.DataFrame) -> Shown:
     ax.set_yticks(range(len(shown)), [words.NAMES[one] for one in shown])
     ax.set(xlabel="standard deviation along an axis (m/s)", ylim=(len(shown) - 0.4, -0.6))
     ax.set_xlim(0, 1.15 * max(sizes))
-    ax.set_title(f"{sizes[0]:.1f} m/s as logged, {sizes[-1]:.1f} m/s with exact poses")
+    ax.set_title(f"{sizes[0]:.1f} m/s, with exact poses {sizes[-1]:.1f} m/s")
     said = ", ".join(f"{words.NAMES[one]} {value:.1f} m/s" for one, value in zip(shown, sizes, strict=True))
     return fig, "readings", f"Standard deviation of a velocity: {said}.", "Medians over flights."

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.detection.floating import find_objects
-from wildlab.detection.flow import filled_outlines, match_features
+from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
@@ -23,7 +23,7 @@ from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import Look, SceneFlight
-from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 
 #: Images of the flight.
@@ -137,21 +137,25 @@ def look(twin: str, seed: int, pairs: int) -> Looked:
     rows = stretches((shares[:-1] > 0) & (shares[1:] > 0), pairs)
     camera, response = scene.poses.camera, CameraResponse()
     sensor = sensor_of(response, (camera.height, camera.width), stream(seed, f"sensor of {twin}"))
-    seen: dict[int, tuple[NDArray[np.uint16], NDArray[np.bool_]]] = {}
+    known: dict[int, Features] = {}
 
-    def image(row: int) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
-        """Counts, and where the detector has anything that floats; kept until the next pair."""
-        if row not in seen:
-            kelvin = scene.view(row, waves_move=False).kelvin
-            counts = expose(kelvin, response, sensor, stream(seed, f"image {row} of {twin}"))
-            seen[row] = counts, filled_outlines(find_objects(counts).labels)
-        return seen[row]
+    def features(row: int) -> Features:
+        """Of the ship in an image, where the detector has anything that floats; kept for the next pair."""
+        if row not in known:
+            part = scene.window(row)
+            here = part.rows, part.columns
+            kelvin = scene.view(row, waves_move=False, camera=part.camera).kelvin
+            own = Sensor(sensor.offset[here], sensor.dead[here], sensor.stuck[here])
+            counts = expose(kelvin, response, own, stream(seed, f"image {row} of {twin}"))
+            found = find_features(counts, filled_outlines(find_objects(counts).labels))
+            corner = np.array([part.columns.start, part.rows.start])
+            known[row] = Features(found.uv + corner, found.descriptors)
+        return known[row]
 
-    found = []
-    for row in rows:
-        (one, inside_one), (two, inside_two) = image(int(row)), image(int(row) + 1)
-        seen.pop(int(row))
-        found.append(FramePair(int(row), int(row) + 1, match_features(one, two, inside_one, inside_two)))
+    found = [
+        FramePair(int(row), int(row) + 1, match_features(features(int(row)), features(int(row) + 1)))
+        for row in rows
+    ]
     with_some = [pair for pair in found if len(pair.matches)]
     if len(with_some) < 5:
         raise WildlabError(
