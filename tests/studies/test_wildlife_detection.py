@@ -26,7 +26,7 @@ from wildlab.simulation.scene import (
 )
 from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
 from wildlab.simulation.scene.response import expose
-from wildlab.studies.wildlife_detection import STUDY, charts, claims, sweeps, text, trial
+from wildlab.studies.wildlife_detection import STUDY, charts, claims, text, trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_MEAN,
@@ -336,12 +336,22 @@ def test_printed_settings_are_the_theses():
 
 def test_a_window_of_another_width_has_the_same_middle():
     picture = picture_of(rhino())
-    wide = sweeps.with_window(picture, 2 * trial.WINDOW)
+    wide = trial.with_window(picture, 2 * trial.WINDOW)
     assert np.isclose(sum(wide.window), sum(picture.window))
     assert np.isclose(np.ptp(wide.window), 2 * np.ptp(picture.window))
     assert wide.grey.max() < picture.grey.max()
-    assert sweeps.f1_of([picture], CONSTANT, "floor") == 1
-    assert sweeps.f1_of([sweeps.with_window(picture, 20.0)], CONSTANT, "floor") == 0
+    faint = trial.with_window(picture, 20.0)
+    assert judge(faint, find(faint, METHODS[CONSTANT])).counts.tolist() == [0, 0, 1]
+
+
+def test_widths_are_told_apart(numbers):
+    spread = spread_of(numbers)
+    for height in trial.READ_AT:
+        spread[trial.read_subject(SUBTRACTED, "offset", 3.0), f"missed_{height}"] = 8.0
+    spread[trial.read_subject(ADAPTIVE, "floor", 1.0), "invented_after"] = 8.0
+    table = claims.over_windows(spread).set_index(["width", "reading"])
+    assert table.loc[(3.0, "offset"), SUBTRACTED] == 0.5 == table.loc[(1.0, "floor"), "after"]
+    assert (table.drop(index=[(3.0, "offset")])[SUBTRACTED] == 1).all()
 
 
 def test_words_on_windows_turn():

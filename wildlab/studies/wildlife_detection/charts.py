@@ -139,8 +139,8 @@ def blocks_shown(picture: Picture, kind: Literal["floor", "offset"], level: floa
     return (
         fig, f"blocks-{kind}-{level:g}",
         f"One animal after an adaptive threshold, {words.level_words(kind, level)}. {'; '.join(said)}.",
-        f"White: {words.level_words(kind, level)}; F prints no level for these. Counterpart of F figures 7.7 and "
-        "7.8.",
+        f"White: {words.level_words(kind, level)}; F prints no level for these. Counterpart of F figures 7.7 "
+        "and 7.8.",
     )  # fmt: skip
 
 

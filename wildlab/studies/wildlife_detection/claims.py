@@ -25,10 +25,15 @@ from wildlab.studies.wildlife_detection.trial import (
     NIGHT,
     NOON,
     NOT_HOT,
+    PRINTED,
+    READ_AT,
     SMALL,
     SUBTRACTED,
+    TRIED,
     VIEWS,
     WEATHERS,
+    WIDTHS,
+    read_subject,
 )
 
 Array = NDArray[np.float64]
@@ -83,6 +88,35 @@ def f1(counts: Array) -> Array:
 def _recall(counts: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(counts[:, 0] / (counts[:, 0] + counts[:, 2]))
+
+
+def over_windows(spread: pd.DataFrame) -> pd.DataFrame:
+    """The printed settings with windows of several widths, over all seeds.
+
+    Parameters
+    ----------
+    spread
+        One row for each seed.
+
+    Returns
+    -------
+    DataFrame
+        ``width``, ``reading``; F1 of each of `PRINTED` under clouds, and of `ADAPTIVE` in the sequence
+        ``before`` and ``after`` the sun came out.
+    """
+    at = [str(height) for height in READ_AT]
+    rows = []
+    for width in WIDTHS:
+        for reading in TRIED:
+            row: dict[str, object] = {"width": width, "reading": reading}
+            for method in PRINTED:
+                counts = counts_of(spread, read_subject(method, reading, width), at)
+                row[method] = float(f1(counts.sum(axis=0)[None])[0])
+            for when in ("before", "after"):
+                counts = counts_of(spread, read_subject(ADAPTIVE, reading, width), [when])
+                row[when] = float(f1(counts.sum(axis=0)[None])[0])
+            rows.append(row)
+    return pd.DataFrame(rows)
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:

@@ -33,6 +33,7 @@ from wildlab.studies.wildlife_detection.trial import (
     SUBTRACTED,
     VIEWS,
     WEATHERS,
+    read_subject,
 )
 
 NAMES = {
@@ -191,7 +192,7 @@ def change_words(spread: pd.DataFrame) -> str:
 def best_of(spread: pd.DataFrame, method: str) -> tuple[str, float]:
     """The reading with the largest F1 of one printed setting, and that."""
     at = [str(height) for height in READ_AT]
-    every = {one: rates_of(spread, f"{method}-{one}", at).f1.estimate for one in READINGS}
+    every = {one: rates_of(spread, read_subject(method, one), at).f1.estimate for one in READINGS}
     name = max(every, key=lambda one: np.nan_to_num(every[one]))
     return name, every[name]
 
@@ -199,12 +200,12 @@ def best_of(spread: pd.DataFrame, method: str) -> tuple[str, float]:
 def best_reading(spread: pd.DataFrame) -> tuple[str, float]:
     """The reading with the largest mean F1 over the printed settings, and that."""
     at = [str(height) for height in READ_AT]
-    means = {
-        reading: float(
-            np.mean([np.nan_to_num(rates_of(spread, f"{one}-{reading}", at).f1.estimate) for one in PRINTED])
-        )
-        for reading in READINGS
-    }
+
+    def mean(reading: str) -> float:
+        found = [rates_of(spread, read_subject(one, reading), at).f1.estimate for one in PRINTED]
+        return float(np.mean(np.nan_to_num(found)))
+
+    means = {reading: mean(reading) for reading in READINGS}
     name = max(means, key=lambda one: means[one])
     return name, means[name]
 
@@ -216,10 +217,10 @@ def readings_table(spread: pd.DataFrame) -> pd.DataFrame:
     for reading in READINGS:
         row: dict[str, object] = {"reading": READ_AS[reading]}
         for method in PRINTED:
-            found = rates_of(spread, f"{method}-{reading}", at)
+            found = rates_of(spread, read_subject(method, reading), at)
             row[method] = ranged(found.f1)
         for when in ("before", "after"):
-            row[when] = ranged(rates_of(spread, f"{ADAPTIVE}-{reading}", [when]).f1)
+            row[when] = ranged(rates_of(spread, read_subject(ADAPTIVE, reading), [when]).f1)
         rows.append(row)
     return pd.DataFrame(rows)
 

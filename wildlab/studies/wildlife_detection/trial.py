@@ -97,6 +97,8 @@ AREA = (0.2, 8.0)
 HOTTEST = 310.15
 #: How wide the operator's window is, as a multiple of what animals have over the ground, and at least, K.
 WINDOW, LEAST_WINDOW = 2.0, 8.0
+#: Other widths, and the readings that are tried with them: F 3.1 leaves them to whoever stands in the field.
+WIDTHS, TRIED = (1.0, 1.5, 2.0, 3.0), ("floor", "offset")
 #: Of an animal that is to be found this share must show.
 SHOWN = 0.25
 #: A detection is no animal's that is so many times larger, or further from it than so many px.
@@ -194,6 +196,18 @@ def find(picture: Picture, thresholds: Warm) -> Detections:
     if np.isinf(thresholds.hottest):
         return find_warm(picture.grey, picture.view.ground, thresholds)
     return find_warm(picture.counts, picture.view.ground, replace(thresholds, window=picture.window))
+
+
+def with_window(picture: Picture, width: float) -> Picture:
+    """The same picture, its window about the same middle and so many times what animals have over the ground"""
+    low, high = picture.window
+    middle, half = (low + high) / 2, (high - low) / 2 * width / WINDOW
+    return replace(picture, window=(middle - half, middle + half))
+
+
+def read_subject(method: str, reading: str, width: float = WINDOW) -> str:
+    """What a setting in a reading, with a window of that width, is called in the numbers."""
+    return f"{method}-{reading}" if width == WINDOW else f"{method}-{reading}-{width:g}"
 
 
 def proposed(name: str, picture: Picture, camera: Camera, response: CameraResponse) -> Warm:
@@ -332,14 +346,20 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
     for name, picture in zip(("before", "after"), pictures.sequence, strict=True):
         for method in (CONSTANT, *PRINTED, BY_MEAN, BY_MEDIAN):
             tally(method, name, picture, METHODS[method])
-        for reading in READINGS:
-            tally(f"{ADAPTIVE}-{reading}", name, picture, read_as(METHODS[ADAPTIVE], reading))
         numbers["ground", f"level_{name}"] = float(np.median(picture.grey[picture.view.labels == 0]))
-    for method in PRINTED:
-        for reading in READINGS:
-            thresholds = read_as(METHODS[method], reading)
-            for height in READ_AT:
-                tally(f"{method}-{reading}", f"{height}", pictures.plain[CLOUDY, height], thresholds)
+    read = {str(height): pictures.plain[CLOUDY, height] for height in READ_AT}
+    sequence = dict(zip(("before", "after"), pictures.sequence, strict=True))
+    for width in WIDTHS:
+        shown, changed = (
+            {at: with_window(one, width) for at, one in own.items()} for own in (read, sequence)
+        )
+        for reading in READINGS if width == WINDOW else TRIED:
+            for method in PRINTED:
+                of = shown | changed if method == ADAPTIVE else shown
+                for at, picture in of.items():
+                    tally(
+                        read_subject(method, reading, width), at, picture, read_as(METHODS[method], reading)
+                    )
     near = pictures.plain[CLOUDY, min(VIEWS)]
     for method in (SMALL, LARGE):
         for kind, level in PIECES:
