@@ -199,7 +199,7 @@ def find(picture: Picture, thresholds: Warm) -> Detections:
 
 
 def with_window(picture: Picture, width: float) -> Picture:
-    """The same picture, its window about the same middle and so many times what animals have over the ground"""
+    """The same picture; its window has the same middle, and is ``width`` times animals' excess wide."""
     low, high = picture.window
     middle, half = (low + high) / 2, (high - low) / 2 * width / WINDOW
     return replace(picture, window=(middle - half, middle + half))
