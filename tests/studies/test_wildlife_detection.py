@@ -246,6 +246,13 @@ def test_claims_turn(numbers):
     assert clear["combinations-best"]
 
 
+def test_false_alarms_are_not_fewer_than_none(numbers):
+    spread = spread_of(numbers)
+    spread.loc[0, [(CONSTANT, "invented_noon_15")]] = 9.0
+    found = claims.false_alarms(spread, CONSTANT, claims.places([NOON]))
+    assert found.low == 0 < found.estimate == pytest.approx(9 / 36) < found.high
+
+
 def test_a_premise_that_is_not_met_decides_nothing(numbers):
     still = spread_of(numbers, ground__level_after=62.0)
     assert not claims.check_claims(still)["constant-fails"].premise.any()
@@ -361,7 +368,9 @@ def test_words_on_windows_turn():
     assert "the level” with 1 times (0.58)" in words and "by the level” with 2 times (0.88)" in words
     assert "copes when the sun comes out: F1 goes from 0.90 to 0.80" in words
     rows[1] = (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.5)
-    assert "does not cope" in text.windows_words(pd.DataFrame(rows, columns=names))
+    rows.append((2.0, "floor", 0.1, 0.1, 0.1, 0.7, 0.2))
+    worse = text.windows_words(pd.DataFrame(rows, columns=names))
+    assert "does not cope" in worse and worse.endswith("read the other way, from 0.70 to 0.20.")
     assert "taken" not in text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
 
 

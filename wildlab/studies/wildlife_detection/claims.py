@@ -63,11 +63,12 @@ def rates_of(spread: pd.DataFrame, subject: str, at: Sequence[str]) -> Rates:
 
 
 def false_alarms(spread: pd.DataFrame, subject: str, at: Sequence[str]) -> Interval:
-    """How many an image, with the interval of the mean."""
+    """How many an image, with the interval of the mean, which ends at zero."""
     invented = counts_of(spread, subject, at)[:, 1]
     if len(invented) < 2:
         return Interval(float(invented.mean()) if len(invented) else np.nan, np.nan, np.nan)
-    return mean_interval(invented)
+    found = mean_interval(invented)
+    return Interval(found.estimate, max(found.low, 0.0), found.high)
 
 
 def _by_seed(spread: pd.DataFrame, subject: str, at: Sequence[str]) -> Array:

@@ -247,11 +247,15 @@ def windows_words(windows: pd.DataFrame) -> str:
     ]
     fall = float(best["before"] - best["after"])
     copes = "copes" if fall < FALL else "does not cope"
+    same = windows[(windows["width"] == best["width"]) & (windows["reading"] != best["reading"])]
+    beside = "".join(
+        f"; read the other way, from {row.before:.2f} to {row.after:.2f}" for row in same.itertuples()
+    )
     return (
         "The window's width was chosen, and the levels hang on it. The mean F1 of the printed settings and "
         f"of the sequence is largest for {'; for '.join(rivals)} the difference between animals and ground. "
         f"With the best of them the adaptive threshold {copes} when the sun comes out: F1 goes from "
-        f"{best['before']:.2f} to {best['after']:.2f}."
+        f"{best['before']:.2f} to {best['after']:.2f}{beside}."
     )
 
 
