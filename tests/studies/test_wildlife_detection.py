@@ -107,8 +107,8 @@ def test_a_detection_much_larger_than_the_animal_is_not_of_it():
 
 def test_readings_are_what_they_are_called():
     base = METHODS[SUBTRACTED]
-    assert read_as(base, "floor") == base
-    assert read_as(base, "offset").level_is == "offset"
+    assert read_as(base, "offset") == base
+    assert read_as(base, "floor").level_is == "floor"
     assert read_as(base, "white").level == 0
     assert read_as(base, "off-mean").level == -65
     # Taken off the mean, everything is above.
@@ -178,7 +178,7 @@ def test_a_seed_has_all_numbers(numbers):
     for subject in (*METHODS, *PROPOSED):
         at = claims.places([CLOUDY])
         assert claims.counts_of(spread, subject, at).shape == (9, 3)
-    assert not claims.counts_of(spread, SMALL, claims.places([NIGHT])).size
+    assert not claims.counts_of(spread, SMALL, ["never"]).size
     assert STUDY.metric_of("herd", "mean_rise") is not None
     assert STUDY.metric_of(CONSTANT, "found_night_15") is None
 
@@ -246,6 +246,14 @@ def test_claims_turn(numbers):
     assert clear["combinations-best"]
 
 
+def test_false_alarms_are_not_fewer_than_none(numbers):
+    spread = spread_of(numbers)
+    spread.loc[0, [(CONSTANT, "invented_noon_15")]] = 9.0
+    found = claims.false_alarms(spread, CONSTANT, claims.places([NOON]))
+    assert found.estimate == pytest.approx(9 / 36)
+    assert found.low == 0 and found.high > found.estimate
+
+
 def test_a_premise_that_is_not_met_decides_nothing(numbers):
     still = spread_of(numbers, ground__level_after=62.0)
     assert not claims.check_claims(still)["constant-fails"].premise.any()
@@ -271,15 +279,23 @@ def test_the_reading_is_that_with_the_largest_rates(numbers):
                 spread[f"{method}-{one}", f"missed_{height}"] = 0.0 if one == "offset" else 9.0
     assert text.best_reading(spread) == ("offset", 1.0)
     assert text.readings_words(spread).count("above the mean of its block by the level") == 3
+    assert "fits the pictures best as “above the mean of its block by" in text.summary(spread)[2]
+    for height in trial.READ_AT:
+        spread[f"{ADAPTIVE}-offset", f"missed_{height}"] = 9.0
+        spread[f"{ADAPTIVE}-floor", f"missed_{height}"] = 0.0
+    assert "figure 7.10a as “above the mean of its block by the level”" in text.summary(spread)[2]
     assert len(text.readings_table(spread)) == 4
 
 
 def test_words_on_pieces_herd_and_sun_turn(numbers):
-    whole = text.pieces_words(spread_of(numbers))
-    assert "1.0 detections an animal, more than one on 0 of 12" in whole
-    split = text.pieces_words(spread_of(numbers, adaptive_51__pieces=2.5, adaptive_251__pieces=np.nan))
-    assert "2.5 detections an animal, more than one on 12 of 12" in split
-    assert "no such animal found" in split
+    assert "With no reading of it" in text.pieces_words(spread_of(numbers))
+    split = spread_of(numbers, adaptive_51__pieces_offset=2.5, adaptive_51__pieces_floor_0=np.nan)
+    assert "12 of 12 images with “above the mean of the block by 65”" in text.pieces_words(split)
+    table = text.pieces_table(split).set_index("reading")
+    assert table.loc["above the mean of the block by 65", "small"] == "2.50"
+    assert table["seeds"].tolist() == [12, 12, 0]
+    more = spread_of(numbers, adaptive_51__pieces=2.5)
+    assert "with more than one reading" in text.pieces_words(more)
     assert "the median finds no more" in text.herd_words(spread_of(numbers))
     blind = spread_of(numbers, mean_constant__missed_herd=4.0)
     assert "the median finds 50 in a hundred more" in text.herd_words(blind)
@@ -288,7 +304,7 @@ def test_words_on_pieces_herd_and_sun_turn(numbers):
 
 def test_tables_have_a_row_for_each_method_and_weather(numbers):
     table = text.rates_table(spread_of(numbers), (CONSTANT, SMALL), text.by_weather())
-    assert len(table) == 5  # without a level only under clouds
+    assert len(table) == 8
     assert set(table["images"]) == {36}
     assert len(text.rates_table(spread_of(numbers), (BY_MEDIAN, BY_MEAN), text.by_height())) == 6
     assert text.chosen_table()["reason"].str.len().min() > 10
@@ -305,7 +321,7 @@ def test_charts_say_what_they_show(numbers):
         "sun out: 0 of 2 found"
         in charts.sequence_shown(picture, picture_of(rhino(0, -4), rhino(0, 4), window=(50.0, 90.0)))[2]
     )
-    assert "detection" in charts.blocks_shown(picture, 150.0)[2]
+    assert "detection" in charts.blocks_shown(picture, "floor", 150.0)[2]
     bad = spread_of(numbers, constant__missed_noon=12.0, constant__invented_morning=7.0)
     recall, false = charts.by_weather_shown(bad)
     assert "constant 150 100 %, 100 %, 25 %, 100 %" in recall[2]
@@ -324,3 +340,42 @@ def test_printed_settings_are_the_theses():
         "enhance", 251, 160,
     )  # fmt: skip
     assert all(isinstance(one, Warm) and one.smallest_px == trial.SMALLEST for one in METHODS.values())
+
+
+def test_a_window_of_another_width_has_the_same_middle():
+    picture = picture_of(rhino())
+    wide = trial.with_window(picture, 2 * trial.WINDOW)
+    assert np.isclose(sum(wide.window), sum(picture.window))
+    assert np.isclose(np.ptp(wide.window), 2 * np.ptp(picture.window))
+    assert wide.grey.max() < picture.grey.max()
+    faint = trial.with_window(picture, 20.0)
+    assert judge(faint, find(faint, METHODS[CONSTANT])).counts.tolist() == [0, 0, 1]
+
+
+def test_widths_are_told_apart(numbers):
+    spread = spread_of(numbers)
+    for height in trial.READ_AT:
+        spread[trial.read_subject(SUBTRACTED, "offset", 3.0), f"missed_{height}"] = 8.0
+    spread[trial.read_subject(ADAPTIVE, "floor", 1.0), "invented_after"] = 8.0
+    table = claims.over_windows(spread).set_index(["width", "reading"])
+    assert table.loc[(3.0, "offset"), SUBTRACTED] == 0.5 == table.loc[(1.0, "floor"), "after"]
+    assert (table.drop(index=[(3.0, "offset")])[SUBTRACTED] == 1).all()
+
+
+def test_words_on_windows_turn():
+    names = ["width", "reading", *PRINTED, "before", "after"]
+    rows = [(1.0, "floor", 0.5, 0.5, 0.5, 0.9, 0.5), (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.8)]
+    words = text.windows_words(pd.DataFrame(rows, columns=names))
+    assert "the level” with 1 times (0.58)" in words and "by the level” with 2 times (0.88)" in words
+    assert "copes when the sun comes out: F1 goes from 0.90 to 0.80" in words
+    rows[1] = (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.5)
+    rows.append((2.0, "floor", 0.1, 0.1, 0.1, 0.7, 0.2))
+    worse = text.windows_words(pd.DataFrame(rows, columns=names))
+    assert "does not cope" in worse and worse.endswith("read the other way, from 0.70 to 0.20.")
+    assert "taken" not in text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
+
+
+def test_settings_say_where_they_are_printed():
+    table = text.settings_table().set_index("method")
+    assert table.loc["constant, 150", "level"] == "150" and "by the level" in table.loc["adaptive 51", "read"]
+    assert table["source"].str.startswith("F ").all()

@@ -21,6 +21,8 @@ from wildlab.simulation.scene.ground import ROCK, SHADOW_DEPTH, Cover, Weather
 BLOOD = 310.15
 #: Of a tree's leaves, which transpire.
 LEAVES = Cover(heating=4.0, cooling=0.5, lag=0.3, texture_sd=0.3)
+#: How much of its height an animal's trunk has, from the belly up; the rest is legs.
+_BELLY_TO_BACK = 0.65
 #: What the sun adds to an animal's back, K, for a sun straight above.
 SUNNED = 4.0
 
@@ -92,16 +94,25 @@ def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
     skin = k.bare * (BLOOD - weather.air) + sun
     uneven = 0.06 * k.bare * (BLOOD - weather.air)
     front = k.length / 2
-    trunk = _oval(k.length, k.width)
-    head = _oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.3 * k.head * k.length, corners=8)
-    tail = _oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.06 * k.length, corners=4)
+    head = _oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.2 * k.head * k.length, corners=8)
+    tail = _oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.05 * k.length, corners=4)
     shoulders = Hot(0.2 * k.length, 0.0, 0.3 * k.width, 0.12 * skin)
-    layers = (
-        Layer(trunk, 0.6 * k.height, 0.9 * skin, uneven, 0.2 * k.length),
-        Layer(tail, 0.8 * k.height, 0.5 * skin),
-        Layer(head, 0.9 * k.height, 0.75 * skin, uneven, 0.1 * k.length),
-        Layer(_oval(0.9 * k.length, 0.7 * k.width), k.height, skin, uneven, 0.2 * k.length, (shoulders,)),
+    # The trunk in as many levels that a camera 60 degrees aside sees no ground between them.
+    levels = int(np.ceil(_BELLY_TO_BACK * k.height * np.tan(np.radians(60)) / (0.6 * k.width)))
+    trunk = []
+    for share in np.linspace(0.0, 1.0, levels):
+        slim = 1 - 0.2 * share**2
+        outline = _oval(slim * k.length, slim * k.width)
+        high = (1 - _BELLY_TO_BACK * (1 - share)) * k.height
+        hot = (shoulders,) if share == 1 else ()
+        trunk.append(
+            Layer(outline, float(high), float(0.85 + 0.15 * share) * skin, uneven, 0.2 * k.length, hot)
+        )
+    ends = (
+        Layer(tail, 0.65 * k.height, 0.5 * skin),
+        Layer(head, 0.65 * k.height, 0.75 * skin, uneven, 0.1 * k.length),
     )
+    layers = tuple(sorted((*ends, *trunk), key=lambda layer: layer.height))
     return Body(kind, layers, texture_seed=seed)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -120,14 +120,14 @@ def sequence_shown(before: Picture, after: Picture) -> Shown:
     )  # fmt: skip
 
 
-def blocks_shown(picture: Picture, level: float) -> Shown:
+def blocks_shown(picture: Picture, kind: Literal["floor", "offset"], level: float) -> Shown:
     """The largest animal with the small and the large block (F figures 7.7, 7.8)."""
     number = max(picture.animals, key=lambda one: picture.animals[one])
     v, u = np.nonzero(picture.view.labels == number)
     fig, axes = new_figure(5.6, 2.9, rows=1, columns=2)
     said = []
     for ax, method in zip(axes.flat, (SMALL, LARGE), strict=True):
-        thresholds = replace(METHODS[method], level=level)
+        thresholds = replace(METHODS[method], level=level, level_is=kind)
         _panel(ax, above(picture, thresholds), "")
         judged = _boxes(ax, picture, thresholds, frame=False)
         count = len(judged.rows[number])
@@ -137,9 +137,10 @@ def blocks_shown(picture: Picture, level: float) -> Shown:
         ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] + half, middle[1] - half))
         said.append(f"{_SHORT[method]}: {one}")
     return (
-        fig, f"blocks-{level:g}",
-        f"One animal after an adaptive threshold, level {level:g}. {'; '.join(said)}.",
-        f"A level of {level:g}; F prints none for these. Counterpart of F figures 7.7 and 7.8.",
+        fig, f"blocks-{kind}-{level:g}",
+        f"One animal after an adaptive threshold, {words.level_words(kind, level)}. {'; '.join(said)}.",
+        f"White: {words.level_words(kind, level)}; F prints no level for these. Counterpart of F figures 7.7 "
+        "and 7.8.",
     )  # fmt: skip
 
 

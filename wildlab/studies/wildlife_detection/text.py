@@ -20,10 +20,12 @@ from wildlab.studies.wildlife_detection.trial import (
     CONSTANT,
     ENHANCED,
     LARGE,
+    METHODS,
     MORNING,
     NIGHT,
     NOON,
     NOT_HOT,
+    PIECES,
     PRINTED,
     READ_AT,
     READINGS,
@@ -31,6 +33,7 @@ from wildlab.studies.wildlife_detection.trial import (
     SUBTRACTED,
     VIEWS,
     WEATHERS,
+    read_subject,
 )
 
 NAMES = {
@@ -65,6 +68,8 @@ READ_AS = {
     "white": "the grey of what is found (OpenCV's maxValue): above the mean of its block",
     "off-mean": "taken off the mean (OpenCV's C)",
 }
+#: F1 falls by a fifth: as for the claims.
+FALL = 0.2
 FIGURE = {ADAPTIVE: "7.6: size 451, val 150", SUBTRACTED: "7.10a: level 65", ENHANCED: "7.10b: level 160"}
 
 METHOD = r"""Rendered thermal images of land: rolling ground with grass, sand and rock under the sun of the
@@ -146,12 +151,20 @@ def summary(spread: pd.DataFrame) -> list[str]:
         else f"a sunny noon is no worse ({noon[1].f1.estimate:.2f}, {NAMES[noon[0]]})"
     )
     reading, value = best_reading(spread)
+    first, second = (FIGURE[one].split(":")[0] for one in (ADAPTIVE, SUBTRACTED))
+    best = {one: best_of(spread, one)[0] for one in (ADAPTIVE, SUBTRACTED)}
+    level = (
+        f"The undefined “level” of an adaptive threshold fits the pictures best as “{READ_AS[reading]}”: a "
+        f"mean F1 of {value:.2f} over the printed settings."
+        if best[ADAPTIVE] == best[SUBTRACTED]
+        else f"The undefined number of an adaptive threshold fits figure {first} best as “"
+        f"{READ_AS[best[ADAPTIVE]]}”, and figure {second} as “{READ_AS[best[SUBTRACTED]]}”."
+    )
     return [
         f"On a clear night the best of the thesis's settings has an F1 of {night[1].f1.estimate:.2f} "
         f"({NAMES[night[0]]}); {worse}.",
         change_words(spread),
-        f"Of the readings of an undefined “level”, “{READ_AS[reading]}” gives the pictures' sense most: a "
-        f"mean F1 of {value:.2f} over the three printed settings.",
+        level,
     ]
 
 
@@ -176,15 +189,23 @@ def change_words(spread: pd.DataFrame) -> str:
     return f"When the sun comes out, the ground rises by {rise:.0f} grey levels, and F1 goes: {said}; {both}."
 
 
+def best_of(spread: pd.DataFrame, method: str) -> tuple[str, float]:
+    """The reading with the largest F1 of one printed setting, and that."""
+    at = [str(height) for height in READ_AT]
+    every = {one: rates_of(spread, read_subject(method, one), at).f1.estimate for one in READINGS}
+    name = max(every, key=lambda one: np.nan_to_num(every[one]))
+    return name, every[name]
+
+
 def best_reading(spread: pd.DataFrame) -> tuple[str, float]:
     """The reading with the largest mean F1 over the printed settings, and that."""
     at = [str(height) for height in READ_AT]
-    means = {
-        reading: float(
-            np.mean([np.nan_to_num(rates_of(spread, f"{one}-{reading}", at).f1.estimate) for one in PRINTED])
-        )
-        for reading in READINGS
-    }
+
+    def mean(reading: str) -> float:
+        found = [rates_of(spread, read_subject(one, reading), at).f1.estimate for one in PRINTED]
+        return float(np.mean(np.nan_to_num(found)))
+
+    means = {reading: mean(reading) for reading in READINGS}
     name = max(means, key=lambda one: means[one])
     return name, means[name]
 
@@ -196,43 +217,101 @@ def readings_table(spread: pd.DataFrame) -> pd.DataFrame:
     for reading in READINGS:
         row: dict[str, object] = {"reading": READ_AS[reading]}
         for method in PRINTED:
-            found = rates_of(spread, f"{method}-{reading}", at)
+            found = rates_of(spread, read_subject(method, reading), at)
             row[method] = ranged(found.f1)
         for when in ("before", "after"):
-            row[when] = ranged(rates_of(spread, f"{ADAPTIVE}-{reading}", [when]).f1)
+            row[when] = ranged(rates_of(spread, read_subject(ADAPTIVE, reading), [when]).f1)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def readings_words(spread: pd.DataFrame) -> str:
     """Which reading gives what F's pictures show, figure by figure."""
-    at = [str(height) for height in READ_AT]
     parts = []
     for method in PRINTED:
-        every = {one: rates_of(spread, f"{method}-{one}", at).f1.estimate for one in READINGS}
-        best = max(every, key=lambda one: np.nan_to_num(every[one]))
-        parts.append(f"figure {FIGURE[method]}: “{READ_AS[best]}” (F1 {every[best]:.2f})")
+        best, value = best_of(spread, method)
+        parts.append(f"figure {FIGURE[method]}: “{READ_AS[best]}” (F1 {value:.2f})")
     return (
         "The thesis does not define the level of an adaptive threshold. What finds the animals best under "
         "clouds, as its pictures have it, is, for " + "; for ".join(parts) + "."
     )
 
 
+def windows_words(windows: pd.DataFrame) -> str:
+    """Which width and reading do best in what F's pictures show, and whether the adaptive one then copes."""
+    sense = windows[[*PRINTED, "before", "after"]].fillna(0.0).mean(axis=1)
+    best = windows.loc[sense.idxmax()]
+    rivals = [
+        f"“{READ_AS[str(reading)]}” with {windows.loc[own.idxmax(), 'width']:g} times ({own.max():.2f})"
+        for reading, own in sense.groupby(windows["reading"])
+    ]
+    fall = float(best["before"] - best["after"])
+    copes = "copes" if fall < FALL else "does not cope"
+    same = windows[(windows["width"] == best["width"]) & (windows["reading"] != best["reading"])]
+    beside = "".join(
+        f"; read the other way, from {row.before:.2f} to {row.after:.2f}" for row in same.itertuples()
+    )
+    return (
+        "The window's width was chosen, and the levels hang on it. The mean F1 of the printed settings and "
+        f"of the sequence is largest for {'; for '.join(rivals)} the difference between animals and ground. "
+        f"With the best of them the adaptive threshold {copes} when the sun comes out: F1 goes from "
+        f"{best['before']:.2f} to {best['after']:.2f}{beside}."
+    )
+
+
+def windows_table(windows: pd.DataFrame) -> pd.DataFrame:
+    """The same as a table, readings in words."""
+    return windows.assign(reading=windows["reading"].map(READ_AS))
+
+
+def _pieces(spread: pd.DataFrame, kind: str, level: float) -> tuple[pd.Series, pd.Series]:
+    """Detections for each animal with the small and with the large block, of the seeds that have both."""
+    small, large = (spread[method, f"pieces_{kind}_{level:g}"] for method in (SMALL, LARGE))
+    known = np.isfinite(small) & np.isfinite(large)
+    return small[known], large[known]
+
+
+def level_words(kind: str, level: float) -> str:
+    """What a level in its reading is called."""
+    if level == 0:
+        return "above the mean of the block: no level"
+    beside = (
+        "above the mean of the block by" if kind == "offset" else "above the mean of the block, and above"
+    )
+    return f"{beside} {level:g}"
+
+
+def pieces_table(spread: pd.DataFrame) -> pd.DataFrame:
+    """Into how many detections animals fall with F's two blocks, by the reading of the missing level."""
+    rows = []
+    for kind, level in PIECES:
+        small, large = _pieces(spread, kind, level)
+        row = {"reading": level_words(kind, level), "seeds": len(small)}
+        for name, own in (("small", small), ("large", large)):
+            row[name] = f"{own.mean():.2f}" if len(own) else ""
+            row[f"{name}_split"] = f"{int((own > 1).sum())}" if len(own) else ""
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
 def pieces_words(spread: pd.DataFrame) -> str:
-    """Into how many pieces animals fall with F's two blocks, with and without a level."""
-    parts = []
-    for method in (SMALL, LARGE):
-        for level, words in ((0, "no level"), (150, "a level of 150")):
-            own = spread[method, f"pieces_level_{level}"]
-            known = own[np.isfinite(own)]
-            said = (
-                f"{known.mean():.1f} detections an animal, more than one on {int((known > 1).sum())} of "
-                f"{len(known)}"
-                if len(known)
-                else "no such animal found"
-            )
-            parts.append(f"{NAMES[method]} with {words}: {said}")
-    return "Animals longer than 51 pixels, seen from the gondola. " + "; ".join(parts) + "."
+    """Which reading of the missing level gives what figures 7.7 and 7.8 show, and how often."""
+    shown = {}
+    for kind, level in PIECES:
+        small, large = _pieces(spread, kind, level)
+        shown[kind, level] = (int(((small > 1) & (large == 1)).sum()), len(small))
+    best = max(shown, key=lambda one: shown[one][0] / max(shown[one][1], 1))
+    count, of = shown[best]
+    start = "Animals longer than 51 pixels, seen from the gondola; the figures print no level. "
+    if not count:
+        return f"{start}With no reading of it a small region splits an animal that a large one leaves whole."
+    return (
+        f"{start}That the small region splits some and the large one none comes on {count} of {of} images "
+        f"with “{level_words(*best)}”, more often than with the other readings."
+        if sum(value[0] / max(value[1], 1) == count / of for value in shown.values()) == 1
+        else f"{start}That the small region splits some and the large one none comes on {count} of {of} "
+        "images with more than one reading."
+    )
 
 
 def herd_words(spread: pd.DataFrame) -> str:
@@ -267,6 +346,7 @@ def sun_words(spread: pd.DataFrame) -> str:
 
 #: What F leaves open about scenes and pictures, its value here, and why.
 CHOSEN = (
+    ("hours", "night 2, morning 8, noon 13", "before dawn, two hours after sunrise, and when ground is hot"),
     (
         "ground",
         "70 % grass, 20 % sand, 10 % rock",
@@ -287,7 +367,7 @@ CHOSEN = (
     ("kinds", "rhinoceros 3.2 m, its calf 1.6 m, antelope 1.5 m", "lengths of trunks of such animals"),
     (
         "gondola",
-        "15 m above the ground, 50 degrees from straight down",
+        "15 m above the ground, 45 degrees from straight down",
         "between 3 and 20 m, turned aside (F 8.2)",
     ),
     (
@@ -300,6 +380,37 @@ CHOSEN = (
     ("sizes from the ground", "0.2 to 8 m2", "half a small antelope's area, twice a rhinoceros'"),
     ("too hot", "mean above 37 degrees C", "no skin is warmer than the blood below it"),
 )
+
+
+#: Where the numbers of each setting are printed, or why they are as they are.
+SOURCES = {
+    CONSTANT: "F figure 7.5",
+    ADAPTIVE: "F figure 7.6",
+    SMALL: "F figure 7.7; no level is printed: that of figure 7.10a",
+    LARGE: "F figure 7.8; no level is printed: that of figure 7.10a",
+    SUBTRACTED: "F figures 7.10a, 7.11a",
+    ENHANCED: "F figures 7.10b, 7.11b",
+    BY_MEAN: "F 8.1.1; the level is chosen: that of figure 7.10a",
+    BY_MEDIAN: "F 8.1.1 proposes it; the level is chosen: that of figure 7.10a",
+}
+
+
+def settings_table() -> pd.DataFrame:
+    """F's settings, and where they are printed."""
+    rows = []
+    for name, one in METHODS.items():
+        adaptive = one.threshold == "adaptive"
+        rows.append(
+            {
+                "method": NAMES[name],
+                "background": {"none": "as it is"}.get(one.background, one.background),
+                "block": f"{one.block_px} px" if adaptive else "",
+                "level": f"{one.level:g}",
+                "read": READ_AS[one.level_is] if adaptive else "above the level",
+                "source": SOURCES[name],
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def chosen_table() -> pd.DataFrame:
