@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
@@ -48,6 +50,26 @@ class Look:
     glint_share: float = 0.5
     fittings: int = 0
     fitting_excess: float = 5.0
+
+
+class Window(NamedTuple):
+    """A part of an image, px."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+    def of(self, camera: Camera) -> Camera:
+        """The camera that sees this part alone."""
+        return replace(
+            camera, width=self.width, height=self.height, cx=camera.cx - self.left, cy=camera.cy - self.top
+        )
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Its rows and columns of the whole image."""
+        return slice(self.top, self.top + self.height), slice(self.left, self.left + self.width)
 
 
 class SceneFlight:
@@ -133,13 +155,30 @@ class SceneFlight:
             found.append(visible_part(outline + 0.5, camera.width, camera.height).area / whole)
         return np.array(found)
 
-    def view(self, exposure: int, *, waves_move: bool = True) -> View:
+    def window(self, exposure: int, margin: int) -> Window | None:
+        """The part of an image about all vessels, ``margin`` px around their outlines; None without any."""
+        pose, camera = self.poses.take(exposure), self.poses.camera
+        found = [outline_of(body, camera, pose.p_nc, pose.R_nc) for body in self.bodies(exposure)]
+        corners = [one for one in found if one is not None]
+        if not corners:
+            return None
+        low = np.floor(np.concatenate(corners).min(axis=0)).astype(int) - margin
+        high = np.ceil(np.concatenate(corners).max(axis=0)).astype(int) + margin + 1
+        left, top = np.clip(low, 0, [camera.width, camera.height])
+        right, bottom = np.clip(high, 0, [camera.width, camera.height])
+        if right <= left or bottom <= top:
+            return None
+        return Window(int(left), int(top), int(right - left), int(bottom - top))
+
+    def view(self, exposure: int, *, waves_move: bool = True, window: Window | None = None) -> View:
         """The image of an exposure in kelvin, with its labels.
 
-        Waves that stand still are quicker, and as good for single images: each shows another place.
+        Waves that stand still are quicker, and as good for single images: each shows another place. Of a
+        ``window`` the pixels are those of the whole image, to the last bit, and pixels are counted from it.
         """
         pose, time = self.poses.take(exposure), float(self.times[exposure])
         # The vessels are where they are already: their own motion from time zero on must not be added.
         bodies = tuple(replace(body, speed=0.0) for body in self.bodies(exposure))
         scene = Scene(self.sea, bodies)
-        return render(scene, self.poses.camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
+        camera = self.poses.camera if window is None else window.of(self.poses.camera)
+        return render(scene, camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
