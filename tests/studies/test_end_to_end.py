@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import Check
+from wildlab.evaluation.shares import Check, decide
 from wildlab.reporting.published import load_claims
 from wildlab.studies.coloured_noise import trial as coloured
 from wildlab.studies.end_to_end import STUDY, charts, text
@@ -145,6 +145,8 @@ def test_own_claims_and_words_follow_the_numbers(numbers):
     assert "2.00 px behind" in text.bias_words(spread_of(numbers, biased))
     assert "0.10 px ahead of" in text.bias_words(spread_of(numbers, noisy))
     small = {(RENDERED, "ellipse_coverage_90"): 0.5, (RENDERED, "ground_coverage_90"): 0.99}
+    assert text.ellipse_word(pd.Series([0.2, 0.9, 1.0])) == "undecided"
+    assert text.ellipse_word(pd.Series([0.9])) == "undecided"
     said = text.ellipse_words(spread_of(numbers, small))
     assert "in the image (too small)" in said
     assert "those of the flight (too large)" in said
@@ -169,9 +171,12 @@ def test_report_parts_are_there(pair, numbers):
     turned = verdicts.copy()
     turned["verdict_rendered"] = "other"
     assert f"{len(verdicts)} of {len(verdicts)} claims" in text.summary(spread, turned)[2]
+    assert text.turned_words(turned).count("“") == len(verdicts)
     same = verdicts.copy()
     same["verdict_rendered"] = same["verdict_drawn"]
     assert "None of" in text.summary(spread, same)[2]
+    assert text.turned_words(same) == "No claim gets another verdict."
+    assert text.decided(decide([True], [False])) == "premise not met"
     assert len(text.tracks_table(spread)) == 5
     assert "not drawn" in text.detections_table(spread)[DRAWN].tolist()
     errors = pixel_errors(pair, TWIN, SEED)

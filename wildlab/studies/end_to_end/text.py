@@ -37,6 +37,10 @@ LIMITS = [
 ]
 
 
+#: Shares between which ellipses that say 90 % are honest.
+HONEST = (0.85, 0.95)
+
+
 def summary(spread: pd.DataFrame, verdicts: pd.DataFrame) -> list[str]:
     """Three sentences: on pixels, on tracks, and on claims.
 
@@ -65,7 +69,7 @@ def summary(spread: pd.DataFrame, verdicts: pd.DataFrame) -> list[str]:
         f"Tracked with the {FILTERS[first]}, the vessel is {mae[RENDERED]:.1f} m from where it is on average "
         f"with these, and {mae[DRAWN]:.1f} m with drawn detections: medians of {len(spread)} "
         f"flight{'s' * (len(spread) != 1)}.",
-        f"{claims}; {moved} come{'s' * (moved == 1)} out otherwise on some flight.",
+        f"{claims}; {moved or 'none'} come{'s' * (moved < 2)} out otherwise on some flight.",
     ]
 
 
@@ -149,7 +153,7 @@ def decided(decision: Decision) -> str:
     >>> decided(decide([True, True, False]))
     'undecided: 2 of 3'
     """
-    return f"{decision.verdict}: {decision.true} of {decision.met}"
+    return f"{decision.verdict}: {decision.true} of {decision.met}" if decision.met else decision.verdict
 
 
 def verdicts_table(
@@ -207,6 +211,32 @@ def bias_words(spread: pd.DataFrame) -> str:
     )
 
 
+def ellipse_word(shares: pd.Series) -> str:
+    """What the shares of flights say of 90 % ellipses: honest where 85 to 95 % is what their interval allows.
+
+    Examples
+    --------
+    >>> ellipse_word(pd.Series([0.9, 0.91, 0.9])), ellipse_word(pd.Series([0.7, 0.71, 0.7]))
+    ('honest', 'too small')
+    """
+    known = shares[shares.notna()]
+    low, high = mean_interval(known)[1:] if len(known) > 1 else (0.0, 1.0)
+    if high < HONEST[0]:
+        return "too small"
+    if low > HONEST[1]:
+        return "too large"
+    return "honest" if low >= HONEST[0] and high <= HONEST[1] else "undecided"
+
+
+def turned_words(verdicts: pd.DataFrame) -> str:
+    """Which claims get another verdict by rendered detections."""
+    others = verdicts[verdicts[f"verdict_{DRAWN}"] != verdicts[f"verdict_{RENDERED}"]]
+    if others.empty:
+        return "No claim gets another verdict."
+    said = [f"“{row['claim']}” ({row[DRAWN]}; {row[RENDERED]})" for _, row in others.iterrows()]
+    return f"Another verdict, drawn and then rendered: {' '.join(said)}."
+
+
 def ellipse_words(spread: pd.DataFrame) -> str:
     """Whether stated ellipses hold the truth, in the image and on the sea."""
     parts = []
@@ -216,7 +246,5 @@ def ellipse_words(spread: pd.DataFrame) -> str:
         ("ground_coverage_90", "on the sea with those of the flight"),
     ):
         values = spread[RENDERED, name]
-        share = float(values.mean())
-        word = "too small" if share < 0.85 else "too large" if share > 0.95 else "honest"
-        parts.append(f"{with_interval(values, 100, 0, share=True)} % {where} ({word})")
+        parts.append(f"{with_interval(values, 100, 0, share=True)} % {where} ({ellipse_word(values)})")
     return f"The 90 % ellipses with the detector's covariances hold the vessel: {', '.join(parts)}."
