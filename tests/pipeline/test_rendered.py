@@ -105,3 +105,38 @@ def test_a_target_that_is_found_nowhere_is_said(flight, camera, shots):
 
 def replace_found(shot):
     return shot._replace(judged=Judged({1: []}, set(), 0), detections=replace(no_detections()))
+
+
+def test_a_window_is_that_part_of_the_whole_image():
+    camera = Photographer("fast-vessel", 1)
+    flown = simulate_twin("fast-vessel", 1, ("imu", "gnss"))
+    exposures = exposures_of(flown.detections)[::60]
+    for exposure in map(int, exposures):
+        window = camera.flight.window(exposure, 20)
+        part = camera.flight.view(exposure, waves_move=False, window=window)
+        whole = camera.flight.view(exposure, waves_move=False)
+        assert part.kelvin.size < 0.1 * whole.kelvin.size
+        assert np.array_equal(part.kelvin, whole.kelvin[window.slices])
+        assert np.array_equal(part.labels, whole.labels[window.slices])
+    shape = shape_of(camera)
+    apart = marks_of(camera.shoot(exposures, margin=48), shape)
+    together = marks_of(camera.shoot(exposures), shape)
+    assert np.allclose(apart.centre, together.centre)
+    # The noise has other draws; what they move is a fraction of a pixel.
+    assert np.hypot(*(apart.uv - together.uv).T).max() < 0.5
+
+
+def test_where_no_vessel_is_no_window_is_rendered():
+    camera = Photographer("fast-vessel", 1)
+    exposure = int(np.flatnonzero(~camera.flight.near().any(axis=1))[0])
+    assert camera.flight.window(exposure, 20) is None
+    shot = next(camera.shoot([exposure], margin=20))
+    assert not shot.seen
+    assert not len(shot.detections)
+
+
+def test_all_frames_stay_where_they_are_asked_for(flight, camera, shots):
+    marks = marks_of(shots, shape_of(camera))
+    kept = with_detections(flight, marks, "ship", all_frames=True)
+    assert len(kept.frames) == len(flight.frames)
+    assert set(kept.detections["frame_id"]) < set(kept.frames["frame_id"])

@@ -185,6 +185,19 @@ def test_a_large_ship_is_tracked_on_two_flights(reports: Path, faults: Faults) -
     assert faults(folder / "report.html") == []
 
 
+def test_both_kinds_of_detections_are_tracked_on_two_flights(reports: Path, faults: Faults) -> None:
+    folder = run("end-to-end-fast", reports, seeds=2)
+    found = values(folder)
+    assert found["pixel_rms", "rendered"]["value"] < found["pixel_rms", "drawn"]["value"]
+    assert found["detection_rate", "rendered"]["value"] > 0.9
+    assert {who for name, who in found if name == "mae"} >= {"drawn-kf", "rendered-kf", "rendered-coloured"}
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 4)
+    for figure in ("frame", "pixels", "tracks"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_survey_markers_beside_the_published_accuracy(
     reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:

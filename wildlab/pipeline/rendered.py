@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.detection.border import adjust_at_border
-from wildlab.detection.detections import Detections
+from wildlab.detection.detections import Detections, no_detections
 from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
@@ -24,9 +24,9 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.simulation.scene.flights import SceneFlight, Window
 from wildlab.simulation.scene.render import Seen, View
-from wildlab.simulation.scene.response import CameraResponse, expose, sensor_of
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
 #: Of the pixels of a detection, the share on an object from which on it is one of that object.
 OVERLAP = 0.25
@@ -116,23 +116,35 @@ class Photographer:
         self._seed = seed
         self._sensor = sensor_of(self.response, (camera.height, camera.width), stream(seed, "thermal sensor"))
 
-    def image(self, exposure: int) -> tuple[View, NDArray[np.uint16]]:
+    def image(self, exposure: int, window: Window | None = None) -> tuple[View, NDArray[np.uint16]]:
         """The scene with its labels, and the counts of the camera (H, W).
 
         Parameters
         ----------
         exposure
             Number of the exposure.
+        window
+            What part of it; None is all of it. A part has the same scene, sensor and kind of noise as it has
+            in the whole image, and other draws of the noise.
 
         Returns
         -------
         (view, counts)
         """
-        view = self.flight.view(exposure, waves_move=False)
+        view = self.flight.view(exposure, waves_move=False, window=window)
+        sensor = self._sensor
+        if window is not None:
+            here = window.slices
+            sensor = Sensor(sensor.offset[here], sensor.dead[here], sensor.stuck[here])
         rng = stream(self._seed, f"thermal image {exposure}")
-        return view, expose(view.kelvin, self.response, self._sensor, rng)
+        return view, expose(view.kelvin, self.response, sensor, rng)
 
-    def shoot(self, exposures: Iterable[int], thresholds: FloatingThresholds | None = None) -> Iterator[Shot]:
+    def shoot(
+        self,
+        exposures: Iterable[int],
+        thresholds: FloatingThresholds | None = None,
+        margin: int | None = None,
+    ) -> Iterator[Shot]:
         """Take images, and look for what floats.
 
         Parameters
@@ -141,15 +153,45 @@ class Photographer:
             Their numbers.
         thresholds
             Of the detector; those of H 4.4.1 by default.
+        margin
+            Render only so many pixels around the vessels, which takes a fraction of the time where these are
+            small; None is the whole image. False alarms elsewhere are not seen then.
 
         Yields
         ------
         Shot
+            In pixels of the whole image.
         """
-        for exposure in exposures:
-            view, counts = self.image(int(exposure))
+        for number in exposures:
+            exposure = int(number)
+            window = None if margin is None else self.flight.window(exposure, margin)
+            if margin is not None and window is None:
+                yield Shot(exposure, (), no_detections(), Judged({}, set(), 0))
+                continue
+            view, counts = self.image(exposure, window)
             objects = find_objects(counts, thresholds=thresholds)
-            yield Shot(int(exposure), view.seen, objects.detections, judge(view, objects))
+            corner = np.zeros(2) if window is None else np.array([window.left, window.top], float)
+            yield Shot(
+                exposure,
+                tuple(_seen_from(seen, corner) for seen in view.seen),
+                _found_from(objects.detections, corner),
+                judge(view, objects),
+            )
+
+
+def _seen_from(seen: Seen, corner: Array) -> Seen:
+    return seen._replace(
+        uv=seen.uv + corner,
+        centre=seen.centre + corner,
+        middle=seen.middle + corner,
+        outline=seen.outline + corner,
+    )
+
+
+def _found_from(found: Detections, corner: Array) -> Detections:
+    box = found.box.copy()
+    box[:, :2] += corner
+    return replace(found, uv=found.uv + corner, box=box)
 
 
 def exposures_of(frames: pd.DataFrame) -> NDArray[np.intp]:
@@ -261,7 +303,9 @@ def marks_of(
     return Marks(exposure, uv, covariance, centre, share, moved, pieces, false)
 
 
-def with_detections(flight: Flight, marks: Marks, target: str, plane_down: float = 0.0) -> Flight:
+def with_detections(
+    flight: Flight, marks: Marks, target: str, plane_down: float = 0.0, *, all_frames: bool = False
+) -> Flight:
     """A twin's flight with the detections of rendered images in place of the drawn ones, and their frames.
 
     Parameters
@@ -274,11 +318,12 @@ def with_detections(flight: Flight, marks: Marks, target: str, plane_down: float
         Its name.
     plane_down
         Down coordinate of the water, m.
+    all_frames
+        Whether the flight keeps all its frames, or those of the marks alone.
 
     Returns
     -------
     Flight
-        The frames are those of the marks alone.
 
     Raises
     ------
@@ -293,12 +338,12 @@ def with_detections(flight: Flight, marks: Marks, target: str, plane_down: float
         )
     frames = flight.table("frames")
     place = pd.Index(exposures_of(frames)).get_indexer(pd.Index(marks.exposure))
-    kept = frames.iloc[place].reset_index(drop=True)
+    marked = frames.iloc[place].reset_index(drop=True)
     rows = np.flatnonzero(marks.found)
     table = pd.DataFrame(
         {
             "detection_id": [f"r{number:06d}" for number in range(1, len(rows) + 1)],
-            "frame_id": kept["frame_id"].to_numpy()[rows],
+            "frame_id": marked["frame_id"].to_numpy()[rows],
             "source": "detector",
             "kind": "pixel",
             "u_px": marks.uv[rows, 0],
@@ -307,4 +352,5 @@ def with_detections(flight: Flight, marks: Marks, target: str, plane_down: float
             "plane_down_m": plane_down,
         }
     )
+    kept = frames if all_frames else marked
     return replace(flight, tables=flight.tables | {"frames": kept, "detections": table})

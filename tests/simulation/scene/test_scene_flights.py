@@ -16,23 +16,21 @@ def flight():
 
 
 def test_a_window_shows_what_the_whole_image_shows_there(flight):
-    part = flight.window(60)
+    part = flight.window(60, 40)
     whole = flight.view(60, waves_move=False)
-    seen = flight.view(60, waves_move=False, camera=part.camera)
-    assert seen.kelvin.shape == (part.camera.height, part.camera.width)
+    seen = flight.view(60, waves_move=False, window=part)
+    assert seen.kelvin.shape == (part.height, part.width)
     assert seen.kelvin.size < 0.7 * whole.kelvin.size
-    assert np.allclose(seen.kelvin, whole.kelvin[part.rows, part.columns], atol=1e-3)
-    assert np.array_equal(seen.labels, whole.labels[part.rows, part.columns])
+    assert np.allclose(seen.kelvin, whole.kelvin[part.slices], atol=1e-3)
+    assert np.array_equal(seen.labels, whole.labels[part.slices])
     # Nothing of the ship is outside of it, and there is sea around it.
     assert (seen.labels > 0).sum() == (whole.labels > 0).sum() > 1000
     assert not seen.labels[:5].any() and not seen.labels[-5:].any()
 
 
-def test_a_window_of_an_image_without_the_ship_is_the_whole(flight):
+def test_an_image_without_the_ship_has_no_window(flight):
     away = int(np.flatnonzero(~flight.near().any(axis=1))[0])
-    part = flight.window(away)
-    assert part.camera == flight.poses.camera
-    assert (part.rows, part.columns) == (slice(0, 512), slice(0, 640))
+    assert flight.window(away, 40) is None
 
 
 def test_fittings_are_on_the_deck_and_as_warm_as_they_should_be():

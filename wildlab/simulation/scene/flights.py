@@ -53,11 +53,23 @@ class Look:
 
 
 class Window(NamedTuple):
-    """A part of an image: a camera that sees just that, and which rows and columns of the whole it is."""
+    """A part of an image, px."""
 
-    camera: Camera
-    rows: slice
-    columns: slice
+    left: int
+    top: int
+    width: int
+    height: int
+
+    def of(self, camera: Camera) -> Camera:
+        """The camera that sees this part alone."""
+        return replace(
+            camera, width=self.width, height=self.height, cx=camera.cx - self.left, cy=camera.cy - self.top
+        )
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Its rows and columns of the whole image."""
+        return slice(self.top, self.top + self.height), slice(self.left, self.left + self.width)
 
 
 class SceneFlight:
@@ -143,46 +155,30 @@ class SceneFlight:
             found.append(visible_part(outline + 0.5, camera.width, camera.height).area / whole)
         return np.array(found)
 
-    def view(self, exposure: int, *, waves_move: bool = True, camera: Camera | None = None) -> View:
+    def window(self, exposure: int, margin: int) -> Window | None:
+        """The part of an image about all vessels, ``margin`` px around their outlines; None without any."""
+        pose, camera = self.poses.take(exposure), self.poses.camera
+        found = [outline_of(body, camera, pose.p_nc, pose.R_nc) for body in self.bodies(exposure)]
+        corners = [one for one in found if one is not None]
+        if not corners:
+            return None
+        low = np.floor(np.concatenate(corners).min(axis=0)).astype(int) - margin
+        high = np.ceil(np.concatenate(corners).max(axis=0)).astype(int) + margin + 1
+        left, top = np.clip(low, 0, [camera.width, camera.height])
+        right, bottom = np.clip(high, 0, [camera.width, camera.height])
+        if right <= left or bottom <= top:
+            return None
+        return Window(int(left), int(top), int(right - left), int(bottom - top))
+
+    def view(self, exposure: int, *, waves_move: bool = True, window: Window | None = None) -> View:
         """The image of an exposure in kelvin, with its labels.
 
-        Waves that stand still are quicker, and as good for single images: each shows another place. With a
-        ``camera`` in place of the flight's, as `window` gives one, a part of the image.
+        Waves that stand still are quicker, and as good for single images: each shows another place. Of a
+        ``window`` the pixels are those of the whole image, to the last bit, and pixels are counted from it.
         """
         pose, time = self.poses.take(exposure), float(self.times[exposure])
         # The vessels are where they are already: their own motion from time zero on must not be added.
         bodies = tuple(replace(body, speed=0.0) for body in self.bodies(exposure))
         scene = Scene(self.sea, bodies)
-        seen_by = camera or self.poses.camera
-        return render(scene, seen_by, pose.p_nc, pose.R_nc, time if waves_move else 0.0)
-
-    def window(self, exposure: int, margin: int = 40) -> Window:
-        """The part of an image about all targets in it, which takes less time to render than the whole.
-
-        Parameters
-        ----------
-        exposure
-            Its number.
-        margin
-            How much of what is around is in it too, px.
-
-        Returns
-        -------
-        Window
-            The whole image where no target is in view.
-        """
-        pose, camera = self.poses.take(exposure), self.poses.camera
-        outlines = [outline_of(body, camera, pose.p_nc, pose.R_nc) for body in self.bodies(exposure)]
-        corners = np.concatenate([one for one in outlines if one is not None] or [np.zeros((0, 2))])
-        limits = np.array([camera.width, camera.height])
-        if not len(corners):
-            return Window(camera, slice(0, camera.height), slice(0, camera.width))
-        low = np.clip(np.floor(corners.min(axis=0)).astype(int) - margin, 0, limits)
-        high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + margin + 1, 0, limits)
-        if (low >= high).any():
-            low, high = np.zeros(2, int), limits
-        (left, top), (right, bottom) = low.tolist(), high.tolist()
-        part = replace(
-            camera, width=right - left, height=bottom - top, cx=camera.cx - left, cy=camera.cy - top
-        )
-        return Window(part, slice(top, bottom), slice(left, right))
+        camera = self.poses.camera if window is None else window.of(self.poses.camera)
+        return render(scene, camera, pose.p_nc, pose.R_nc, time if waves_move else 0.0)

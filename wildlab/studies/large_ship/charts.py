@@ -16,13 +16,14 @@ _LABELS = {WITH: "adjusted", WITHOUT: "not adjusted"}
 
 
 def images_shown(taken: Photographs) -> Shown:
-    """An image that shows much of the ship and one in which its centre was moved far (H figures 6.2, 4.8)."""
+    """An image that shows much of the ship, and one that shows about half of it (H figures 6.2, 4.8)."""
     plain, moved = taken.marks(np.nan), taken.marks()
     whole = int(np.argmax(np.where(plain.found, plain.share, -1.0)))
-    by = np.where(moved.moved, np.hypot(*(moved.uv - plain.uv).T), -1.0)
-    part = (
-        int(np.argmax(by)) if moved.moved.any() else int(np.argmin(np.where(plain.found, plain.share, 2.0)))
-    )
+    cut = moved.moved if moved.moved.any() else plain.found
+    part = int(np.argmin(np.where(cut, np.abs(plain.share - 0.5), 2.0)))
+    height, width = taken.shape
+    beyond = [max(float((-at).max()), *(at - [width, height])) for at in plain.centre[[whole, part]]]
+    reach = max(0.0, *beyond) + 25
     fig, axes = new_figure(5.9, 3.1, columns=2)
     said = []
     for ax, row, name in zip(axes, (whole, part), ("Much of it", "A part of it"), strict=True):
@@ -38,9 +39,7 @@ def images_shown(taken: Photographs) -> Shown:
         ax.plot(*plain.uv[row], "x", color=VERMILLION, ms=8, mew=2, label="found")
         ax.plot(*moved.uv[row], "+", color=BLUE, ms=10, mew=2, label="adjusted")
         ax.plot(*plain.centre[row], "o", mfc="none", mec=ORANGE, ms=9, mew=1.6, label="true")
-        rows, columns = counts.shape
-        reach = max(0.0, float((-plain.centre[row]).max()), *(plain.centre[row] - [columns, rows])) + 25
-        ax.set(xlim=(-reach, columns + reach), ylim=(rows + reach, -reach), xticks=[], yticks=[])
+        ax.set(xlim=(-reach, width + reach), ylim=(height + reach, -reach), xticks=[], yticks=[])
         ax.set_facecolor("0.92")
         ax.grid(False)
         ax.set_title(f"{name}: {100 * plain.share[row]:.0f} %")

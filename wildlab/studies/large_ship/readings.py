@@ -93,6 +93,11 @@ def readings_of(taken: Photographs) -> list[Reading]:
         Reading(f"ship told {word} % {way}", WITH, follow(taken, taken.marks(factor * taken.length)))
         for word, way, factor in ((10, "too short", 0.9), (10, "too long", 1.1))
     ]
+    half = taken._replace(shots=taken.shots[::2])
+    found += [
+        Reading("every second of these images, adjusted", WITH, follow(half, half.marks())),
+        Reading("every second of these images, not adjusted", WITHOUT, follow(half, half.marks(np.nan))),
+    ]
     found += [
         Reading(f"filter's noise {wide.pixel:.0f} px, adjusted", WITH, follow(taken, moved, wide)),
         Reading(f"filter's noise {wide.pixel:.0f} px, not adjusted", WITHOUT, follow(taken, still, wide)),

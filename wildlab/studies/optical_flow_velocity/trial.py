@@ -22,7 +22,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.flights import Look, SceneFlight
+from wildlab.simulation.scene.flights import Look, SceneFlight, Window
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 from wildlab.simulation.twins import AUTOPILOT, TRUTH, simulate_twin
 
@@ -54,6 +54,8 @@ STRETCH = 30
 #: The ship: as long as the one of H 6.4.1, the only large one whose size H prints, and five times its beam.
 #: What is on its deck is chosen: without anything no feature detector would find more than corners.
 SHIP = Look(lengths=(70.0,), slender=5.0, fittings=30)
+#: Around the ship, what of an image is rendered, px.
+MARGIN = 40
 
 
 class Looked(NamedTuple):
@@ -142,14 +144,13 @@ def look(twin: str, seed: int, pairs: int) -> Looked:
     def features(row: int) -> Features:
         """Of the ship in an image, where the detector has anything that floats; kept for the next pair."""
         if row not in known:
-            part = scene.window(row)
-            here = part.rows, part.columns
-            kelvin = scene.view(row, waves_move=False, camera=part.camera).kelvin
+            part = scene.window(row, MARGIN) or Window(0, 0, camera.width, camera.height)
+            here = part.slices
+            kelvin = scene.view(row, waves_move=False, window=part).kelvin
             own = Sensor(sensor.offset[here], sensor.dead[here], sensor.stuck[here])
             counts = expose(kelvin, response, own, stream(seed, f"image {row} of {twin}"))
             found = find_features(counts, filled_outlines(find_objects(counts).labels))
-            corner = np.array([part.columns.start, part.rows.start])
-            known[row] = Features(found.uv + corner, found.descriptors)
+            known[row] = Features(found.uv + [part.left, part.top], found.descriptors)
         return known[row]
 
     found = [

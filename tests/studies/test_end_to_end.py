@@ -1,0 +1,188 @@
+"""Drawn and rendered detections of the same flight: what is alike, what is compared, and the words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check, decide
+from wildlab.reporting.published import load_claims
+from wildlab.studies.coloured_noise import trial as coloured
+from wildlab.studies.end_to_end import STUDY, charts, text
+from wildlab.studies.end_to_end.trial import (
+    COLOURED,
+    DRAWN,
+    KINDS,
+    RENDERED,
+    STUDY_OF,
+    TWO_FILTERS,
+    check_claims,
+    checks_of,
+    fly,
+    numbers_of,
+    of_kind,
+    pixel_errors,
+    source_of,
+)
+from wildlab.studies.linear_vs_nonlinear import trial as filters
+
+TWIN, SEED = "fast-vessel", 1
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return fly(TWIN, SEED, every=6)
+
+
+@pytest.fixture(scope="module")
+def numbers(pair):
+    return numbers_of(pair, TWIN, SEED)
+
+
+def spread_of(numbers, changes=None, flights=3):
+    return pd.DataFrame([dict(numbers) | (changes or {})] * flights)
+
+
+def test_only_the_pixels_differ_between_both(pair):
+    drawn, rendered = (pair.flights[kind] for kind in KINDS)
+    assert drawn.frames.equals(rendered.frames)
+    assert drawn.truth.equals(rendered.truth)
+    assert drawn.nav is rendered.nav
+    assert set(rendered.detections["frame_id"]) <= set(drawn.detections["frame_id"])
+    same = drawn.detections.set_index("frame_id").loc[rendered.detections["frame_id"]]
+    assert np.array_equal(same["plane_down_m"], rendered.detections["plane_down_m"])
+    assert (same["u_px"].to_numpy() != rendered.detections["u_px"].to_numpy()).all()
+    apart = same[["u_px", "v_px"]].to_numpy() - rendered.detections[["u_px", "v_px"]].to_numpy()
+    assert np.hypot(*apart.T).max() < 30
+
+
+def test_errors_are_along_the_vessels_axes(pair):
+    errors = pixel_errors(pair, TWIN, SEED)
+    moved = pair._replace(drawn_uv=pair.marks.uv)
+    again = pixel_errors(moved, TWIN, SEED)
+    assert np.allclose(again.drawn, again.rendered)
+    # The axes are perpendicular and of unit length, but for perspective.
+    far = np.hypot(*(pair.drawn_uv - pair.marks.uv).T)
+    assert np.allclose(np.hypot(*(errors.drawn - errors.rendered).T), far, rtol=0.15)
+
+
+def test_numbers_of_a_kind_are_those_of_the_cases(pair, numbers):
+    plain = filters.numbers_of(
+        pair.seen[DRAWN], filters.follow(pair.seen[DRAWN], filters.FAST, filters.PUBLISHED)
+    )
+    assert numbers["drawn-kf", "mae"] == plain["kf", "mae"]
+    tracked = coloured.follow(pair.seen[RENDERED], coloured.FAST)
+    assert numbers["rendered-coloured", "mae"] == tracked["coloured"].scored.numbers["mae"]
+
+
+def test_the_detector_is_nearer_than_what_the_twin_draws(numbers):
+    assert numbers[RENDERED, "pixel_rms"] < numbers[DRAWN, "pixel_rms"]
+    assert numbers[RENDERED, "detection_rate"] > 0.9
+    assert numbers[DRAWN, "detection_rate"] == 1
+    assert 0.5 < numbers[RENDERED, "ellipse_coverage_90"] <= 1
+    for kind in KINDS:
+        bias = np.hypot(numbers[kind, "bias_ahead"], numbers[kind, "bias_right"])
+        assert np.hypot(bias, numbers[kind, "pixel_sd"]) == pytest.approx(numbers[kind, "pixel_rms"])
+
+
+def test_only_twins_with_a_case_are_flown():
+    assert source_of("fast-vessel") == "observer"
+    assert source_of("slow-vessel-eight") == "autopilot"
+    assert source_of("drifting-vessel") == "observer"
+    with pytest.raises(WildlabError, match=r"[Tt]he twin 'gondola' has no case to compare"):
+        source_of("gondola")
+
+
+def test_every_claim_of_the_cases_is_checked_with_both(numbers):
+    spread = spread_of(numbers)
+    for kind in KINDS:
+        checks = checks_of(spread, kind)
+        assert set(checks) == {TWO_FILTERS, COLOURED}
+        for case, found in checks.items():
+            assert {claim["id"] for claim in load_claims(STUDY_OF[case, TWIN])} <= set(found)
+    slow = spread[[key for key in spread if key[0] in KINDS or key[0].endswith(("kf", "measurements"))]]
+    assert set(checks_of(slow, DRAWN)) == {TWO_FILTERS}
+    assert ("kf", "mae") in of_kind(spread, RENDERED)
+
+
+def test_verdicts_stand_side_by_side():
+    many = np.ones(40, bool)
+    claims = {"one": [{"id": "a", "text": "A.", "source": "x"}, {"id": "b", "text": "B.", "source": "y"}]}
+    checks = {
+        DRAWN: {"one": {"a": Check(true=many), "b": Check(true=many)}},
+        RENDERED: {"one": {"a": Check(true=many), "b": Check(true=~many)}},
+    }
+    table = text.verdicts_table(checks, claims)
+    assert table["flights"].tolist() == [0, 40]
+    assert table["verdict_drawn"].tolist() == ["holds", "holds"]
+    assert table["verdict_rendered"].tolist() == ["holds", "does not hold"]
+    assert table[RENDERED].tolist() == ["holds: 40 of 40", "does not hold: 0 of 40"]
+
+
+def test_own_claims_and_words_follow_the_numbers(numbers):
+    better = {(RENDERED, "pixel_rms"): 1.0, (DRAWN, "pixel_rms"): 5.0, (RENDERED, "detection_rate"): 1.0}
+    worse = {(RENDERED, "pixel_rms"): 9.0, (DRAWN, "pixel_rms"): 3.0, (RENDERED, "detection_rate"): 0.5}
+    alike = {("rendered-" + who, "mae"): 10.0 for who in ("kf", "ekf", *coloured.SUBJECTS)} | {
+        ("drawn-" + who, "mae"): 10.1 for who in ("kf", "ekf", *coloured.SUBJECTS)
+    }
+    apart = alike | {("rendered-singer", "mae"): 20.0}
+    biased = {(RENDERED, "bias_ahead"): -2.0, (RENDERED, "bias_right"): 0.0, (RENDERED, "pixel_sd"): 1.0}
+    noisy = {(RENDERED, "bias_ahead"): 0.1, (RENDERED, "bias_right"): 0.0, (RENDERED, "pixel_sd"): 1.0}
+    thresholds = {claim["id"]: claim.get("threshold") for claim in load_claims("end-to-end-fast")}
+
+    def held(changes):
+        return {
+            key: bool(check.holds(None if thresholds[key] is None else float(thresholds[key])).all())
+            for key, check in check_claims(spread_of(numbers, changes)).items()
+        }
+
+    assert all(held(better | alike | biased).values())
+    assert not any(held(worse | apart | noisy).values())
+    assert "5.0 times smaller than the drawn ones" in text.bias_words(spread_of(numbers, better))
+    assert "3.0 times as large as the drawn ones" in text.bias_words(spread_of(numbers, worse))
+    assert "2.00 px behind" in text.bias_words(spread_of(numbers, biased))
+    assert "0.10 px ahead of" in text.bias_words(spread_of(numbers, noisy))
+    small = {(RENDERED, "ellipse_coverage_90"): 0.5, (RENDERED, "ground_coverage_90"): 0.99}
+    assert text.ellipse_word(pd.Series([0.2, 0.9, 1.0])) == "undecided"
+    assert text.ellipse_word(pd.Series([0.9])) == "undecided"
+    said = text.ellipse_words(spread_of(numbers, small))
+    assert "in the image (too small)" in said
+    assert "those of the flight (too large)" in said
+    assert text.percent(text.found_share(spread_of(numbers, worse))) == "50.0 %"
+
+
+def test_intervals_of_shares_stay_within_all_and_none():
+    values = pd.Series([0.9, 1.0, 1.0])
+    assert text.with_interval(values, 100, 0, share=True) == "97 (82 to 100)"
+    assert text.with_interval(values, 100, 0) == "97 (82 to 111)"
+    assert text.with_interval(pd.Series([1.0])) == "1.0"
+    assert text.with_interval(pd.Series([np.nan])) == ""
+
+
+def test_report_parts_are_there(pair, numbers):
+    spread = spread_of(numbers)
+    checks = {kind: checks_of(spread, kind) for kind in KINDS}
+    claims = {case: load_claims(STUDY_OF[case, TWIN]) for case in checks[DRAWN]}
+    verdicts = text.verdicts_table(checks, claims)
+    summary = text.summary(spread, verdicts)
+    assert len(summary) == 3
+    turned = verdicts.copy()
+    turned["verdict_rendered"] = "other"
+    assert f"{len(verdicts)} of {len(verdicts)} claims" in text.summary(spread, turned)[2]
+    assert text.turned_words(turned).count("“") == len(verdicts)
+    same = verdicts.copy()
+    same["verdict_rendered"] = same["verdict_drawn"]
+    assert "None of" in text.summary(spread, same)[2]
+    assert text.turned_words(same) == "No claim gets another verdict."
+    assert text.decided(decide([True], [False])) == "premise not met"
+    assert len(text.tracks_table(spread)) == 5
+    assert "not drawn" in text.detections_table(spread)[DRAWN].tolist()
+    errors = pixel_errors(pair, TWIN, SEED)
+    for shown in (charts.frame_shown(pair), charts.pixels_shown(errors), charts.tracks_shown(spread)):
+        assert len(shown[2]) > 30
+    assert all(
+        STUDY.metric_of(*key) is None or STUDY.metric_of(*key).unit in ("px", "1", "m", "m/s", "rad")
+        for key in numbers
+    )
