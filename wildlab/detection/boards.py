@@ -24,6 +24,8 @@ Grey = NDArray[np.uint8]
 CODES = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
 #: Fewer codes than this may be chance.
 FEWEST_CODES = 4
+#: Of a square's side, how far about a corner its edges are looked at.
+WINDOW = 0.35
 #: Shares of the pixels that an image is stretched between: a few hot ones do not make the rest dark.
 STRETCHED = (0.5, 99.5)
 
@@ -121,11 +123,12 @@ def find_board(grey: Grey, board: Board) -> Seen | None:
     Seen or None
         None where it is not there as a whole.
     """
-    find = _chessboard if board.pattern == "chessboard" else _circles
-    for inverted in (False, True):
-        uv = find(255 - grey if inverted else grey, board)
-        if uv is not None:
-            return Seen(uv, inverted)
+    ways = (_by_grid, _by_squares) if board.pattern == "chessboard" else (_circles,)
+    for find in ways:
+        for inverted in (False, True):
+            uv = find(255 - grey if inverted else grey, board)
+            if uv is not None:
+                return Seen(_refined(uv, grey, board) if board.pattern == "chessboard" else uv, inverted)
     return None
 
 
@@ -152,13 +155,36 @@ def count_codes(grey: Grey) -> int:
     return most
 
 
-def _chessboard(grey: Grey, board: Board) -> Array | None:
-    quick = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-    for flags in (quick, quick | cv2.CALIB_CB_EXHAUSTIVE):
-        found, corners = cv2.findChessboardCornersSB(grey, (board.columns, board.rows), flags=flags)
-        if found:
-            return _as_pixels(cast(Any, corners), grey)
-    return None
+def _by_grid(grey: Grey, board: Board, also: int = 0) -> Array | None:
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY | also
+    found, corners = cv2.findChessboardCornersSB(grey, (board.columns, board.rows), flags=flags)
+    return _as_pixels(cast(Any, corners), grey) if found else None
+
+
+def _by_squares(grey: Grey, board: Board) -> Array | None:
+    # Sees what blur hides from the other one.
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
+    found, corners = cv2.findChessboardCorners(grey, (board.columns, board.rows), flags=flags)
+    return _as_pixels(cast(Any, corners), grey) if found else None
+
+
+def _by_grid_in_depth(grey: Grey, board: Board) -> Array | None:
+    return _by_grid(grey, board, cv2.CALIB_CB_EXHAUSTIVE)
+
+
+def _refined(uv: Array, grey: Grey, board: Board) -> Array:
+    """Corners where the gradients about them cross, looked for within a third of a square's side."""
+    grid = uv.reshape(board.rows, board.columns, 2)
+    side = min(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min() for axis in (0, 1))
+    half = int(WINDOW * side)
+    if half < 2:
+        return uv
+    at = uv.astype(np.float32).reshape(-1, 1, 2)
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
+    found = cv2.cornerSubPix(grey, at.copy(), (half, half), (-1, -1), stop).reshape(-1, 2).astype(float)
+    # Where it ran off to something else, the first answer stays.
+    near = np.linalg.norm(found - uv, axis=1) < half / 2
+    return np.where(near[:, None], found, uv)
 
 
 def _circles(grey: Grey, board: Board) -> Array | None:

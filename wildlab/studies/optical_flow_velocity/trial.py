@@ -150,7 +150,7 @@ def look(twin: str, seed: int, pairs: int) -> Looked:
             own = Sensor(sensor.offset[here], sensor.dead[here], sensor.stuck[here])
             counts = expose(kelvin, response, own, stream(seed, f"image {row} of {twin}"))
             found = find_features(counts, filled_outlines(find_objects(counts).labels))
-            known[row] = Features(found.uv + [part.left, part.top], found.descriptors)
+            known[row] = Features(found.uv + np.array([part.left, part.top]), found.descriptors)
         return known[row]
 
     found = [
