@@ -114,18 +114,15 @@ def test_moving_brings_centres_nearer(numbers):
 def test_every_recorded_number_is_computed_and_every_published_one_has_a_subject(numbers):
     assert {name for _, name in numbers} <= set(UNITS)
     printed = load_published("large-ship")
-    computed = printed[~printed["name"].str.startswith("position_")]
-    assert {(subject, name) for name, subject in computed[["name", "subject"]].to_numpy()} <= set(numbers)
+    assert {(subject, name) for name, subject in printed[["name", "subject"]].to_numpy()} <= set(numbers)
     assert all(STUDY.metric_of(*key) is not None for key in numbers)
 
 
 def test_published_differences_are_those_of_the_table():
     printed = load_published("large-ship").set_index(["name", "subject"])["value"].to_dict()
     for subject in (WITH, WITHOUT):
-        apart = [
-            printed[f"position_{axis}", "reference"] - printed[f"position_{axis}", subject]
-            for axis in ("north", "east")
-        ]
+        pairs = zip(text.POSITIONS["reference"], text.POSITIONS[subject], strict=True)
+        apart = [reference - value for reference, value in pairs]
         assert [printed[f"mean_{axis}", subject] for axis in ("north", "east")] == pytest.approx(apart)
         assert printed["error_of_mean", subject] == pytest.approx(np.hypot(*apart), abs=0.06)
         sds = [printed[f"sd_{axis}", subject] for axis in ("north", "east")]

@@ -13,7 +13,7 @@ def _metric(subject: str, name: str) -> Metric | None:
 
 STUDY = Study(
     "large-ship",
-    (*trial.SUBJECTS, trial.DETECTOR, trial.REFERENCE),
+    (*trial.SUBJECTS, trial.DETECTOR),
     trial.trial,
     trial.check_claims,
     _metric,

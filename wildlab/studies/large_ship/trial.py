@@ -39,8 +39,6 @@ WITH, WITHOUT = "with-adjustment", "without-adjustment"
 SUBJECTS = (WITH, WITHOUT)
 #: The detector alone, without and before any adjustment.
 DETECTOR = "detector"
-#: The ship's own receiver, whose mean place about an unprinted origin nothing here can have.
-REFERENCE = "reference"
 
 #: H 6.4.1 says of its filter only that its parameters are those of another article. These are the printed
 #: ones for a slow vessel (H 6.4.2, flight 2).
