@@ -263,3 +263,29 @@ def test_what_a_method_says_of_itself_holds(method: str) -> None:
     changed = [how.black_hot(defaults)] if how.black_hot else []
     changed += [how.for_distance(defaults, 30.0, 400.0, 3.0)] if how.for_distance else []
     assert all(type(one) is how.thresholds and one != defaults for one in changed)
+
+
+def test_stated_ellipses_are_held_against_the_middle_of_labels(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    count = 400
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]])
+    off = rng.multivariate_normal([0, 0], covariance, count)
+    table = pd.DataFrame(
+        {
+            "frame_id": [f"{n}.png" for n in range(count)], "u_px": 50 + off[:, 0], "v_px": 40 + off[:, 1],
+            "left_px": 45.0, "top_px": 35.0, "width_px": 10.0, "height_px": 10.0, "score": 1.0,
+            "cov_uu_px2": 4.0, "cov_uv_px2": 1.0, "cov_vv_px2": 2.0,
+        }
+    )  # fmt: skip
+    frames = pd.DataFrame({"frame_id": table["frame_id"], "width_px": 128, "height_px": 96, "problem": None})
+    rows = "".join(f"{name},46,34,8,12\n" for name in table["frame_id"])
+    (tmp_path / "l.csv").write_text(f"image,x,y,w,h\n{rows}", encoding="utf-8")
+    labels = read_labels(tmp_path / "l.csv")
+    honest = judge_detections(table, frames, labels).ellipse
+    assert honest is not None and honest.low < 0.9 < honest.high
+    small = judge_detections(table.assign(cov_uu_px2=1.0, cov_uv_px2=0.0, cov_vv_px2=1.0), frames, labels)
+    # 4.6 = -2 ln 0.1: within a circle of that squared radius.
+    expected = float((np.sum(off**2, axis=1) <= 4.605).mean())
+    assert small.ellipse is not None and abs(small.ellipse.estimate - expected) < 1e-9
+    assert small.ellipse.high < 0.9
+    assert judge_detections(table.drop(columns=["cov_uv_px2"]), frames, labels).ellipse is None

@@ -147,3 +147,14 @@ def test_counts_of_each_image_are_said():
     assert "2 of 3 images have none; the most has b, with 3." in words
     _, none = shown(run(), frames=frames.assign(detections=0))
     assert "None of 3 images has any." in none
+
+
+def test_ellipses_are_held_against_labels_where_there_are_any():
+    judged = rates(6, 2, 3) | {"ellipse_coverage_90": {"estimate": 0.5, "low": 0.2, "high": 0.8}}
+    assert (
+        "hold the middle of 50 % (20 to 80) of the labels found: they are too small."
+        in shown(run(judged=judged))[1]
+    )
+    assert "90 % ellipses" not in shown(run(judged=rates(6, 2, 3)))[1]
+    assert "12 % of its length" in shown(run(), thresholds={"part": 0.12})[1]
+    assert "of its length" not in shown(run(), thresholds={"part": 0.0})[1]

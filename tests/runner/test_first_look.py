@@ -302,6 +302,19 @@ def test_what_a_pass_is_is_said(studies: Studies) -> None:
     assert "First looks: 2 of 3 reports from few flights, and 1 in full." in text.getvalue()
 
 
+def test_a_study_that_is_kept_apart_runs_by_name_only(studies: Studies) -> None:
+    path = studies.notebooks / "studies.toml"
+    text = path.read_text(encoding="utf-8")
+    names = [line[1:-1] for line in text.splitlines() if line.startswith("[") and "." not in line]
+    path.write_text(text.replace(f"[{names[0]}]\n", f"[{names[0]}]\napart = true\n"), encoding="utf-8")
+    said = StringIO()
+    console = Console(file=said, force_terminal=False, width=200)
+    ran = studies.run(everything=True, console=console)
+    assert names[0] not in {one.name for one in ran} and names[1] in {one.name for one in ran}
+    assert f"Not among all, to be run by name: {names[0]}." in said.getvalue()
+    assert [one.name for one in studies.run(names[0])] == [names[0]]
+
+
 # -- the first seed of a case, and what processes say meanwhile
 # ------------------------------------------------------------------------------------
 

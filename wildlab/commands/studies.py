@@ -58,7 +58,10 @@ def list_(out: Path | None, as_json: bool) -> None:
 @click.command(short_help="Run studies; each leaves a report.")
 @click.argument("studies", nargs=-1, metavar="STUDY...")
 @click.option(
-    "--all", "everything", is_flag=True, help="All studies; those whose data are not here are skipped."
+    "--all",
+    "everything",
+    is_flag=True,
+    help="All studies but those kept apart; those whose data are not here are skipped.",
 )
 @click.option("--first-look", is_flag=True, help="A few flights of each study, and say so; no full numbers.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed in place of the study's own.")

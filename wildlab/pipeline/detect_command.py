@@ -32,6 +32,7 @@ from wildlab.pipeline.detection_compared import (
 from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import (
     Judged,
+    ellipse_sentence,
     judge_detections,
     labels_sentences,
     plain_rates,
@@ -333,6 +334,8 @@ def _result(
             else "Beside the labels"
         )
         say.append(f"{where}: {rates_sentence(result['judged'])}")
+        if "ellipse_coverage_90" in result["judged"]:
+            say.append(ellipse_sentence(result["judged"]["ellipse_coverage_90"]))
         say += labels_sentences(labels)
         kinds = labels.marked.known_kinds
         if len(kinds) > 1 and not wanted.classes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +12,13 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
+from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.labels import Labels
+from wildlab.geometry.uncertainty import inside_ellipse
 
+#: Probability of the ellipses that are held against labels.
+ELLIPSE = 0.9
+_COVARIANCE = ["cov_uu_px2", "cov_uv_px2", "cov_uv_px2", "cov_vv_px2"]
 _BOX = ["left_px", "top_px", "width_px", "height_px"]
 
 
@@ -38,6 +44,9 @@ class Judged:
         Names of labelled frames that the run does not have; their labels count nowhere.
     outside
         Labels that lie wholly outside their image.
+    ellipse
+        Of the labels that were found, the share whose middle lies in the detection's `ELLIPSE`; Wilson's
+        interval. None where detections have no covariance, or nothing was found. Errors of the labels count.
     """
 
     rates: Rates
@@ -47,6 +56,7 @@ class Judged:
     unusable: int
     absent: tuple[str, ...]
     outside: int
+    ellipse: Interval | None
 
     def as_plain(self) -> dict[str, Any]:
         """Numbers for JSON, without those that are none.
@@ -57,7 +67,35 @@ class Judged:
         """
         found: dict[str, Any] = plain_rates(self.rates)
         found |= {"frames": self.frames, "frames_without_labels": self.without_labels}
+        if self.ellipse is not None:
+            names = zip(("estimate", "low", "high"), self.ellipse, strict=True)
+            found["ellipse_coverage_90"] = {name: round(value, 4) for name, value in names}
         return found | {"frames_unusable": self.unusable, "labelled_frames_absent": len(self.absent)}
+
+
+def ellipse_sentence(share: Mapping[str, float]) -> str:
+    """Whether the stated ellipses of pixels can be believed.
+
+    Parameters
+    ----------
+    share
+        ``estimate``, ``low`` and ``high`` of what they hold.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> ellipse_sentence({"estimate": 0.6, "low": 0.5, "high": 0.7})
+    'The stated 90 % ellipses hold the middle of 60 % (50 to 70) of the labels found: they are too small.'
+    """
+    word = (
+        "they are too small" if share["high"] < ELLIPSE else "they are too large" if share["low"] > ELLIPSE
+        else "90 % is within that"
+    )  # fmt: skip
+    span = f"{100 * share['estimate']:.0f} % ({100 * share['low']:.0f} to {100 * share['high']:.0f})"
+    return f"The stated 90 % ellipses hold the middle of {span} of the labels found: {word}."
 
 
 def plain_rates(given: Rates) -> dict[str, Any]:
@@ -155,6 +193,7 @@ def judge_detections(
     groups: list[str] = []
     rows: list[tuple[Any, ...]] = []
     named = set()
+    inside: list[NDArray[np.bool_]] = []
     unusable = outside = 0
     columns = (frames[one] for one in ("frame_id", "width_px", "height_px"))
     for frame, width, height, problem in zip(*columns, frames["problem"].fillna(""), strict=True):
@@ -172,6 +211,12 @@ def judge_detections(
             beyond = (true[:, :2] >= [width, height]) | (true[:, :2] + true[:, 2:] < 0)
             outside += int(beyond.any(axis=1).sum())
         found = match(centred, true, rule, ignore)
+        if own is not None and set(_COVARIANCE) <= set(own.columns) and len(found.pairs):
+            covariance = own[_COVARIANCE].to_numpy(float)[found.pairs[:, 0]].reshape(-1, 2, 2)
+            middle = true[:, :2] + true[:, 2:] / 2
+            off = middle[found.pairs[:, 1]] - own[["u_px", "v_px"]].to_numpy(float)[found.pairs[:, 0]]
+            known = np.isfinite(covariance).all(axis=(1, 2))
+            inside.append(inside_ellipse(off[known], covariance[known], ELLIPSE))
         counts.append(found.counts)
         groups.append(labels.group[name])
         verdicts = (("found", found.pairs[:, 0]), ("invented", found.invented), ("not judged", found.ignored))
@@ -186,8 +231,13 @@ def judge_detections(
     absent = tuple(sorted(set(labels.boxes) - named))
     return Judged(
         rates(np.array(counts), groups), things, len(counts), len(frames) - len(counts), unusable, absent,
-        outside,
+        outside, _share(inside),
     )  # fmt: skip
+
+
+def _share(inside: list[NDArray[np.bool_]]) -> Interval | None:
+    all_of = np.concatenate([np.zeros(0, bool), *inside])
+    return share_interval(int(all_of.sum()), len(all_of)) if len(all_of) else None
 
 
 def boxes_by_frame(

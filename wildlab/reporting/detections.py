@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from wildlab.pipeline.detection_judged import ellipse_sentence
 from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
 from wildlab.reporting.html import examine
@@ -106,6 +107,13 @@ def detections_page(
     parts += _overlays(overlays, left, judged is not None)
     parts += _per_frame(frames, of)
     parts += _problems(result)
+    if isinstance(thresholds.get("part"), float) and thresholds["part"] > 0:
+        parts.append(
+            "<h2>What the covariances are of</h2><p>The middle of a whole animal, of which the warm part "
+            f"that is seen shows where it lies to {100 * thresholds['part']:.0f} % of its length (the threshold "
+            "part, chosen on labelled people and deer). What is evenly warm all over is better known than "
+            "that: part 0 leaves what the shape and the noise of the image explain.</p>"
+        )
     rows = "".join(
         f'<tr><th scope="row" class="text">{escape(key)}</th><td class="text">{escape(value)}</td></tr>'
         for key, value in thresholds.items()
@@ -192,6 +200,8 @@ def _summary(result: Mapping[str, Any]) -> str:
         first = f"{_plural(result['detections'], 'detection')}; without labels, none is judged."
     then = [str(one) for one in result.get("notes", ())]
     judged = result.get("judged")
+    if judged and "ellipse_coverage_90" in judged:
+        then.append(ellipse_sentence(judged["ellipse_coverage_90"]))
     if judged:
         aside = result["detections"] - judged["found"] - judged["invented"]
         if aside > 0:

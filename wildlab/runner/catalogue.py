@@ -15,6 +15,7 @@
     seeds = 100                          # over how many flights; handed to the notebook as `seeds`. The
                                          # case's trial is computed for each before the notebook starts
     timeout_minutes = 30                 # for the notebook, and for each seed
+    # apart = true                       # runs where it is named only, not with all
     [static-point.parameters]            # handed to the notebook besides the five every notebook gets
     steps = 60
     [static-point.first_look]            # what a first look takes less of than the study, besides `seeds`,
@@ -67,6 +68,7 @@ class StudyEntry(BaseModel):
     beside: list[str] = Field(default_factory=list)
     seed: int = Field(default=1, ge=0, lt=2**32)
     seeds: int | None = Field(default=None, ge=1, le=1_000_000)
+    apart: bool = False
     timeout_minutes: float = Field(default=30.0, gt=0, allow_inf_nan=False)
     parameters: dict[str, Any] = Field(default_factory=dict)
     first_look: dict[str, int] = Field(default_factory=dict)

@@ -150,7 +150,7 @@ def run_studies(
     everything
         Run all studies, the quick ones first, and twice: a first look at each, then the full numbers (see
         `wildlab.runner.first_look`). One whose public data are not here is skipped, and says so; asked for by
-        name, it is an error.
+        name, it is an error. One that is kept apart is left out.
     first_look
         Take the first look alone, at all studies or those named.
     seeds
@@ -180,7 +180,7 @@ def run_studies(
     """
     studies = load_studies(notebooks / "studies.toml")
     chosen = (
-        list(studies.values())
+        [study for study in studies.values() if not study.apart]
         if everything
         else list({study.name: study for name in names for study in find_studies(name, studies)}.values())
     )
@@ -223,6 +223,9 @@ def run_studies(
         passes = [planned.first] if first_look else [planned.first, planned.second]
         skipped += planned.kept if first_look else []
     notes = _notes(chosen, seeds, scheduler)
+    apart = [study.name for study in studies.values() if study.apart]
+    if everything and apart:
+        notes.append(f"Not among all, to be run by name: {', '.join(apart)}.")
     return run_all(
         passes, skipped, studies, reports, console, notes=notes, parallel=parallel, scheduler=scheduler
     )
