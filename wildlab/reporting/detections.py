@@ -109,10 +109,10 @@ def detections_page(
     parts += _problems(result)
     if isinstance(thresholds.get("part"), float) and thresholds["part"] > 0:
         parts.append(
-            "<h2>What the covariances are of</h2><p>The middle of a whole animal, of which the warm part "
-            f"that is seen shows where it lies to {100 * thresholds['part']:.0f} % of its length (the threshold "
-            "part, chosen on labelled people and deer). What is evenly warm all over is better known than "
-            "that: part 0 leaves what the shape and the noise of the image explain.</p>"
+            "<h2>What the covariances are of</h2><p>The middle of a whole animal. The warm part that is seen "
+            f"shows where it lies to {100 * thresholds['part']:.0f} % of its length (the threshold part, "
+            "chosen on labelled people and deer). What is evenly warm all over is better known than that: "
+            "part 0 leaves what the shape and the noise of the image explain.</p>"
         )
     rows = "".join(
         f'<tr><th scope="row" class="text">{escape(key)}</th><td class="text">{escape(value)}</td></tr>'
