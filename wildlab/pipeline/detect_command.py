@@ -19,7 +19,6 @@ from wildlab.files import write_atomic, write_json
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
-from wildlab.flight.readers.frames.shutter import CORRECTIONS
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
 from wildlab.pipeline.detect import Detected, run_detection
@@ -40,11 +39,10 @@ from wildlab.pipeline.detection_judged import (
 )
 from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_pictures import write_pictures
+from wildlab.pipeline.detection_said import frames_said, not_judged, too_few_or_many
 from wildlab.pipeline.detection_shape_fit import fit_shapes
 from wildlab.pipeline.detection_thresholds import read_thresholds, write_thresholds
 
-#: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
-MANY = 10
 #: Bytes of an earlier run's result.json at most.
 MOST_BYTES = 50_000_000
 
@@ -183,7 +181,11 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         )
     result = _result(wanted, thresholds, detected, judged, fitted, pictures, labels)
     usable = result["frames"]["usable"]
-    result["notes"] = [*frames_said(frames, detected), *_too_few_or_many(wanted, detected, usable)]
+    chosen = bool(wanted.fit or wanted.thresholds or wanted.distance_m is not None)
+    result["notes"] = [
+        *frames_said(frames, detected),
+        *too_few_or_many(wanted.method, wanted.polarity, len(detected.detections), usable, chosen=chosen),
+    ]
     result["sentences"] = [*result["notes"], *result["sentences"]]
     if others and labels is not None:
         ours = f"wildlab {wanted.method}"
@@ -342,83 +344,8 @@ def _result(
             some = ", ".join(printable(one) for one in kinds[:5])
             say.append(f"Labels of {len(kinds)} classes count alike ({some}); --class chooses.")
         if judged.without_labels or judged.unusable or judged.absent:
-            say += _not_judged(judged)
+            say += not_judged(judged)
     return result
-
-
-def _not_judged(judged: Judged) -> list[str]:
-    """Which frames and labels say nothing, or count as missed for a reason of their own."""
-    said = []
-    if judged.without_labels:
-        said.append(f"{judged.without_labels} of the frames are not judged: the labels do not name them.")
-    if judged.outside:
-        said.append(
-            f"{judged.outside} labels lie wholly outside their image and count as missed: are they of these "
-            "images, at this size?"
-        )
-    if judged.unusable:
-        said.append(f"{judged.unusable} labelled frames could not be used; what is labelled there is missed.")
-    if judged.absent:
-        first = ", ".join(printable(one) for one in judged.absent[:3])
-        more = len(judged.absent) - 3
-        said.append(
-            f"{len(judged.absent)} labelled frames are not here and count nowhere: {first}"
-            + (f" and {more} more." if more > 0 else ".")
-        )
-    return said
-
-
-def _too_few_or_many(wanted: Wanted, detected: Detected, usable: int) -> list[str]:
-    """What may be wrong where nothing is found, or more than can be looked through."""
-    number = len(detected.detections)
-    if not usable:
-        return []
-    if not number and wanted.method != "colour" and wanted.polarity != "black-hot":
-        return ["Nothing stands out as warm. Where what is warm looks dark, say --polarity black-hot."]
-    chosen = wanted.fit or wanted.thresholds or wanted.distance_m is not None
-    if number > MANY * usable and not chosen:
-        return [
-            f"That is {number / usable:.0f} an image: the defaults fit no camera in particular. Sizes follow "
-            "from --distance and --focal, and --fit chooses thresholds from labels."
-        ]
-    return []
-
-
-def frames_said(frames: Frames, detected: Detected) -> list[str]:
-    """Sentences on what was found of the camera itself: its shutter, its pixels, its corners.
-
-    Parameters
-    ----------
-    frames
-        That were looked at.
-    detected
-        What came out of them.
-
-    Returns
-    -------
-    list of str
-        None of them where there is nothing to be said.
-    """
-    kept = frames.kept
-    said = [f"{note[0].upper()}{note[1:]}." for note in kept.notes]
-    problems = detected.frames["problem"].fillna("").astype(str)
-    corrections = problems.str.contains("|".join(CORRECTIONS)).sum()
-    if corrections:
-        said.append(f"Taken during a flat-field correction: {corrections} of {len(problems)} frames.")
-    if kept.dead is not None and kept.dead.any():
-        number = int(kept.dead.sum())
-        word = "1 pixel does not" if number == 1 else f"{number} pixels do not"
-        said.append(f"{word} see the scene and {'is' if number == 1 else 'are'} masked.")
-    if frames.even and kept.vignetting is None:
-        said.append("No fall of brightness towards the corners could be measured, and none is taken off.")
-    elif kept.vignetting is not None:
-        corner, sd = kept.vignetting.corner, kept.vignetting.sd
-        word = "darker" if corner < 0 else "brighter"
-        said.append(
-            f"The corners are {abs(corner):.3g} (standard deviation {sd:.2g}) {word} than the middle, by "
-            f"{kept.vignetting.images} frames; that is taken off."
-        )
-    return said
 
 
 @contextmanager
