@@ -124,11 +124,14 @@ def find_board(grey: Grey, board: Board) -> Seen | None:
         None where it is not there as a whole.
     """
     ways = (_by_grid, _by_squares) if board.pattern == "chessboard" else (_circles,)
-    for find in ways:
-        for inverted in (False, True):
+    for inverted in (False, True):
+        for find in ways:
             uv = find(255 - grey if inverted else grey, board)
             if uv is not None:
-                return Seen(_refined(uv, grey, board) if board.pattern == "chessboard" else uv, inverted)
+                if board.pattern != "chessboard":
+                    return Seen(uv, inverted)
+                # Squares are dark and light in turn: which way round they were found says nothing of them.
+                return Seen(_refined(uv, grey, board), inverted and find is _by_grid)
     return None
 
 
@@ -155,8 +158,8 @@ def count_codes(grey: Grey) -> int:
     return most
 
 
-def _by_grid(grey: Grey, board: Board, also: int = 0) -> Array | None:
-    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY | also
+def _by_grid(grey: Grey, board: Board) -> Array | None:
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(grey, (board.columns, board.rows), flags=flags)
     return _as_pixels(cast(Any, corners), grey) if found else None
 
@@ -166,10 +169,6 @@ def _by_squares(grey: Grey, board: Board) -> Array | None:
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     found, corners = cv2.findChessboardCorners(grey, (board.columns, board.rows), flags=flags)
     return _as_pixels(cast(Any, corners), grey) if found else None
-
-
-def _by_grid_in_depth(grey: Grey, board: Board) -> Array | None:
-    return _by_grid(grey, board, cv2.CALIB_CB_EXHAUSTIVE)
 
 
 def _refined(uv: Array, grey: Grey, board: Board) -> Array:

@@ -207,8 +207,13 @@ def solve_boards(
 
     found = calibrate_camera(points, uv, width, height, estimate)
     held_out = held_out_errors(found, points, uv)
-    odd = odd_views(held_out)
-    rest = calibrate_camera(points, uv[~odd], width, height, estimate) if odd.any() else None
+    odd, rest = np.zeros(len(uv), bool), None
+    errors = held_out
+    # One at a time, the worst first: a view that is wrong pulls the camera away from others too.
+    while odd.sum() < _most_odd(len(uv)) and (wrong := odd_views(errors)).any():
+        odd[np.flatnonzero(~odd)[np.where(wrong, errors, -np.inf).argmax()]] = True
+        rest = calibrate_camera(points, uv[~odd], width, height, estimate)
+        errors = held_out_errors(rest, points, uv[~odd])
     names = tuple(one.name for one, is_odd in zip(used, odd, strict=True) if is_odd)
     return CameraCalibration(board, width, height, images, choice, found, held_out, names, rest)
 
@@ -231,6 +236,10 @@ def held_out_errors(found: Intrinsics, points: Array, uv: Array) -> Array:
     return np.array([view_errors(c, points, one[None])[0] for c, one in zip(cameras, uv, strict=True)])
 
 
+def _most_odd(views: int) -> int:
+    return min(int(ODD * views), views - FEWEST)
+
+
 def odd_views(errors: Array) -> NDArray[np.bool_]:
     """Which views disagree with the rest, by their held-out errors.
 
@@ -246,7 +255,7 @@ def odd_views(errors: Array) -> NDArray[np.bool_]:
     middle = np.median(errors)
     spread = 1.4826 * np.median(np.abs(errors - middle))
     odd = (errors > TIMES * middle) & (errors > middle + DEVIATIONS * spread)
-    most = min(int(ODD * len(errors)), len(errors) - FEWEST)
+    most = _most_odd(len(errors))
     if odd.sum() > most:
         odd &= errors >= (np.sort(errors)[-most] if most > 0 else np.inf)
     return np.asarray(odd)
