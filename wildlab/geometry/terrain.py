@@ -1,6 +1,6 @@
 """Terrain: heights on a grid in n, and where rays meet them.
 
-The surface is bilinear between nodes. Heights are metres above the plane ``down = 0`` of n, not above a datum:
+The surface is bilinear between nodes. Heights are metres above the plane ``down = 0`` of n, not a datum:
 what the curvature of the Earth takes away is settled where a map is resampled into n, and rays are straight.
 """
 

@@ -108,6 +108,13 @@ def first_crossing(height: Array, i: int, j: int, start: Array, ray: Array, t0: 
 
 
 @compiled
+def onward(position: float, along: float, before: int, first: int, last: int) -> int:
+    """Cell of a position within first to last, never behind the one before: rounding makes circles."""
+    now = min(max(int(position), first), last)
+    return max(now, before) if along > 0 else min(now, before)
+
+
+@compiled
 def walk(
     height: Array, blocks: Array, shapes: Array, start: Array, ray: Array, furthest: float, top: float
 ) -> tuple[float, int]:
@@ -161,8 +168,8 @@ def walk(
                     # Nothing in this block is higher: the ray may begin where it comes down to that.
                     t = min(max(t, (highest - z) * per_z), out)
                     begun = False
-                    j = min(max(int(x + t * dx), left), right - 1)
-                    i = min(max(int(y + t * dy), low), high - 1)
+                    j = onward(x + t * dx, dx, j, left, right - 1)
+                    i = onward(y + t * dy, dy, i, low, high - 1)
                 continue
         else:
             missing = height[i, j] + height[i, j + 1] + height[i + 1, j] + height[i + 1, j + 1]
@@ -181,11 +188,12 @@ def walk(
         # The border that was crossed says in which cell the walk goes on; rounding has no say in it.
         if tx <= ty:
             j = right if dx > 0 else left - 1
-            i = min(max(int(y + t * dy), low), high - 1)
+            if tx < ty:
+                i = onward(y + t * dy, dy, i, low, high - 1)
         if ty <= tx:
             i = high if dy > 0 else low - 1
-            if tx > ty:
-                j = min(max(int(x + t * dx), left), right - 1)
+            if ty < tx:
+                j = onward(x + t * dx, dx, j, left, right - 1)
         if not (0 <= i < rows - 1 and 0 <= j < columns - 1):
             return np.nan, MISSED
         level = min(level + 1, levels)
