@@ -66,7 +66,7 @@ def patch_height(height: Array, x: float, y: float) -> float:
         return np.nan
     j, i = min(int(x), columns - 2), min(int(y), rows - 2)
     u, v = x - j, y - i
-    a, c = float(height[i, j]), float(height[i + 1, j])
+    a, c = np.float64(height[i, j]), np.float64(height[i + 1, j])
     low, high = a + u * (height[i, j + 1] - a), c + u * (height[i + 1, j + 1] - c)
     return float(low + v * (high - low))
 
@@ -74,7 +74,7 @@ def patch_height(height: Array, x: float, y: float) -> float:
 @compiled
 def first_crossing(height: Array, i: int, j: int, start: Array, ray: Array, t0: float, t1: float) -> float:
     """Smallest parameter in [t0, t1] at which a ray above patch (i, j) reaches it; NaN for none."""
-    a = float(height[i, j])
+    a = np.float64(height[i, j])
     b, c = height[i, j + 1] - a, height[i + 1, j] - a
     d = height[i + 1, j + 1] - a - b - c
     # From t0 on, so that the numbers stay small: over a long way a square of t loses what z has.
