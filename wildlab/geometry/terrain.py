@@ -258,7 +258,7 @@ def _to_grid(terrain: Terrain, vectors: Array, *, whole: bool) -> Array:
 def _pyramid(height: NDArray[np.float32], top: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Highest nodes of blocks of 4, 8, 16, ... cells a side, one after the other, and each level's shape."""
     with announced("the walk over terrain"):
-        levels = [highest_of_blocks(height, 1 << FIRST, np.float32(top))]
+        levels = [highest_of_blocks(height, 1 << FIRST, top)]
         while max(levels[-1].shape) > 1:
             levels.append(highest_of_four(levels[-1]))
     shapes = np.array([one.shape for one in levels], np.int64)
