@@ -97,6 +97,14 @@ def test_where_the_image_is_not_covered(good):
     assert text.number_sentence(few) and not text.number_sentence(good)
 
 
+def test_focal_lengths_that_are_known_well_are_not_complained_of(good):
+    assert text.rim_px(good.found) < text.MATTERS_PX
+    flat = solve_boards(images(8, 0.1, 1.0), BOARD, 640, 512, "none").found
+    sd = dict(zip(flat.names, np.sqrt(np.diag(flat.covariance)), strict=True))
+    by_hand = max(sd["fx"] / flat.camera.fx, sd["fy"] / flat.camera.fy) * np.hypot(320, 256)
+    assert text.rim_px(flat) == pytest.approx(by_hand) and by_hand > text.MATTERS_PX
+
+
 def test_what_cannot_be_told_apart(good):
     assert text.confusion_sentences(good) == []
     flat = solve_boards(images(8, 0.1, 1.0), BOARD, 640, 512, "none")

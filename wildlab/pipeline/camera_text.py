@@ -15,6 +15,8 @@ from wildlab.pipeline.camera import CameraCalibration, coverage
 COVERED = 0.8
 #: Fewer views than this give wide intervals.
 PLENTY = 15
+#: What a focal length may be off by at the corner of the image (1 SD) without a word, pixels.
+MATTERS_PX = 0.5
 #: Tilts less than this (degrees) hardly tell focal length from distance.
 FLAT_DEG = 15.0
 #: A direction that is off by more than this (pixels, one standard deviation) at a corner is worth a sentence.
@@ -99,6 +101,14 @@ def tilts_deg(found: Intrinsics) -> Array:
     return np.asarray(np.degrees(np.arccos(np.clip(np.abs(found.views.rotation[:, 2, 2]), 0, 1))))
 
 
+def rim_px(found: Intrinsics) -> float:
+    """By how much the least certain focal length moves a point at the corner of the image, 1 SD, pixels."""
+    sd = np.sqrt(np.diag(found.covariance))
+    focal = [name in ("f", "fx", "fy") for name in found.names]
+    share = float(np.max(sd[focal] / found.values[focal], initial=0.0))
+    return float(share * np.hypot(found.camera.width, found.camera.height) / 2)
+
+
 def confusion_sentences(found: CameraCalibration) -> list[str]:
     """Which parameters the views cannot tell apart, and what would help."""
     said = []
@@ -111,6 +121,9 @@ def confusion_sentences(found: CameraCalibration) -> list[str]:
             lens = "k1" if "k3" not in group else "k1-k2"
             said.append(f"{what}: together they say how the lens bends, and --lens {lens} does with fewer.")
         elif set(group) & {"f", "fx", "fy"}:
+            # Two focal lengths change together wherever the board stands; it matters where both are vague.
+            if rim_px(found.found) < MATTERS_PX:
+                continue
             said.append(
                 f"{what}: tilt the board more, it is {tilts_deg(found.found).max():.0f} degrees at most."
             )
