@@ -69,10 +69,12 @@ from wildlab.geometry.flow import (
     CameraMotion,
     Twist,
     camera_flow,
+    camera_rates,
     camera_twist,
     flow_between,
     flow_matrix,
     gimbal_axes,
+    lens_velocity,
     motion_between,
     target_velocity,
     velocity_from_pair,
@@ -145,6 +147,13 @@ from wildlab.geometry.robust import (
     student_scale,
     student_weights,
 )
+from wildlab.geometry.terrain import (
+    BECAME,
+    Met,
+    Terrain,
+    intersect_terrain,
+    pixels_to_terrain,
+)
 from wildlab.geometry.uncertainty import (
     GroundCovariance,
     GroundJacobians,
@@ -158,6 +167,7 @@ from wildlab.geometry.uncertainty import (
 )
 
 __all__ = [
+    "BECAME",
     "BORESIGHT",
     "EARTH_RATE",
     "ESTIMATED",
@@ -179,6 +189,7 @@ __all__ = [
     "GroundJacobians",
     "Intrinsics",
     "LensChoice",
+    "Met",
     "Mount",
     "Mounting",
     "Origin",
@@ -186,6 +197,7 @@ __all__ = [
     "PosesAt",
     "Projected",
     "RobustFit",
+    "Terrain",
     "Twist",
     "Velocity",
     "Views",
@@ -200,6 +212,7 @@ __all__ = [
     "camera_from_matrix",
     "camera_of",
     "camera_pose",
+    "camera_rates",
     "camera_rotation",
     "camera_twist",
     "choose_lens",
@@ -235,6 +248,8 @@ __all__ = [
     "in_image",
     "inside_ellipse",
     "intersect_plane",
+    "intersect_terrain",
+    "lens_velocity",
     "linear_enu_error",
     "local_earth",
     "matrix_to_euler",
@@ -253,6 +268,7 @@ __all__ = [
     "parameters_of",
     "pixel_rays",
     "pixel_to_plane",
+    "pixels_to_terrain",
     "project",
     "project_board",
     "quaternion_to_matrix",

@@ -84,7 +84,19 @@ def gimbal_axes(mount: Mount, pan: ArrayLike | None = None) -> Array:
 
 
 def camera_rates(poses: CameraPoses, motion: CameraMotion) -> Array:
-    """Angular velocity of the camera against n, in b: `w_nb + w_bc` of H (5.26). (N, 3) or (3,) rad/s."""
+    """Angular velocity of the camera against n, in b: `w_nb + w_bc` of H (5.26).
+
+    Parameters
+    ----------
+    poses
+        Of the camera.
+    motion
+        Of the airframe and the gimbal.
+
+    Returns
+    -------
+    (N, 3) or (3,) rad/s, in b.
+    """
     rates = np.asarray(motion.rates, float)
     if motion.gimbal_rates is None:
         return rates
@@ -96,6 +108,17 @@ def lens_velocity(poses: CameraPoses, motion: CameraMotion) -> Array:
     """Velocity of the lens over the ground, in n, (N, 3) or (3,) m/s.
 
     H (5.25) takes that of b; where the lens is elsewhere, the airframe's turning moves it too.
+
+    Parameters
+    ----------
+    poses
+        Of the camera.
+    motion
+        Of the airframe.
+
+    Returns
+    -------
+    (N, 3) or (3,) m/s, in n.
     """
     around = np.cross(np.asarray(motion.rates, float), poses.lever_arm)
     turned = np.einsum("...ij,...j->...i", poses.R_nb, around)
@@ -281,13 +304,13 @@ def velocity_from_pair(
     WildlabError
         Where the interval is not above zero, or there is another number of poses than of pixels.
     """
-    seconds = positive_interval(interval)
+    seconds = _positive_interval(interval)
     there = georeference_pixels(second, uv_second, plane_down)
     here = georeference_pixels(first, uv_first, plane_down)
     return np.asarray((there - here)[..., :2] / seconds)
 
 
-def positive_interval(interval: float) -> float:
+def _positive_interval(interval: float) -> float:
     """The time between two images, s.
 
     Raises
@@ -327,7 +350,7 @@ def flow_between(uv_first: ArrayLike, uv_second: ArrayLike, interval: float) -> 
     >>> print(middle, flow)
     [[11. 20.]] [[20.  0.]]
     """
-    seconds = positive_interval(interval)
+    seconds = _positive_interval(interval)
     here, there = np.asarray(uv_first, float), np.asarray(uv_second, float)
     return (here + there) / 2, (there - here) / seconds
 
@@ -357,7 +380,7 @@ def motion_between(
     WildlabError
         Where the interval is not above zero, or mounts or numbers of rows differ.
     """
-    seconds = positive_interval(interval)
+    seconds = _positive_interval(interval)
     if first.mount != second.mount or first.rows != second.rows:
         raise WildlabError(
             f"poses of the rows {first.rows} and {second.rows}, or of two mounts",

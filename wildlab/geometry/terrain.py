@@ -14,21 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import matching, pixel_rays
-from wildlab.geometry.terrain_kernels import (
-    BELOW,
-    FIRST,
-    HIT,
-    MISSED,
-    NO_DATA,
-    NOT_KNOWN,
-    highest_of_blocks,
-    highest_of_four,
-    walk_all,
-)
 
+#: What became of a ray.
+HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
 #: What became of a ray, in words, by its number.
 BECAME = {
     HIT: "met the ground",
@@ -208,6 +198,10 @@ def intersect_terrain(terrain: Terrain, rays: ArrayLike, p_nc: ArrayLike, furthe
             "give one start for each ray, or one for all, three columns each",
             field="p_nc",
         )
+    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
+    from wildlab.geometry.compilation import announced
+    from wildlab.geometry.terrain_kernels import walk_all
+
     grid = _to_grid(terrain, starts, whole=True)
     along = _to_grid(terrain, directions, whole=False)
     blocks, shapes = terrain._blocks
@@ -257,6 +251,9 @@ def _to_grid(terrain: Terrain, vectors: Array, *, whole: bool) -> Array:
 
 def _pyramid(height: NDArray[np.float32], top: float) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Highest nodes of blocks of 4, 8, 16, ... cells a side, one after the other, and each level's shape."""
+    from wildlab.geometry.compilation import announced
+    from wildlab.geometry.terrain_kernels import FIRST, highest_of_blocks, highest_of_four
+
     with announced("the walk over terrain"):
         levels = [highest_of_blocks(height, 1 << FIRST, top)]
         while max(levels[-1].shape) > 1:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.geometry.compilation import compiled
+from wildlab.geometry.terrain import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 #: Any array: the types are the compiler's business.
 Array = Any
@@ -24,8 +25,6 @@ Array = Any
 FIRST = 2
 #: Of a direction, what is as good as nothing.
 TINY = 1e-150
-#: What became of a ray.
-HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
 
 
 @compiled
