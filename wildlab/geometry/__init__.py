@@ -140,6 +140,7 @@ from wildlab.geometry.mount import (
     mount_rotation,
 )
 from wildlab.geometry.mounting import Mounting, mounting_from_points
+from wildlab.geometry.ray_ends import BECAME
 from wildlab.geometry.robust import (
     RobustFit,
     fit_linear,
@@ -148,7 +149,6 @@ from wildlab.geometry.robust import (
     student_weights,
 )
 from wildlab.geometry.terrain import (
-    BECAME,
     Met,
     Terrain,
     intersect_terrain,

@@ -16,17 +16,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import matching, pixel_rays
-
-#: What became of a ray.
-HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
-#: What became of a ray, in words, by its number.
-BECAME = {
-    HIT: "met the ground",
-    MISSED: "left the map without meeting the ground",
-    NO_DATA: "came to where the map has no height",
-    BELOW: "started below the ground",
-    NOT_KNOWN: "has no direction or no start",
-}
+from wildlab.geometry.ray_ends import BECAME
 
 
 @dataclass(frozen=True, eq=False)

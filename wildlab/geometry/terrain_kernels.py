@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from wildlab.geometry.compilation import compiled
-from wildlab.geometry.terrain import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
+from wildlab.geometry.ray_ends import BELOW, HIT, MISSED, NO_DATA, NOT_KNOWN
 
 #: Any array: the types are the compiler's business.
 Array = Any

@@ -1,0 +1,12 @@
+"""What becomes of a ray over terrain, as numbers that compiled loops and everyone else share."""
+
+HIT, MISSED, NO_DATA, BELOW, NOT_KNOWN = 0, 1, 2, 3, 4
+
+#: The same in words.
+BECAME = {
+    HIT: "met the ground",
+    MISSED: "left the map without meeting the ground",
+    NO_DATA: "came to where the map has no height",
+    BELOW: "started below the ground",
+    NOT_KNOWN: "has no direction or no start",
+}
