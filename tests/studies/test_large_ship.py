@@ -132,6 +132,14 @@ def test_published_differences_are_those_of_the_table():
     assert table["reference"].tolist() == ["6.6", "16.4", "x", "x"]
 
 
+def test_only_what_no_turn_of_the_scene_changes_is_judged():
+    """A turn of the whole scene changes deviations north and east, and leaves their sum as it is."""
+    printed = load_published("large-ship")
+    turned = printed["name"].str.contains("_north|_east")
+    assert turned.sum() == 8
+    assert (printed["unjudged"].str.len() > 0).equals(turned)
+
+
 def test_claims_follow_the_numbers(numbers):
     good = {
         (WITH, "error_of_mean"): 4.0, (WITHOUT, "error_of_mean"): 7.0,
