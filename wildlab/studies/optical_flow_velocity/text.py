@@ -123,9 +123,9 @@ def mean_words(spread: pd.DataFrame) -> str:
     largest = f"The largest mean is {means.max():.2f} m/s off."
     if not known:
         return (
-            f"On none of {flights(len(spread))} can the pairs tell whether the mean velocity of a ship at rest "
-            f"is within {WITHIN_M_S:g} m/s north and east: the 95 % intervals of the means, which count the "
-            f"neighbours' correlation, have both sides of it in them. {largest} {count}"
+            f"On none of {flights(len(spread))} can the pairs tell whether the mean velocity of a ship at "
+            f"rest is within {WITHIN_M_S:g} m/s north and east: the 95 % intervals of the means, which "
+            f"count the neighbours' correlation, have both sides of it in them. {largest} {count}"
         )
     within = share_interval(int((means[decided] <= WITHIN_M_S).sum()), known)
     rest = f", on {len(spread) - known} more the pairs cannot tell" if known < len(spread) else ""
