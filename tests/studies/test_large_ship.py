@@ -280,6 +280,7 @@ def test_the_rate_of_detections_has_its_interval_over_flights(numbers):
     said = text.detected_words(pd.concat(rows))
     assert "In 97.0 % (95 % interval 89.5 to 100.0 %, over flights)" in said
     assert "missed on 1 of 3 flights by the first count, on 3 by the second" in said
+    assert "in 100.0 % (on each of 3 flights)" in said, "no interval without width"
     assert "In 94.0 % (one flight)" in text.detected_words(rows[0])
     known = {(DETECTOR, "largest_missed"): 0.004}
     assert "what is missed shows 0.4 % of the ship at most" in text.detected_words(spread_of(numbers, known))

@@ -160,6 +160,8 @@ def _over_flights(rates: pd.Series) -> str:
     """The mean of flights' rates with Student's interval: images of one pass are not independent."""
     if rates.notna().sum() < 2:
         return f"{100 * rates.mean():.1f} % (one flight)"
+    if np.ptp(rates.dropna()) < 1e-12:  # flights that are all alike have no spread to make an interval of
+        return f"{100 * rates.mean():.1f} % (on each of {int(rates.notna().sum())} flights)"
     mean, low, high = mean_interval(rates)
     low, high = max(low, 0.0), min(high, 1.0)
     return f"{100 * mean:.1f} % (95 % interval {100 * low:.1f} to {100 * high:.1f} %, over flights)"
