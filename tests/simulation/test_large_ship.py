@@ -45,6 +45,12 @@ def test_five_segments_of_441_images_and_438_detections_whatever_the_seed(seed):
     assert 0.7 < d["touches_border"].mean() < 1.0
 
 
+def test_a_lap_takes_as_long_as_its_reason_says(twin, flight):
+    passes = flight.frames.groupby("group")["time_s"].mean().sort_values().diff().dropna()
+    stated = float(twin.route.length.reason.split("some ")[1].split(" s")[0])
+    assert passes.median() == pytest.approx(stated, abs=2)
+
+
 def test_the_three_misses_show_least_of_the_ship(twin, flight):
     without = set(flight.frames["frame_id"]) - set(flight.detections["frame_id"])
     all_found = simulate(with_values(twin, target__observations=441), 3).detections

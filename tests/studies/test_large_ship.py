@@ -6,17 +6,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.studies.large_ship import STUDY, charts, text
+from wildlab.studies.large_ship.claims import check_claims, scatter_left
 from wildlab.studies.large_ship.readings import BOX, readings_of, readings_table, shots_as_boxes
 from wildlab.studies.large_ship.trial import (
     DETECTOR,
+    NEAR_M,
+    SLIVER,
     START_S,
     UNITS,
     WITH,
     WITHOUT,
-    check_claims,
+    centres_of,
     errors_of,
     follow_both,
     merged_times,
@@ -104,6 +108,43 @@ def test_exact_centres_and_poses_put_the_ship_where_it_is(taken, tracked):
     assert 2 < np.hypot(*(truth - bodies[:, :2].mean(axis=0))) < 12
 
 
+def test_distances_from_the_middle_leave_the_receiver_out(taken, tracked, numbers):
+    """About where the rendered ship's centre lies, not the log of the receiver ahead of it."""
+    one = tracked[WITH]
+    middle, known = centres_of(taken, one), one.seen.seen
+    rows = [int(row) for row in one.marks.exposure]
+    bodies = [taken.camera.flight.bodies(row)[0].centre(0.0) for row in rows]
+    assert np.allclose(middle, np.array(bodies)[:, :2])
+    apart = middle - one.seen.truth[:, :2]
+    assert numbers[DETECTOR, "receiver_off"] == pytest.approx(np.nanmean(np.linalg.norm(apart, axis=1)))
+    points = one.seen.positions[known]
+    off = np.linalg.norm(points - middle[known], axis=1)
+    for limit in NEAR_M:
+        assert numbers[WITH, f"share_near_{limit}"] == pytest.approx((off < limit).mean())
+    # What the mean is off from both origins differs by what lies between these.
+    mean = (middle[known] - points).mean(axis=0)
+    assert numbers[WITH, "centre_error_of_mean"] == pytest.approx(np.linalg.norm(mean))
+    assert np.linalg.norm(mean - apart[known].mean(axis=0)) == pytest.approx(numbers[WITH, "error_of_mean"])
+    late = one.seen.times >= START_S
+    tracked_off = np.linalg.norm(middle - one.track.x[:, :2], axis=1)[late]
+    assert numbers[WITH, "centre_mae_after_start"] == pytest.approx(tracked_off.mean())
+    assert numbers[WITH, "centre_error_true_poses"] < numbers[WITH, "error_true_poses"] + np.linalg.norm(
+        apart[known].mean(axis=0)
+    )
+
+
+def test_slivers_are_counted_apart(taken, tracked, numbers):
+    marks = taken.marks(np.nan)
+    clear = marks.share >= SLIVER
+    assert numbers[DETECTOR, "rate_beyond_sliver"] == pytest.approx(marks.found[clear].mean())
+    best = int(np.argmax(np.where(marks.found, marks.share, -1.0)))
+    shots = list(taken.shots)
+    shots[best] = shots[best]._replace(judged=shots[best].judged._replace(found={}))
+    blind = numbers_of(taken._replace(shots=shots), tracked)
+    assert blind[DETECTOR, "largest_missed"] == marks.share[best] > SLIVER
+    assert blind[DETECTOR, "rate_beyond_sliver"] < numbers[DETECTOR, "rate_beyond_sliver"]
+
+
 def test_moving_brings_centres_nearer(numbers):
     assert numbers[WITH, "pixel_error"] < numbers[WITHOUT, "pixel_error"]
     assert numbers[DETECTOR, "share_cut"] > 0.5
@@ -132,13 +173,21 @@ def test_published_differences_are_those_of_the_table():
     assert table["reference"].tolist() == ["6.6", "16.4", "x", "x"]
 
 
+def test_only_what_no_turn_of_the_scene_changes_is_judged():
+    """A turn of the whole scene changes deviations north and east, and leaves their sum as it is."""
+    printed = load_published("large-ship")
+    turned = printed["name"].str.contains("_north|_east")
+    assert turned.sum() == 8
+    assert (printed["unjudged"].str.len() > 0).equals(turned)
+
+
 def test_claims_follow_the_numbers(numbers):
     good = {
         (WITH, "error_of_mean"): 4.0, (WITHOUT, "error_of_mean"): 7.0,
         (WITH, "sd_north"): 9.0, (WITHOUT, "sd_north"): 8.0,
         (WITH, "sd_east"): 9.0, (WITHOUT, "sd_east"): 8.0,
         (WITH, "sd_true_poses"): 1.0, (WITHOUT, "sd_true_poses"): 1.0,
-        (WITH, "share_near"): 0.6, (WITHOUT, "share_near"): 0.5,
+        (WITH, "share_near_10"): 0.6, (WITHOUT, "share_near_10"): 0.5,
         (WITH, "mae_after_start"): 9.0, (WITHOUT, "mae_after_start"): 12.0,
         (WITH, "time_to_rest"): 9.0, (WITHOUT, "time_to_rest"): np.nan,
         (WITH, "speed_after_start"): 0.2, (WITHOUT, "speed_after_start"): 0.2,
@@ -166,6 +215,17 @@ def test_claims_follow_the_numbers(numbers):
 
     assert all(held(good).values())
     assert not any(held(bad).values())
+    assert float(thresholds["mainly-navigation"]) == pytest.approx(text.HALF_OF_VARIANCE)
+    assert float(thresholds["high-success-rate"]) == pytest.approx(text.MISSED)
+    near = check_claims(
+        spread_of(numbers, good | {(WITH, "share_near_5"): 0.1, (WITHOUT, "share_near_5"): 0.2})
+    )
+    held_at = {limit: near["more-near-centre"].holds(float(limit)).all() for limit in NEAR_M[:2]}
+    assert held_at == {5: False, 10: True}, "each limit has shares of its own"
+    stated = float(thresholds["more-near-centre"])
+    assert [stated / 2, stated, 2 * stated] == list(NEAR_M)
+    with pytest.raises(WildlabError, match=r"(?s)Nothing was counted within 7 m.*Use one of 5, 10, 20"):
+        near["more-near-centre"].holds(7)
     never = check_claims(
         spread_of(numbers, {(WITH, "time_to_rest"): np.nan, (WITHOUT, "time_to_rest"): np.nan})
     )
@@ -185,14 +245,77 @@ def test_words_turn_with_the_numbers(numbers):
     assert "from the poses, as the thesis has it" in text.cause_words(spread_of(numbers, poses))
     parts = {(who, "sd_true_poses"): 9.0 for who in (WITH, WITHOUT)} | calm
     assert "the thesis puts it down to the poses" in text.cause_words(spread_of(numbers, parts))
-    small = {(WITH, "ellipse_coverage_90"): 0.4, (DETECTOR, "share_in_pieces"): 0.2}
-    assert "too small. In 20 %" in text.ellipse_words(spread_of(numbers, small))
+    small = {(WITH, "ellipse_coverage_90"): 0.4, (WITHOUT, "ellipse_coverage_90"): 0.95}
+    small[DETECTOR, "share_in_pieces"] = 0.2
+    assert "large is too small: adjusted. In 20 %" in text.ellipse_words(spread_of(numbers, small))
     fine = {(who, "ellipse_coverage_90"): 0.9 for who in (WITH, WITHOUT)} | {(DETECTOR, "share_in_pieces"): 0}
-    assert text.ellipse_words(spread_of(numbers, fine)).endswith("of it is enough.")
+    assert text.ellipse_words(spread_of(numbers, fine)).endswith("states of it is too small.")
+    apart = pd.concat(
+        [spread_of(numbers, fine | {(WITH, "ellipse_coverage_90"): x}).head(1) for x in (0.2, 1.0)]
+    )
+    said = text.ellipse_words(apart)
+    assert "60 % in the image (0 to 100: 90 % lies within)" in said
+    assert "do not show that" in said, "two flights that far apart show nothing"
+    assert "One flight cannot tell" in text.ellipse_words(spread_of(numbers, fine).head(1))
     rest = {(WITH, "time_to_rest"): 12.0, (WITHOUT, "time_to_rest"): np.nan}
     assert "adjusted after 12 s; not adjusted never (median)" in text.rest_words(spread_of(numbers, rest))
+    one_only = {(WITH, "sd_true_poses"): 3.2, (WITHOUT, "sd_true_poses"): 8.3}
+    mixed = spread_of(numbers, calm | one_only)  # 0.64 and 0.92: the claim takes the larger
+    assert scatter_left(mixed) == pytest.approx(8.3 / 9)
+    assert "the thesis puts it down to the poses" in text.cause_words(mixed)
+    low = spread_of(numbers, calm | {(who, "sd_true_poses"): 1.0 for who in (WITH, WITHOUT)})
+    assert "as the thesis has it" in text.cause_words(low)
+    assert "So on 3 of 6 flights" in text.cause_words(pd.concat([mixed, low]))
     alarm = {(DETECTOR, "images"): 10.0, (DETECTOR, "false_alarms_per_image"): 0.1}
     assert "with 3 false alarms" in text.detected_words(spread_of(numbers, alarm))
+
+
+def test_the_rate_of_detections_has_its_interval_over_flights(numbers):
+    rows = [
+        spread_of(numbers, {(DETECTOR, "detection_rate"): rate, (DETECTOR, "rate_beyond_sliver"): 1.0}).head(
+            1
+        )
+        for rate in (0.94, 0.97, 1.0)
+    ]
+    said = text.detected_words(pd.concat(rows))
+    assert "In 97.0 % (95 % interval 89.5 to 100.0 %, over flights)" in said
+    assert "missed on 1 of 3 flights by the first count, on 3 by the second" in said
+    assert "in 100.0 % (on each of 3 flights)" in said, "no interval without width"
+    assert "In 94.0 % (one flight)" in text.detected_words(rows[0])
+    known = {(DETECTOR, "largest_missed"): 0.004}
+    assert "what is missed shows 0.4 % of the ship at most" in text.detected_words(spread_of(numbers, known))
+    none = spread_of(numbers, {(DETECTOR, "largest_missed"): np.nan})
+    assert "at most" not in text.detected_words(none)
+
+
+def test_both_origins_are_said(numbers):
+    changes = {(who, "mae_after_start"): 13.9 for who in (WITH, WITHOUT)}
+    changes |= {(WITH, "centre_mae_after_start"): 9.1, (DETECTOR, "receiver_off"): 6.3}
+    published = {("mae_after_start", who): 9.96 for who in (WITH, WITHOUT)}
+    said = text.origin_words(spread_of(numbers, changes), published)
+    assert "is 6.3 m from the ship's middle" in said
+    assert "adjusted 13.9 m from the receiver and 9.1 m from the middle (published 9.96 m" in said
+    means = {(WITH, "centre_error_of_mean"): 5.4, (WITH, "centre_error_true_poses"): 2.6}
+    assert "from the ship's middle, 5.4 m and" in text.summary(spread_of(numbers, means))[2]
+    assert "2.6 m of 5.4 m from the ship's middle" in text.cause_words(spread_of(numbers, means))
+
+
+def test_rendering_fewer_images_is_a_limit():
+    assert text.limits(1) == text.LIMITS
+    assert "one in 4 is rendered" in text.limits(4)[-1]
+
+
+def test_each_reading_is_held_against_the_track_of_the_same_images_and_noise():
+    rows = [
+        ("as it stands, adjusted", WITH, 6.0), ("as it stands, not adjusted", WITHOUT, 5.0),
+        ("a of (4.7) half of the axis", WITH, 4.0),
+        ("every second of these images, adjusted", WITH, 7.0),
+        ("every second of these images, not adjusted", WITHOUT, 9.0),
+    ]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["reading", "subject", "mae_after_start"])
+    assert "2 of 3 readings" in text.readings_words(table), "7 m is nearer than its own 9 m, not than 5 m"
+    swapped = table.assign(mae_after_start=[6.0, 5.0, 4.0, 4.5, 3.0])
+    assert "1 of 3 readings" in text.readings_words(swapped)
 
 
 def test_readings_change_one_thing_each(taken, tracked, numbers):

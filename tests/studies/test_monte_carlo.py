@@ -48,6 +48,20 @@ def test_published_beside_flights(report: Report) -> None:
         monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["speed"])
 
 
+def test_a_number_that_needs_what_is_not_printed_is_not_judged(report: Report) -> None:
+    """Even where ours is the printed one: as printed and turned by a right angle it would say two things."""
+    row = report.printed("mae", "ekf")
+    assert row is not None
+    spread = recorded(report, mae=np.full(101, row["value"]))
+    assert monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])["verdict"].tolist() == [
+        "agrees"
+    ]
+    row["unjudged"] = "nobody says which way"
+    table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])
+    assert table["verdict"].tolist() == ["not judged: nobody says which way"]
+    assert table["quantity"].tolist() == ["mean distance"] and table["ratio"].tolist() == ["0.00"]
+
+
 def test_what_is_recorded_is_what_is_judged(report: Report) -> None:
     recorded(report, mae=np.linspace(8, 12, 101), mean_north=np.linspace(-5, 5, 101))
     entries = report.recorded

@@ -24,7 +24,9 @@ from wildlab.studies.optical_flow_velocity.trial import (
     SYNCHRONISED,
     TRUE,
     check_claims,
+    half_of_mean,
     look,
+    mean_decided,
     numbers_of,
     readings,
     stretches,
@@ -123,10 +125,10 @@ def spread_of(count=40, **changes):
     for subject in (*READINGS, SLOW, LIKELY):
         values = {
             "mean_north": 0.2, "mean_east": -0.3, "sd_north": 6.0, "sd_east": 5.0, "pairs": 50.0,
-            "interval_share_95": 0.95,
+            "interval_share_95": 0.95, "half_mean_north": 0.1, "half_mean_east": 0.1,
         }  # fmt: skip
         numbers |= {(subject, name): value for name, value in values.items()}
-    for one, sd in ((SYNCHRONISED, 4.0), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5), (STAMPS, 90.0)):
+    for one, sd in ((SYNCHRONISED, 2.5), (STILL, 3.0), (CALIBRATED, 4.5), (TRUE, 0.5), (STAMPS, 90.0)):
         numbers[one, "sd_north"] = numbers[one, "sd_east"] = sd
     numbers[LOGGED, "correlation_u"], numbers[LOGGED, "correlation_v"] = 0.9, 0.8
     for key, value in changes.items():
@@ -141,7 +143,7 @@ def spread_of(count=40, **changes):
         ("mean-within-one", {"logged__mean_east": -1.1}),
         ("very-large-variance", {"logged__sd_east": 0.5}),
         ("flows-correlate", {"logged__correlation_v": 0.3}),
-        ("better-synchronised", {"synchronised__sd_north": 9.0}),
+        ("better-synchronised", {"synchronised__sd_north": 4.0, "synchronised__sd_east": 4.0}),
         ("better-with-a-still-gimbal", {"still_gimbal__sd_north": 9.0}),
         ("own-motion-dominates", {"true_poses__sd_east": 9.0}),
     ],
@@ -155,9 +157,63 @@ def test_each_claim_turns_with_its_numbers(claim, changes):
     assert not check_claims(spread_of(**changes))[claim].holds(threshold).any()
 
 
+def test_the_interval_of_a_mean_counts_neighbours_correlation():
+    """Of white values it is Student's, and covers zero 19 times of 20, of a slow series as well."""
+    rng, held, plain = np.random.default_rng(1), 0, 0
+    for _ in range(300):
+        slow = np.convolve(rng.normal(size=120), np.ones(6), "valid")
+        held += abs(slow.mean()) <= half_of_mean(slow)
+        plain += abs(slow.mean()) <= 1.96 * slow.std(ddof=1) / np.sqrt(len(slow))
+    assert plain < 0.7 * 300 and held > 0.85 * 300
+    alternating = np.tile([1.0, -1.0], 20)
+    assert half_of_mean(alternating) == pytest.approx(
+        2.0227 * alternating.std(ddof=1) / np.sqrt(40), rel=1e-3
+    )
+    assert np.isnan(half_of_mean([1.0])) and np.isnan(half_of_mean([3.0, 3.0, 3.0]))
+
+
+def test_a_mean_whose_interval_has_both_sides_in_it_decides_nothing():
+    for mean, half, known in (
+        (-1.4, 1.0, False), (-1.4, 0.3, True), (0.8, 0.3, False), (0.8, 0.1, True), (0.2, np.nan, False),
+    ):  # fmt: skip
+        changes = {"logged__mean_north": mean, "logged__half_mean_north": half}
+        check = check_claims(spread_of(**changes))["mean-within-one"]
+        assert check.premise.tolist() == [known] * 40, (mean, half)
+    wide_elsewhere = {"logged__mean_north": -1.4, "logged__half_mean_east": 3.0}
+    assert mean_decided(spread_of(**wide_elsewhere)).all(), "one axis clearly outside is enough"
+    assert not mean_decided(spread_of(logged__half_mean_east=3.0)).any()
+
+
+def test_the_sentence_on_the_mean_says_how_many_pairs_can_tell():
+    none = text.mean_words(spread_of(4, logged__half_mean_north=2.0))
+    assert none.startswith("On none of 4 flights can the pairs tell")
+    assert "There are 50 pairs a flight; the thesis used every pair of its 250 images." in none
+    some = pd.concat([spread_of(3), spread_of(1, logged__half_mean_north=2.0, logged__pairs=70.0)])
+    said = text.mean_words(some)
+    assert said.startswith("On 3 of 3 flights (44 to 100 %)")
+    assert "on 1 more the pairs cannot tell" in said and "50 to 70 pairs" in said
+    value, label = text.mean_tile(spread_of(logged__half_mean_east=2.0))
+    assert value == "0.3 m/s" and "known to ± 2.0 m/s" in label
+    assert (
+        "known"
+        not in text.mean_tile(spread_of(logged__half_mean_east=np.nan, logged__half_mean_north=np.nan))[1]
+    )
+
+
+def test_what_exact_times_leave_is_said_beside_particularly_vulnerable():
+    few, many = ({"synchronised__sd_north": sd, "synchronised__sd_east": sd} for sd in (1.0, 5.0))
+    assert text.synchronised_words(spread_of(**few)).endswith("so it is here.")
+    said = text.synchronised_words(spread_of(**many))
+    assert said.endswith("so it is not here.") and "leave 91 %" in said
+    mixed = text.synchronised_words(pd.concat([spread_of(1, **few), spread_of(1, **many)]))
+    assert "18 to 91 %" in mixed and mixed.endswith("on some of the flights only.")
+    stated = {one["id"]: one for one in load_claims("optical-flow-velocity")}["better-synchronised"]
+    assert float(stated["threshold"]) == text.PARTICULAR and "particularly" in stated["text"]
+
+
 def test_the_sentences_turn_with_the_numbers():
     good = " ".join(text.summary(spread_of()))
-    assert "On 40 of 40 flights" in good and "says little" in good
+    assert "On 40 of 40 flights (91 to 100 %)" in good and "says little" in good
     assert "Most of it comes from the poses: with all of them exact 0.5 m/s are left" in good
     other = spread_of(1, logged__mean_north=2.5, logged__sd_north=0.4, logged__sd_east=0.4)
     bad = " ".join(text.summary(other))
@@ -168,6 +224,11 @@ def test_the_sentences_turn_with_the_numbers():
 def test_intervals_are_called_what_they_are():
     for share, word in ((0.7, "too sure"), (0.95, "about right"), (1.0, "too cautious")):
         assert text.interval_words(spread_of(logged__interval_share_95=share)).endswith(f"{word}.")
+    wide = pd.concat([spread_of(1, logged__interval_share_95=share) for share in (0.8, 0.9, 1.0)])
+    said = text.interval_words(wide)
+    assert "in 90 % (65 to 100 %, over flights) of a flight's pairs, of 150 in all" in said
+    assert said.endswith("about right."), "its interval has 95 % in it"
+    assert "one flight cannot tell" in text.interval_words(spread_of(1))
 
 
 def test_stamps_and_limits_say_what_they_do():

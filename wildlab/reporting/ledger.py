@@ -34,7 +34,8 @@ printed number lies in the middle 90 % of our flights (of fewer than 30: between
 **too vague to tell** when that is so, and this middle is wider than a factor of {widest:g}; **differs** when
 it lies outside. The margins are the same for all studies: {margins}. A signed mean whose sign the thesis does
 not define is compared by its size. A number that is listed beside several tunings is counted once. What a
-simulated flight was fitted to is **not judged** by it, number or claim.
+simulated flight was fitted to is **not judged** by it, number or claim; nor is a number that says nothing
+without what the thesis leaves out.
 
 A **claim** is a sentence of a thesis. It **holds** when the 95 % interval of the share of flights on which it
 is true lies at or above 90 %, **holds on most flights** above 50 %, and **fails on most flights** or **does

@@ -16,6 +16,7 @@
     runs = 10000                # of a mean of runs: how many
     again = true                # the same printed number as another entry: shown, and counted there
     fitted = "..."              # why ours may not be judged by it: something of ours was chosen by it
+    unjudged = "..."            # why it cannot be held against ours at all: what the thesis leaves out
 
     [[claim]]
     study = "schmidt"
@@ -67,6 +68,7 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
         "runs": int,
         "again": bool,
         "fitted": str,
+        "unjudged": str,
     },
     "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool, "fitted": str},
 }
@@ -75,7 +77,7 @@ CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight
 _OF_FILE = {"kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS), "signs": ("defined", "undefined")}
 _COLUMNS = [
     *("name", "subject", "value", "digits", "unit", "source", "within"),
-    *("kind", "by_size", "runs", "again", "fitted"),
+    *("kind", "by_size", "runs", "again", "fitted", "unjudged"),
 ]
 #: What a quantity is, by its name; the first pattern that fits.
 _QUANTITIES = (
@@ -105,7 +107,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
         ``name``, ``subject``, ``value`` (float), ``digits`` (decimals printed in the source), ``unit``,
         ``source``, ``within`` (of a calculation at least what rounding leaves open) and ``runs`` (NaN where
         none is stated), ``kind``, ``by_size`` (a signed mean
-        that is compared by its size), ``again``, ``fitted``; no rows where the study has none.
+        that is compared by its size), ``again``, ``fitted``, ``unjudged``; no rows where the study has none.
 
     Raises
     ------
@@ -128,6 +130,7 @@ def load_published(study: str, folder: Path = FOLDER) -> pd.DataFrame:
             "runs": float(entry.get("runs", math.nan)),
             "again": bool(entry.get("again", False)),
             "fitted": entry.get("fitted", ""),
+            "unjudged": entry.get("unjudged", ""),
         }
         for entry in _entries("number", folder)
         if entry["study"] == study

@@ -86,6 +86,8 @@ def judge(
     if here is None:
         return None
     value = abs(float(row["value"])) if row["by_size"] else float(row["value"])
+    if row["unjudged"]:
+        return Comparison(NOT_JUDGED, None, here - value, None, str(row["unjudged"]))
     within = None if math.isnan(row["within"]) else float(row["within"])
     if row["kind"] == CALCULATED:
         return compare_calculation(here, value, within)

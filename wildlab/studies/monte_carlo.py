@@ -29,6 +29,8 @@ CLAIM_COLUMNS = {
     "premise": "premise",
     "threshold": "at half and twice the threshold",
 }
+#: What a quantity is called where its name says it badly: the mean of distances is no mean of errors.
+QUANTITIES = {"mae": "mean distance", "mae_after_start": "mean distance after the start"}
 
 
 #: What stands over the claims.
@@ -188,7 +190,7 @@ def beside_published(
             rows.append(
                 {
                     "subject": words,
-                    "quantity": {"mae": "mean error"}.get(name, name.replace("_", " ").replace("sd", "SD"))
+                    "quantity": QUANTITIES.get(name, name.replace("_", " ").replace("sd", "SD"))
                     + (", by size" if by_size else ""),
                     "published": abs(row["value"]) if by_size else row["value"],
                     "here": found.get("value", np.nan),
@@ -197,7 +199,9 @@ def beside_published(
                     "below": "" if below is None else f"{100 * below:.0f} %",
                     "verdict": ""
                     if compared is None
-                    else compared.verdict + (", fitted to it" if row["fitted"] else ""),
+                    else compared.verdict
+                    + (", fitted to it" if row["fitted"] else "")
+                    + (f": {row['unjudged']}" if row["unjudged"] else ""),
                     "drawn": values.iloc[0],
                 }
             )

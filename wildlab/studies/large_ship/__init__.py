@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wildlab.studies.large_ship import trial
+from wildlab.studies.large_ship.claims import check_claims
 from wildlab.studies.protocol import Metric, Study
 
 
@@ -15,6 +16,6 @@ STUDY = Study(
     "large-ship",
     (*trial.SUBJECTS, trial.DETECTOR),
     trial.trial,
-    trial.check_claims,
+    check_claims,
     _metric,
 )

@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import t as student
 
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
+from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
 from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
 from wildlab.simulation.error_models import stream
@@ -42,6 +44,8 @@ RECORDED = {
     "feature_rate": "1",
     "mean_north": "m/s",
     "mean_east": "m/s",
+    "half_mean_north": "m/s",
+    "half_mean_east": "m/s",
     "sd_north": "m/s",
     "sd_east": "m/s",
     "pairs": "1",
@@ -51,8 +55,11 @@ RECORDED = {
 }
 #: Pairs that follow each other without a gap: errors of one attitude spoil two of them in opposite ways.
 STRETCH = 30
-#: The ship: as long as the one of H 6.4.1, the only large one whose size H prints, and five times its beam.
-#: What is on its deck is chosen: without anything no feature detector would find more than corners.
+#: Within what the mean is, north and east, m/s (H 5.6.3).
+WITHIN_M_S = 1.0
+#: The ship: as long as the one of H 6.4.1, and five times its beam. H 5.6.3 does not print how long its ship
+#: was; the other large one whose length H prints, in figure 4.3, has 55 m. What is on its deck is chosen:
+#: without anything no feature detector would find more than corners.
 SHIP = Look(lengths=(70.0,), slender=5.0, fittings=30)
 #: Around the ship, what of an image is rendered, px.
 MARGIN = 40
@@ -185,6 +192,56 @@ def readings(looked: Looked) -> dict[str, pd.DataFrame]:
     return {name: pair_velocities(flight, looked.pairs, way) for name, (flight, way) in ways.items()}
 
 
+def half_of_mean(values: ArrayLike) -> float:
+    """Half of the 95 % interval of the mean of correlated values, in their unit.
+
+    Parameters
+    ----------
+    values
+        (N,), of pairs in order. Neighbours share what the autopilot has wrong: they are worth fewer values
+        that are independent (`wildlab.evaluation.whiteness.effective_sample_size`). Pairs on both sides of a
+        gap count as neighbours; there are few of them.
+
+    Returns
+    -------
+    float
+        Student's; NaN where the values are worth fewer than two.
+
+    Examples
+    --------
+    >>> round(half_of_mean([1.0, -1.0, 1.0, -1.0]), 2)
+    1.84
+    """
+    v = np.asarray(values, float)
+    if len(v) < 2 or not np.ptp(v) > 0:
+        return np.nan
+    worth = float(np.clip(effective_sample_size(v, len(v) - 1), 1.0, len(v)))
+    if worth < 2:
+        return np.nan
+    return float(student.ppf(0.975, worth - 1) * v.std(ddof=1) / np.sqrt(worth))
+
+
+def mean_decided(spread: pd.DataFrame) -> NDArray[np.bool_]:
+    """Of which flights the pairs can tell whether both means are within 1 m/s.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each flight.
+
+    Returns
+    -------
+    (flights,) bool: both intervals lie inside, or one of them lies wholly outside.
+    """
+    mean, half = (
+        np.stack([spread[LOGGED, f"{name}_{axis}"].to_numpy(float) for axis in ("north", "east")])
+        for name in ("mean", "half_mean")
+    )
+    inside = (np.abs(mean) + half <= WITHIN_M_S).all(axis=0)
+    outside = (np.abs(mean) - half > WITHIN_M_S).any(axis=0)
+    return np.asarray(inside | outside)
+
+
 def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     """Means and standard deviations of the velocities of a ship at rest, and whether intervals hold zero."""
     known = table.dropna(subset=["v_north_m_s", "v_east_m_s"])
@@ -193,6 +250,7 @@ def velocity_numbers(table: pd.DataFrame) -> dict[str, float]:
     for axis, variance in (("north", "cov_nn"), ("east", "cov_ee")):
         v = known[f"v_{axis}_m_s"].to_numpy(float)
         numbers[f"mean_{axis}"] = float(v.mean()) if len(v) else np.nan
+        numbers[f"half_mean_{axis}"] = half_of_mean(v)
         numbers[f"sd_{axis}"] = float(v.std(ddof=1)) if len(v) > 1 else np.nan
         inside.append(np.abs(v) <= 1.96 * np.sqrt(known[variance].to_numpy(float)))
     numbers["interval_share_95"] = float(np.mean(inside)) if len(known) else np.nan
@@ -251,13 +309,17 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     means = np.maximum(np.abs(of(LOGGED, "mean_north")), np.abs(of(LOGGED, "mean_east")))
     correlation = np.minimum(of(LOGGED, "correlation_u"), of(LOGGED, "correlation_v"))
     return {
-        "mean-within-one": Check(true=means <= 1.0),
+        # A mean over some pairs of a flight that could as well lie on the other side decides nothing.
+        "mean-within-one": Check(true=means <= WITHIN_M_S, premise=mean_decided(spread)),
         "very-large-variance": Check(
             measured=np.minimum(of(LOGGED, "sd_north"), of(LOGGED, "sd_east")), above=True
         ),
         "flows-correlate": Check(measured=correlation, above=True),
         "better-synchronised": Check(
-            true=size(SYNCHRONISED) < size(LOGGED), first=size(SYNCHRONISED), second=size(LOGGED), unit="m/s"
+            measured=size(SYNCHRONISED) / size(LOGGED),
+            first=size(SYNCHRONISED),
+            second=size(LOGGED),
+            unit="m/s",
         ),
         "better-with-a-still-gimbal": Check(
             true=size(STILL) < size(LOGGED), first=size(STILL), second=size(LOGGED), unit="m/s"
