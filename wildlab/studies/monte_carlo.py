@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import average
-from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide, paired_difference
-from wildlab.reporting.published import load_claims, quantity_kind
+from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_check, paired_difference
+from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
 from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
@@ -31,6 +32,14 @@ CLAIM_COLUMNS = {
 }
 
 
+#: Headings of the table that `shares_beside_published` gives.
+SHARE_COLUMNS = {
+    "of": "share",
+    "published": "published",
+    "here": "here, all images together",
+    "images": "images",
+    "verdict": "verdict",
+}
 #: What stands over the claims.
 CLAIMS_EXPLAINED = (
     "A claim holds where the 95 % interval of the share of flights on which it is true lies at or above "
@@ -134,10 +143,39 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1)
             continue
+        if printed is not None and printed["kind"] == SHARE_OF_IMAGES:
+            share, images = pooled_share(spread, *key)
+            if images:
+                report.metric(name, subject, share.estimate, unit, n=images, low=share.low, high=share.high)
+                continue
         value = None if printed is None else float(printed["value"])
         _record(report, name, subject, values, unit, n.get(subject), value)
         if value is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
             _record(report, size_name(name), subject, values.abs(), unit, n.get(subject), abs(value))
+
+
+def pooled_share(spread: pd.DataFrame, subject: str, name: str) -> tuple[Interval, int]:
+    """A share of all images of all flights, with its 95 % interval, and how many images there are.
+
+    Parameters
+    ----------
+    spread
+        One row for each flight; besides the share of each flight it has how many ``images`` there were.
+    subject, name
+        Of the share. Of a mean count the interval is that of a share, and ends at one.
+
+    Returns
+    -------
+    (share, images)
+        The share is NaN where there is no image.
+    """
+    images, rate = (spread[subject, one].to_numpy(float) for one in ("images", name))
+    known = np.isfinite(rate) & (images > 0)
+    count, of = round(float((images * rate)[known].sum())), round(float(images[known].sum()))
+    if not of:
+        return Interval(np.nan, np.nan, np.nan), 0
+    share = share_interval(min(count, of), of)
+    return share._replace(estimate=count / of), of
 
 
 def _record(
@@ -204,6 +242,47 @@ def beside_published(
     return pd.DataFrame(rows)
 
 
+def shares_beside_published(report: Report, names: Mapping[tuple[str, str], str]) -> pd.DataFrame:
+    """Published shares of images beside those of all our images, with their 95 % intervals.
+
+    Parameters
+    ----------
+    report
+        What `record_spread` has recorded in.
+    names
+        Words for each share, by (name, subject).
+
+    Returns
+    -------
+    DataFrame
+        One row for each share, with the columns of `SHARE_COLUMNS`.
+
+    Raises
+    ------
+    WildlabError
+        If one of them is not published.
+    """
+    rows = []
+    for (name, subject), words in names.items():
+        row = report.printed(name, subject)
+        if row is None:
+            raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
+        found = report.recorded[name, subject]
+        compared = judge(row, report.recorded, report.published)
+        interval = [found[one] for one in ("value", "low", "high")]
+        known = all(one is not None for one in interval)
+        rows.append(
+            {
+                "of": words,
+                "published": percent(row["value"]),
+                "here": "{} ({} to {})".format(*map(percent, interval)) if known else "",
+                "images": found["n"],
+                "verdict": "" if compared is None else compared.verdict,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
 def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
     """Record the verdict on each claim of a study, and return them as a table of `CLAIM_COLUMNS`.
 
@@ -228,11 +307,11 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             )
         check = Check.of(checks[claim["id"]])
         threshold = None if "threshold" not in claim else float(claim["threshold"])
-        found = decide(check.holds(threshold), check.premise)
+        found = decide_check(check, threshold)
         at = {}
         if threshold is not None and found.verdict != NO_PREMISE:
             at = {
-                key: decide(check.holds(times * threshold), check.premise).verdict
+                key: decide_check(check, times * threshold).verdict
                 for key, times in (("half", 0.5), ("twice", 2.0))
             }
         apart = None
@@ -247,7 +326,8 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             low=None if share is None else share.low,
             high=None if share is None else share.high,
             seeds=found.flights,
-            met=found.met,
+            # Images together, and a calculation, are of no number of flights.
+            met=None if check.calculated or (check.pooled and check.pooled.of) else found.met,
             half=at.get("half"),
             twice=at.get("twice"),
             difference=None if apart is None else apart.estimate,
@@ -259,7 +339,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
                 "claim": claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else ""),
                 "source": claim["source"],
                 "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
-                "share": _share_words(found),
+                "share": _share_words(found, check),
                 "difference": "" if apart is None else _difference_words(apart, check.unit),
                 "premise": _premise_words(claim.get("premise", ""), check, found),
                 "threshold": _threshold_words(threshold, at, claim.get("reason", "")),
@@ -274,13 +354,35 @@ def holding(report: Report, *ids: str) -> bool:
     return all(verdicts.get(one) == HOLDS for one in ids)
 
 
-def _share_words(found: Any) -> str:
+def _share_words(found: Any, check: Check) -> str:
+    if check.calculated and check.measured is not None:
+        low, high = (f"{end(check.measured):.3g}" for end in (np.min, np.max))
+        apart = f"{low} to {high}" if low != high else low
+        return f"a calculation: {apart} {check.unit}".rstrip()
+    if check.pooled is not None and check.pooled.of:
+        count, of = check.pooled
+        low, high = map(percent, share_interval(count, of)[1:])
+        return f"{count} of {of} images ({low} to {high})"
     if found.share is None:
         return f"{found.met} of {found.flights} flights meet the premise"
     low, high = (100 * end for end in found.share[1:])
     of = f"{found.true} of {found.met}"
     beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
     return f"{of} ({low:.0f} to {high:.0f} %){beyond}"
+
+
+def percent(share: float) -> str:
+    """A share in per cent; never rounded to all or to none.
+
+    Examples
+    --------
+    >>> percent(0.9999), percent(1.0)
+    ('99.9 %', '100 %')
+    """
+    # A mean count may be above one.
+    if min(share, 1 - share) < 1e-9:
+        return f"{100 * share:.0f} %"
+    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def _difference_words(apart: Any, unit: str) -> str:
