@@ -138,7 +138,7 @@ def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) ->
         assert metric["low"] <= metric["value"] <= metric["high"]
         assert metric["published"] is not None
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 4)
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 5)
     for figure in ("rates", "steps-ship", "steps-boats-whole", "shares", "heights", "contrast", "weather"):
         assert (folder / "figures" / f"{figure}.png").is_file()
     assert faults(folder / "report.html") == []

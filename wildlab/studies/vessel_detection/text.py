@@ -184,7 +184,8 @@ def missed_words(spread: pd.DataFrame) -> str:
     for subject in (SHIP, WHOLE, CUT):
         missed = int(spread[subject, "missed"].sum())
         if not missed:
-            parts.append(f"{NAMES[subject]}: none missed")
+            images = round(float(spread[subject, "images"].sum()))
+            parts.append(f"{NAMES[subject]}: none missed in {images} images")
             continue
         share = float(spread[subject, "largest_share_missed"].max())
         parts.append(

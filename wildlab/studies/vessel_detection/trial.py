@@ -235,6 +235,9 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "near-perfect": max(missed, key=_share),
         "ship-without-false-alarm": together("images_with_false", SHIP),
         "whole-always-found": missed[1],
+        "only-small-parts-missed": Check(
+            measured=of(SHIP, "largest_share_missed"), premise=of(SHIP, "missed") > 0
+        ),
         "no-blob-in-empty-images": together("images_with_false", SEA),
     }
 
