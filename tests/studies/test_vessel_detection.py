@@ -161,8 +161,8 @@ def test_what_scaling_the_area_does_is_said_as_it_is():
 def test_nine_of_ten_of_few_is_all_of_them_and_says_what_it_leaves_open():
     few, many = (heights_of().assign(draws=draws) for draws in (6, 20))
     few_words, many_words = (text.summary(spread_of(), one)[2] for one in (few, many))
-    assert "found, all 6 (which leaves open a share down to 61.0 %) drawn at each" in few_words
-    assert "found, at least 18 of 20 (which leaves open a share down to 69.9 %) drawn at each" in many_words
+    assert "found, all 6 drawn (which leaves open a share down to 61.0 %) at each" in few_words
+    assert "found, at least 18 of 20 drawn (which leaves open a share down to 69.9 %) at each" in many_words
 
 
 def test_missed_vessels_are_counted_and_none_is_said_where_there_are_none():

@@ -356,13 +356,13 @@ def holding(report: Report, *ids: str) -> bool:
 
 def _share_words(found: Any, check: Check) -> str:
     if check.calculated and check.measured is not None:
-        low, high = (f"{end(check.measured):.3g}" for end in (np.min, np.max))
+        low, high = f"{check.measured.min():.3g}", f"{check.measured.max():.3g}"
         apart = f"{low} to {high}" if low != high else low
         return f"a calculation: {apart} {check.unit}".rstrip()
     if check.pooled is not None and check.pooled.of:
         count, of = check.pooled
-        low, high = map(percent, share_interval(count, of)[1:])
-        return f"{count} of {of} images ({low} to {high})"
+        ends = share_interval(count, of)[1:]
+        return f"{count} of {of} images ({percent(ends[0])} to {percent(ends[1])})"
     if found.share is None:
         return f"{found.met} of {found.flights} flights meet the premise"
     low, high = (100 * end for end in found.share[1:])

@@ -115,8 +115,7 @@ def summary(spread: pd.DataFrame, heights: pd.DataFrame) -> list[str]:
         f"In {percent_within(ship)} of the images the ship is found, or the part of it that shows, and in "
         f"{percent_within(whole)} all boats that are wholly in view.",
         f"{false}; the thesis counts 15 in 27866.",
-        f"Up to which height smaller things are found, {_needed(heights)} drawn at each: "
-        f"{reach_words(heights)}.",
+        f"Up to which height smaller things are found, {_needed(heights)} at each: {reach_words(heights)}.",
     ]
 
 
@@ -169,7 +168,7 @@ def _needed(sweep: pd.DataFrame) -> str:
     for draws in sorted({int(one) for one in sweep["draws"]}):
         least = int(np.ceil(FOUND * draws - 1e-9))
         low = share_interval(least, draws).low
-        of = f"all {draws}" if least == draws else f"at least {least} of {draws}"
+        of = f"all {draws} drawn" if least == draws else f"at least {least} of {draws} drawn"
         parts.append(f"{of} (which leaves open a share down to {percent(low)})")
     return " or ".join(parts)
 
@@ -230,9 +229,7 @@ def contrast_words(contrast: pd.DataFrame) -> str:
         needed = f"{good.min():g} K" if len(good) else f"more than {own['excess_k'].max():g} K"
         parts.append(f"{needed} at {length:g} m")
     return (
-        f"What a deck must have over the sea for {_needed(contrast)} drawn to be found: "
-        + ", ".join(parts)
-        + "."
+        f"What a deck must have over the sea for {_needed(contrast)} to be found: " + ", ".join(parts) + "."
     )
 
 

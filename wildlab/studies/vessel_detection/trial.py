@@ -224,10 +224,10 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
 
     def together(count: str, *subjects: str) -> Check:
         """Each flight's share of images with something missed or false, and that of all flights' images."""
-        some, images = (sum(of(one, name) for one in subjects) for name in (count, "images"))
+        some, images = (np.sum([of(one, name) for one in subjects], axis=0) for name in (count, "images"))
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.asarray(some / images)
-        return Check(measured=share, pooled=Pooled(round(np.sum(some)), round(np.sum(images))))
+        return Check(measured=share, pooled=Pooled(round(float(some.sum())), round(float(images.sum()))))
 
     # The worse of the two decides whether the rate is near perfect.
     missed = [together("images_with_missed", one) for one in (SHIP, WHOLE)]
