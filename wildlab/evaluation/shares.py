@@ -56,24 +56,24 @@ class Check:
         Whether the sentence is true above the threshold; else it is below.
     premise
         (N,) bool: which flights have what the sentence is about; None means all.
-    first, second
-        (N,), what a comparison compares, in ``unit``: the paired difference is shown.
     pooled
         Images of all flights together, where the threshold is for their share: few images of a flight cannot
         tell it. ``measured`` is then each flight's own share.
     calculated
         Whether ``measured`` follows from the parameters alone, so that flights add nothing to it.
+    first, second
+        (N,), what a comparison compares, in ``unit``: the paired difference is shown.
     """
 
     true: NDArray[np.bool_] | None = None
     measured: Array | None = None
     above: bool = False
     premise: NDArray[np.bool_] | None = None
+    pooled: Pooled | None = None
+    calculated: bool = False
     first: Array | None = None
     second: Array | None = None
     unit: str = ""
-    pooled: Pooled | None = None
-    calculated: bool = False
 
     @classmethod
     def of(cls, given: Check | ArrayLike) -> Check:
