@@ -19,7 +19,7 @@ from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene import EVEN, IDEAL, Scene, expose, rectangle, render, sensor_of
 from wildlab.simulation.scene.flights import SceneFlight
-from wildlab.studies import monte_carlo
+from wildlab.studies import image_shares, monte_carlo
 from wildlab.studies.vessel_detection import STUDY, charts, sweeps, text
 from wildlab.studies.vessel_detection.trial import (
     BOATS,
@@ -276,7 +276,7 @@ def test_printed_rates_are_held_against_all_images_together():
     def verdict(**changes):
         report = open_report(study="vessel-detection", kind="twin")
         monte_carlo.record_spread(report, STUDY, spread_of(**changes)[:6], {})
-        table = monte_carlo.shares_beside_published(report, text.SHARES)
+        table = image_shares.shares_beside_published(report, text.SHARES)
         return table.set_index("of").loc["images with boats wholly in view, all found"]
 
     # Each flight's rate is 0.96 or 1.00: what 48 images say is too little, and 12000 are enough.

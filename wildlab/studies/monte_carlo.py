@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import average
-from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_check, paired_difference
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
 from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
+from wildlab.studies.image_shares import percent, pooled_share
 from wildlab.studies.protocol import Study
 
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
@@ -39,14 +40,6 @@ CLAIMS_EXPLAINED = (
     "interval has 50 % in it, it is undecided. A vague word has a threshold, which is ours: the verdicts at "
     "half and at twice of it stand beside. Differences are means over flights, with their 95 % interval."
 )
-#: Headings of the table that `shares_beside_published` gives.
-SHARE_COLUMNS = {
-    "of": "share",
-    "published": "published",
-    "here": "here, all images together",
-    "images": "images",
-    "verdict": "verdict",
-}
 #: Headings of the table that `n_run_tests` gives, and what it is.
 N_RUN_COLUMNS = {
     "filter": "filter",
@@ -154,30 +147,6 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
             _record(report, size_name(name), subject, values.abs(), unit, n.get(subject), abs(value))
 
 
-def pooled_share(spread: pd.DataFrame, subject: str, name: str) -> tuple[Interval, int]:
-    """A share of all images of all flights, with its 95 % interval, and how many images there are.
-
-    Parameters
-    ----------
-    spread
-        One row for each flight; besides the share of each flight it has how many ``images`` there were.
-    subject, name
-        Of the share. Of a mean count the interval is that of a share, and ends at one.
-
-    Returns
-    -------
-    (share, images)
-        The share is NaN where there is no image.
-    """
-    images, rate = (spread[subject, one].to_numpy(float) for one in ("images", name))
-    known = np.isfinite(rate) & (images > 0)
-    count, of = round(float((images * rate)[known].sum())), round(float(images[known].sum()))
-    if not of:
-        return Interval(np.nan, np.nan, np.nan), 0
-    share = share_interval(min(count, of), of)
-    return share._replace(estimate=count / of), of
-
-
 def _record(
     report: Report,
     name: str,
@@ -239,47 +208,6 @@ def beside_published(
                     "drawn": values.iloc[0],
                 }
             )
-    return pd.DataFrame(rows)
-
-
-def shares_beside_published(report: Report, names: Mapping[tuple[str, str], str]) -> pd.DataFrame:
-    """Published shares of images beside those of all our images, with their 95 % intervals.
-
-    Parameters
-    ----------
-    report
-        What `record_spread` has recorded in.
-    names
-        Words for each share, by (name, subject).
-
-    Returns
-    -------
-    DataFrame
-        One row for each share, with the columns of `SHARE_COLUMNS`.
-
-    Raises
-    ------
-    WildlabError
-        If one of them is not published.
-    """
-    rows = []
-    for (name, subject), words in names.items():
-        row = report.printed(name, subject)
-        if row is None:
-            raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
-        found = report.recorded[name, subject]
-        compared = judge(row, report.recorded, report.published)
-        interval = [found[one] for one in ("value", "low", "high")]
-        known = all(one is not None for one in interval)
-        rows.append(
-            {
-                "of": words,
-                "published": percent(row["value"]),
-                "here": "{} ({} to {})".format(*map(percent, interval)) if known else "",
-                "images": found["n"],
-                "verdict": "" if compared is None else compared.verdict,
-            }
-        )
     return pd.DataFrame(rows)
 
 
@@ -369,20 +297,6 @@ def _share_words(found: Any, check: Check) -> str:
     of = f"{found.true} of {found.met}"
     beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
     return f"{of} ({low:.0f} to {high:.0f} %){beyond}"
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none.
-
-    Examples
-    --------
-    >>> percent(0.9999), percent(1.0)
-    ('99.9 %', '100 %')
-    """
-    # A mean count may be above one.
-    if min(share, 1 - share) < 1e-9:
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def _difference_words(apart: Any, unit: str) -> str:
