@@ -135,3 +135,21 @@ def test_margins_are_what_twenty_independent_values_leave_open() -> None:
     assert mean == pytest.approx(p.MARGINS["signed mean"].difference, abs=0.01)
     by_deviation = np.quantile(np.abs(errors[..., 0].mean(axis=1)), 0.95)
     assert by_deviation == pytest.approx(p.BY_DEVIATION, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("here", "print_", "low", "high", "verdict"),
+    [
+        (46 / 48, 1.0, 0.860, 0.988, p.TOO_VAGUE),
+        (1.0, 0.993, 0.926, 1.0, p.TOO_VAGUE),
+        (0.99, 0.993, 0.98, 0.995, p.AGREES),
+        (0.96, 1.0, 0.95, 0.97, p.DIFFERS),
+        (0.05, 0.0, 0.03, 0.08, p.DIFFERS),
+        (0.0, 0.0, 0.0, 0.01, p.AGREES),
+        (1.0, 1.0, None, None, p.NOT_JUDGED),
+    ],
+)
+def test_a_share_of_images_is_judged_by_its_interval(
+    here: float, print_: float, low: float | None, high: float | None, verdict: str
+) -> None:
+    assert p.compare_share(here, print_, low, high).verdict == verdict

@@ -89,3 +89,38 @@ def test_how_often_chance_makes_a_verdict_wrong(flights: int) -> None:
     for border, wrong in ((0.9, [s.HOLDS]), (0.5, [s.HOLDS, s.MOSTLY]), (0.1, [s.FAILS])):
         assert binom.pmf(counts[np.isin(verdicts, wrong)], flights, border).sum() <= s.WRONG
     assert s.expected_wrong(100) == 100 * s.WRONG
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "above", "verdict"),
+    [
+        (0, 48, False, s.UNDECIDED),
+        (0, 500, False, s.HOLDS),
+        (20, 500, False, s.FAILS),
+        (20, 500, True, s.HOLDS),
+        (0, 500, True, s.FAILS),
+        (0, 0, False, s.NO_PREMISE),
+    ],
+)
+def test_images_together_are_held_against_the_threshold(
+    count: int, of: int, above: bool, verdict: str
+) -> None:
+    check = s.Check(measured=np.zeros(6), pooled=s.Pooled(count, of), above=above)
+    assert s.decide_check(check, 0.01).verdict == verdict
+
+
+def test_images_together_need_a_threshold() -> None:
+    with pytest.raises(WildlabError, match="Images are pooled and no threshold"):
+        s.decide_check(s.Check(measured=np.zeros(6), pooled=s.Pooled(0, 48)))
+
+
+def test_a_calculation_holds_or_does_not_and_has_no_share() -> None:
+    check = s.Check(measured=np.array([0.55, 0.57]), calculated=True)
+    found = [s.decide_check(check, threshold) for threshold in (1.0, 0.5, 0.56)]
+    assert [one.verdict for one in found] == [s.HOLDS, s.FAILS, s.UNDECIDED]
+    assert all(one.share is None for one in found)
+
+
+def test_any_other_check_is_decided_by_flights() -> None:
+    true, premise = np.arange(40) < 30, np.arange(40) < 38
+    assert s.decide_check(s.Check(true=true, premise=premise)) == s.decide(true, premise)

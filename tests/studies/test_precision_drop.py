@@ -10,12 +10,14 @@ import pytest
 
 from wildlab.detection.colour import Colour
 from wildlab.errors import WildlabError
-from wildlab.evaluation.shares import decide
+from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
 from wildlab.geometry.camera import Camera
 from wildlab.reporting.published import load_claims
+from wildlab.reporting.report import open_report
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.coloured import Ground
 from wildlab.simulation.scene.flights import SceneFlight
+from wildlab.studies import monte_carlo
 from wildlab.studies.precision_drop import STUDY, charts, text
 from wildlab.studies.precision_drop.trial import (
     COUNTS,
@@ -125,12 +127,42 @@ def test_words_turn_with_the_numbers():
     assert text.summary(table(mean_error=4.0))[2].endswith("worth about 1 independent one.")
     assert "independent, 75 would lower it to 0.3 m" in text.mean_words(table())
     assert "That is what independent errors would give" in text.mean_words(table(mean_error=0.4))
+    assert "25.0 % of the mean square error" in text.mean_words(table())
+    assert "69.4 % of the mean square error" in text.mean_words(table(mean_error=10 / 3))
     assert "too narrow" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=0.5))
     assert "wider than" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=1.0))
     assert "All of the tarpaulin" in text.pixel_words(table(tarpaulin_area_share=1.02))
     assert "12 have a sky" in text.horizon_words(table()) and "let 0 of these" in text.horizon_words(table())
     assert "let 6 of these" in text.horizon_words(table(horizon_alarms_with_borders=0.25))
     assert "is blue enough" in text.horizon_words(table(horizon_alarms_without_borders=0))
+
+
+def test_a_distance_is_never_said_to_be_below_zero():
+    two = table()
+    two[MEAN, "error"] = [0.5, 3.0]  # Student's interval of two begins far below zero
+    assert "(mean over flights 1.8 m, 0.0 to 17.6 m)" in text.mean_words(two)
+    assert "(mean over flights 2.0 m, 2.0 to 2.0 m)" in text.mean_words(table())
+
+
+def test_what_a_mean_is_worth_has_an_interval_over_flights():
+    assert text.worth_interval(table()) is None
+    twelve = pd.concat([table(), table(mean_error=2.5)] * 3, ignore_index=True)
+    low, high = text.worth_interval(twelve)
+    assert low < text.worth(twelve) < high
+    assert 16 / 6.25 <= low < high <= 4
+    assert f"worth about 3 ({low:.1f} to {high:.1f}) independent ones" in text.summary(twelve)[2]
+    alike = pd.concat([table()] * 3, ignore_index=True)
+    assert "worth about 4 (4.0 to 4.0) independent ones" in text.summary(alike)[2]
+
+
+def test_a_few_pixels_on_the_ground_are_a_calculation():
+    check = check_claims(table())["few-pixels-are-little"]
+    assert (decide_check(check, 1.0).verdict, decide_check(check, 0.5).verdict) == (HOLDS, FAILS)
+    assert decide_check(check, 1.0).share is None
+    report = open_report(study="precision-drop", kind="twin")
+    said = monte_carlo.decide_claims(report, "precision-drop", check_claims(table()))
+    assert "a calculation: 0.6 m" in set(said["share"])
+    assert next(one for one in report.claims if one["id"] == "few-pixels-are-little")["fraction"] is None
 
 
 def test_claims_turn_with_the_numbers():

@@ -1,9 +1,10 @@
 """A printed number beside ours: how near is near, and what may be concluded.
 
-A printed number is one of three. The result of an exact *calculation* is reached or not, within what rounding
+A printed number is one of four. The result of an exact *calculation* is reached or not, within what rounding
 leaves open. A *mean of runs* is compared with our mean, by the standard errors of both. *One flight's* figure
 is a single draw: our flights say where such draws fall, and the margin says from which distance on it matters
-that theirs fell elsewhere.
+that theirs fell elsewhere. A *share of images* is compared with the share of all our images together, by its
+interval.
 
 The margins are fixed here for each kind of quantity, once for all studies. They are what a figure of one
 flight is uncertain by if the flight has `INDEPENDENT` independent values: errors stay alike for tens of
@@ -233,6 +234,41 @@ def compare_flight(
         return Comparison(NOT_JUDGED, ratio, difference, spread, why)
     verdict = DIFFERS if not inside else TOO_VAGUE if vague else POSSIBLE
     return Comparison(verdict, ratio, difference, spread, f"not within {margin}")
+
+
+def compare_share(here: float, printed: float, low: float | None, high: float | None) -> Comparison:
+    """The share of all our images beside the share of all images of the print.
+
+    Agrees: the whole 95 % interval of ours is within the margin of a rate of the printed value. Differs: none
+    of it is. Too vague to tell: part of it is, for there are too few images.
+
+    Parameters
+    ----------
+    here, printed
+        Shares, 0 to 1.
+    low, high
+        Bounds of the interval of ours; None where there is none.
+
+    Returns
+    -------
+    Comparison
+
+    Examples
+    --------
+    >>> compare_share(1.0, 0.993, 0.926, 1.0).verdict
+    'too vague to tell'
+    """
+    ratio, difference = _ratio(here, printed), here - printed
+    if low is None or high is None:
+        return Comparison(NOT_JUDGED, ratio, difference, reason="its interval is not known")
+    margin = MARGINS["rate"].difference or 0.0
+    least, most = printed - margin - 1e-9, printed + margin + 1e-9
+    if low >= least and high <= most:
+        verdict = AGREES
+    else:
+        verdict = DIFFERS if high < least or low > most else TOO_VAGUE
+    why = f"interval {100 * low:.1f} to {100 * high:.1f} %, margin {100 * margin:.2g} %"
+    return Comparison(verdict, ratio, difference, reason=why)
 
 
 def _ratio(a: float, b: float) -> float | None:

@@ -34,6 +34,13 @@ ALMOST_ALL, HALF, ALMOST_NONE = 0.9, 0.5, 0.1
 WRONG = 0.035
 
 
+class Pooled(NamedTuple):
+    """In how many images of all flights together something is so."""
+
+    count: int
+    of: int
+
+
 @dataclass(frozen=True)
 class Check:
     """What simulated flights give for a sentence; `Check.of` takes plain bools.
@@ -49,6 +56,11 @@ class Check:
         Whether the sentence is true above the threshold; else it is below.
     premise
         (N,) bool: which flights have what the sentence is about; None means all.
+    pooled
+        Images of all flights together, where the threshold is for their share: few images of a flight cannot
+        tell it. ``measured`` is then each flight's own share.
+    calculated
+        Whether ``measured`` follows from the parameters alone, so that flights add nothing to it.
     first, second
         (N,), what a comparison compares, in ``unit``: the paired difference is shown.
     """
@@ -57,6 +69,8 @@ class Check:
     measured: Array | None = None
     above: bool = False
     premise: NDArray[np.bool_] | None = None
+    pooled: Pooled | None = None
+    calculated: bool = False
     first: Array | None = None
     second: Array | None = None
     unit: str = ""
@@ -175,6 +189,53 @@ def decide(true: ArrayLike, premise: ArrayLike | None = None) -> Decision:
         return Decision(NO_PREMISE, None, count, of, len(yes))
     share = share_interval(count, of)
     return Decision(share_verdict(share), share, count, of, len(yes))
+
+
+def decide_check(check: Check, threshold: float | None = None) -> Decision:
+    """Decide a sentence by its check: by flights (`decide`), by all images together, or as a calculation.
+
+    By all images together it holds where the 95 % interval of their share lies on the true side of the
+    threshold, does not hold where it lies on the other, and is undecided where the threshold is inside: there
+    are too few images. A calculation holds or does not.
+
+    Parameters
+    ----------
+    check
+        What the flights give.
+    threshold
+        Of the sentence, where it has one.
+
+    Returns
+    -------
+    Decision
+        ``share`` is None but of flights.
+
+    Raises
+    ------
+    WildlabError
+        As `decide` and `Check.holds`; or where images are pooled without a threshold.
+
+    Examples
+    --------
+    >>> rates = np.zeros(6)
+    >>> decide_check(Check(measured=rates, pooled=Pooled(0, 48)), 0.0086).verdict
+    'undecided'
+    """
+    flights = len(check)
+    if check.pooled is not None:
+        if threshold is None:
+            raise WildlabError("images are pooled and no threshold is stated", "state it with the claim")
+        if not check.pooled.of:
+            return Decision(NO_PREMISE, None, 0, 0, flights)
+        share = share_interval(*check.pooled)
+        under, over = share.high <= threshold, share.low > threshold
+        yes, no = (over, under) if check.above else (under, over)
+        return Decision(HOLDS if yes else FAILS if no else UNDECIDED, None, 0, flights, flights)
+    true = check.holds(threshold)
+    if check.calculated:
+        verdict = HOLDS if true.all() else UNDECIDED if true.any() else FAILS
+        return Decision(verdict, None, int(true.sum()), flights, flights)
+    return decide(true, check.premise)
 
 
 def paired_difference(first: ArrayLike, second: ArrayLike) -> Interval | None:

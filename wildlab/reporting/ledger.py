@@ -25,9 +25,11 @@ from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, inline, prose
 
 EXPLANATION = """
-A printed number is one of three. An exact **calculation** agrees within what rounding leaves open. A **mean
-of runs** is compared with our mean, by both standard errors and a stated tolerance. **One flight's** figure
-is a single draw, which our simulated flights are held against:
+A printed number is one of four. An exact **calculation** agrees within what rounding leaves open. A **mean
+of runs** is compared with our mean, by both standard errors and a stated tolerance. A **share of images** is
+compared with the share of all our images: it agrees where the whole 95 % interval of ours is within the
+margin of a rate, differs where none of it is, and is too vague to tell where a part is. **One flight's**
+figure is a single draw, which our simulated flights are held against:
 
 **agrees** when the median of our flights is within the margin of it; **possible** when it is not, and the
 printed number lies in the middle 90 % of our flights (of fewer than 30: between the lowest and the highest);
@@ -39,7 +41,9 @@ without what the thesis leaves out.
 
 A **claim** is a sentence of a thesis. It **holds** when the 95 % interval of the share of flights on which it
 is true lies at or above 90 %, **holds on most flights** above 50 %, and **fails on most flights** or **does
-not hold** likewise below 50 % and 10 %; where the interval contains 50 % it is **undecided**. Where the
+not hold** likewise below 50 % and 10 %; where the interval contains 50 % it is **undecided**. A claim on how
+often something happens in images holds, or does not, where the interval of the share of all images lies on
+one side of its threshold; else it is undecided. Where the
 simulated flights lack what the sentence is about, its **premise is not met** and it is not judged. That a
 share is 95 % **holds** where the interval has 95 % in it and is narrow; where it is wide, that is
 **undecided**.

@@ -6,7 +6,7 @@ import math
 
 from wildlab.evaluation.printed import AGREES, DIFFERS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
 from wildlab.evaluation.shares import FAILS, HOLDS, MOSTLY, MOSTLY_NOT, NO_PREMISE, UNDECIDABLE, UNDECIDED
-from wildlab.reporting.published import ONE_FLIGHT
+from wildlab.reporting.published import ONE_FLIGHT, SHARE_OF_IMAGES
 from wildlab.reporting.spread import MANY, spread_words
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Claim, Number, StudyStatus
 from wildlab.reporting.text import NOTHING, escape, number
@@ -96,7 +96,8 @@ def flights_of(one: StudyStatus) -> str:
 
 
 def _has_band(n: Number) -> bool:
-    return n.low is not None and n.high is not None
+    # Of a share of images the bounds are those of its interval, not of flights.
+    return n.low is not None and n.high is not None and n.kind != SHARE_OF_IMAGES
 
 
 def _row(n: Number, *, ran: bool) -> str:
@@ -136,7 +137,7 @@ def _why(n: Number) -> str:
         parts.append(n.reason)
     if n.again:
         parts.append("counted once")
-    if n.kind != ONE_FLIGHT and n.reason and n.verdict in (AGREES, DIFFERS):
+    if n.kind != ONE_FLIGHT and n.reason and n.verdict in (AGREES, DIFFERS, TOO_VAGUE):
         parts.append(n.reason)
     return f' <span class="dim">{escape("; ".join(parts))}</span>' if parts else ""
 

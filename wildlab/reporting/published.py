@@ -28,8 +28,9 @@
     reason = "..."              # why that threshold
     own = true                  # optional: a sentence of ours, not of a thesis
 
-A number's ``kind`` is "calculated", "mean of runs" or "one flight": `wildlab.evaluation.printed` compares
-each in its own way, one flight's by what the quantity is (`quantity_kind`).
+A number's ``kind`` is "calculated", "mean of runs", "one flight" or "share of images":
+`wildlab.evaluation.printed` compares each in its own way, one flight's by what the quantity is
+(`quantity_kind`).
 """
 
 from __future__ import annotations
@@ -73,8 +74,13 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
     "claim": {"premise": str, "threshold": (Decimal, int), "reason": str, "own": bool, "fitted": str},
 }
 CALCULATED, MEAN_OF_RUNS, ONE_FLIGHT = "calculated", "mean of runs", "one flight"
+#: Of a rate: all images of all flights together are compared, not one flight's.
+SHARE_OF_IMAGES = "share of images"
 #: What a file says of all its numbers, and the words allowed; the first is taken where it says nothing.
-_OF_FILE = {"kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS), "signs": ("defined", "undefined")}
+_OF_FILE = {
+    "kind": (ONE_FLIGHT, CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES),
+    "signs": ("defined", "undefined"),
+}
 _COLUMNS = [
     *("name", "subject", "value", "digits", "unit", "source", "within"),
     *("kind", "by_size", "runs", "again", "fitted", "unjudged"),

@@ -57,7 +57,7 @@ class Number:
     within: float | None
     verdict: str
     reason: str = ""
-    #: "calculated", "mean of runs" or "one flight".
+    #: "calculated", "mean of runs", "one flight" or "share of images".
     kind: str = "one flight"
     ratio: float | None = None
     #: The share of our flights that are below the published number, and the upper bound of ours to the lower.

@@ -16,8 +16,9 @@ from wildlab.evaluation.printed import (
     compare_calculation,
     compare_flight,
     compare_mean,
+    compare_share,
 )
-from wildlab.reporting.published import CALCULATED, MEAN_OF_RUNS, SIZES, quantity_kind
+from wildlab.reporting.published import CALCULATED, MEAN_OF_RUNS, SHARE_OF_IMAGES, SIZES, quantity_kind
 
 #: What a run recorded, by name and subject: entries of ``metrics.json``.
 Recorded = Mapping[tuple[str, str], Mapping[str, Any]]
@@ -102,6 +103,8 @@ def judge(
         # Of a signed mean near zero a ratio says nothing.
         ratio = here / value if here > 0 and value > 0 and quantity_kind(name) != "signed mean" else None
         return Comparison(NOT_JUDGED, ratio, here - value, None, str(row["fitted"]))
+    if row["kind"] == SHARE_OF_IMAGES:
+        return compare_share(here, value, found.get("low"), found.get("high"))
     kind = quantity_kind(name)
     if not kind:
         return Comparison(NOT_JUDGED, None, here - value, None, "no margin is fixed for this quantity")

@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import average
-from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide, paired_difference
-from wildlab.reporting.published import load_claims, quantity_kind
+from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_check, paired_difference
+from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
 from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
+from wildlab.studies.image_shares import percent, pooled_share
 from wildlab.studies.protocol import Study
 
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.
@@ -136,6 +138,11 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
             report.metric(name, subject, values.iloc[0], unit, n=1)
             continue
+        if printed is not None and printed["kind"] == SHARE_OF_IMAGES:
+            share, images = pooled_share(spread, *key)
+            if images:
+                report.metric(name, subject, share.estimate, unit, n=images, low=share.low, high=share.high)
+                continue
         value = None if printed is None else float(printed["value"])
         _record(report, name, subject, values, unit, n.get(subject), value)
         if value is not None and quantity_kind(name) == "signed mean" and len(values) > 1:
@@ -232,11 +239,11 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             )
         check = Check.of(checks[claim["id"]])
         threshold = None if "threshold" not in claim else float(claim["threshold"])
-        found = decide(check.holds(threshold), check.premise)
+        found = decide_check(check, threshold)
         at = {}
         if threshold is not None and found.verdict != NO_PREMISE:
             at = {
-                key: decide(check.holds(times * threshold), check.premise).verdict
+                key: decide_check(check, times * threshold).verdict
                 for key, times in (("half", 0.5), ("twice", 2.0))
             }
         apart = None
@@ -251,7 +258,8 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
             low=None if share is None else share.low,
             high=None if share is None else share.high,
             seeds=found.flights,
-            met=found.met,
+            # Images together, and a calculation, are of no number of flights.
+            met=None if check.calculated or (check.pooled and check.pooled.of) else found.met,
             half=at.get("half"),
             twice=at.get("twice"),
             difference=None if apart is None else apart.estimate,
@@ -263,7 +271,7 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
                 "claim": claim["text"] + (" (Ours, not the thesis's.)" if claim.get("own") else ""),
                 "source": claim["source"],
                 "verdict": f"{FITTED} ({claim['fitted']})" if claim.get("fitted") else found.verdict,
-                "share": _share_words(found),
+                "share": _share_words(found, check),
                 "difference": "" if apart is None else _difference_words(apart, check.unit),
                 "premise": _premise_words(claim.get("premise", ""), check, found),
                 "threshold": _threshold_words(threshold, at, claim.get("reason", "")),
@@ -278,7 +286,15 @@ def holding(report: Report, *ids: str) -> bool:
     return all(verdicts.get(one) == HOLDS for one in ids)
 
 
-def _share_words(found: Any) -> str:
+def _share_words(found: Any, check: Check) -> str:
+    if check.calculated and check.measured is not None:
+        low, high = f"{check.measured.min():.3g}", f"{check.measured.max():.3g}"
+        apart = f"{low} to {high}" if low != high else low
+        return f"a calculation: {apart} {check.unit}".rstrip()
+    if check.pooled is not None and check.pooled.of:
+        count, of = check.pooled
+        ends = share_interval(count, of)[1:]
+        return f"{count} of {of} images ({percent(ends[0])} to {percent(ends[1])})"
     if found.share is None:
         return f"{found.met} of {found.flights} flights meet the premise"
     low, high = (100 * end for end in found.share[1:])

@@ -24,6 +24,8 @@ Images with the horizon are rendered apart: the twin's camera never sees it. The
 the images for independent, and those of one flight are alike: they are rather too narrow."""
 #: From which share of the detections on their mean is worth about as many independent ones.
 NEARLY_ALL = 0.7
+#: How often flights are drawn again for an interval.
+DRAWN_AGAIN = 2000
 
 
 def pooled(spread: pd.DataFrame, count: str, of: str) -> Interval:
@@ -50,6 +52,21 @@ def worth(spread: pd.DataFrame) -> float:
     return float((single**2).mean() / (mean**2).mean())
 
 
+def worth_interval(spread: pd.DataFrame) -> tuple[float, float] | None:
+    """95 % interval of `worth`, from flights drawn again and again; None where there are fewer than three."""
+    if len(spread) < 3:
+        return None
+    single, mean = (spread[one].to_numpy(float) ** 2 for one in ((SINGLE, "rms_error"), (MEAN, "error")))
+    drawn = np.random.default_rng(0).integers(0, len(spread), (DRAWN_AGAIN, len(spread)))
+    low, high = np.percentile(single[drawn].mean(axis=1) / mean[drawn].mean(axis=1), [2.5, 97.5])
+    return float(low), float(high)
+
+
+def common(spread: pd.DataFrame) -> float:
+    """Share of the mean square error that the mean of all detections of a flight keeps."""
+    return 1 / worth(spread)
+
+
 def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what the trial gives, one row for each flight."""
     rate = pooled(spread, "right", "should")
@@ -60,10 +77,13 @@ def summary(spread: pd.DataFrame) -> list[str]:
     alarms = "nothing else was found" if not false else f"something else was found in {false}"
     much = "much better" if mean < single / 2 else "better" if mean < 0.9 * single else "hardly better"
     many = worth(spread)
+    within = worth_interval(spread)
+    between = "" if within is None else f" ({within[0]:.1f} to {within[1]:.1f})"
+    ones = f"independent one{'s' * (many >= 1.5)}"
     shared = (
-        "as independent errors are: their mean is worth about that many."
+        f"as independent errors are: their mean is worth about that many{between}."
         if many > NEARLY_ALL * count
-        else f"alike: their mean is worth about {max(many, 1):.0f} independent one{'s' * (many >= 1.5)}."
+        else f"alike: their mean is worth about {max(many, 1):.0f}{between} {ones}."
     )
     return [
         f"By its colour the tarpaulin is found in {with_interval(rate)} of the images that have it inside "
@@ -86,8 +106,10 @@ def mean_words(spread: pd.DataFrame) -> str:
     else:
         why = (
             f"Were their errors independent, {last} would lower it to "
-            f"{error[first] / np.sqrt(last / first):.1f} m. The images of one pass share what the "
-            "autopilot has wrong, and what is left of the mount's angles stays in all of them"
+            f"{error[first] / np.sqrt(last / first):.1f} m. {percent(min(common(spread), 1.0))} of the mean "
+            "square error of single positions is still in their mean. What can last over a flight is the "
+            "slow part of the autopilot's position and angles, the mount's angles and the camera's "
+            "calibration; how much comes from which is not computed here"
         )
     return (
         f"After {first} detection{'s' * (first > 1)} the median flight is {error[first]:.1f} m off, after "
@@ -96,7 +118,8 @@ def mean_words(spread: pd.DataFrame) -> str:
 
 
 def _span(found: Interval) -> str:
-    return f"{found.estimate:.1f} m, {found.low:.1f} to {found.high:.1f} m"
+    # A distance is not below zero, which Student's interval of few flights may be.
+    return f"{found.estimate:.1f} m, {max(found.low, 0.0):.1f} to {found.high:.1f} m"
 
 
 def pixel_words(spread: pd.DataFrame) -> str:

@@ -331,7 +331,8 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     return {
         "easy-to-separate": Check(true=of(FOUND, "false_alarms_per_image") == 0),
         "centred-without-rim": Check(measured=of(FOUND, "off_centre"), premise=of(FOUND, "area_share") < 1),
-        "few-pixels-are-little": Check(measured=of(FOUND, "few_pixels")),
+        # Height and focal length alone: no flight adds to it.
+        "few-pixels-are-little": Check(measured=of(FOUND, "few_pixels"), unit="m", calculated=True),
         "horizon-near-the-border": Check(measured=accepted, premise=every > 0),
         "single-is-inaccurate": Check(true=mean < single, first=single, second=mean, unit="m"),
         "within-a-few-metres": Check(measured=mean),

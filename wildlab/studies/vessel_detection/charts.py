@@ -136,9 +136,10 @@ def weather_shown(weather: pd.DataFrame) -> Shown:
     for colour, (_, own) in zip(_COLOURS, weather.groupby("glint"), strict=False):
         glint = float(own["glint"].iloc[0])
         label = f"glint of {glint:g} K" if glint else "no sun"
-        ax.plot(own["wind"], own["false"], "o-", color=colour, label=label)
-    ax.set(xlabel="wind (m/s)", ylabel="false alarms an image")
-    ax.set_ylim(bottom=-0.03 * max(1.0, float(weather["false"].max())))
+        own = own.assign(found=own["alarmed"] / own["draws"])
+        ax.plot(own["wind"], 100 * own["found"], "o-", color=colour, label=label)
+        _bars(ax, own, "wind", colour)
+    ax.set(xlabel="wind (m/s)", ylabel="images with a false alarm (%)", ylim=(-3, 103))
     calm = float(weather["false"].max()) == 0
     ax.set_title(
         f"No false alarm in {int(weather['draws'].sum())} images of an empty sea"
@@ -147,7 +148,12 @@ def weather_shown(weather: pd.DataFrame) -> Shown:
     )
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     said = words.weather_words(weather)
-    return fig, "weather", said, f"From 100 m, the camera halfway to the horizon. {said}"
+    return (
+        fig,
+        "weather",
+        said,
+        f"Bars: 95 % intervals. From 100 m, the camera halfway to the horizon. {said}",
+    )
 
 
 def seen_shares(objects: pd.DataFrame) -> Shown:

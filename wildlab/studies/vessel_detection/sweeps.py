@@ -119,7 +119,7 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
     -------
     DataFrame
         ``wind`` m/s, ``glint`` K of the sun mirrored in view (0: no sun), ``false`` alarms per
-        image, of ``draws`` images.
+        image, of ``draws`` images, of which so many are ``alarmed``.
     """
     response = CameraResponse()
     sensor = sensor_of(response, (camera.height, camera.width), np.random.default_rng([seed, 5]))
@@ -130,14 +130,16 @@ def over_weather(camera: Camera, draws: int, seed: int) -> pd.DataFrame:
             # Ahead, as far above the horizon as the camera looks below it: mirrored in the image's middle.
             elevation = float(np.pi / 2 - TILT) if glint else None
             sea = Sea(wind_speed=wind, sun_azimuth=0.0, sun_elevation=elevation, glint=glint, seed=seed)
-            alarms = 0
+            alarms = alarmed = 0
             for number in range(draws):
                 rng = np.random.default_rng([seed, int(10 * wind), int(10 * glint), number])
                 at = np.array([*rng.uniform(-1000.0, 1000.0, 2), -REFERENCE])
                 poses = CameraPoses(camera, Mount("down"), at, R_nb)
                 view = render(Scene(sea), camera, poses.p_nc, poses.R_nc)
-                alarms += len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
-            rows.append({"wind": wind, "glint": glint, "false": alarms / draws, "draws": draws})
+                found = len(find_objects(expose(view.kelvin, response, sensor, rng)).detections)
+                alarms, alarmed = alarms + found, alarmed + bool(found)
+            row = {"wind": wind, "glint": glint, "false": alarms / draws, "draws": draws}
+            rows.append(row | {"alarmed": alarmed})
     return pd.DataFrame(rows)
 
 

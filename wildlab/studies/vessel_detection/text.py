@@ -10,6 +10,7 @@ import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.studies.image_shares import percent
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 
 NAMES = {
@@ -19,8 +20,17 @@ NAMES = {
     BOATS: "boats",
     SEA: "empty sea",
 }
+#: What is published, and what it is called.
+SHARES = {
+    ("detection_rate", SHIP): "images of the ship, found",
+    ("detection_rate", WHOLE): "images with boats wholly in view, all found",
+    ("false_alarms_per_image", SHIP): "images of the ship, false alarms",
+    ("false_alarms_per_image", BOATS): "images of the second flight, false alarms",
+}
 #: From which share on something counts as found.
 FOUND = 0.9
+#: Where the intervals with the two areas overlap at each height.
+_CHANCE = "; so few are drawn that not all of this can be told from chance"
 #: What the ellipse of a centre should hold.
 ELLIPSE = 0.9
 
@@ -28,7 +38,9 @@ METHOD = r"""The seven steps of H 4.3, with the printed threshold of 230 of 255 
 area of 50 pixels, counted before the blob is filled. What H does not print is chosen; the table above
 says what, why, and what it changes. A detection of which less than a quarter of the pixels are a
 vessel's is a false alarm. Otherwise it is one of the vessel that has most of these: of two that are
-found as one, the smaller counts as missed. An image counts as right if all in it are found.
+found as one, the smaller counts as missed. An image counts as right if all in it are found; where one boat
+is whole and the other cut, it counts by the whole one. Intervals of shares of images take the images for
+independent, and those of one flight are alike: they are rather too narrow.
 
 Each flight is that of the twin, with its true poses; vessels, sea and sky are rendered in kelvin for
 every image that is looked at, blurred, and counted by a camera with noise, a fixed pattern, vignetting
@@ -52,13 +64,6 @@ def false_alarms(spread: pd.DataFrame, *subjects: str) -> tuple[int, int]:
         for one in subjects
     )
     return round(float(np.sum(alarms))), round(float(np.sum(images)))
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none."""
-    if min(share, 1 - share) < 1e-9:
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def percent_within(share: Interval) -> str:
@@ -110,9 +115,62 @@ def summary(spread: pd.DataFrame, heights: pd.DataFrame) -> list[str]:
         f"In {percent_within(ship)} of the images the ship is found, or the part of it that shows, and in "
         f"{percent_within(whole)} all boats that are wholly in view.",
         f"{false}; the thesis counts 15 in 27866.",
-        f"Up to which height smaller things are found nine times of ten, of {_draws(heights)} drawn at each: "
-        f"{reach_words(heights)}.",
+        f"Up to which height smaller things are found, {_needed(heights)} at each: {reach_words(heights)}.",
     ]
+
+
+def alarmed_words(spread: pd.DataFrame) -> str:
+    """How many images were looked at, and in which share of such there is a false alarm, by the interval."""
+    some = sum(spread[one, "images_with_false"].sum() for one in (SHIP, BOATS))
+    images = false_alarms(spread, SHIP, BOATS)[1]
+    return f"{images} images (in {percent_within(share_interval(round(float(some)), images))} of these)"
+
+
+def flights_words(spread: pd.DataFrame) -> str:
+    """How the rates go from flight to flight, with Student's interval of their mean."""
+    parts = []
+    for subject in (SHIP, WHOLE):
+        rates = spread[subject, "detection_rate"].to_numpy(float)
+        rates = rates[np.isfinite(rates)]
+        if len(rates) < 2 or np.ptp(rates) < 1e-12:
+            continue
+        mean = mean_interval(rates)
+        low, high = (percent(min(max(end, 0.0), 1.0)) for end in mean[1:])
+        parts.append(f"{NAMES[subject]} {percent(mean.estimate)} ({low} to {high})")
+    if not parts:
+        return "The rates are the same on all flights, or these are too few to say how they go over them."
+    return f"Flight by flight, with the interval of their mean: {'; '.join(parts)}."
+
+
+def printed_words(spread: pd.DataFrame) -> str:
+    """How many images there are here for what the thesis says of all of its own, where these are fewer."""
+    parts = []
+    for subject, theirs, what in ((SHIP, 441, "the ship"), (WHOLE, 4903, "boats wholly in view")):
+        ours = round(float(spread[subject, "images"].sum()))
+        if ours < theirs:
+            parts.append(f"{ours} of {what}, and the thesis {theirs}")
+    how = (
+        "A claim holds where the 95 % interval of the share of all flights' images lies at or below its "
+        "threshold, does not hold where it lies above, and is undecided between. The verdicts at half and at "
+        "twice of the threshold stand beside."
+    )
+    if not parts:
+        return f"There are as many images here as the thesis has. {how}"
+    return (
+        f"Here are {'; '.join(parts)}: that none fails among fewer does not say that none "
+        f"would among as many. {how}"
+    )
+
+
+def _needed(sweep: pd.DataFrame) -> str:
+    """How many of those drawn must be found for nine of ten, and what that leaves open."""
+    parts = []
+    for draws in sorted({int(one) for one in sweep["draws"]}):
+        least = int(np.ceil(FOUND * draws - 1e-9))
+        low = share_interval(least, draws).low
+        of = f"all {draws} drawn" if least == draws else f"at least {least} of {draws} drawn"
+        parts.append(f"{of} (which leaves open a share down to {percent(low)})")
+    return " or ".join(parts)
 
 
 def _draws(sweep: pd.DataFrame) -> str:
@@ -125,7 +183,8 @@ def missed_words(spread: pd.DataFrame) -> str:
     for subject in (SHIP, WHOLE, CUT):
         missed = int(spread[subject, "missed"].sum())
         if not missed:
-            parts.append(f"{NAMES[subject]}: none missed")
+            images = round(float(spread[subject, "images"].sum()))
+            parts.append(f"{NAMES[subject]}: none missed in {images} images")
             continue
         share = float(spread[subject, "largest_share_missed"].max())
         parts.append(
@@ -137,17 +196,23 @@ def missed_words(spread: pd.DataFrame) -> str:
     return words[0].upper() + words[1:]
 
 
+def _tied(readings: pd.DataFrame, column: str) -> str:
+    """All readings that have the least of a column."""
+    least = readings[readings[column] <= readings[column].min() + 1e-9]
+    return " and ".join(f"“{name}”" for name in least["reading"])
+
+
 def readings_words(readings: pd.DataFrame) -> str:
     """How far the rates go apart over the readings of what H leaves open."""
     base = readings.iloc[0]
-    worst = readings.loc[readings["boats"].idxmin()]
     loud = readings.loc[readings["false"].idxmax()]
     low, high = (
         [percent(getattr(readings[one], end)()) for one in ("ship", "boats")] for end in ("min", "max")
     )
     ship = f"the ship's rate lies between {low[0]} and {high[0]}"
     boats = f"that of whole boats between {low[1]} and {high[1]}"
-    apart = f", the least with “{worst['reading']}”" if worst["boats"] < base["boats"] else ""
+    apart = f", the least with {_tied(readings, 'boats')}" if readings["boats"].min() < base["boats"] else ""
+    ship += f", the least with {_tied(readings, 'ship')}" if readings["ship"].min() < base["ship"] else ""
     noise = (
         f"false alarms come up to {loud['false']:.2g} an image, with “{loud['reading']}”"
         if loud["false"] > base["false"]
@@ -164,9 +229,7 @@ def contrast_words(contrast: pd.DataFrame) -> str:
         needed = f"{good.min():g} K" if len(good) else f"more than {own['excess_k'].max():g} K"
         parts.append(f"{needed} at {length:g} m")
     return (
-        f"What a deck must have over the sea for nine of ten to be found, of {_draws(contrast)} drawn each: "
-        + ", ".join(parts)
-        + "."
+        f"What a deck must have over the sea for {_needed(contrast)} to be found: " + ", ".join(parts) + "."
     )
 
 
@@ -184,7 +247,13 @@ def weather_words(weather: pd.DataFrame) -> str:
                 f"up to {worst['false']:.2g} an image"
             )
         else:
-            parts.append(f"{where} there are none up to {own['wind'].max():g} m/s of wind")
+            images = int(own["draws"].sum())
+            least = own["draws"].min()
+            parts.append(
+                f"{where} there are none up to {own['wind'].max():g} m/s of wind, in {images} images, which "
+                f"leaves open up to {percent(share_interval(0, images).high)} of them, and at any one wind "
+                f"up to {percent(share_interval(0, least).high)}"
+            )
     return f"False alarms on an empty sea, {_draws(weather)} images each: {'; '.join(parts)}."
 
 
@@ -205,7 +274,19 @@ def scaled_words(heights: pd.DataFrame) -> str:
     more = f"a {' and a '.join(gained)} from higher up" if gained else ""
     less = f"a {' and a '.join(lost)} only from lower down" if lost else ""
     both = " and ".join(part for part in (more, less) if part)
-    return f"Scaled with the height, the smallest area finds {both}."
+    sure = "" if all(_apart(heights, kind) for kind in gained + lost) else _CHANCE
+    return f"Scaled with the height, the smallest area finds {both}{sure}."
+
+
+def _apart(heights: pd.DataFrame, kind: str) -> bool:
+    """Whether at some height the intervals with the printed and with the scaled area do not overlap."""
+    for _, row in heights[heights["kind"] == kind].iterrows():
+        one, other = (
+            share_interval(round(row[name] * row["draws"]), int(row["draws"])) for name in ("found", "scaled")
+        )
+        if one.high < other.low or other.high < one.low:
+            return True
+    return False
 
 
 def ellipse_words(spread: pd.DataFrame) -> str:
