@@ -38,7 +38,8 @@ CLAIMS_EXPLAINED = (
     "A claim holds where the 95 % interval of the share of flights on which it is true lies at or above "
     "90 %, on most flights above 50 %; likewise it fails below 50 % and does not hold below 10 %. Where the "
     "interval has 50 % in it, it is undecided. A vague word has a threshold, which is ours: the verdicts at "
-    "half and at twice of it stand beside, where what is measured can be on either side of them. Differences are means over flights, with their 95 % interval."
+    "half and at twice of it stand beside, where what is measured can be on either side of them. "
+    "Differences are means over flights, with their 95 % interval."
 )
 #: Headings of the table that `n_run_tests` gives, and what it is.
 N_RUN_COLUMNS = {
