@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from wildlab.detection.warm import Warm
+from wildlab.evaluation.runs import Interval
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.reporting.published import load_claims
@@ -26,9 +27,10 @@ from wildlab.simulation.scene import (
 )
 from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
 from wildlab.simulation.scene.response import expose
-from wildlab.studies.wildlife_detection import STUDY, charts, claims, text, trial
+from wildlab.studies.wildlife_detection import STUDY, charts, claims, settings, text, trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
+    BY_EMPTY,
     BY_MEAN,
     BY_MEDIAN,
     CLOUDY,
@@ -229,8 +231,8 @@ def test_claims_turn(numbers):
     assert not good["enhancement-misses"]
     bad = true(
         spread_of(
-            numbers, constant__invented=5.0, adaptive__invented=5.0, constant__invented_before=0.0,
-            adaptive__invented_before=0.0, adaptive_51__pieces=2.0, adaptive_251__pieces=2.0,
+            numbers, constant__invented=5.0, adaptive_offset__invented=5.0, constant__invented_before=0.0,
+            adaptive_offset__invented_before=0.0, adaptive_51__pieces=2.0, adaptive_251__pieces=2.0,
             mean_constant__found=0.0, mean_constant__missed=4.0, herd__mean=1.0, herd__median=3.0,
             ground__as_warm=4.0, subtracted__invented=3.0, enhanced__missed=2.0, enhanced__background=9.0,
         )
@@ -242,8 +244,73 @@ def test_claims_turn(numbers):
     assert not bad["median-rises-less"] and bad["median-finds-more"]
     assert bad["sun-breaks"] and not bad["night-keeps"]
     assert bad["too-hot"] and bad["size-from-ground"] and bad["block-from-distance"]
-    clear = true(spread_of(numbers, constant__invented=9.0, adaptive__invented=9.0))
+    clear = true(spread_of(numbers, constant__invented=9.0, adaptive_offset__invented=9.0))
     assert clear["combinations-best"]
+    # The constant threshold under another name neither copes nor competes.
+    twin = true(spread_of(numbers, adaptive__invented_after=9.0, adaptive__found=0.0))
+    assert twin["adaptive-copes"]
+    beaten = spread_of(numbers, constant__invented=9.0, adaptive_offset__invented=9.0, adaptive__invented=0.0)
+    assert true(beaten)["combinations-best"]
+
+
+def check_of(claim, spread):
+    threshold = next(c for c in load_claims("wildlife-detection") if c["id"] == claim).get("threshold")
+    return claims.check_claims(spread)[claim].holds(threshold)
+
+
+@pytest.mark.parametrize(("claim", "subject"), [("too-hot", "not_hot"), ("size-from-ground", "sized")])
+def test_a_filter_has_to_be_worth_what_it_costs(numbers, claim, subject):
+    gain = {"subtracted__invented": 3.0}
+    assert check_of(claim, spread_of(numbers, **gain)).all()
+    # Fewer false alarms, and as many animals lost: 8 / 11 becomes 8 / 12.
+    loss = gain | {f"{subject}__missed": 4.0}
+    assert not check_of(claim, spread_of(numbers, **loss)).any()
+    assert not check_of(claim, spread_of(numbers, **gain, **{f"{subject}__invented": 3.0})).any()
+
+
+def test_the_threshold_is_higher_than_needed_where_that_without_the_herd_finds_more(numbers):
+    claim = "threshold-higher-than-needed"
+    assert not check_of(claim, spread_of(numbers)).any()
+    assert check_of(claim, spread_of(numbers, mean_constant__missed_herd=4.0)).all()
+    # The rise alone does not make it so.
+    assert check_of("herd-biases-mean", spread_of(numbers)).all()
+
+
+def test_a_fall_is_a_part_of_what_was(numbers):
+    assert claims.fall([1.0, 0.2], [0.8, 0.0]).tolist() == pytest.approx([0.2, 1.0])
+    assert np.isnan(claims.fall([0.0], [0.0])).all()
+    # From 0.2 to zero is by all of it, and by no more than the threshold of 0.2.
+    low = {"adaptive_offset__found": 1.0, "adaptive_offset__missed": 8.0}
+    gone = spread_of(numbers, **low, adaptive_offset__found_after=0.0)
+    assert not check_of("adaptive-copes", gone).any()
+    assert check_of("adaptive-copes", spread_of(numbers, **low)).all()
+
+
+def test_thresholds_lie_where_their_measures_can_be(numbers):
+    checks = claims.check_claims(spread_of(numbers))
+    assert checks["subtraction-and-constant-good"].reaches(0.35)
+    assert not checks["subtraction-and-constant-good"].reaches(1.4)
+    assert not checks["constant-fails"].reaches(1.0)
+
+
+def test_masks_are_compared_pixel_by_pixel():
+    picture = picture_of(rhino())
+    constant, floor = METHODS[CONSTANT], METHODS[ADAPTIVE]
+    assert trial.overlap(picture, constant, floor) == 1.0
+    assert trial.overlap(picture, constant, replace(constant, level=255.0)) == 0.0
+    assert trial.overlap(picture, replace(constant, level=255.0), replace(floor, level=255.0)) == 1.0
+    both = trial.above(picture, constant), trial.above(picture, replace(constant, level=180.0))
+    part = trial.overlap(picture, constant, replace(constant, level=180.0))
+    assert part == both[1].sum() / both[0].sum() < 1
+    # Where blocks are as bright as the level the two differ.
+    bright = picture_of(rhino(), window=(-30.0, 10.0))
+    assert trial.overlap(bright, constant, floor) < 1
+
+
+def test_the_herd_is_also_searched_with_the_threshold_of_the_empty_place(numbers):
+    rise = numbers["herd", "mean_rise"]
+    assert rise > 0
+    assert numbers[BY_EMPTY, "missed_herd"] <= numbers[BY_MEAN, "missed_herd"]
 
 
 def test_false_alarms_are_not_fewer_than_none(numbers):
@@ -263,12 +330,60 @@ def test_a_premise_that_is_not_met_decides_nothing(numbers):
 
 def test_the_summary_turns_with_the_numbers(numbers):
     good = " ".join(text.summary(spread_of(numbers)))
-    assert "F1 of 1.00" in good and "a sunny noon is no worse" in good
-    assert "rises by 40 grey levels" in good and "copes no better" in good
-    every = {f"{one}__invented_noon": 20.0 for one in (CONSTANT, ADAPTIVE, SUBTRACTED, ENHANCED)}
-    bad = " ".join(text.summary(spread_of(numbers, constant__invented_after=9.0, **every)))
-    assert "at a sunny noon the best comes to 0.29" in bad
-    assert "the adaptive threshold copes better" in bad
+    assert f"the best of {len(METHODS)} settings has an F1 of 1.00 (" in good
+    assert "which is not told from that" in good
+    assert "rises by 40 grey levels" in good
+    every = {f"{one.replace('-', '_')}__invented_noon": 20.0 for one in METHODS}
+    bad = " ".join(text.summary(spread_of(numbers, **every)))
+    assert "at a sunny noon the best comes to 0.29 (" in bad and " only" in bad
+    every = {f"{one.replace('-', '_')}__invented_night": 20.0 for one in METHODS}
+    assert "which is more" in text.summary(spread_of(numbers, **every))[0]
+
+
+def test_all_settings_that_are_as_good_as_the_best_are_named(numbers):
+    first = text.summary(spread_of(numbers))[0]
+    assert all(text.NAMES[one] in first.split("; at a sunny noon")[0] for one in METHODS)
+    worse = {f"{one.replace('-', '_')}__invented_night": 20.0 for one in METHODS if one != BY_MEDIAN}
+    alone = text.summary(spread_of(numbers, **worse))[0].split("; at a sunny noon")[0]
+    assert f"({text.NAMES[BY_MEDIAN]})" in alone and "within its interval" not in alone
+
+
+def test_who_is_told_from_the_best():
+    every = {"a": Interval(0.8, 0.7, 0.9), "b": Interval(0.9, 0.78, 0.95), "c": Interval(0.5, 0.2, 0.99)}
+    assert text.equals(every) == ["b", "a"]
+    assert text.equals(every | {"b": Interval(0.9, 0.81, 0.95)}) == ["b"]
+    blunt = {"a": Interval(0.999, np.nan, np.nan), "b": Interval(1.0, np.nan, np.nan)}
+    assert text.equals(blunt) == ["b", "a"]
+    assert text.equals(blunt | {"a": Interval(np.nan, np.nan, np.nan)}) == ["b"]
+
+
+def test_words_on_the_sun_that_comes_out_turn(numbers):
+    both = text.change_words(spread_of(numbers))
+    assert both.endswith("; the adaptive threshold copes.")
+    better = text.change_words(spread_of(numbers, constant__invented_after=9.0))
+    assert better.endswith("; the adaptive threshold copes, the constant one does not.")
+    name = text.NAMES[CONSTANT]
+    assert f"{name} from 1.00 (" in better and ") to 0.47 (" in better
+    neither = text.change_words(spread_of(numbers, adaptive_offset__invented_after=8.0))
+    assert neither.endswith("the adaptive threshold loses 50 % of its F1, the constant one nothing.")
+    none = text.change_words(spread_of(numbers, constant__found_before=0.0, constant__missed_before=4.0))
+    assert none.endswith("where nothing was found before, nothing can be said to cope.")
+
+
+def test_a_threshold_under_two_names_is_said_to_be_one(numbers):
+    same = text.masks_words(spread_of(numbers, masks__overlap=1.0))
+    assert "in 168 of 168 images (98 to 100 %)" in same and "under another name" in same
+    assert "100 % of what either makes white" in same
+    apart = text.masks_words(spread_of(numbers, masks__overlap=0.5))
+    assert "in 0 of 168 images (0 to 2 %); on average 50 %" in apart and "So the two differ" in apart
+
+
+def test_tiles_have_intervals(numbers):
+    spread = spread_of(numbers, subtracted__missed_noon=4.0, subtracted__invented_noon=2.0)
+    night, noon, alarms = text.tiles(spread)
+    assert night[0] == "100 %" and "(97 to 100 %)" in night[1]
+    assert noon[0] == "50 %" and "(44 to 56 %)" in noon[1]
+    assert alarms[0] == "2.0" and "(2.0 to 2.0)" in alarms[1]
 
 
 def test_the_reading_is_that_with_the_largest_rates(numbers):
@@ -277,13 +392,23 @@ def test_the_reading_is_that_with_the_largest_rates(numbers):
         for one in READINGS:
             for height in trial.READ_AT:
                 spread[f"{method}-{one}", f"missed_{height}"] = 0.0 if one == "offset" else 9.0
-    assert text.best_reading(spread) == ("offset", 1.0)
-    assert text.readings_words(spread).count("above the mean of its block by the level") == 3
-    assert "fits the pictures best as “above the mean of its block by" in text.summary(spread)[2]
+    names, found = text.best_of(spread, ADAPTIVE)
+    assert names == ["offset"] and found.estimate == 1.0
+    words = text.readings_words(spread)
+    assert words.count("above the mean of its block by the level") == 3 and "not told from" not in words
+    assert "held against the thesis's own pictures" in words
+    assert text.summary(spread)[2].count("as “above the mean of its block by the level” with") == 3
     for height in trial.READ_AT:
         spread[f"{ADAPTIVE}-offset", f"missed_{height}"] = 9.0
         spread[f"{ADAPTIVE}-floor", f"missed_{height}"] = 0.0
-    assert "figure 7.10a as “above the mean of its block by the level”" in text.summary(spread)[2]
+    last = text.summary(spread)[2]
+    assert f"“{text.READ_AS['floor']}” with the numbers of figure 7.6" in last
+    assert f"“{text.READ_AS['offset']}” with the numbers of figure 7.10a" in last
+    for height in trial.READ_AT:
+        spread[f"{ADAPTIVE}-white", f"missed_{height}"] = 0.0
+    tied = f"not told from “{text.READ_AS['white']}”; for figure 7.10a"
+    assert tied in text.readings_words(spread)
+    assert f"“{text.READ_AS['floor']}” or “{text.READ_AS['white']}” with" in text.summary(spread)[2]
     assert len(text.readings_table(spread)) == 4
 
 
@@ -307,7 +432,7 @@ def test_tables_have_a_row_for_each_method_and_weather(numbers):
     assert len(table) == 8
     assert set(table["images"]) == {36}
     assert len(text.rates_table(spread_of(numbers), (BY_MEDIAN, BY_MEAN), text.by_height())) == 6
-    assert text.chosen_table()["reason"].str.len().min() > 10
+    assert settings.chosen_table()["reason"].str.len().min() > 10
     assert [text.percent(one) for one in (0.0, 0.001, 0.5, 0.999, 1.0, np.nan)] == [
         "0 %", "1 %", "50 %", "99 %", "100 %", "none",
     ]  # fmt: skip
@@ -372,10 +497,14 @@ def test_words_on_windows_turn():
     rows.append((2.0, "floor", 0.1, 0.1, 0.1, 0.7, 0.2))
     worse = text.windows_words(pd.DataFrame(rows, columns=names))
     assert "does not cope" in worse and worse.endswith("read the other way, from 0.70 to 0.20.")
+    rows.append((3.0, "floor", 0.9, 0.9, 0.9, 0.9, 0.5))
+    tied = text.windows_words(pd.DataFrame(rows, columns=names))
+    assert "With the best of 4," in tied and "1 more of which is equal to two digits" in tied
+    assert "equal to two digits" not in worse
     assert "taken" not in text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
 
 
 def test_settings_say_where_they_are_printed():
-    table = text.settings_table().set_index("method")
+    table = settings.settings_table().set_index("method")
     assert table.loc["constant, 150", "level"] == "150" and "by the level" in table.loc["adaptive 51", "read"]
     assert table["source"].str.startswith("F ").all()
