@@ -164,10 +164,10 @@ def best_methods(spread: pd.DataFrame, weather: str) -> tuple[list[str], Rates]:
 
 
 def _best_words(names: Sequence[str], found: Rates) -> str:
-    """An F1 with its interval, whose it is, and who else lies within that interval."""
-    first, *more = (NAMES[one] for one in names)
-    tied = f"; within its interval: {'; '.join(more)}" if more else ""
-    return f"{ranged(found.f1)} ({first}{tied})"
+    """An F1 with its interval, whose it is, and who else is not told from it."""
+    first, *more = (f"“{NAMES[one]}”" for one in names)
+    tied = f" (not told from it: {', '.join(more)})" if more else ""
+    return f"{ranged(found.f1)} with {first}{tied}"
 
 
 def summary(spread: pd.DataFrame) -> list[str]:
@@ -175,15 +175,18 @@ def summary(spread: pd.DataFrame) -> list[str]:
     night, noon = (best_methods(spread, weather) for weather in (NIGHT, NOON))
     dark, bright = night[1].f1, noon[1].f1
     if bright.high < dark.low:
-        beside = f"at a sunny noon the best comes to {_best_words(*noon)} only"
+        beside = f"at a sunny noon the best comes only to {_best_words(*noon)}"
     elif bright.low > dark.high:
-        beside = f"at a sunny noon the best comes to {_best_words(*noon)}, which is more"
+        beside = f"at a sunny noon it is more: {_best_words(*noon)}"
     else:
-        beside = f"at a sunny noon it is {_best_words(*noon)}, which is not told from that"
+        beside = f"at a sunny noon it is not told from {_best_words(*noon)}"
+    read: dict[str, list[str]] = {}
+    for method in PRINTED:
+        words = " or ".join(f"“{READ_AS[one]}”" for one in best_of(spread, method)[0])
+        read.setdefault(words, []).append(FIGURE[method].split(":")[0])
     level = "; ".join(
-        f"as {' or '.join(f'“{READ_AS[one]}”' for one in best_of(spread, method)[0])} with the numbers of "
-        f"figure {FIGURE[method].split(':')[0]}"
-        for method in PRINTED
+        f"as {words} with the numbers of figure{'s' * (len(figures) > 1)} {', '.join(figures)}"
+        for words, figures in read.items()
     )
     return [
         f"On a clear night the best of {len(METHODS)} settings has an F1 of {_best_words(*night)}; {beside}.",
