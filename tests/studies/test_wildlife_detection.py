@@ -341,11 +341,19 @@ def test_the_summary_turns_with_the_numbers(numbers):
 
 
 def test_all_settings_that_are_as_good_as_the_best_are_named(numbers):
-    first = text.summary(spread_of(numbers))[0]
-    assert all(text.NAMES[one] in first.split("; at a sunny noon")[0] for one in METHODS)
+    others = len(METHODS) - 1
+    assert f"({others} more not told from it)" in text.summary(spread_of(numbers))[0]
+    night = text.ties_words(spread_of(numbers)).split("; on a clear morning")[0]
+    assert all(f"“{text.NAMES[one]}”" in night for one in METHODS)
     worse = {f"{one.replace('-', '_')}__invented_night": 20.0 for one in METHODS if one != BY_MEDIAN}
-    alone = text.summary(spread_of(numbers, **worse))[0].split("; at a sunny noon")[0]
-    assert alone.endswith(f" with “{text.NAMES[BY_MEDIAN]}”")
+    alone = spread_of(numbers, **worse)
+    first = text.summary(alone)[0].split("; at a sunny noon")[0]
+    assert first.endswith(f" with “{text.NAMES[BY_MEDIAN]}”")
+    night, morning = text.ties_words(alone).split("; on a clear morning")
+    assert "not told from" not in night and "not told from" in morning
+    worse.pop("constant__invented_night")
+    two = text.summary(spread_of(numbers, **worse))[0]
+    assert f"with “{text.NAMES[CONSTANT]}” (“{text.NAMES[BY_MEDIAN]}” not told from it);" in two
 
 
 def test_who_is_told_from_the_best():

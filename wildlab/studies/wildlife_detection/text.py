@@ -164,10 +164,20 @@ def best_methods(spread: pd.DataFrame, weather: str) -> tuple[list[str], Rates]:
 
 
 def _best_words(names: Sequence[str], found: Rates) -> str:
-    """An F1 with its interval, whose it is, and who else is not told from it."""
+    """An F1 with its interval, whose it is, and how many are not told from it; `ties_words` names them."""
     first, *more = (f"“{NAMES[one]}”" for one in names)
-    tied = f" (not told from it: {', '.join(more)})" if more else ""
+    tied = f" ({more[0] if len(more) == 1 else f'{len(more)} more'} not told from it)" if more else ""
     return f"{ranged(found.f1)} with {first}{tied}"
+
+
+def ties_words(spread: pd.DataFrame) -> str:
+    """Which setting is best in each weather, and which are not told from it, by name."""
+    parts = []
+    for weather in WHEN:
+        (first, *more), found = best_methods(spread, weather)
+        tied = f", not told from {', '.join(f'“{NAMES[one]}”' for one in more)}" if more else ""
+        parts.append(f"{AT[weather]} {ranged(found.f1)} with “{NAMES[first]}”{tied}")
+    return f"The largest F1 is {'; '.join(parts)}."
 
 
 def summary(spread: pd.DataFrame) -> list[str]:
