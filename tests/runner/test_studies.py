@@ -163,7 +163,7 @@ def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: 
         metric = found[f"recall_{weather}", "subtracted"]
         assert metric["low"] <= metric["value"] <= metric["high"] and metric["n"] == 6
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 16)
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 17)
     for figure in ("methods-noon", "sequence", "blocks-offset-65", "weather-recall", "heights"):
         assert (folder / "figures" / f"{figure}.png").is_file()
     assert faults(folder / "report.html") == []

@@ -230,6 +230,7 @@ def test_claims_follow_the_numbers(numbers):
         spread_of(numbers, {(WITH, "time_to_rest"): np.nan, (WITHOUT, "time_to_rest"): np.nan})
     )
     assert not never["rest-sooner"].premise.any(), "of a ship that never rests nothing is sooner"
+    assert not never["mainly-navigation"].reaches(1.4), "what is left above all is no reduction"
 
 
 def test_words_turn_with_the_numbers(numbers):

@@ -104,6 +104,31 @@ def test_a_threshold_is_shown_at_half_and_at_twice(report: Report, monkeypatch: 
     assert (report.claims[0]["half"], report.claims[0]["twice"]) == ("does not hold", "holds")
 
 
+def test_a_threshold_that_the_measure_cannot_reach_is_left_out(
+    report: Report, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claims_of(monkeypatch, "a", threshold=0.7)
+    f1 = np.full(50, 0.9)
+
+    def row(check: Check) -> str:
+        (one,) = monte_carlo.decide_claims(report, "x", {"a": check}).to_dict("records")
+        return str(one["threshold"])
+
+    assert row(Check(measured=f1, above=True)) == "at 0.35 holds, at 1.4 does not hold; taken: 0.7"
+    assert row(Check(measured=f1, above=True, reach=(0, 1))) == "at 0.35 holds; taken: 0.7"
+    assert (report.claims[-1]["half"], report.claims[-1].get("twice")) == ("holds", None)
+    # A ratio below 1.4 would hold of what does not decrease.
+    assert row(Check(measured=f1, reach=(0, 1))) == "at 0.35 does not hold; taken: 0.7"
+    assert row(Check(measured=f1, reach=(0.6, 1))) == "0.7"
+
+
+def test_a_measure_reaches_what_it_can_be_on_either_side_of() -> None:
+    above, below = (Check(measured=np.ones(1), above=up, reach=(0, 1)) for up in (True, False))
+    at = (-0.1, 0.0, 0.5, 1.0, 1.1)
+    assert [above.reaches(one) for one in at] == [False, True, True, False, False]
+    assert [below.reaches(one) for one in at] == [False, False, True, True, False]
+
+
 def test_a_premise_and_a_difference_are_said(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
     claims_of(monkeypatch, "a", premise="Errors grow in turns", own=True)
     met, true = np.arange(100) < 80, np.arange(100) < 40

@@ -260,3 +260,8 @@ def test_charts_say_what_they_show(looked, tables):
     mean = tables[LOGGED]["v_north_m_s"].mean()
     assert f"{mean:.1f} m/s north" in shown[4][2]
     assert "all poses exact 0.5 m/s" in shown[5][2]
+
+
+def test_no_correlation_is_asked_to_be_above_one():
+    check, threshold = check_claims(spread_of())["flows-correlate"], 0.5
+    assert check.reaches(threshold / 2) and check.reaches(threshold) and not check.reaches(2 * threshold)

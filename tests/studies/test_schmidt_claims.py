@@ -201,3 +201,9 @@ def test_an_average_at_the_thesis_bounds_is_within_and_an_unknown_one_is_not() -
 
 def test_apart_is_a_share_of_the_smaller() -> None:
     assert apart([1.0, 1.25], [1.25, 1.0]).tolist() == [0.25, 0.25]
+
+
+def test_no_share_is_asked_to_be_above_one() -> None:
+    checks = check_claims(pd.DataFrame([flight_with()]))
+    for one in ("ekf-overconfident-between", "high-nis-after-pauses"):
+        assert checks[one].reaches(0.25) and not checks[one].reaches(1.0)

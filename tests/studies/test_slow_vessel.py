@@ -146,3 +146,8 @@ def test_a_simulated_flight_gives_every_number():
     assert found["observer", "mae"] == pytest.approx(table["error_m"].mean())
     # The receiver is metres off, and a metre behind the middle: that is all that lies between the two truths.
     assert abs(found["observer", "mae"] - found["observer-exact", "mae"]) < found["reference", "mae"] < 5.0
+
+
+def test_no_share_is_asked_to_be_above_one():
+    check = check_claims(pd.DataFrame([GOOD]))["better-part-five-to-ten"]
+    assert check.reaches(0.25) and not check.reaches(1.0)

@@ -63,6 +63,9 @@ class Check:
         Whether ``measured`` follows from the parameters alone, so that flights add nothing to it.
     first, second
         (N,), what a comparison compares, in ``unit``: the paired difference is shown.
+    reach
+        What the measure can be where the sentence says anything: an F1 is from 0 to 1, and a ratio above 1
+        is no decrease. A threshold beyond it decides nothing (`reaches`).
     """
 
     true: NDArray[np.bool_] | None = None
@@ -74,6 +77,7 @@ class Check:
     first: Array | None = None
     second: Array | None = None
     unit: str = ""
+    reach: tuple[float, float] = (-np.inf, np.inf)
 
     @classmethod
     def of(cls, given: Check | ArrayLike) -> Check:
@@ -98,6 +102,18 @@ class Check:
         with np.errstate(invalid="ignore"):
             beyond = self.measured > threshold if self.above else self.measured < threshold
         return beyond if self.true is None else beyond & self.true
+
+    def reaches(self, threshold: float) -> bool:
+        """Whether the measure can be on either side of a threshold; else that alone gives the answer.
+
+        Examples
+        --------
+        >>> f1 = Check(measured=np.array([0.8]), above=True, reach=(0, 1))
+        >>> f1.reaches(0.7), f1.reaches(1.4)
+        (True, False)
+        """
+        low, high = self.reach
+        return low <= threshold < high if self.above else low < threshold <= high
 
     def __len__(self) -> int:
         return len(self.true if self.true is not None else np.asarray(self.measured))

@@ -35,12 +35,15 @@ CLAIM_COLUMNS = {
 QUANTITIES = {"mae": "mean distance", "mae_after_start": "mean distance after the start"}
 
 
+#: By how much a threshold is varied.
+TIMES = {"half": 0.5, "twice": 2.0}
 #: What stands over the claims.
 CLAIMS_EXPLAINED = (
     "A claim holds where the 95 % interval of the share of flights on which it is true lies at or above "
     "90 %, on most flights above 50 %; likewise it fails below 50 % and does not hold below 10 %. Where the "
     "interval has 50 % in it, it is undecided. A vague word has a threshold, which is ours: the verdicts at "
-    "half and at twice of it stand beside. Differences are means over flights, with their 95 % interval."
+    "half and at twice of it stand beside, where what is measured can be on either side of them. "
+    "Differences are means over flights, with their 95 % interval."
 )
 #: Headings of the table that `n_run_tests` gives, and what it is.
 N_RUN_COLUMNS = {
@@ -244,7 +247,8 @@ def decide_claims(report: Report, study: str, checks: Mapping[str, Check | Array
         if threshold is not None and found.verdict != NO_PREMISE:
             at = {
                 key: decide_check(check, times * threshold).verdict
-                for key, times in (("half", 0.5), ("twice", 2.0))
+                for key, times in TIMES.items()
+                if check.reaches(times * threshold)
             }
         apart = None
         if check.first is not None and check.second is not None:
@@ -323,4 +327,5 @@ def _threshold_words(threshold: float | None, at: Mapping[str, str], reason: str
     why = f" ({reason})" if reason else ""
     if not at:
         return f"{threshold:g}{why}"
-    return f"at {threshold / 2:g} {at['half']}, at {2 * threshold:g} {at['twice']}; taken: {threshold:g}{why}"
+    beside = ", ".join(f"at {TIMES[key] * threshold:g} {verdict}" for key, verdict in at.items())
+    return f"{beside}; taken: {threshold:g}{why}"

@@ -98,6 +98,6 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "within-five-metres": Check(true=of("share_within_5_m") > 0.5),
         "rest-sooner": Check(true=rest < rest_without, premise=known),
         "speed-near-zero": Check(measured=np.max(both("speed_after_start"), axis=0)),
-        "mainly-navigation": Check(measured=scatter_left(spread)),
+        "mainly-navigation": Check(measured=scatter_left(spread), reach=(0, 1)),
         "high-success-rate": Check(measured=1 - of("detection_rate")),
     }

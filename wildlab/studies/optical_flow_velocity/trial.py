@@ -314,7 +314,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "very-large-variance": Check(
             measured=np.minimum(of(LOGGED, "sd_north"), of(LOGGED, "sd_east")), above=True
         ),
-        "flows-correlate": Check(measured=correlation, above=True),
+        "flows-correlate": Check(measured=correlation, above=True, reach=(-1, 1)),
         "better-synchronised": Check(
             measured=size(SYNCHRONISED) / size(LOGGED),
             first=size(SYNCHRONISED),

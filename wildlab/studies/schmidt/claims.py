@@ -134,7 +134,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "schmidt-fits": Check(true=schmidt.inside & nis["schmidt"].inside, premise=fits),
         # NEES, single values
         "ekf-overconfident-between": Check(
-            measured=of("ekf", "fraction_above_predicted"), above=True, premise=drifts
+            measured=of("ekf", "fraction_above_predicted"), above=True, premise=drifts, reach=(0, 1)
         ),
         "ekf-overconfident-in-every-pause": Check(true=of("ekf", "pauses_above") == 1, premise=drifts),
         "schmidt-inside-mostly": Check(measured=1 - inside["schmidt"], premise=fits),
@@ -182,6 +182,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
             measured=np.minimum(of("ekf", "nis_top_after_pauses"), of("schmidt", "nis_top_after_pauses")),
             above=True,
             premise=of("flight", "pauses") >= 2,
+            reach=(0, 1),
         ),
         # The poses
         "covariance-constant": Check(measured=pose("sd_spread"), premise=settled),

@@ -278,7 +278,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         ),
         "largest-almost-forty": Check(measured=np.abs(largest - 37.5)),
         "majority-below-twenty": Check(measured=1 - of("observer", "below_20")),
-        "better-part-five-to-ten": Check(measured=of("observer", "5_to_10"), above=True),
+        "better-part-five-to-ten": Check(measured=of("observer", "5_to_10"), above=True, reach=(0, 1)),
         "grows-at-end": Check(
             true=of("observer", "last_tenth") > mae, first=of("observer", "last_tenth"), second=mae, unit="m"
         ),

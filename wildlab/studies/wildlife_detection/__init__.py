@@ -12,4 +12,6 @@ def _metric(subject: str, name: str) -> Metric | None:
     return None if unit is None else Metric(name, subject, unit)
 
 
-STUDY = Study("wildlife-detection", (*trial.SUBJECTS, "ground", "herd"), trial.trial, check_claims, _metric)
+STUDY = Study(
+    "wildlife-detection", (*trial.SUBJECTS, "ground", "herd", "masks"), trial.trial, check_claims, _metric
+)

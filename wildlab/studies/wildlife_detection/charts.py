@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from wildlab.detection.warm import Warm, enhance, grey_above, subtract_background
+from wildlab.detection.warm import Warm
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.studies.wildlife_detection import text as words
+from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.claims import false_alarms, places, rates_of
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
@@ -25,6 +26,7 @@ from wildlab.studies.wildlife_detection.trial import (
     LARGE,
     METHODS,
     NOON,
+    OVER_MEAN,
     SMALL,
     SUBTRACTED,
     VIEWS,
@@ -37,10 +39,11 @@ from wildlab.studies.wildlife_detection.trial import (
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
-_COLOURS = {CONSTANT: BLUE, ADAPTIVE: VERMILLION, SUBTRACTED: GREEN, ENHANCED: PURPLE, BY_SIZE: ORANGE}
+_COLOURS = {CONSTANT: BLUE, OVER_MEAN: VERMILLION, SUBTRACTED: GREEN, ENHANCED: PURPLE, BY_SIZE: ORANGE}
 _SHORT = {
     CONSTANT: "constant 150",
     ADAPTIVE: "adaptive 451, 150",
+    OVER_MEAN: "adaptive 451, mean + 150",
     SMALL: "adaptive 51",
     LARGE: "adaptive 251",
     SUBTRACTED: "subtracted, 251, 65",
@@ -51,12 +54,7 @@ _SHORT = {
 
 def above(picture: Picture, thresholds: Warm) -> NDArray[np.uint8]:
     """The image after threshold: white where it is above (F figures 7.5 to 7.11)."""
-    grey = picture.grey
-    if thresholds.background == "enhance":
-        grey = enhance(grey)
-    elif thresholds.background != "none":
-        grey = subtract_background(grey, picture.view.ground, thresholds.background)
-    return np.asarray(255 * grey_above(grey, thresholds), np.uint8)
+    return np.where(trial.above(picture, thresholds), np.uint8(255), np.uint8(0))
 
 
 def _panel(ax: Axes, image: NDArray[Any], title: str) -> None:
@@ -86,7 +84,7 @@ def _said(judged: Judged) -> str:
 
 def methods_shown(picture: Picture, name: str, when: str) -> Shown:
     """One image through each method side by side, as in F figures 7.5 to 7.11."""
-    methods = (CONSTANT, ADAPTIVE, LARGE, SUBTRACTED, ENHANCED)
+    methods = (CONSTANT, OVER_MEAN, LARGE, SUBTRACTED, ENHANCED)
     fig, axes = new_figure(5.6, 6.1, rows=3, columns=2)
     _panel(axes.flat[0], picture.grey, f"{when}, 8 bits")
     said = {}
@@ -104,11 +102,11 @@ def methods_shown(picture: Picture, name: str, when: str) -> Shown:
 
 def sequence_shown(before: Picture, after: Picture) -> Shown:
     """A sequence over which the background changes: constant and adaptive threshold (F figures 7.5, 7.6)."""
-    fig, axes = new_figure(5.6, 6.1, rows=3, columns=2)
+    fig, axes = new_figure(5.6, 8.1, rows=4, columns=2)
     said = []
     for column, (when, picture) in enumerate((("under clouds", before), ("sun out", after))):
         _panel(axes[0, column], picture.grey, f"{when}, 8 bits")
-        for row, method in enumerate((CONSTANT, ADAPTIVE), start=1):
+        for row, method in enumerate((CONSTANT, ADAPTIVE, OVER_MEAN), start=1):
             ax = axes[row, column]
             _panel(ax, above(picture, METHODS[method]), "")
             one = _said(_boxes(ax, picture, METHODS[method]))
@@ -146,7 +144,7 @@ def blocks_shown(picture: Picture, kind: Literal["floor", "offset"], level: floa
 
 def by_weather_shown(spread: pd.DataFrame) -> list[Shown]:
     """Recall, and false alarms an image, by weather and method with their intervals."""
-    methods = (CONSTANT, ADAPTIVE, SUBTRACTED, ENHANCED, BY_SIZE)
+    methods = (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE)
     shown: list[Shown] = []
     for what in ("recall", "false"):
         fig, ax = new_figure(5.6, 3.9)

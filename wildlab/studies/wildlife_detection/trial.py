@@ -16,6 +16,7 @@ from wildlab.detection.warm import (
     enhance,
     find_warm,
     gate_from_distance,
+    grey_above,
     subtract_background,
     to_grey,
 )
@@ -54,8 +55,13 @@ HERD = replace(VIEWS[30], animals=(14, 20), kinds=("rhinoceros",))
 #: 251 without a level have that of figure 7.10a here, see `PIECES`.
 CONSTANT, ADAPTIVE, SMALL, LARGE = "constant", "adaptive", "adaptive-51", "adaptive-251"
 SUBTRACTED, ENHANCED = "subtracted", "enhanced"
+#: `ADAPTIVE` with its level read the other way. As a floor of 150 it is hardly more than `CONSTANT`: the mean
+#: of so large a block is seldom above 150. What is said of adaptive thresholds is held against this one.
+OVER_MEAN = "adaptive-offset"
 #: F 8.1.1: background subtraction and a constant threshold, by the mean, and by the median as F proposes.
 BY_MEAN, BY_MEDIAN = "mean-constant", "median-constant"
+#: The same with the threshold that the herd's place gives without the herd.
+BY_EMPTY = "empty-constant"
 #: F 3.2, 8.4: `SUBTRACTED` with what F proposes: sizes and blocks from the ground, and nothing too hot.
 BY_SIZE, BY_BLOCK, NOT_HOT = "sized", "block", "not-hot"
 #: The smallest contour, px^2; F prints none.
@@ -64,6 +70,7 @@ _PLAIN = Warm(background="none", smallest_px=SMALLEST, largest_px=float("inf"))
 METHODS = {
     CONSTANT: replace(_PLAIN, threshold="constant", level=150.0),
     ADAPTIVE: replace(_PLAIN, threshold="adaptive", level=150.0, block_px=451),
+    OVER_MEAN: replace(_PLAIN, threshold="adaptive", level=150.0, level_is="offset", block_px=451),
     SMALL: replace(_PLAIN, threshold="adaptive", level=65.0, level_is="offset", block_px=51),
     LARGE: replace(_PLAIN, threshold="adaptive", level=65.0, level_is="offset", block_px=251),
     SUBTRACTED: replace(
@@ -196,6 +203,23 @@ def find(picture: Picture, thresholds: Warm) -> Detections:
     if np.isinf(thresholds.hottest):
         return find_warm(picture.grey, picture.view.ground, thresholds)
     return find_warm(picture.counts, picture.view.ground, replace(thresholds, window=picture.window))
+
+
+def above(picture: Picture, thresholds: Warm) -> NDArray[np.bool_]:
+    """The mask of a picture: where it is above the threshold (F figures 7.5 to 7.11)."""
+    grey = picture.grey
+    if thresholds.background == "enhance":
+        grey = enhance(grey)
+    elif thresholds.background != "none":
+        grey = subtract_background(grey, picture.view.ground, thresholds.background)
+    return np.asarray(grey_above(grey, thresholds), bool)
+
+
+def overlap(picture: Picture, first: Warm, second: Warm) -> float:
+    """What is in both masks, of what is in either: 1 where they are equal."""
+    one, other = above(picture, first), above(picture, second)
+    either = int((one | other).sum())
+    return float((one & other).sum() / either) if either else 1.0
 
 
 def with_window(picture: Picture, width: float) -> Picture:
@@ -340,12 +364,14 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
             tally(method, at, picture, thresholds)
         for method in PROPOSED:
             tally(method, at, picture, proposed(method, picture, operator.camera, operator.response))
+        numbers["masks", f"overlap_{at}"] = overlap(picture, METHODS[CONSTANT], METHODS[ADAPTIVE])
         numbers["ground", f"as_warm_{at}"] = as_warm(picture)
         left = background_left(picture)
         numbers[SUBTRACTED, f"background_{at}"], numbers[ENHANCED, f"background_{at}"] = left
     for name, picture in zip(("before", "after"), pictures.sequence, strict=True):
         for method in (CONSTANT, *PRINTED, BY_MEAN, BY_MEDIAN):
             tally(method, name, picture, METHODS[method])
+        numbers["masks", f"overlap_{name}"] = overlap(picture, METHODS[CONSTANT], METHODS[ADAPTIVE])
         numbers["ground", f"level_{name}"] = float(np.median(picture.grey[picture.view.labels == 0]))
     read = {str(height): pictures.plain[CLOUDY, height] for height in READ_AT}
     sequence = dict(zip(("before", "after"), pictures.sequence, strict=True))
@@ -369,6 +395,8 @@ def numbers_of(operator: Operator, pictures: Pictures) -> dict[tuple[str, str], 
         tally(method, "herd", pictures.herd, METHODS[method])
     for name, middle in (("mean", np.mean), ("median", np.median)):
         numbers["herd", f"{name}_rise"] = float(middle(pictures.herd.grey) - middle(pictures.no_herd.grey))
+    lower = METHODS[BY_MEAN].level - numbers["herd", "mean_rise"]
+    tally(BY_EMPTY, "herd", pictures.herd, replace(METHODS[BY_MEAN], level=float(np.clip(lower, 0, 255))))
     numbers["herd", "share"] = float((pictures.herd.view.labels > 0).mean())
     return numbers
 

@@ -1,0 +1,40 @@
+"""Small rendered pictures of animals on even ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.simulation.scene import (
+    EVEN_LAND,
+    IDEAL,
+    LandScene,
+    Weather,
+    animal,
+    render_land,
+    sensor_of,
+)
+from wildlab.simulation.scene.response import expose
+from wildlab.studies.wildlife_detection import trial
+from wildlab.studies.wildlife_detection.trial import (
+    Picture,
+)
+
+CAMERA = Camera(180, 120, 320.0, 320.0, 89.5, 59.5)
+DARK = Weather(hour=2.0)
+
+
+def picture_of(*bodies, height=30.0, weather=DARK, window=(-5.0, 20.0)):
+    """Over even ground as warm as the air; the window in K about it."""
+    land = replace(EVEN_LAND, weather=weather)
+    view = render_land(LandScene(land, bodies), CAMERA, [0.0, 0.0, -height], R_MC_DOWN)
+    counts = expose(view.kelvin, IDEAL, sensor_of(IDEAL, (120, 180), np.random.default_rng(1)), None)
+    low, high = (trial.to_counts(weather.air + one, IDEAL) for one in window)
+    return Picture(view, counts, (low, high), height)
+
+
+def rhino(north=0.0, east=0.0, course=0.0):
+    return animal("rhinoceros", DARK, 1).at(north, east, course)

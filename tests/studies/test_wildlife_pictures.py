@@ -1,0 +1,147 @@
+"""What is found in single rendered pictures of animals, and what it counts as."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.studies.animal_pictures import CAMERA, DARK, picture_of, rhino
+from wildlab.simulation.scene import (
+    IDEAL,
+    Weather,
+    render_land,
+    slab,
+    tree,
+)
+from wildlab.simulation.scene.drawn_land import LandDraw, draw_layout
+from wildlab.studies.wildlife_detection import charts, trial
+from wildlab.studies.wildlife_detection.trial import (
+    ADAPTIVE,
+    CONSTANT,
+    METHODS,
+    SUBTRACTED,
+    find,
+    judge,
+    read_as,
+)
+
+
+def test_animals_in_the_open_are_found_and_nothing_else():
+    picture = picture_of(rhino(0, -4), rhino(0, 4, 1.0))
+    judged = judge(picture, find(picture, METHODS[CONSTANT]))
+    assert judged.counts.tolist() == [2, 0, 0]
+
+
+def test_a_warm_slab_is_a_false_alarm_and_a_missed_animal_is_missed():
+    picture = picture_of(rhino(0, -4), slab(2.0, 2.0, 14.0).at(0.0, 4.0))
+    judged = judge(picture, find(picture, METHODS[CONSTANT]))
+    assert judged.counts.tolist() == [1, 1, 0]
+    deaf = judge(picture, find(picture, replace(METHODS[CONSTANT], level=254.0)))
+    assert deaf.counts.tolist() == [0, 0, 1]
+
+
+def test_an_animal_under_a_tree_counts_neither_way():
+    under = replace(tree(3.6, DARK), texture_seed=4).at(0.9, 0.0)
+    picture = picture_of(rhino(), under)
+    assert picture.view.visible(1) < trial.SHOWN
+    assert picture.animals == {}
+    judged = judge(picture, find(picture, replace(METHODS[CONSTANT], smallest_px=3.0)))
+    assert judged.counts.tolist() == [0, 0, 0]
+
+
+def test_pieces_of_one_animal_are_found_once_and_invented_for_the_rest():
+    picture = picture_of(rhino())
+    found = find(picture, METHODS[CONSTANT])
+    twice = found.select(np.array([0, 0]))
+    assert judge(picture, twice).counts.tolist() == [1, 1, 0]
+    assert len(judge(picture, twice).rows[1]) == 2
+
+
+def test_a_detection_much_larger_than_the_animal_is_not_of_it():
+    picture = picture_of(rhino())
+    found = find(picture, METHODS[CONSTANT])
+    assert judge(picture, replace(found, area=found.area * 5)).counts.tolist() == [0, 1, 1]
+
+
+def test_readings_are_what_they_are_called():
+    base = METHODS[SUBTRACTED]
+    assert read_as(base, "offset") == base
+    assert read_as(base, "floor").level_is == "floor"
+    assert read_as(base, "white").level == 0
+    assert read_as(base, "off-mean").level == -65
+    # Taken off the mean, everything is above.
+    picture = picture_of(rhino())
+    assert charts.above(picture, read_as(METHODS[ADAPTIVE], "off-mean")).all()
+    assert not charts.above(picture, METHODS[ADAPTIVE]).all()
+
+
+def test_what_is_proposed_follows_from_the_ground():
+    picture = picture_of(rhino())
+    sized = trial.proposed(trial.BY_SIZE, picture, CAMERA, IDEAL)
+    assert sized.smallest_px == pytest.approx(0.2 * (320 / 30) ** 2)
+    near = replace(picture, distance=15.0)
+    assert (
+        trial.proposed(trial.BY_BLOCK, near, CAMERA, IDEAL).block_px
+        > trial.proposed(trial.BY_BLOCK, picture, CAMERA, IDEAL).block_px
+    )
+    cold = trial.proposed(trial.NOT_HOT, picture, CAMERA, IDEAL)
+    oven = picture_of(rhino(0, -4), slab(2.0, 2.0, 60.0).at(0.0, 4.0))
+    assert judge(oven, find(oven, METHODS[SUBTRACTED])).counts.tolist() == [1, 1, 0]
+    assert judge(oven, find(oven, cold)).counts.tolist() == [1, 0, 0]
+
+
+def test_how_much_ground_is_as_warm_as_animals():
+    assert trial.as_warm(picture_of(rhino())) == 0
+    hot = trial.as_warm(picture_of(rhino(0, -4), slab(3.0, 4.0, 30.0).at(0.0, 4.0)))
+    own = (picture_of(rhino(0, -4)).view.labels == 1).sum()
+    assert hot == pytest.approx(12 * (320 / 30) ** 2 / own, rel=0.05)
+    assert np.isnan(trial.as_warm(picture_of()))
+
+
+def test_enhancement_leaves_the_ground_black_unless_it_is_above_half_of_the_brightest():
+    dark = trial.background_left(picture_of(rhino()))
+    assert dark[1] < 0.05  # the rim of the animal
+    bright = trial.background_left(picture_of(rhino(), window=(-60.0, 20.0)))
+    assert bright[1] > bright[0]
+
+
+def test_a_layout_is_the_same_place_in_any_weather():
+    layout = draw_layout(np.random.default_rng(3), CAMERA, LandDraw(animals=(4, 4), stones=(2, 2)))
+    night, noon = (layout.scene(weather) for weather in (DARK, Weather(hour=13.0)))
+    assert [body.kind for body in night.bodies] == [body.kind for body in noon.bodies]
+    assert all(
+        np.allclose(one.centre(0), other.centre(0))
+        for one, other in zip(night.bodies, noon.bodies, strict=True)
+    )
+    assert np.array_equal(night.land.cover, noon.land.cover)
+    assert layout.scene(DARK, with_animals=False).bodies[0].kind == "stone"
+    view = render_land(night, CAMERA, layout.p_nc, layout.R_nc)
+    uv = [one.uv for one in view.seen if one.kind in trial.ANIMALS]
+    assert len(uv) == 4
+    assert (np.array(uv) > 25).all() and (np.array(uv) < [155, 95]).all()
+
+
+def test_masks_are_compared_pixel_by_pixel():
+    picture = picture_of(rhino())
+    constant, floor = METHODS[CONSTANT], METHODS[ADAPTIVE]
+    assert trial.overlap(picture, constant, floor) == 1.0
+    assert trial.overlap(picture, constant, replace(constant, level=255.0)) == 0.0
+    assert trial.overlap(picture, replace(constant, level=255.0), replace(floor, level=255.0)) == 1.0
+    both = trial.above(picture, constant), trial.above(picture, replace(constant, level=180.0))
+    part = trial.overlap(picture, constant, replace(constant, level=180.0))
+    assert part == both[1].sum() / both[0].sum() < 1
+    # Where blocks are as bright as the level the two differ.
+    bright = picture_of(rhino(), window=(-30.0, 10.0))
+    assert trial.overlap(bright, constant, floor) < 1
+
+
+def test_a_window_of_another_width_has_the_same_middle():
+    picture = picture_of(rhino())
+    wide = trial.with_window(picture, 2 * trial.WINDOW)
+    assert np.isclose(sum(wide.window), sum(picture.window))
+    assert np.isclose(np.ptp(wide.window), 2 * np.ptp(picture.window))
+    assert wide.grey.max() < picture.grey.max()
+    faint = trial.with_window(picture, 20.0)
+    assert judge(faint, find(faint, METHODS[CONSTANT])).counts.tolist() == [0, 0, 1]
