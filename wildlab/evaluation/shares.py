@@ -37,7 +37,7 @@ WRONG = 0.035
 class Pooled(NamedTuple):
     """In how many images of all flights together something is so."""
 
-    count: int
+    so: int
     of: int
 
 

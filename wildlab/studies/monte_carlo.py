@@ -292,8 +292,8 @@ def holding(report: Report, *ids: str) -> bool:
 
 def _share_words(found: Any, check: Check) -> str:
     if check.calculated and check.measured is not None:
-        low, high = f"{check.measured.min():.3g}", f"{check.measured.max():.3g}"
-        apart = f"{low} to {high}" if low != high else low
+        least, most = f"{check.measured.min():.3g}", f"{check.measured.max():.3g}"
+        apart = f"{least} to {most}" if least != most else least
         return f"a calculation: {apart} {check.unit}".rstrip()
     if check.pooled is not None and check.pooled.of:
         count, of = check.pooled
@@ -302,9 +302,9 @@ def _share_words(found: Any, check: Check) -> str:
     if found.share is None:
         return f"{found.met} of {found.flights} flights meet the premise"
     low, high = (100 * end for end in found.share[1:])
-    of = f"{found.true} of {found.met}"
+    told = f"{found.true} of {found.met}"
     beyond = f", of {found.flights} flights in all" if found.met < found.flights else ""
-    return f"{of} ({low:.0f} to {high:.0f} %){beyond}"
+    return f"{told} ({low:.0f} to {high:.0f} %){beyond}"
 
 
 def _difference_words(apart: Any, unit: str) -> str:

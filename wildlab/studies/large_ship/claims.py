@@ -52,7 +52,7 @@ class NearCheck(Check):
         WildlabError
             If nothing was counted within that limit.
         """
-        if threshold not in self.shares:
+        if threshold is None or threshold not in self.shares:
             raise WildlabError(
                 f"nothing was counted within {threshold} m of the ship's centre",
                 f"use one of {', '.join(f'{one:g}' for one in self.shares)} as the claim's threshold",

@@ -13,6 +13,7 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import judge
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
+from wildlab.studies.image_shares import percent
 from wildlab.studies.vessel_detection import text as words
 from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image
 
@@ -33,7 +34,7 @@ def rates_shown(spread: pd.DataFrame, published: dict[str, float]) -> Shown:
         if subject in published:
             label = "published" if row == 0 else None
             ax.plot(100 * published[subject], row, "D", mfc="none", mec=INK, ms=9, label=label)
-        said.append(f"{words.NAMES[subject]} {words.percent(found.estimate)}")
+        said.append(f"{words.NAMES[subject]} {percent(found.estimate)}")
     ax.set_yticks(range(len(subjects)), [words.NAMES[one] for one in subjects])
     ax.set(xlabel="images in which all was found (%)", ylim=(len(subjects) - 0.5, -0.5))
     ax.set_title(f"Found in {said[0].split(' ', 1)[1]} of the images of the ship")
