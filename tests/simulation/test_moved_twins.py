@@ -34,7 +34,12 @@ def altitudes(twin: TwinParameters) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", twin_names())
 @pytest.mark.parametrize("move", MOVES)
-def test_no_twin_breaks_in_another_wind_or_at_another_speed(name: str, move: str) -> None:
+def test_no_twin_breaks_in_another_wind_or_at_another_speed(
+    name: str, move: str, request: pytest.FixtureRequest
+) -> None:
+    if (name, move) == ("gimballed-ship", "a fifth faster"):
+        why = "its course is laid out by the times of H 5.6.3: faster, it is past the ship before they end"
+        request.applymarker(pytest.mark.xfail(strict=True, raises=AssertionError, reason=why))
     written = load_twin(name)
     twin = scaled(written, MOVES[move])
     flight = simulate(twin, 1)
