@@ -19,13 +19,13 @@ from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline import detect as subject
-from wildlab.pipeline.detect import detect_frame, run_detection, thresholds_from
+from wildlab.pipeline.detect import detect_frame, run_detection
 from wildlab.pipeline.detect_command import samples_of
 from wildlab.pipeline.detection_fit import Sample, fit_thresholds
 from wildlab.pipeline.detection_judged import judge_detections
 from wildlab.pipeline.detection_methods import METHODS, for_distance
 from wildlab.pipeline.detection_shape_fit import fit_shapes
-from wildlab.pipeline.detection_thresholds import read_thresholds, write_thresholds
+from wildlab.pipeline.detection_thresholds import read_thresholds, thresholds_from, write_thresholds
 
 
 def picture(places: list[tuple[int, int]], seed: int, size: int = 5, warmer: int = 60) -> np.ndarray:

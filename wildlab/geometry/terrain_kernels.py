@@ -150,7 +150,8 @@ def walk(
     level = min(levels, 2)
     j = min(max(int(x + t * dx), 0), columns - 2)
     i = min(max(int(y + t * dy), 0), rows - 2)
-    while True:
+    # Every step crosses a border or goes down a level, and every border takes it up by one level at most.
+    for _ in range(4 * (rows + columns) + 100):
         size = 0 if level == 0 else FIRST + level - 1
         bi, bj = i >> size, j >> size
         left, low = bj << size, bi << size
@@ -196,6 +197,7 @@ def walk(
         if not (0 <= i < rows - 1 and 0 <= j < columns - 1):
             return np.nan, MISSED
         level = min(level + 1, levels)
+    return np.nan, NOT_KNOWN
 
 
 @compiled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -288,45 +288,3 @@ def _parquet(table: pd.DataFrame) -> bytes:
 def _joined(tables: list[pd.DataFrame], columns: tuple[str, ...]) -> pd.DataFrame:
     some = [one for one in tables if len(one)]
     return pd.concat(some, ignore_index=True) if some else pd.DataFrame(columns=list(columns))
-
-
-def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:
-    """Thresholds of a method from plain values, as they were written to a file.
-
-    Parameters
-    ----------
-    kind
-        Of thresholds: ``METHODS[method].thresholds``, or one inside it.
-    given
-        By the name of the field; what is not there keeps its default.
-
-    Returns
-    -------
-    object
-        Of that kind.
-
-    Raises
-    ------
-    WildlabError
-        Where a name is not known, or a value is not of the kind of the default.
-    """
-    known = {one.name: one.default for one in fields(kind)}
-    for name, value in given.items():
-        if name not in known:
-            raise WildlabError(f"there is no threshold {name!r}", f"there are {', '.join(known)}")
-        default = known[name]
-        numbers = isinstance(default, int | float) and not isinstance(default, bool)
-        plain = isinstance(value, int | float) and not isinstance(value, bool)
-        good = plain if numbers else isinstance(value, type(default))
-        if default is None:  # a limit, or two, that there may be
-            several = value if isinstance(value, tuple) else (value,)
-            good = value is None or all(isinstance(one, int | float) for one in several)
-        if isinstance(default, tuple):
-            good = isinstance(value, tuple) and all(isinstance(one, int | float) for one in value)
-        if not good:
-            like = "give a number, or leave it out" if default is None else f"give one like {default!r}"
-            raise WildlabError(f"the threshold {name!r} is {value!r}", like)
-    try:
-        return kind(**given)
-    except TypeError:  # one number in place of two, or the other way round
-        raise WildlabError("the thresholds do not fit together", "write them anew with --fit") from None

@@ -16,7 +16,7 @@ from wildlab.evaluation.runs import Interval
 from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, read_labels
-from wildlab.pipeline.detection_judged import boxes_by_frame, plain_rates, rates_sentence
+from wildlab.pipeline.detection_judged import boxes_by_frame, plain_rates, rate_words, rates_sentence
 
 NOTHING = np.zeros((0, 4))
 
@@ -306,12 +306,7 @@ def compared_sentences(one: Compared, first: Compared) -> list[str]:
     area, beyond = plain["average_precision"], plain["f1_beyond_ours"]
     lines = [] if one is first else [f"{one.name}, all its boxes: {rates_sentence(plain)}"]
     if area is not None and area["estimate"] is not None and plain["lowest_score"] is not None:
-        lines.append(f"{one.name}, along the score: average precision {_span(area)}.")
+        lines.append(f"{one.name}, along the score: average precision {rate_words(area)}.")
     if one is not first and beyond["estimate"] is not None:
-        lines.append(f"{one.name}, F1 minus that of {first.name}: {_span(beyond, '+')}.")
+        lines.append(f"{one.name}, F1 minus that of {first.name}: {rate_words(beyond, '+')}.")
     return lines + [f"{one.name}: {line}" for line in one.told]
-
-
-def _span(given: dict[str, float | None], sign: str = "") -> str:
-    limits = "" if given["low"] is None else f" ({given['low']:{sign}.2f} to {given['high']:{sign}.2f})"
-    return f"{given['estimate']:{sign}.2f}{limits}"

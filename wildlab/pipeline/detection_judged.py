@@ -118,6 +118,31 @@ def plain_rates(given: Rates) -> dict[str, Any]:
     return found
 
 
+def rate_words(one: Mapping[str, float | None] | None, sign: str = "") -> str:
+    """A rate, or a difference of two, with its interval; "" where it is not defined.
+
+    Parameters
+    ----------
+    one
+        ``estimate``, ``low`` and ``high``, as of `plain_rates`.
+    sign
+        ``+`` shows that of a difference.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> rate_words({"estimate": 0.5, "low": 0.25, "high": 0.75})
+    '0.50 (0.25 to 0.75)'
+    """
+    if one is None or one["estimate"] is None:
+        return ""
+    span = "" if one["low"] is None else f" ({one['low']:{sign}.2f} to {one['high']:{sign}.2f})"
+    return f"{one['estimate']:{sign}.2f}{span}"
+
+
 def rates_sentence(rates: dict[str, Any]) -> str:
     """Rates as a line that is printed.
 
@@ -132,11 +157,7 @@ def rates_sentence(rates: dict[str, Any]) -> str:
     """
 
     def shown(name: str) -> str:
-        one = rates[name]
-        if one["estimate"] is None:
-            return f"{name} not defined"
-        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
-        return f"{name} {one['estimate']:.2f}{span}"
+        return f"{name} {rate_words(rates[name]) or 'not defined'}"
 
     counts = f"{rates['found']} found, {rates['invented']} invented, {rates['missed']} missed"
     return f"{shown('f1')}, {shown('precision')}, {shown('recall')}; {counts}.".replace("f1", "F1")

@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.files import read_regular
-from wildlab.pipeline.detect import thresholds_from
 from wildlab.pipeline.detection_methods import METHODS
 
 #: Bytes of a file of thresholds at most.
@@ -29,7 +27,7 @@ def write_thresholds(path: Path, method: str, thresholds: Any) -> None:
     method, thresholds
         Which detector's.
     """
-    write_json(path, {"method": method, "thresholds": _plain(asdict(thresholds))})
+    write_json(path, {"method": method, "thresholds": _plain(dataclasses.asdict(thresholds))})
 
 
 def _plain(value: Any) -> Any:
@@ -88,3 +86,45 @@ def _thresholds(kind: type[Any], method: str, values: dict[str, Any]) -> Any:
         else:
             made[name] = tuple(value) if isinstance(value, list) else value
     return thresholds_from(kind, made)
+
+
+def thresholds_from(kind: type[Any], given: dict[str, Any]) -> Any:
+    """Thresholds of a method from plain values, as they were written to a file.
+
+    Parameters
+    ----------
+    kind
+        Of thresholds: ``METHODS[method].thresholds``, or one inside it.
+    given
+        By the name of the field; what is not there keeps its default.
+
+    Returns
+    -------
+    object
+        Of that kind.
+
+    Raises
+    ------
+    WildlabError
+        Where a name is not known, or a value is not of the kind of the default.
+    """
+    known = {one.name: one.default for one in dataclasses.fields(kind)}
+    for name, value in given.items():
+        if name not in known:
+            raise WildlabError(f"there is no threshold {name!r}", f"there are {', '.join(known)}")
+        default = known[name]
+        numbers = isinstance(default, int | float) and not isinstance(default, bool)
+        plain = isinstance(value, int | float) and not isinstance(value, bool)
+        good = plain if numbers else isinstance(value, type(default))
+        if default is None:  # a limit, or two, that there may be
+            several = value if isinstance(value, tuple) else (value,)
+            good = value is None or all(isinstance(one, int | float) for one in several)
+        if isinstance(default, tuple):
+            good = isinstance(value, tuple) and all(isinstance(one, int | float) for one in value)
+        if not good:
+            like = "give a number, or leave it out" if default is None else f"give one like {default!r}"
+            raise WildlabError(f"the threshold {name!r} is {value!r}", like)
+    try:
+        return kind(**given)
+    except TypeError:  # one number in place of two, or the other way round
+        raise WildlabError("the thresholds do not fit together", "write them anew with --fit") from None

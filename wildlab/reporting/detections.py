@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.detection_judged import ellipse_sentence
+from wildlab.detection.detections import PART
+from wildlab.pipeline.detection_judged import ellipse_sentence, rate_words
 from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
 from wildlab.reporting.html import examine
 from wildlab.reporting.page import page
-from wildlab.reporting.text import escape, inline
+from wildlab.reporting.text import NOTHING, escape, inline
 
 #: Bytes of pictures on a page at most: it is sent by mail. What has no room is left out, and that is said.
 ROOM = 2_500_000
@@ -99,7 +100,8 @@ def detections_page(
         number = int(result["pictures"].get(key, 0))
         total = int(judged[key]) if judged else int(result["detections"])
         left -= len(sheets[key])
-        which = "of all scores, the surest first" if key in ("found", "detected") else "the surest first"
+        which = "the first" if key == "missed" else "the surest"
+        which = "some of all scores" if key in ("found", "detected") else which
         more = f" {number} of {total}, {which}." if number < total else ""
         parts.append(f"<h2>{heading}: {total}</h2>")
         alt = f"{_plural(number, 'cutting')} of what was {key}, each with the name of its image."
@@ -108,11 +110,12 @@ def detections_page(
     parts += _per_frame(frames, of)
     parts += _problems(result)
     if isinstance(thresholds.get("part"), float) and thresholds["part"] > 0:
+        whose = "chosen on labelled people and deer" if thresholds["part"] == PART else "as it was given"
         parts.append(
             "<h2>What the covariances are of</h2><p>The middle of a whole animal. The warm part that is seen "
             f"shows where it lies to {100 * thresholds['part']:.0f} % of its length (the threshold part, "
-            "chosen on labelled people and deer). What is evenly warm all over is better known than that: "
-            "part 0 leaves what the shape and the noise of the image explain.</p>"
+            f"{whose}). What is evenly warm all over is better known than that: part 0 leaves what the shape "
+            "and the noise of the image explain.</p>"
         )
     rows = "".join(
         f'<tr><th scope="row" class="text">{escape(key)}</th><td class="text">{escape(value)}</td></tr>'
@@ -178,8 +181,6 @@ def _rates_shown(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
         rows["where they were chosen (too good)"] = fit["where_chosen"]
         what = "without a classifier" if result["method"] == "shape" else "with the defaults"
         rows[what] = fit["defaults"]
-    for other in result.get("compared", ())[1:]:
-        rows[f"{other['name']}, all its boxes, beside the labels"] = other
     return rows
 
 
@@ -225,7 +226,7 @@ def _tiles(result: Mapping[str, Any]) -> str:
     for key in ("recall", "precision") if rates else ():
         one = rates[key]
         if one["estimate"] is None:
-            tiles.append(("–", f"{key}, not defined here"))
+            tiles.append((NOTHING, f"{key}, not defined here"))
             continue
         span = "no interval" if one["low"] is None else f"95 %: {one['low']:.2f} to {one['high']:.2f}"
         meaning = "of what is labelled is found" if key == "recall" else "of detections are labelled"
@@ -244,12 +245,6 @@ def _rates_table(result: Mapping[str, Any]) -> str:
     if not rows:
         return ""
 
-    def cell(one: Mapping[str, Any]) -> str:
-        if one["estimate"] is None:
-            return "–"
-        span = "" if one["low"] is None else f" ({one['low']:.2f} to {one['high']:.2f})"
-        return f"{one['estimate']:.2f}{span}"
-
     heads = ("where", "F1", "precision", "recall", "found", "invented", "missed")
     head = "".join(
         f'<th scope="col"{" class=" + chr(34) + "text" + chr(34) if one == "where" else ""}>{one}</th>'
@@ -257,7 +252,7 @@ def _rates_table(result: Mapping[str, Any]) -> str:
     )
     body = "".join(
         f'<tr><th scope="row" class="text">{escape(where)}</th>'
-        + "".join(f"<td>{cell(of[key])}</td>" for key in ("f1", "precision", "recall"))
+        + "".join(f"<td>{rate_words(of[key]) or NOTHING}</td>" for key in ("f1", "precision", "recall"))
         + "".join(f"<td>{of[key]}</td>" for key in ("found", "invented", "missed"))
         + "</tr>"
         for where, of in rows.items()

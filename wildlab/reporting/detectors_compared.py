@@ -9,8 +9,9 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
+from wildlab.pipeline.detection_judged import rate_words
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure, png_bytes
-from wildlab.reporting.text import escape
+from wildlab.reporting.text import NOTHING, escape
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, INK)
 
@@ -36,8 +37,10 @@ def compared_section(compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame
     head = "".join(f'<th scope="col"{_text(number == 0)}>{one}</th>' for number, one in enumerate(heads))
     rows = []
     for number, one in enumerate(compared):
-        cells = [_cell(one[key]) for key in ("f1", "precision", "recall", "average_precision")]
-        cells.append("" if number == 0 else _cell(one["f1_beyond_ours"], "+"))
+        cells = [
+            (rate_words(one[key]) or NOTHING) for key in ("f1", "precision", "recall", "average_precision")
+        ]
+        cells.append("" if number == 0 else (rate_words(one["f1_beyond_ours"], "+") or NOTHING))
         name = f'<th scope="row" class="text">{escape(one["name"])}</th>'
         rows.append(f"<tr>{name}{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
     told = [f"<li>{escape(one['name'])}: {escape(line)}</li>" for one in compared for line in one["told"]]
@@ -96,10 +99,3 @@ def curves_shown(compared: Sequence[Mapping[str, Any]], curves: pd.DataFrame) ->
 
 def _text(first: bool) -> str:
     return ' class="text"' if first else ""
-
-
-def _cell(one: Mapping[str, Any] | None, sign: str = "") -> str:
-    if one is None or one["estimate"] is None:
-        return "–"
-    span = "" if one["low"] is None else f" ({one['low']:{sign}.2f} to {one['high']:{sign}.2f})"
-    return f"{one['estimate']:{sign}.2f}{span}"

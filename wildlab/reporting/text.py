@@ -108,6 +108,33 @@ def number(value: Any, digits: int | None = None) -> str:
     return shown.replace("-", "−")
 
 
+def percent(share: float, digits: int = 1) -> str:
+    """A share in per cent; never rounded to all or to none.
+
+    Parameters
+    ----------
+    share
+        From 0 to 1; a mean count may be above.
+    digits
+        Behind the point.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> percent(0.9999), percent(1.0), percent(0.004, 0), percent(float("nan"))
+    ('99.9 %', '100 %', '1 %', 'none')
+    """
+    if not math.isfinite(share):
+        return "none"
+    if min(share, 1 - share) < 1e-9:
+        return f"{100 * share:.0f} %"
+    least = 10.0**-digits
+    return f"{min(max(100 * share, least), 100 - least):.{digits}f} %"
+
+
 def slug(text: str) -> str:
     """Letters, digits and hyphens only: for the names of files and the ids of headings."""
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"

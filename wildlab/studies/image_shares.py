@@ -10,6 +10,7 @@ import pandas as pd
 from wildlab.errors import WildlabError
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import percent
 from wildlab.reporting.verdicts import judge
 
 #: Headings of the table that `shares_beside_published` gives.
@@ -20,20 +21,6 @@ SHARE_COLUMNS = {
     "images": "images",
     "verdict": "verdict",
 }
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none.
-
-    Examples
-    --------
-    >>> percent(0.9999), percent(1.0)
-    ('99.9 %', '100 %')
-    """
-    # A mean count may be above one.
-    if min(share, 1 - share) < 1e-9:
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def pooled_share(spread: pd.DataFrame, subject: str, name: str) -> tuple[Interval, int]:

@@ -16,8 +16,9 @@ from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_c
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import bounds_of, range_words, share_below, spread_words
+from wildlab.reporting.text import percent
 from wildlab.reporting.verdicts import comparison_words, judge, recorded_for, size_name
-from wildlab.studies.image_shares import percent, pooled_share
+from wildlab.studies.image_shares import pooled_share
 from wildlab.studies.protocol import Study
 
 #: Decimals of the table that `beside_published` gives, headings of that of `decide_claims`.

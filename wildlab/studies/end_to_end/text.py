@@ -9,6 +9,7 @@ import pandas as pd
 
 from wildlab.evaluation.runs import mean_interval
 from wildlab.evaluation.shares import Check, Decision, decide
+from wildlab.reporting.text import percent
 from wildlab.studies.end_to_end.trial import DRAWN, KINDS, PIXEL_UNITS, RENDERED, followed_by
 
 FILTERS = {
@@ -77,13 +78,6 @@ def found_share(spread: pd.DataFrame) -> float:
     """Of all rendered frames of all flights, in how many the vessel was found."""
     images = spread[RENDERED, "images"].to_numpy(float)
     return float((images * spread[RENDERED, "detection_rate"]).sum() / images.sum())
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none."""
-    if share in (0.0, 1.0):
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def with_interval(values: pd.Series, scale: float = 1.0, decimals: int = 1, *, share: bool = False) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.reporting.text import percent
 from wildlab.studies.precision_drop.trial import COUNTS, FEW_PX, FOUND, HORIZON, MEAN, SINGLE
 
 METHOD = r"""The six steps of H 4.4.2 on images of 640 x 360 pixels, with the printed limits of hue,
@@ -32,13 +33,6 @@ def pooled(spread: pd.DataFrame, count: str, of: str) -> Interval:
     """Share of images over all flights, with its interval; both are names of numbers of what was found."""
     numbers = (round(float(spread[FOUND, name].sum())) for name in (count, of))
     return share_interval(*numbers)
-
-
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none."""
-    if share in (0.0, 1.0):
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 0.1), 99.9):.1f} %"
 
 
 def with_interval(share: Interval) -> str:

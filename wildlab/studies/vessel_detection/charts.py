@@ -13,7 +13,7 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import judge
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure
-from wildlab.studies.image_shares import percent
+from wildlab.reporting.text import percent
 from wildlab.studies.vessel_detection import text as words
 from wildlab.studies.vessel_detection.trial import CUT, SHIP, WHOLE, Image
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import Interval, mean_interval, share_interval
-from wildlab.studies.image_shares import percent
+from wildlab.reporting.text import percent
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 
 NAMES = {

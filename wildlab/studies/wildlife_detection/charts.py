@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.warm import Warm
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
+from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_detection import text as words
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.claims import false_alarms, places, rates_of
@@ -185,8 +186,7 @@ def by_weather_shown(spread: pd.DataFrame) -> list[Shown]:
         ax.set_title(title)
         fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         said = "; ".join(
-            f"{_SHORT[m]} "
-            + ", ".join(words.percent(v) if what == "recall" else f"{v:.1f}" for v in values[m])
+            f"{_SHORT[m]} " + ", ".join(percent(v, 0) if what == "recall" else f"{v:.1f}" for v in values[m])
             for m in methods
         )
         shown.append(

@@ -9,6 +9,7 @@ import pandas as pd
 
 from wildlab.evaluation.matching import Rates
 from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_detection.claims import fall, false_alarms, places, rates_of
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
@@ -89,15 +90,6 @@ quarter shows count neither way. Intervals of rates draw images with replacement
 Student's."""
 
 
-def percent(share: float) -> str:
-    """A share in per cent; never rounded to all or to none."""
-    if not np.isfinite(share):
-        return "none"
-    if share in (0.0, 1.0):
-        return f"{100 * share:.0f} %"
-    return f"{min(max(100 * share, 1), 99):.0f} %"
-
-
 def ranged(one: Interval, digits: int = 2) -> str:
     """A number with its interval."""
     if not np.isfinite(one.low):
@@ -108,8 +100,8 @@ def ranged(one: Interval, digits: int = 2) -> str:
 def percent_ranged(one: Interval) -> str:
     """A share in per cent with its interval."""
     if not np.isfinite(one.low):
-        return percent(one.estimate)
-    return f"{percent(one.estimate)} ({100 * max(one.low, 0):.0f} to {100 * min(one.high, 1):.0f} %)"
+        return percent(one.estimate, 0)
+    return f"{percent(one.estimate, 0)} ({100 * max(one.low, 0):.0f} to {100 * min(one.high, 1):.0f} %)"
 
 
 def equals(every: dict[str, Interval]) -> list[str]:
@@ -216,11 +208,14 @@ def tiles(spread: pd.DataFrame) -> list[tuple[str, str]]:
 
     return [
         (
-            percent(night.estimate),
+            percent(night.estimate, 0),
             f"of the animals found on a clear night{beside(percent_ranged(night))}: subtraction and adaptive "
             "threshold",
         ),
-        (percent(noon.estimate), f"of them found at a sunny noon{beside(percent_ranged(noon))}, by the same"),
+        (
+            percent(noon.estimate, 0),
+            f"of them found at a sunny noon{beside(percent_ranged(noon))}, by the same",
+        ),
         (f"{alarms.estimate:.1f}", f"false alarms an image at that noon{beside(ranged(alarms, 1))}"),
     ]
 
@@ -234,7 +229,7 @@ def masks_words(spread: pd.DataFrame) -> str:
     start = (
         f"With its level as a floor, {NAMES[ADAPTIVE]} gives the same mask as {NAMES[CONSTANT]}, pixel for "
         f"pixel, in {same} of {of} images ({100 * share.low:.0f} to {100 * share.high:.0f} %); on average "
-        f"{percent(float(alike.mean()))} of what either makes white is white in both."
+        f"{percent(float(alike.mean()), 0)} of what either makes white is white in both."
     )
     verdict = (
         "Read so it is the constant threshold under another name"
@@ -261,8 +256,8 @@ def change_words(spread: pd.DataFrame) -> str:
     elif adaptive < FALL:
         both = "the adaptive threshold copes" + ("" if constant < FALL else ", the constant one does not")
     else:
-        both = f"the adaptive threshold loses {percent(adaptive)} of its F1, the constant one " + (
-            f"{percent(constant)}" if constant > 0 else "nothing"
+        both = f"the adaptive threshold loses {percent(adaptive, 0)} of its F1, the constant one " + (
+            f"{percent(constant, 0)}" if constant > 0 else "nothing"
         )
     return f"When the sun comes out, the ground rises by {rise:.0f} grey levels, and F1 goes: {said}; {both}."
 
@@ -397,7 +392,7 @@ def herd_words(spread: pd.DataFrame) -> str:
         else "the median finds no more"
     )
     return (
-        f"A herd over {percent(share)} of the image raises the mean by {mean:.1f} grey levels and the "
+        f"A herd over {percent(share, 0)} of the image raises the mean by {mean:.1f} grey levels and the "
         f"median by {median:.1f}; {cost}, with F1 of {ranged(found[BY_MEDIAN].f1)} beside "
         f"{ranged(found[BY_MEAN].f1)}."
     )
