@@ -17,6 +17,7 @@ from tests.flight.frames.test_cptv import pictures, video, written
 from tests.pipeline.test_detect import folder, picture
 from tests.test_cli_camera import huge_png
 from wildlab import cli
+from wildlab.pipeline.detection_said import too_few_or_many
 
 
 def call(capsys, *arguments):
@@ -62,6 +63,11 @@ def test_images_that_are_dark_where_it_is_warm_are_asked_about(capsys, tmp_path)
     assert code == 0 and "--polarity black-hot" in out
     code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--polarity", "black-hot")
     assert code == 0 and out.startswith("12 detections") and "black-hot" not in out
+
+
+def test_many_is_by_the_image():
+    said = [too_few_or_many("warm", "unknown", n, 5, chosen=False) for n in (50, 51)]
+    assert said[0] == [] and said[1][0].startswith("That is 10 an image")
 
 
 def test_more_than_anyone_looks_through_is_said(capsys, tmp_path):
@@ -173,10 +179,10 @@ def test_wrong_use_is_a_sentence(capsys, tmp_path):
 def test_labels_that_cannot_be_of_these_images_are_told(capsys, tmp_path):
     path = folder(tmp_path / "in")
     rows = (path / "labels.csv").read_text(encoding="utf-8").splitlines()
-    rows += ["000.png,900,900,5,5,far", "gone.png,1,2,3,4,far"]
+    rows += ["000.png,900,900,5,5,far", "001.png,-40,20,30,10,far", "gone.png,1,2,3,4,far"]
     (tmp_path / "l.csv").write_text("\n".join(rows), encoding="utf-8")
     code, out, _ = call(capsys, "detect", path, "--into", tmp_path / "out", "--labels", tmp_path / "l.csv")
-    assert code == 0 and "1 labels lie wholly outside their image" in out and "1 missed" in out
+    assert code == 0 and "2 labels lie wholly outside their image" in out and "2 missed" in out
     assert "1 labelled frames are not here and count nowhere: gone.png." in out
     code, _, err = call(capsys, "detect", path, "--into", tmp_path / "b", "--class", "deer")
     assert code == 2 and "there are no labels whose classes or groups are meant" in err.lower()

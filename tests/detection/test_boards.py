@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from wildlab.detection import boards
 from wildlab.detection.boards import FEWEST_CODES, Board, count_codes, find_board, grey8
 from wildlab.errors import WildlabError
 from wildlab.geometry.board_views import Views, parameters_of, project_board
@@ -109,3 +110,27 @@ def test_of_43_thermal_images_at_least_22_boards_are_found(shared_data):
     board = Board("chessboard", 8, 7, 0.05)
     greys = [grey8(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) for path in files]
     assert sum(find_board(grey, board) is not None for grey in greys) >= 22
+
+
+def test_corners_are_where_edges_cross():
+    """Nearer than the finder says, over views; and what is too far off to be a corner stays where it was."""
+    board, errors = BOARDS[0], {"found": [], "refined": []}
+    for seed, tilt in enumerate([(15.0, -20.0, 12.0), (-25.0, 10.0, 40.0), (5.0, 30.0, -60.0)]):
+        R, t = pose(board, tilt)
+        rng = np.random.default_rng(seed)
+        clean = board_image(CAMERA, R, t, board.points, board.spacing, warm=200.0, cold=50.0)
+        grey = grey8(cv2.GaussianBlur(clean, (0, 0), 0.6) + rng.normal(0, 2, clean.shape))
+        true = project_board(parameters_of(CAMERA), Views(R[None], t[None]), board.points).uv[0]
+        found = true + rng.normal(0, 0.4, true.shape)
+        refined = boards._refined(found, grey, board)
+        errors["found"].append(found - true)
+        errors["refined"].append(refined - true)
+        far = true.copy()
+        # The edges cross within the window, and yet farther off than a corner may move.
+        far[0] = true[0] + 0.3 * (true[1] - true[0])
+        kept = boards._refined(far, grey, board)
+        moved = np.linalg.norm(kept[0] - far[0])
+        side = np.linalg.norm(true[1] - true[0])
+        assert moved < 0.5 * int(boards.WINDOW * side)
+    found, refined = (np.sqrt(np.mean(np.square(errors[key]))) for key in ("found", "refined"))
+    assert refined < 0.3 * found

@@ -83,3 +83,18 @@ def test_what_cannot_be_boxes_is_refused() -> None:
         match([], [[np.nan, 1]])
     with pytest.raises(WildlabError, match="2 frames have counts and 1 have a clip"):
         rates([[1, 0, 0], [1, 0, 0]], ["a"])
+
+
+def test_what_has_not_gone_wrong_yet_may_still() -> None:
+    """Draws of frames that are all alike have no spread: Wilson's interval of as many things stays."""
+    z2 = 1.959963984540054**2
+    all_found = rates([[2, 0, 0]] * 8)
+    for one in (all_found.precision, all_found.recall, all_found.f1):
+        assert one.estimate == 1 and one.high == pytest.approx(1)
+        assert one.low == pytest.approx(16 / (16 + z2))
+    none_found = rates([[0, 1, 1]] * 8)
+    assert none_found.recall.low == pytest.approx(0)
+    assert none_found.recall.high == pytest.approx(z2 / (8 + z2))
+    # Frames that differ much keep the width of the draws.
+    uneven = rates([[10, 0, 0], [0, 0, 10]] * 4).recall
+    assert uneven.low < 0.25 and uneven.high > 0.75

@@ -172,3 +172,13 @@ def test_a_terrain_that_is_none_is_refused(arguments, says):
 def test_starts_have_to_go_with_rays():
     with pytest.raises(WildlabError, match="one start for each ray"):
         intersect_terrain(Terrain(np.zeros((3, 3)), 0, 0, 1.0), np.ones((3, 3)), np.zeros((2, 3)))
+
+
+@pytest.mark.parametrize("along", [(0.0, -1e-100), (-1e-100, 0.0), (-1e-300, -1e-120), (1e-100, -1e-100)])
+def test_a_ray_on_a_border_that_hardly_leaves_it_arrives(along):
+    """In rounded numbers it never leaves: only the cell that was entered says where it is."""
+    north, east = np.meshgrid(np.arange(81.0), np.arange(81.0), indexing="ij")
+    slope = Terrain((0.3 * (north - 40) + 0.2 * (east - 40)).astype(np.float32), 0.0, 0.0, 1.0)
+    met = intersect_terrain(slope, [[*along, 1.0]], [40.0, 40.0, -100.0])
+    assert met.became[0] == HIT
+    np.testing.assert_allclose(met.points[0], [40.0, 40.0, 0.0], atol=1e-5)

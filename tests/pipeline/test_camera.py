@@ -46,6 +46,15 @@ def test_a_view_that_disagrees_is_named_with_figures_without_it(good, odd):
     assert f"{odd.without_odd.rms:.3f} px" in said
 
 
+def test_two_views_that_disagree_are_both_named_and_no_other():
+    some = list(images())
+    some[4] = replace(some[4], uv=some[4].uv * [1.0, 0.8])
+    some[9] = replace(some[9], uv=some[9].uv * [0.9, 1.0])
+    both = solve_boards(tuple(some), BOARD, 640, 512, "k1")
+    assert set(both.odd) == {"4.png", "9.png"}
+    assert both.without_odd.rms < 0.2 and both.without_odd.views.rotation.shape[0] == len(some) - 2
+
+
 def test_no_more_than_a_quarter_are_odd():
     errors = np.r_[np.full(12, 0.2) + 0.01 * np.arange(12), 5, 6, 7, 8]
     assert odd_views(errors).sum() == 4
