@@ -15,7 +15,7 @@ from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.evaluation.runs import Interval
 from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
 from wildlab.flight.files import printable
-from wildlab.flight.readers.labels import Labels, read_labels
+from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
 from wildlab.pipeline.detection_judged import boxes_by_frame, plain_rates, rate_words, rates_sentence
 
 NOTHING = np.zeros((0, 4))
@@ -163,7 +163,7 @@ def read_others(
         if classes and not taken and known:
             some = ", ".join(printable(one) for one in known[:8])
             told.append(f"All its classes are taken ({some}): none is called {', '.join(classes)}.")
-        boxes = read_labels(path, classes=taken, truth=labels) if taken else every
+        boxes = choose_classes(every.marked, path, taken) if taken else every
         found.append(Other(printable(name), boxes, taken, tuple(told)))
     return found
 

@@ -149,7 +149,30 @@ def read_labels(
         Where the file cannot be read, lacks something or holds something that cannot be used, or where no
         label is of a class that is looked for.
     """
-    marked = _read(path, group, None if truth is None else truth.marked)
+    return choose_classes(_read(path, group, None if truth is None else truth.marked), path, classes)
+
+
+def choose_classes(marked: Marked, path: Path, classes: tuple[str, ...] = ()) -> Labels:
+    """Labels of some classes out of what a file holds.
+
+    Parameters
+    ----------
+    marked
+        All of it.
+    path
+        Of the file.
+    classes
+        Which are looked for; all others are then regions that are not judged. Empty: all.
+
+    Returns
+    -------
+    Labels
+
+    Raises
+    ------
+    WildlabError
+        Where no label is of a class that is looked for, or a frame has too many boxes.
+    """
     unknown = sorted(set(classes) - set(marked.known_kinds))
     if unknown:
         there = ", ".join(printable(one) for one in sorted(set(marked.known_kinds))[:20])
