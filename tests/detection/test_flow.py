@@ -111,6 +111,20 @@ def test_what_turns_or_grows_too_much_is_chance():
     assert len(agreeing(here, here @ turn.T, FlowThresholds(largest_turn=0.4))) == 12
 
 
+def test_the_scatter_of_few_features_is_that_of_what_moved_them():
+    """A motion of four numbers takes four of the differences: of five features six are left."""
+    rng, variances = np.random.default_rng(11), []
+    for _ in range(400):
+        here = rng.uniform(0, 60, (5, 2))
+        there = here + [3.0, -2.0] + 0.2 * rng.standard_normal((5, 2))
+        found = agreeing(here, there, FlowThresholds(smallest_sd=1e-6))
+        assert len(found) == 5
+        variances.append(found.sd**2)
+    assert np.mean(variances) == pytest.approx(0.2**2, rel=0.15)
+    exact = agreeing(here, here + np.array([3.0, -2.0]), FlowThresholds(smallest_sd=0.07))
+    assert exact.sd == 0.07, "features that fit exactly are not known exactly"
+
+
 def test_an_open_contour_is_filled_by_its_convex_outline():
     labels = np.zeros((40, 60), np.int32)
     labels[10, 10:50] = labels[10:30, 10] = labels[29, 10:50] = 1  # open to the right

@@ -73,6 +73,16 @@ def test_a_measure_is_held_against_the_threshold() -> None:
             check.holds()
 
 
+def test_a_threshold_may_say_what_is_counted() -> None:
+    yes, no = np.array([True, True]), np.array([True, False])
+    check = s.Check(by_threshold={5.0: no, 10.0: yes}, first=np.ones(2), second=np.zeros(2))
+    assert check.holds(5).tolist() == [True, False] and check.holds(10).all()
+    assert len(check) == 2 and check.reaches(10)
+    assert s.decide_check(check, 5).true == 1
+    with pytest.raises(WildlabError, match=r"(?s)Nothing was counted for the threshold 7.*Use one of 5, 10"):
+        check.holds(7)
+
+
 def test_a_paired_difference_has_students_interval() -> None:
     rng = np.random.default_rng(1)
     first, second = rng.normal(5, 2, 30), rng.normal(4, 2, 30)

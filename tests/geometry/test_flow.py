@@ -191,6 +191,28 @@ def errors_of(scale=1.0):
     )  # fmt: skip
 
 
+def test_every_source_of_error_is_carried_by_its_own_derivatives():
+    """To first order the covariance is that of what one standard deviation of one error does, either way."""
+    uv = pixels(0.0)
+    J = flow_jacobians(pose_at(0.0), MOTION, uv, FLOW, PLANE)
+    nothing = FlowErrors(*(0.0 * np.asarray(part) for part in errors_of()))
+    total = velocity_covariance(J, errors_of())
+    for name, size in (
+        ("pixel", 2), ("flow", 2), ("pose", 6), ("mount", 3), ("velocity", 3), ("rates", 3),
+        ("gimbal_rates", 2), ("plane", 1), ("interval", 1),
+    ):  # fmt: skip
+        given = np.asarray(getattr(errors_of(), name))
+        found = velocity_covariance(J, nothing._replace(**{name: given}))
+        truth = np.zeros((3, 2, 2))
+        for deviation in 1e-3 * np.linalg.cholesky(np.atleast_2d(given)).T:
+            way = deviation if size > 1 else deviation[0]
+            change = (moved(CAMERA, **{name: way}) - moved(CAMERA, **{name: -way})) / 2e-3
+            truth += change[:, :, None] * change[:, None, :]
+        assert np.allclose(found, truth, rtol=1e-3, atol=1e-9), name
+        total = total - found
+    assert np.allclose(total, 0.0, atol=1e-9), "and there is nothing else in it"
+
+
 def test_what_features_share_does_not_average_out():
     pose, uv = pose_at(0.0), pixels(0.0)
     one = mean_velocity(pose, MOTION, uv[:1], FLOW[:1], PLANE, errors_of())

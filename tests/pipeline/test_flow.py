@@ -12,14 +12,18 @@ import pytest
 from wildlab.detection.flow import FlowThresholds, Matches
 from wildlab.errors import WildlabError
 from wildlab.flight.store import load_flight, save_flight
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.pipeline.flow import (
+    USUAL_MOTION,
     FramePair,
     Reading,
+    flow_errors,
     pair_velocities,
     velocity_detections,
     velocity_measurements,
 )
+from wildlab.pipeline.georeference import assumed_deviations
 from wildlab.simulation.parameters import load_twin
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
@@ -41,14 +45,15 @@ def seen():
     return SceneFlight(load_twin(TWIN), 3)
 
 
-def pairs_of(seen, velocity=(0.0, 0.0), rows=range(10, 140, 13)):
+def pairs_of(seen, velocity=(0.0, 0.0), rows=range(10, 140, 13), down=0.0):
     """Exact features of something that moves from where it is at each pair's first image."""
+    ship = SHIP + np.array([0.0, 0.0, down])
     found = []
     for row in rows:
         moved = np.append(velocity, 0.0) * (seen.times[row + 1] - seen.times[row])
         one, two = seen.poses.take(row), seen.poses.take(row + 1)
-        first = ground_to_pixel(seen.poses.camera, SHIP, one.p_nc, one.R_nc)
-        second = ground_to_pixel(seen.poses.camera, SHIP + moved, two.p_nc, two.R_nc)
+        first = ground_to_pixel(seen.poses.camera, ship, one.p_nc, one.R_nc)
+        second = ground_to_pixel(seen.poses.camera, ship + moved, two.p_nc, two.R_nc)
         found.append(FramePair(row, row + 1, Matches(first, second, 0.1)))
     return found
 
@@ -83,6 +88,43 @@ def test_of_a_ship_at_rest_flow_is_that_of_the_camera(flight, seen):
     assert np.allclose(table["flow_u"], table["camera_u"], atol=1.0)
     assert np.allclose(table["flow_v"], table["camera_v"], atol=1.0)
     assert np.abs(table[["flow_u", "flow_v"]].to_numpy()).max() > 10
+
+
+def test_a_deck_is_seen_on_its_own_plane(flight, seen):
+    pairs = pairs_of(seen, down=-30.0)
+    table = pair_velocities(quiet(flight, seen), pairs, true_reading(seen, plane_down=-30.0))
+    assert np.allclose(table["flow_u"], table["camera_u"], atol=1.0)
+    assert np.allclose(table["flow_v"], table["camera_v"], atol=1.0)
+    assert np.allclose(speeds(table), 0.0, atol=0.15)
+    flat = pair_velocities(quiet(flight, seen), pairs, true_reading(seen))
+    assert not np.allclose(speeds(flat), 0.0, atol=0.5)
+
+
+def test_what_is_stated_of_a_flight_is_what_its_velocities_are_held_to(flight, seen):
+    """Of a pose that the log gives no covariance, by turning its angles one at a time."""
+    stated = assumed_deviations(flight)
+    assert stated["position_horizontal_m"] != stated["position_vertical_m"]
+    pose = replace(seen.poses.take(40), R_nb=euler_to_matrix(0.3, 0.2, 1.1), covariance=None)
+    found = flow_errors(flight, pose, 0.2, 0.25)
+    step, turns = 1e-6, []
+    for axis in np.eye(3):
+        there, here = (euler_to_matrix(*(np.array([0.3, 0.2, 1.1]) + s * axis)) for s in (step, -step))
+        turns.append(matrix_to_rotation_vector(here.T @ there) / (2 * step))
+    E = np.stack(turns, axis=1)
+    angles = np.radians([stated["roll_deg"], stated["pitch_deg"], stated["yaw_deg"]])
+    assert np.allclose(found.pose[3:, 3:], E @ np.diag(angles**2) @ E.T, rtol=1e-5, atol=1e-12)
+    across, down = stated["position_horizontal_m"], stated["position_vertical_m"]
+    assert np.allclose(found.pose[:3, :3], np.diag([across, across, down]) ** 2)
+    assert not found.pose[:3, 3:].any()
+    assert np.allclose(found.pixel, 0.04 * np.eye(2))
+    assert np.allclose(found.flow, 0.8**2 * np.eye(2)), "0.2 px in a quarter of a second are 0.8 px/s"
+    usual = {name: np.radians(USUAL_MOTION[name]) ** 2 for name in ("rate_deg_s", "gimbal_rate_deg_s")}
+    assert np.allclose(found.rates, usual["rate_deg_s"] * np.eye(3))
+    assert np.allclose(found.gimbal_rates, usual["gimbal_rate_deg_s"] * np.eye(2))
+    tables = {name: table for name, table in flight.tables.items() if name != "gimbal"}
+    assert not flow_errors(replace(flight, tables=tables), pose, 0.2, 0.25).gimbal_rates.any()
+    known = np.diag(np.arange(1.0, 7.0))
+    assert np.array_equal(flow_errors(flight, replace(pose, covariance=known), 0.2, 0.25).pose, known)
 
 
 def test_the_log_alone_says_about_as_much_as_it_claims(flight, seen):
@@ -133,6 +175,7 @@ def test_velocities_are_detections_of_their_own_kind_and_feed_a_track(flight, se
     loaded = load_flight(tmp_path / "flight")
     times, v, R = velocity_measurements(loaded)
     assert np.allclose(v, speeds(table)) and (np.diff(times) > 0).all()
+    assert np.allclose(times, flight.frames["time_s"].to_numpy()[table["second"]]), "known with the second"
     assert np.allclose(R[:, 0, 1], table["cov_ne"]) and np.allclose(R[:, 1, 1], table["cov_ee"])
     # Started without any idea of its speed, and with no position at all, a track knows it.
     start = Start(times[0], np.zeros(4), np.diag([1e4, 1e4, 100.0, 100.0]))

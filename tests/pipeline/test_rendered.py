@@ -103,6 +103,14 @@ def test_a_target_that_is_found_nowhere_is_said(flight, camera, shots):
         with_detections(flight, marks_of(nothing, shape_of(camera)), "ship")
 
 
+def test_an_image_of_another_flight_is_refused(flight, camera, shots):
+    marks = marks_of(shots, shape_of(camera))
+    other = marks._replace(exposure=marks.exposure.copy())
+    other.exposure[1] = 10**6
+    with pytest.raises(WildlabError, match=r"xposure 1000000 of the marks is none of .* frames\. Render"):
+        with_detections(flight, other, "ship")
+
+
 def replace_found(shot):
     return shot._replace(judged=Judged({1: []}, set(), 0), detections=replace(no_detections()))
 
@@ -119,8 +127,16 @@ def test_a_window_is_that_part_of_the_whole_image():
         assert np.array_equal(part.kelvin, whole.kelvin[window.slices])
         assert np.array_equal(part.labels, whole.labels[window.slices])
     shape = shape_of(camera)
-    apart = marks_of(camera.shoot(exposures, margin=48), shape)
-    together = marks_of(camera.shoot(exposures), shape)
+    windows, wholes = list(camera.shoot(exposures, margin=48)), list(camera.shoot(exposures))
+    for part, whole in zip(windows, wholes, strict=True):
+        one, other = part.seen[0], whole.seen[0]
+        for name in ("uv", "centre", "middle"):
+            assert np.allclose(getattr(one, name), getattr(other, name)), name
+        for end in (np.min, np.max):
+            assert np.allclose(end(one.outline, axis=0), end(other.outline, axis=0))
+        boxes = (shot.detections.box[shot.judged.found[1][0]] for shot in (part, whole))
+        assert np.abs(np.subtract(*boxes)).max() <= 2, "but for other draws of the noise"
+    apart, together = marks_of(windows, shape), marks_of(wholes, shape)
     assert np.allclose(apart.centre, together.centre)
     # The noise has other draws; what they move is a fraction of a pixel.
     assert np.hypot(*(apart.uv - together.uv).T).max() < 0.5

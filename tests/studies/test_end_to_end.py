@@ -161,6 +161,25 @@ def test_intervals_of_shares_stay_within_all_and_none():
     assert text.with_interval(pd.Series([np.nan])) == ""
 
 
+def test_a_count_has_no_end_at_one_and_a_bias_is_a_share_of_its_own_flight(numbers):
+    rows = [
+        spread_of(
+            numbers,
+            {
+                (RENDERED, "false_alarms_per_image"): alarms, (RENDERED, "pixel_rms"): rms,
+                (RENDERED, "bias_ahead"): bias, (RENDERED, "bias_right"): 0.0,
+            },
+            flights=1,
+        )
+        for alarms, rms, bias in ((1.0, 1.0, 0.5), (1.2, 4.0, 2.0), (1.4, 10.0, 5.0))
+    ]  # fmt: skip
+    spread = pd.concat(rows)
+    table = text.detections_table(spread).set_index("quantity")
+    assert table.loc["false alarms an image", RENDERED] == "1.200 (0.703 to 1.697)"
+    assert "the bias is 25 % of their mean square" in text.bias_words(spread)
+    assert "undecided on 7," in text.limits(7)[-1]
+
+
 def test_report_parts_are_there(pair, numbers):
     spread = spread_of(numbers)
     checks = {kind: checks_of(spread, kind) for kind in KINDS}

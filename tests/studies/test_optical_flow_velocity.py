@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -114,7 +116,6 @@ def test_means_deviations_and_intervals_are_those_of_the_table():
 
 def test_a_flight_without_features_says_so(monkeypatch, looked):
     monkeypatch.setattr(study, "simulate_twin", lambda name, seed: looked.flight)
-    monkeypatch.setattr(study, "SceneFlight", lambda *given: looked.scene)
     monkeypatch.setattr(study, "match_features", lambda *images: ())
     with pytest.raises(WildlabError, match="0 of 2 pairs of images have features"):
         look(TWIN, 2, 2)
@@ -207,8 +208,17 @@ def test_what_exact_times_leave_is_said_beside_particularly_vulnerable():
     assert said.endswith("so it is not here.") and "leave 91 %" in said
     mixed = text.synchronised_words(pd.concat([spread_of(1, **few), spread_of(1, **many)]))
     assert "18 to 91 %" in mixed and mixed.endswith("on some of the flights only.")
+    unknown = spread_of(1, synchronised__sd_north=np.nan)
+    assert "no flight can tell" in text.synchronised_words(unknown)
+    assert text.synchronised_words(pd.concat([unknown, spread_of(1, **few)])).endswith("so it is here.")
     stated = {one["id"]: one for one in load_claims("optical-flow-velocity")}["better-synchronised"]
     assert float(stated["threshold"]) == text.PARTICULAR and "particularly" in stated["text"]
+
+
+def test_limits_say_what_is_on_deck_and_how_many_pairs(monkeypatch):
+    monkeypatch.setattr(text, "SHIP", replace(study.SHIP, fittings=7))
+    said = " ".join(text.limits(42))
+    assert "that is 7 small things" in said and "about 42 pairs" in said
 
 
 def test_the_sentences_turn_with_the_numbers():

@@ -78,5 +78,9 @@ def test_what_does_not_fit_is_refused():
     for run in (run_filter, run_unscented):
         with pytest.raises(WildlabError, match="a sensor of 4 states for a motion model of 2"):
             run([0.0], [[1.0, 2.0]], np.eye(2), positions_or_velocities([True]), rest, start)
+    with pytest.raises(WildlabError, match="a sensor of 4 states for a motion model of 2"):
+        run_imm(
+            [0.0], [[1.0, 2.0]], np.eye(2), positions_or_velocities([True]), [rest, rest], [9.0, 9.0], start
+        )
     with pytest.raises(WildlabError, match="kinds of the shape"):
         positions_or_velocities(True)

@@ -181,7 +181,7 @@ def match_features(first: Features, second: Features, thresholds: FlowThresholds
     all, and the same each time.
     """
     given = thresholds or FlowThresholds()
-    if min(len(first), len(second)) < max(given.fewest, 2):
+    if min(len(first), len(second)) < given.fewest:
         return _none()
     here, there = nearest_by_ratio(first.descriptors, second.descriptors, given.ratio)
     return agreeing(first.uv[here], second.uv[there], given)

@@ -9,7 +9,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
 - `track_errors.track_errors`, `summarise_track`: how far is a track from the truth?
 - `ospa`, `gospa`: how far is a set of tracks?
-- `mean_interval`, `share_interval`: what do so many independent runs say?
+- `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
 - `held_out`, `gain_of`, `rank_models`: which constant error is behind them; `split_along`; `find_outliers`.
@@ -49,7 +49,7 @@ from wildlab.evaluation.errors import (
 )
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
-from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
 from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
 from wildlab.evaluation.track_errors import TrackErrors, TrackSummary, summarise_track
@@ -102,6 +102,7 @@ __all__ = [
     "judge_ellipses",
     "largest_visible",
     "mean_interval",
+    "mean_share_interval",
     "mean_summary",
     "nees",
     "nis",

@@ -58,6 +58,32 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
+def mean_share_interval(shares: ArrayLike) -> Interval:
+    """As `mean_interval` with 95 %, of shares: it ends at none and at all.
+
+    Parameters
+    ----------
+    shares
+        (N,) from 0 to 1, one for each run; NaN are left out.
+
+    Returns
+    -------
+    Interval
+
+    Raises
+    ------
+    WildlabError
+        If fewer than two are known.
+
+    Examples
+    --------
+    >>> [round(x, 2) for x in mean_share_interval([0.9, 1.0, 1.0])]
+    [0.97, 0.82, 1.0]
+    """
+    found = mean_interval(shares)
+    return Interval(found.estimate, max(found.low, 0.0), min(found.high, 1.0))
+
+
 def share_interval(count: float, runs: float, probability: float = 0.95) -> Interval:
     """Share of independent runs of which something is true, with Wilson's score interval.
 

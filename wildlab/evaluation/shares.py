@@ -7,6 +7,7 @@ that few flights decide little: of twenty, even all of them leave open whether i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -63,6 +64,9 @@ class Check:
         Whether ``measured`` follows from the parameters alone, so that flights add nothing to it.
     first, second
         (N,), what a comparison compares, in ``unit``: the paired difference is shown.
+    by_threshold
+        Of which flights it is true, (N,) bool by the threshold, where that says what is counted: a share of
+        what lies within a limit has no single measure to hold against the limit.
     reach
         What the measure can be where the sentence says anything: an F1 is from 0 to 1, and a ratio above 1
         is no decrease. A threshold beyond it decides nothing (`reaches`).
@@ -77,6 +81,7 @@ class Check:
     first: Array | None = None
     second: Array | None = None
     unit: str = ""
+    by_threshold: Mapping[float, NDArray[np.bool_]] | None = None
     reach: tuple[float, float] = (-np.inf, np.inf)
 
     @classmethod
@@ -90,8 +95,15 @@ class Check:
         Raises
         ------
         WildlabError
-            If it needs a threshold and there is none, or has no use for one.
+            If it needs a threshold and there is none, has no use for one, or nothing was counted by this one.
         """
+        if self.by_threshold is not None:
+            if threshold not in self.by_threshold:
+                raise WildlabError(
+                    f"nothing was counted for the threshold {threshold}",
+                    f"use one of {', '.join(f'{one:g}' for one in self.by_threshold)}",
+                )
+            return self.by_threshold[threshold]
         if self.true is not None and self.measured is None:
             return self.true
         if self.measured is None or threshold is None:
@@ -116,6 +128,8 @@ class Check:
         return low <= threshold < high if self.above else low < threshold <= high
 
     def __len__(self) -> int:
+        if self.by_threshold is not None:
+            return len(next(iter(self.by_threshold.values())))
         return len(self.true if self.true is not None else np.asarray(self.measured))
 
 

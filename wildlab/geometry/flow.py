@@ -217,8 +217,11 @@ def camera_flow(poses: CameraPoses, motion: CameraMotion, uv: ArrayLike, plane_d
     WildlabError
         Where there is another number of poses, or of planes, than of pixels.
     """
-    twist = np.concatenate(camera_twist(poses, motion), axis=-1)
-    return np.asarray(np.einsum("...ij,...j->...i", flow_matrix(poses, uv, plane_down), twist))
+    return _made_by(flow_matrix(poses, uv, plane_down), camera_twist(poses, motion))
+
+
+def _made_by(by_twist: Array, twist: Twist) -> Array:
+    return np.asarray(np.einsum("...ij,...j->...i", by_twist, np.concatenate(twist, axis=-1)))
 
 
 def target_velocity(
@@ -267,10 +270,11 @@ def target_velocity(
             "give one flow for each pixel",
             field="flow",
         )
-    own = measured - camera_flow(poses, motion, pixels, plane_down)
+    by_twist = flow_matrix(poses, pixels, plane_down)
+    own = measured - _made_by(by_twist, camera_twist(poses, motion))
     # The third column, of the velocity downward, is discarded: the target stays on the plane (H 5.29, 5.30).
     R_cn = np.swapaxes(poses.R_nc, -1, -2)
-    A = flow_matrix(poses, pixels, plane_down)[..., :3] @ R_cn[..., :, :2]
+    A = by_twist[..., :3] @ R_cn[..., :, :2]
     return np.asarray(np.linalg.solve(A, own[..., None])[..., 0])
 
 

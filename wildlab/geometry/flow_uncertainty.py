@@ -123,31 +123,30 @@ def flow_jacobians(
         change = dv + w_n[..., :, None] * deeper[..., None, :] + depth * dw - sink * dd
         return np.asarray(onto @ change)
 
-    eye = np.broadcast_to(np.eye(3), (*d_n.shape, 3))
     none = np.zeros((*d_n.shape, 3))
+    eye = none + np.eye(3)
     R_all, lever = np.broadcast_to(R, none.shape), skew(poses.lever_arm)
     spin = skew(rates)
     by_ray = R_bc[..., :, :2] @ by_pixel
-    by_flow = np.zeros((*d_n.shape, 2)) + R_all @ by_ray
+    by_flow = R_all @ by_ray
     along = R_all @ (spin @ by_ray + R_bc[..., :, :2] @ _bend(poses, pixels, measured))
-    turned = -R_all @ skew(d_b)
+    turned = -R_all @ skew(d_b)  # of the ray, by a turn of b: by its error, or a second of its rate
     around = np.cross(np.broadcast_to(np.asarray(motion.rates, float), d_n.shape), poses.lever_arm)
     pose = np.empty((*slope.shape, 6))
-    pose[..., :3] = through(none, none, 0.0, np.broadcast_to(eye[..., 2, :], d_n.shape))
+    pose[..., :3] = through(none, none, 0.0, eye[..., 2, :])
     pose[..., 3:] = through(turned, -R_all @ skew(w_b), -R_all @ skew(around), (-R_all @ lever)[..., 2, :])
     swung = -R_bm @ skew(np.einsum("...ji,...j->...i", R_bm, d_b))
     slid = -R_bm @ skew(np.einsum("...ji,...j->...i", R_bm, x_b))
-    by_rates = -R_all @ skew(d_b)
     axes = gimbal_axes(poses.mount, poses.pan)
-    flow_only = through(by_flow * 0.0, by_flow)
+    flow_only = through(none[..., :2], by_flow)
     return FlowJacobians(
         pixel=through(by_flow, along),
         flow=flow_only,
         pose=pose,
         mount=through(R_all @ swung, R_all @ (spin @ swung + slid)),
         velocity=through(none, none, eye),
-        rates=through(none, by_rates, -R_all @ lever),
-        gimbal_rates=through(none[..., :2], by_rates @ axes),
+        rates=through(none, turned, -R_all @ lever),
+        gimbal_rates=through(none[..., :2], turned @ axes),
         plane=through(none[..., :1], none[..., :1], 0.0, -np.ones((*d_n.shape[:-1], 1)))[..., 0],
         interval=-np.einsum("...ij,...j->...i", flow_only, measured),
     )

@@ -16,11 +16,10 @@ from wildlab.flight.clocks import between, frame_times, poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.flow import CameraMotion, camera_flow, flow_between, motion_between
+from wildlab.geometry.flow import camera_flow, flow_between, motion_between
 from wildlab.geometry.flow_uncertainty import FlowErrors, mean_velocity
-from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.mount import Mount
-from wildlab.pipeline.georeference import assumed_deviations
+from wildlab.pipeline.georeference import assumed_deviations, assumed_pose_covariance
 
 Array = NDArray[np.float64]
 
@@ -185,16 +184,14 @@ def _one(
     uv, flow = flow_between(pair.matches.first, pair.matches.second, times[1])
     row["flow_u"], row["flow_v"] = flow.mean(axis=0)
     row["camera_u"], row["camera_v"] = camera_flow(pose, motion, uv, plane_down).mean(axis=0)
-    errors = flow_errors(flight, pose, motion, pair.matches.sd, times[1])
+    errors = flow_errors(flight, pose, pair.matches.sd, times[1])
     found = mean_velocity(pose, motion, uv, flow, plane_down, errors)
     row["v_north_m_s"], row["v_east_m_s"] = found.value
     row["cov_nn"], row["cov_ne"], row["cov_ee"] = found.covariance[[0, 0, 1], [0, 1, 1]]
     return row
 
 
-def flow_errors(
-    flight: Flight, pose: CameraPoses, motion: CameraMotion, sd: float, interval: float
-) -> FlowErrors:
+def flow_errors(flight: Flight, pose: CameraPoses, sd: float, interval: float) -> FlowErrors:
     """Covariances of what a velocity is computed from: the log's, the manifest's, else the usual ones.
 
     Parameters
@@ -203,8 +200,6 @@ def flow_errors(
         With its manifest.
     pose
         One; its covariance where the log has one.
-    motion
-        Beside it.
     sd
         Of a feature's displacement, px: see `wildlab.detection.flow.Matches`.
     interval
@@ -217,14 +212,8 @@ def flow_errors(
     stated, usual = assumed_deviations(flight), USUAL_MOTION
     covariance = pose.covariance
     if covariance is None:
-        roll, pitch, _ = matrix_to_euler(pose.R_nb)
-        E = euler_errors_to_body(roll, pitch)
-        covariance = np.zeros((6, 6))
-        place = [stated["position_horizontal_m"]] * 2 + [stated["position_vertical_m"]]
-        covariance[:3, :3] = np.diag(place) ** 2
-        turn = np.radians([stated["roll_deg"], stated["pitch_deg"], stated["yaw_deg"]])
-        covariance[3:, 3:] = E * turn**2 @ E.T
-    moving = motion.gimbal_rates is not None and flight.gimbal is not None
+        covariance = assumed_pose_covariance(pose.R_nb, stated)
+    moving = flight.gimbal is not None
     return FlowErrors(
         pixel=np.eye(2) * sd**2,
         flow=np.eye(2) * (sd / interval) ** 2,

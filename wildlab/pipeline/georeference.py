@@ -203,23 +203,38 @@ def pose_errors(
         Of the N observations.
     """
     sd = assumed_deviations(flight) | (assumed or {})
-    n = len(observations.uv)
     pose = observations.poses.covariance
     if pose is None or assumed is not None:
-        roll, pitch, _ = matrix_to_euler(observations.poses.R_nb).T
-        E = euler_errors_to_body(roll, pitch)
-        attitude = (
-            E * np.radians([sd["roll_deg"], sd["pitch_deg"], sd["yaw_deg"]]) ** 2 @ np.swapaxes(E, 1, 2)
-        )
-        pose = np.zeros((n, 6, 6))
-        pose[:, :3, :3] = np.diag([sd["position_horizontal_m"]] * 2 + [sd["position_vertical_m"]]) ** 2
-        pose[:, 3:, 3:] = attitude
+        pose = assumed_pose_covariance(observations.poses.R_nb, sd)
     return PoseErrors(
         pixel=np.eye(2) * sd["pixel_px"] ** 2,
         pose=pose,
         mount=np.eye(3) * np.radians(sd["misalignment_deg"]) ** 2,
         plane=sd["plane_height_m"] ** 2,
     )
+
+
+def assumed_pose_covariance(R_nb: Array, sd: dict[str, float]) -> Array:
+    """Covariance of poses whose log has none, from standard deviations along north, east, down and of angles.
+
+    Parameters
+    ----------
+    R_nb
+        (3, 3) or (N, 3, 3): which way the airframe lies.
+    sd
+        By the names of :data:`USUAL`.
+
+    Returns
+    -------
+    (6, 6) or (N, 6, 6): position in n, m^2, and rotation vector in b, rad^2.
+    """
+    roll, pitch, _ = np.moveaxis(matrix_to_euler(R_nb), -1, 0)
+    E = euler_errors_to_body(roll, pitch)
+    angles = np.radians([sd["roll_deg"], sd["pitch_deg"], sd["yaw_deg"]])
+    pose = np.zeros((*np.shape(R_nb)[:-2], 6, 6))
+    pose[..., :3, :3] = np.diag([sd["position_horizontal_m"]] * 2 + [sd["position_vertical_m"]]) ** 2
+    pose[..., 3:, 3:] = E * angles**2 @ np.swapaxes(E, -1, -2)
+    return pose
 
 
 def assumed_deviations(flight: Flight) -> dict[str, float]:

@@ -24,7 +24,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin
-from wildlab.simulation.scene.flights import SceneFlight, Window
+from wildlab.simulation.scene.flights import Look, SceneFlight, Window, corner_of
 from wildlab.simulation.scene.render import Seen, View
 from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
 
@@ -109,9 +109,9 @@ class Photographer:
         The flight as scenes, with the camera's true poses.
     """
 
-    def __init__(self, twin: str, seed: int, response: CameraResponse | None = None) -> None:
-        self.flight = SceneFlight(load_twin(twin), seed)
-        self.response = response or CameraResponse()
+    def __init__(self, twin: str, seed: int, look: Look | None = None) -> None:
+        self.flight = SceneFlight(load_twin(twin), seed, look)
+        self.response = CameraResponse()
         camera = self.flight.poses.camera
         self._seed = seed
         self._sensor = sensor_of(self.response, (camera.height, camera.width), stream(seed, "thermal sensor"))
@@ -170,7 +170,7 @@ class Photographer:
                 continue
             view, counts = self.image(exposure, window)
             objects = find_objects(counts, thresholds=thresholds)
-            corner = np.zeros(2) if window is None else np.array([window.left, window.top], float)
+            corner = corner_of(window)
             yield Shot(
                 exposure,
                 tuple(_seen_from(seen, corner) for seen in view.seen),
@@ -249,10 +249,7 @@ class Marks(NamedTuple):
 
     def take(self, rows: slice) -> Marks:
         """The marks of some of the images."""
-        return Marks(
-            self.exposure[rows], self.uv[rows], self.covariance[rows], self.centre[rows], self.share[rows],
-            self.moved[rows], self.pieces[rows], self.false[rows],
-        )  # fmt: skip
+        return Marks(*(part[rows] for part in self))
 
 
 def marks_of(
@@ -328,7 +325,7 @@ def with_detections(
     Raises
     ------
     WildlabError
-        Where none of the images shows the target.
+        Where none of the images shows the target, or one of them is no frame of the flight.
     """
     if not marks.found.any():
         raise WildlabError(
@@ -338,6 +335,12 @@ def with_detections(
         )
     frames = flight.table("frames")
     place = pd.Index(exposures_of(frames)).get_indexer(pd.Index(marks.exposure))
+    if (place < 0).any():
+        raise WildlabError(
+            f"exposure {marks.exposure[place < 0][0]} of the marks is none of {len(frames)} frames",
+            "render images of the same twin and seed",
+            field="frame_id",
+        )
     marked = frames.iloc[place].reset_index(drop=True)
     rows = np.flatnonzero(marks.found)
     table = pd.DataFrame(

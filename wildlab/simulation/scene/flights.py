@@ -72,6 +72,17 @@ class Window(NamedTuple):
         return slice(self.top, self.top + self.height), slice(self.left, self.left + self.width)
 
 
+def corner_of(window: Window | None) -> Array:
+    """Where a window's first pixel lies in the whole image, (2,) px; None is the whole image.
+
+    Examples
+    --------
+    >>> corner_of(Window(30, 40, 64, 48)).tolist(), corner_of(None).tolist()
+    ([30.0, 40.0], [0.0, 0.0])
+    """
+    return np.zeros(2) if window is None else np.array([window.left, window.top], float)
+
+
 class SceneFlight:
     """A flight of a twin whose images can be rendered, one exposure at a time.
 

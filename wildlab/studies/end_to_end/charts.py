@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wildlab.reporting.figures import BLUE, ORANGE, VERMILLION, new_figure
+from wildlab.simulation.scene.flights import corner_of
 from wildlab.studies.end_to_end.text import FILTERS
 from wildlab.studies.end_to_end.trial import (
     DRAWN,
@@ -28,7 +29,7 @@ def frame_shown(pair: Pair) -> Shown:
     exposure = int(pair.marks.exposure[row])
     window = pair.camera.flight.window(exposure, MARGIN)
     _, counts = pair.camera.image(exposure, window)
-    corner = np.zeros(2) if window is None else np.array([window.left, window.top], float)
+    corner = corner_of(window)
     fig, ax = new_figure(5.2, 4.2)
     low, high = np.quantile(counts, [0.005, 0.998])  # but for dead pixels
     ax.imshow(counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")

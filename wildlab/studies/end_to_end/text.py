@@ -7,10 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from wildlab.evaluation.runs import mean_interval
+from wildlab.evaluation.runs import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
 from wildlab.reporting.text import percent
-from wildlab.studies.end_to_end.trial import DRAWN, KINDS, PIXEL_UNITS, RENDERED, followed_by
+from wildlab.studies.end_to_end.trial import DRAWN, KINDS, MARGIN, PIXEL_UNITS, RENDERED, followed_by
 
 FILTERS = {
     "kf": "linear filter, on the ground",
@@ -20,11 +20,11 @@ FILTERS = {
     "coloured": "differenced measurements",
 }
 
-METHOD = r"""The frames in which the twin marks its vessel are rendered from the camera's true poses, 48 px
-around the vessel: sea, vessel, wake and engine in kelvin, blurred, and counted by a camera with noise, a
-fixed pattern, vignetting and dead pixels. The seven steps of H 4.3 search them with the printed thresholds.
-Of what is found of the vessel the largest piece takes the place of the drawn detection; that it is the
-vessel's is known from the scene's labels, as the thesis neglects data association here.
+METHOD = f"""The frames in which the twin marks its vessel are rendered from the camera's true poses,
+{MARGIN} px around the vessel: sea, vessel, wake and engine in kelvin, blurred, and counted by a camera with
+noise, a fixed pattern, vignetting and dead pixels. The seven steps of H 4.3 search them with the printed
+thresholds. Of what is found of the vessel the largest piece takes the place of the drawn detection; that it
+is the vessel's is known from the scene's labels, as the thesis neglects data association here.
 
 Everything else is that of the two cases: the same flights, poses, clocks, tunings and truth, and claims by
 the same thresholds. A drawn detection is the vessel's true pixel and white noise; a rendered one has the
@@ -34,8 +34,15 @@ LIMITS = [
     "How the vessel looked is not printed: its length, warmth, engine and wake are chosen.",
     "Only frames that the twin marks are rendered, so neither kind can find the vessel in other ones.",
     "Only the surroundings of the vessel are rendered: false alarms elsewhere in images are not seen.",
-    "Few flights: a verdict that hundreds of flights allow may be undecided here with either kind.",
 ]
+
+
+def limits(flights: int) -> list[str]:
+    """`LIMITS`, and what so many flights leave open."""
+    return [
+        *LIMITS,
+        f"A verdict that more flights allow may be undecided on {flights}, with either kind.",
+    ]
 
 
 #: Shares between which ellipses that say 90 % are honest.
@@ -88,14 +95,13 @@ def with_interval(values: pd.Series, scale: float = 1.0, decimals: int = 1, *, s
     >>> with_interval(pd.Series([1.0, 2.0, 3.0]))
     '2.0 (−0.5 to 4.5)'
     """
-    known = scale * values[values.notna()]
+    known = values[values.notna()]
     if not len(known):
         return ""
     if len(known) < 2:
-        return f"{known.iloc[0]:.{decimals}f}"
-    mean, low, high = mean_interval(known)
-    if share:
-        low, high = max(low, 0.0), min(high, scale)
+        return f"{scale * known.iloc[0]:.{decimals}f}"
+    found = mean_share_interval(known) if share else mean_interval(known)
+    mean, low, high = (scale * end for end in found)
     return f"{mean:.{decimals}f} ({low:.{decimals}f} to {high:.{decimals}f})".replace("-", "\N{MINUS SIGN}")
 
 
@@ -118,7 +124,7 @@ def detections_table(spread: pd.DataFrame) -> pd.DataFrame:
         row = {"quantity": words}
         for kind in KINDS:
             row[kind] = (
-                with_interval(spread[kind, name], scale, decimals, share=PIXEL_UNITS[name] == "1")
+                with_interval(spread[kind, name], scale, decimals, share=scale == 100.0)
                 if (kind, name) in spread
                 else "not drawn"
             )
@@ -191,16 +197,19 @@ def turned(verdicts: pd.DataFrame) -> int:
 
 def bias_words(spread: pd.DataFrame) -> str:
     """What the detector's errors are like, beside those that a twin draws."""
-    ahead, right = (float(spread[RENDERED, name].median()) for name in ("bias_ahead", "bias_right"))
+    ahead = float(spread[RENDERED, "bias_ahead"].median())
     sd, rms = (float(spread[RENDERED, name].median()) for name in ("pixel_sd", "pixel_rms"))
     drawn = float(spread[DRAWN, "pixel_rms"].median())
-    share = (ahead**2 + right**2) / rms**2
+    # Of each flight: a median of squares over that of others may be above all of them.
+    shares = (spread[RENDERED, "bias_ahead"] ** 2 + spread[RENDERED, "bias_right"] ** 2) / spread[
+        RENDERED, "pixel_rms"
+    ] ** 2
     way = "behind" if ahead < 0 else "ahead of"
     ratio = rms / drawn
     beside = f"{1 / ratio:.1f} times smaller than" if ratio < 1 else f"{ratio:.1f} times as large as"
     return (
         f"The detector's errors are {beside} the drawn ones. On average they lie {abs(ahead):.2f} px {way} "
-        f"the vessel's point, and scatter by {sd:.2f} px; the bias is {100 * min(share, 1):.0f} % of their "
+        f"the vessel's point, and scatter by {sd:.2f} px; the bias is {100 * shares.median():.0f} % of their "
         "mean square."
     )
 

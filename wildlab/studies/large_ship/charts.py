@@ -26,7 +26,7 @@ def images_shown(taken: Photographs) -> Shown:
     reach = max(0.0, *beyond) + 25
     fig, axes = new_figure(5.9, 3.1, columns=2)
     said = []
-    for ax, row, name in zip(axes, (whole, part), ("Much of it", "A part of it"), strict=True):
+    for ax, row, name in zip(axes, (whole, part), ("Most in view", "Nearest to half"), strict=True):
         _, counts = taken.camera.image(int(plain.exposure[row]))
         low, high = np.quantile(counts, [0.01, 0.99])
         ax.imshow(counts, cmap="gray", vmin=low, vmax=high, interpolation="nearest")

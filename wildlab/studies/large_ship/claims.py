@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.studies.large_ship.trial import DETECTOR, NEAR_M, SUBJECTS, WITH, WITHOUT
 
@@ -30,35 +26,6 @@ def scatter_left(spread: pd.DataFrame) -> Array:
             for who in SUBJECTS
         ]
     return np.asarray(np.max(left, axis=0))
-
-
-@dataclass(frozen=True)
-class NearCheck(Check):
-    """Whether more lies within a limit with the adjustment than without: the threshold is the limit, m.
-
-    Attributes
-    ----------
-    shares
-        By the limit two (flights,) arrays, with the adjustment and without.
-    """
-
-    shares: Mapping[float, tuple[Array, Array]] = field(default_factory=dict)
-
-    def holds(self, threshold: float | None = None) -> NDArray[np.bool_]:
-        """(flights,) bool.
-
-        Raises
-        ------
-        WildlabError
-            If nothing was counted within that limit.
-        """
-        if threshold is None or threshold not in self.shares:
-            raise WildlabError(
-                f"nothing was counted within {threshold} m of the ship's centre",
-                f"use one of {', '.join(f'{one:g}' for one in self.shares)} as the claim's threshold",
-            )
-        one, other = self.shares[threshold]
-        return np.asarray(one > other)
 
 
 def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
@@ -91,7 +58,11 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
         "variance-increases": Check(
             true=(north[0] > north[1]) & (east[0] > east[1]), first=logged[0], second=logged[1], unit="m"
         ),
-        "more-near-centre": NearCheck(true=near > far, first=near, second=far, shares=shares),
+        "more-near-centre": Check(
+            by_threshold={limit: one > other for limit, (one, other) in shares.items()},
+            first=near,
+            second=far,
+        ),
         "mostly-a-part": Check(true=of("share_cut") > 0.5),
         "not-every-image-adjusted": Check(true=of("share_moved") < 1.0),
         "more-accurate-after-start": smaller("mae_after_start", "m"),

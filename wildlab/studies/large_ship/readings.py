@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.detection.floating import find_objects
-from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.pipeline.rendered import Marks, Shot, judge
+from wildlab.pipeline.rendered import Marks, Shot
 from wildlab.pipeline.track import start
 from wildlab.studies.large_ship.trial import (
     TUNING,
@@ -33,11 +31,24 @@ NAMES = (
 
 
 class Reading(NamedTuple):
-    """A reading: its words, whether centres are moved, and the track that it gives."""
+    """A way to read the images, and the track that it gives.
+
+    Attributes
+    ----------
+    words
+        What is read otherwise.
+    subject
+        Whether centres are moved.
+    tracked
+        What comes out.
+    beside
+        Words of the reading without the adjustment of the same images and noise.
+    """
 
     words: str
     subject: str
     tracked: Tracked
+    beside: str
 
 
 def shots_as_boxes(shots: list[Shot]) -> list[Shot]:
@@ -45,16 +56,6 @@ def shots_as_boxes(shots: list[Shot]) -> list[Shot]:
     return [
         shot._replace(detections=replace(shot.detections, axes=BOX * shot.detections.axes)) for shot in shots
     ]
-
-
-def shots_again(taken: Photographs, thresholds: FloatingThresholds) -> list[Shot]:
-    """The same images, searched with other thresholds."""
-    found = []
-    for shot in taken.shots:
-        view, counts = taken.camera.image(shot.exposure)
-        objects = find_objects(counts, thresholds=thresholds)
-        found.append(Shot(shot.exposure, view.seen, objects.detections, judge(view, objects)))
-    return found
 
 
 def with_own_covariance(taken: Photographs, marks: Marks) -> Tracked:
@@ -78,39 +79,45 @@ def readings_of(taken: Photographs) -> list[Reading]:
     """Every reading of one flight's images, the study's own two first."""
     moved, still = taken.marks(), taken.marks(np.nan)
     boxes = taken._replace(shots=shots_as_boxes(taken.shots))
-    wide = TUNING._replace(pixel=TUNING.measurement * taken.per_metre)
-    found = [
-        Reading("as it stands, adjusted", WITH, follow(taken, moved)),
-        Reading("as it stands, not adjusted", WITHOUT, follow(taken, still)),
-        Reading("a of (4.7) half of the axis", WITH, follow(taken, taken.marks(full_axis=False))),
-        Reading("a of (4.7) the length of a box", WITH, follow(taken, boxes.marks())),
-    ]
-    found += [
-        Reading(f"axes {ratio:g} to 1 at least", WITH, follow(taken, taken.marks(axis_ratio=ratio)))
-        for ratio in (1.2, 2.5)
-    ]
-    found += [
-        Reading(f"ship told {word} % {way}", WITH, follow(taken, taken.marks(factor * taken.length)))
-        for word, way, factor in ((10, "too short", 0.9), (10, "too long", 1.1))
-    ]
     half = taken._replace(shots=taken.shots[::2])
-    found += [
-        Reading("every second of these images, adjusted", WITH, follow(half, half.marks())),
-        Reading("every second of these images, not adjusted", WITHOUT, follow(half, half.marks(np.nan))),
+    wide = TUNING._replace(pixel=TUNING.measurement * taken.per_metre)
+
+    def pair(words: str, adjusted: Tracked, plain: Tracked) -> list[Reading]:
+        beside = f"{words}, not adjusted"
+        return [
+            Reading(f"{words}, adjusted", WITH, adjusted, beside),
+            Reading(beside, WITHOUT, plain, beside),
+        ]
+
+    as_it_stands = pair("as it stands", follow(taken, moved), follow(taken, still))
+    otherwise = {
+        "a of (4.7) half of the axis": taken.marks(full_axis=False),
+        "a of (4.7) the length of a box": boxes.marks(),
+        **{f"axes {ratio:g} to 1 at least": taken.marks(axis_ratio=ratio) for ratio in (1.2, 2.5)},
+        "ship told 10 % too short": taken.marks(0.9 * taken.length),
+        "ship told 10 % too long": taken.marks(1.1 * taken.length),
+    }
+    return [
+        *as_it_stands,
+        *(
+            Reading(words, WITH, follow(taken, marks), as_it_stands[1].words)
+            for words, marks in otherwise.items()
+        ),
+        *pair("every second of these images", follow(half, half.marks()), follow(half, half.marks(np.nan))),
+        *pair(f"filter's noise {wide.pixel:.0f} px", follow(taken, moved, wide), follow(taken, still, wide)),
+        *pair(
+            "each with its covariance", with_own_covariance(taken, moved), with_own_covariance(taken, still)
+        ),
     ]
-    found += [
-        Reading(f"filter's noise {wide.pixel:.0f} px, adjusted", WITH, follow(taken, moved, wide)),
-        Reading(f"filter's noise {wide.pixel:.0f} px, not adjusted", WITHOUT, follow(taken, still, wide)),
-        Reading("each with its covariance, adjusted", WITH, with_own_covariance(taken, moved)),
-        Reading("each with its covariance, not adjusted", WITHOUT, with_own_covariance(taken, still)),
-    ]
-    return found
 
 
 def readings_table(taken: Photographs, readings: list[Reading]) -> pd.DataFrame:
-    """Numbers of each reading: ``reading``, ``subject`` and `NAMES`."""
+    """Numbers of each reading: ``reading``, ``subject``, ``beside`` and `NAMES`."""
     rows = []
     for one in readings:
         numbers = numbers_of_track(taken, one.tracked)
-        rows.append({"reading": one.words, "subject": one.subject} | {name: numbers[name] for name in NAMES})
+        rows.append(
+            {"reading": one.words, "subject": one.subject, "beside": one.beside}
+            | {name: numbers[name] for name in NAMES}
+        )
     return pd.DataFrame(rows)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.runs import mean_interval
+from wildlab.evaluation.runs import mean_share_interval
 from wildlab.studies.large_ship.claims import scatter_left
-from wildlab.studies.large_ship.trial import DETECTOR, SLIVER, START_S, WITH, WITHOUT
+from wildlab.studies.large_ship.trial import AT_REST_M_S, DETECTOR, SLIVER, START_S, WITH, WITHOUT
 
 #: What the stated ellipses should hold.
 ELLIPSE = 0.9
@@ -46,14 +46,27 @@ LIMITS = [
 ]
 
 
-def limits(every: int) -> list[str]:
-    """`LIMITS`, and what it means that only every so many images are rendered."""
+def shown_words(flights: int, images: int, every: int) -> str:
+    """What was rendered of how many flights.
+
+    Examples
+    --------
+    >>> shown_words(1, 441, 4)
+    '1 simulated flight, one in 4 of its 441 images rendered'
+    """
+    whose = "its" if flights == 1 else "their"
+    part = f"all of {whose}" if every == 1 else f"one in {every} of {whose}"
+    return f"{flights} simulated flight{'s' * (flights != 1)}, {part} {images} images rendered"
+
+
+def limits(images: int, every: int) -> list[str]:
+    """`LIMITS`, and what it means that only every so many of the images are rendered."""
     if every == 1:
         return LIMITS
     return [
         *LIMITS,
-        f"Of the 441 images one in {every} is rendered, and the filter has as many fewer measurements than "
-        "that of the thesis: errors of its track and its time to rest are not those of all images.",
+        f"Of the {images} images one in {every} is rendered, and the filter has as many fewer measurements "
+        "than that of the thesis: errors of its track and its time to rest are not those of all images.",
     ]
 
 
@@ -162,8 +175,7 @@ def _over_flights(rates: pd.Series) -> str:
         return f"{100 * rates.mean():.1f} % (one flight)"
     if np.ptp(rates.dropna()) < 1e-12:  # flights that are all alike have no spread to make an interval of
         return f"{100 * rates.mean():.1f} % (on each of {int(rates.notna().sum())} flights)"
-    mean, low, high = mean_interval(rates)
-    low, high = max(low, 0.0), min(high, 1.0)
+    mean, low, high = mean_share_interval(rates)
     return f"{100 * mean:.1f} % (95 % interval {100 * low:.1f} to {100 * high:.1f} %, over flights)"
 
 
@@ -176,8 +188,7 @@ def ellipse_words(spread: pd.DataFrame) -> str:
             values = spread[subject, name]
             shown = f"{100 * values.mean():.0f} % {where}"
             if values.notna().sum() > 1:
-                _, low, high = mean_interval(values)
-                low, high = max(low, 0.0), min(high, 1.0)
+                _, low, high = mean_share_interval(values)
                 shown += f" ({100 * low:.0f} to {100 * high:.0f}"
                 if name == "ellipse_coverage_90":
                     words[subject] = (
@@ -214,22 +225,17 @@ def rest_words(spread: pd.DataFrame) -> str:
         times = spread[subject, "time_to_rest"]
         never = int(times.isna().sum())
         shown = f"after {times.median():.0f} s" if times.notna().any() else "never"
-        some = f", on {never} flights never" if never and shown != "never" else ""
+        some = f", on {never} flight{'s' * (never != 1)} never" if never and shown != "never" else ""
         parts.append(f"{NAMES[subject]} {shown}{some}")
-    return f"The estimated speed stays below 1 m/s: {'; '.join(parts)} (median)."
+    return f"The estimated speed stays below {AT_REST_M_S:g} m/s: {'; '.join(parts)} (median)."
 
 
 def readings_words(table: pd.DataFrame) -> str:
     """What the readings change in the comparison of both tracks."""
     moved, late = table[table["subject"] == WITH], table.set_index("reading")["mae_after_start"]
-    # Readings with another noise or other images have a track of their own without the adjustment.
-    own = [one.replace(", adjusted", ", not adjusted") for one in moved["reading"]]
-    base = [
-        late[one if one in late and one != mine else table["reading"].iloc[1]]
-        for one, mine in zip(own, moved["reading"], strict=True)
-    ]
-    better = moved[moved["mae_after_start"] < np.array(base)]
-    best, worst = (moved.loc[getattr(moved["mae_after_start"], end)()] for end in ("idxmin", "idxmax"))
+    better = moved[moved["mae_after_start"].to_numpy() < late[moved["beside"]].to_numpy()]
+    ordered = moved.sort_values("mae_after_start")
+    best, worst = ordered.iloc[0], ordered.iloc[-1]
     return (
         f"On the flight of the figures {len(better)} of {len(moved)} readings with the adjustment give a "
         "track nearer than the one without it of the same images and noise: from "

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import Interval, mean_interval, share_interval
+from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.reporting.text import percent
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 
@@ -134,9 +134,8 @@ def flights_words(spread: pd.DataFrame) -> str:
         rates = rates[np.isfinite(rates)]
         if len(rates) < 2 or np.ptp(rates) < 1e-12:
             continue
-        mean = mean_interval(rates)
-        low, high = (percent(min(max(end, 0.0), 1.0)) for end in mean[1:])
-        parts.append(f"{NAMES[subject]} {percent(mean.estimate)} ({low} to {high})")
+        mean, low, high = map(percent, mean_share_interval(rates))
+        parts.append(f"{NAMES[subject]} {mean} ({low} to {high})")
     if not parts:
         return "The rates are the same on all flights, or these are too few to say how they go over them."
     return f"Flight by flight, with the interval of their mean: {'; '.join(parts)}."
@@ -300,8 +299,7 @@ def ellipse_words(spread: pd.DataFrame) -> str:
             )
             parts.append(f"{some} for {NAMES[subject]} (too few flights for an interval)")
             continue
-        share = mean_interval(shares)
-        low, high = max(share.low, 0.0), min(share.high, 1.0)
+        share, low, high = mean_share_interval(shares)
         word = (
             "too small"
             if high < ELLIPSE
@@ -309,9 +307,7 @@ def ellipse_words(spread: pd.DataFrame) -> str:
             if low > ELLIPSE
             else f"{percent(ELLIPSE)} lies within"
         )
-        parts.append(
-            f"{percent(share.estimate)} ({percent(low)} to {percent(high)}: {word}) for {NAMES[subject]}"
-        )
+        parts.append(f"{percent(share)} ({percent(low)} to {percent(high)}: {word}) for {NAMES[subject]}")
     return (
         "The 90 % ellipse that goes with a centre holds the outline's true centre in "
         + " and ".join(parts)
