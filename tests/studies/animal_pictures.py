@@ -17,8 +17,7 @@ from wildlab.simulation.scene import (
     render_land,
     sensor_of,
 )
-from wildlab.simulation.scene.response import expose
-from wildlab.studies.wildlife_detection import trial
+from wildlab.simulation.scene.response import expose, to_counts
 from wildlab.studies.wildlife_detection.trial import (
     Picture,
 )
@@ -32,7 +31,7 @@ def picture_of(*bodies, height=30.0, weather=DARK, window=(-5.0, 20.0)):
     land = replace(EVEN_LAND, weather=weather)
     view = render_land(LandScene(land, bodies), CAMERA, [0.0, 0.0, -height], R_MC_DOWN)
     counts = expose(view.kelvin, IDEAL, sensor_of(IDEAL, (120, 180), np.random.default_rng(1)), None)
-    low, high = (trial.to_counts(weather.air + one, IDEAL) for one in window)
+    low, high = to_counts(weather.air + np.array(window), IDEAL).tolist()
     return Picture(view, counts, (low, high), height)
 
 

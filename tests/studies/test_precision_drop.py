@@ -131,6 +131,12 @@ def test_words_turn_with_the_numbers():
     assert "69.4 % of the mean square error" in text.mean_words(table(mean_error=10 / 3))
     assert "too narrow" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=0.5))
     assert "wider than" in text.pixel_words(table(tarpaulin_ellipse_coverage_90=1.0))
+    wide = table()
+    wide[FOUND, "ellipse_coverage_90"] = [0.8, 0.98]
+    assert "89.0 % (0 % to 100 %) of a flight's images, on the mean: they are not told from right" in (
+        text.pixel_words(wide)
+    )
+    assert "90.0 % of the images of the one flight." in text.pixel_words(table().head(1))
     assert "All of the tarpaulin" in text.pixel_words(table(tarpaulin_area_share=1.02))
     assert "12 have a sky" in text.horizon_words(table()) and "let 0 of these" in text.horizon_words(table())
     assert "let 6 of these" in text.horizon_words(table(horizon_alarms_with_borders=0.25))

@@ -225,15 +225,42 @@ def test_who_is_told_from_the_best():
 
 def test_words_on_the_sun_that_comes_out_turn(numbers):
     both = text.change_words(spread_of(numbers))
-    assert both.endswith("; the adaptive threshold copes.")
+    copes = "the adaptive threshold copes and loses nothing (0 to 0 %)"
+    assert both.endswith(f"{copes}, the constant one copes and loses nothing (0 to 0 %).")
     better = text.change_words(spread_of(numbers, constant__invented_after=9.0))
-    assert better.endswith("; the adaptive threshold copes, the constant one does not.")
+    assert better.endswith(f"{copes}, the constant one does not cope and loses 53 % of it (53 to 53 %).")
     name = text.NAMES[CONSTANT]
     assert f"{name} from 1.00 (" in better and ") to 0.47 (" in better
     neither = text.change_words(spread_of(numbers, adaptive_offset__invented_after=8.0))
-    assert neither.endswith("the adaptive threshold loses 50 % of its F1, the constant one nothing.")
+    assert "the adaptive threshold does not cope and loses 50 % of it" in neither
     none = text.change_words(spread_of(numbers, constant__found_before=0.0, constant__missed_before=4.0))
-    assert none.endswith("where nothing was found before, nothing can be said to cope.")
+    assert none.endswith("the constant one cannot be said to cope, as it found nothing before.")
+    some = spread_of(numbers)
+    some.loc[:3, [(CONSTANT, "missed_after")]] = 6.0
+    assert "whether it copes is not told" in text.change_words(some)
+    assert "too few flights to say whether it copes" in text.change_words(some.head(3))
+    falls = text.change_words(spread_of(numbers, ground__level_after=20.0))
+    assert "the ground falls by 40 grey levels" in falls
+
+
+def test_copes_is_read_as_in_the_claims():
+    of = {one["id"]: float(one.get("threshold", 0)) for one in load_claims("wildlife-detection")}
+    assert of["constant-fails"] == of["adaptive-copes"] == text.FALL
+
+
+def test_a_fall_has_the_interval_of_seeds_drawn_again():
+    before = np.tile([4.0, 0.0, 0.0], (40, 1))
+    after = np.where(np.arange(40)[:, None] % 2, before, [0.0, 0.0, 4.0])
+    found = claims.fall_interval(before, after)
+    # F1 from 1 to 2 k / (k + n), where k of n = 40 seeds are drawn that keep all.
+    k = np.random.default_rng(3).binomial(40, 0.5, 100_000)
+    assert found.estimate == pytest.approx(1 - 2 * 20 / 60)
+    assert [found.low, found.high] == pytest.approx(
+        np.percentile(1 - 2 * k / (k + 40), [2.5, 97.5]), abs=0.03
+    )
+    few = claims.fall_interval(before[:4], after[:4])
+    assert np.isfinite(few.estimate) and np.isnan(few.low)
+    assert np.isnan(claims.fall_interval(0 * before, after).estimate)
 
 
 def test_a_threshold_under_two_names_is_said_to_be_one(numbers):
@@ -284,15 +311,28 @@ def test_the_reading_is_that_with_the_largest_rates(numbers):
 def test_words_on_pieces_herd_and_sun_turn(numbers):
     assert "With no reading of it" in text.pieces_words(spread_of(numbers))
     split = spread_of(numbers, adaptive_51__pieces_offset=2.5, adaptive_51__pieces_floor_0=np.nan)
-    assert "12 of 12 images with “above the mean of the block by 65”" in text.pieces_words(split)
+    alone = text.pieces_words(split)
+    assert "12 of 12 images (76 to 100 %) with “above the mean of the block by 65”, more often" in alone
     table = text.pieces_table(split).set_index("reading")
     assert table.loc["above the mean of the block by 65", "small"] == "2.50"
     assert table["seeds"].tolist() == [12, 12, 0]
     more = spread_of(numbers, adaptive_51__pieces=2.5)
-    assert "with more than one reading" in text.pieces_words(more)
-    assert "the median finds no more" in text.herd_words(spread_of(numbers))
+    assert "not told from “above the mean of the block, and above 150”" in text.pieces_words(more)
+    more.loc[:1, [(SMALL, "pieces_offset_65")]] = 1.0
+    assert "12 of 12 images" in text.pieces_words(more) and "not told from" in text.pieces_words(more)
+    words = text.herd_words(spread_of(numbers))
+    assert "changes the mean by +20.0 (+20.0 to +20.0) grey levels and the median by +2.0 (" in words
+    assert "the median finds as many (+0 to +0)" in words
     blind = spread_of(numbers, mean_constant__missed_herd=4.0)
-    assert "the median finds 50 in a hundred more" in text.herd_words(blind)
+    assert "the median finds 50 in a hundred more (+50 to +50)" in text.herd_words(blind)
+    worse = text.herd_words(spread_of(numbers, median_constant__missed_herd=4.0, herd__mean=-3.0))
+    assert "the median finds 50 in a hundred fewer (−50 to −50)" in worse and "the mean by −3.0 (" in worse
+    one = spread_of(numbers)
+    one.loc[0, [(BY_MEAN, "missed_herd")]] = 4.0
+    assert "that the median finds 4 in a hundred more is not told from chance (−5 to +13)" in text.herd_words(
+        one
+    )
+    assert "in a hundred more is not told from chance, with F1" in text.herd_words(one.head(1))
     assert "sunny noon 3" in text.sun_words(spread_of(numbers, ground__as_warm_noon=3.0))
 
 
@@ -321,7 +361,24 @@ def test_charts_say_what_they_show(numbers):
     assert "constant 150 100 %, 100 %, 25 %, 100 %" in recall[2]
     assert recall[0].axes[0].get_title(loc="left") == "Fewest animals are found at a sunny noon"
     assert false[0].axes[0].get_title(loc="left") == "Most false alarms come on a clear morning"
-    assert "15 m constant 150 (1.00)" in charts.heights_shown(spread_of(numbers))[2]
+    # Where seeds differ as much as weathers do, none is named alone.
+    alike = spread_of(numbers, constant__missed_noon=12.0, constant__missed_night=12.0)
+    fewest = charts.by_weather_shown(alike)[0][0].axes[0].get_title(loc="left")
+    assert fewest == "Fewest animals are found on a clear night or at a sunny noon"
+    even, none = (one[0].axes[0].get_title(loc="left") for one in charts.by_weather_shown(spread_of(numbers)))
+    assert even == "In no one weather clearly the fewest animals are found"
+    assert none == "In no one weather clearly the most false alarms come"
+    assert "15 m constant 150 1.00 (" in charts.heights_shown(spread_of(numbers))[2]
+
+
+def test_the_worst_weather_is_told_seed_by_seed():
+    rng = np.random.default_rng(1)
+    base = rng.normal(0, 5, 12)
+    values = {"a": base, "b": base + 1 + rng.normal(0, 0.2, 12), "c": base + rng.normal(0, 0.2, 12)}
+    assert claims.extremes(values, 1.0) == ["b"]
+    assert set(claims.extremes(values, -1.0)) == {"a", "c"}
+    assert len(claims.extremes({name: one[:1] for name, one in values.items()}, 1.0)) == 3
+    assert claims.extremes(values | {"d": np.full(12, np.nan)}, 1.0)[0] == "b"
 
 
 def test_printed_settings_are_the_theses():
@@ -344,22 +401,43 @@ def test_widths_are_told_apart(numbers):
     table = claims.over_windows(spread).set_index(["width", "reading"])
     assert table.loc[(3.0, "offset"), SUBTRACTED] == 0.5 == table.loc[(1.0, "floor"), "after"]
     assert (table.drop(index=[(3.0, "offset")])[SUBTRACTED] == 1).all()
+    assert (
+        table["tied"].sum() == 6 and not table["tied"][(3.0, "offset")] and not table["tied"][(1.0, "floor")]
+    )
+    assert tuple(table.loc[(1.0, "floor"), ["fall", "fall_low", "fall_high"]]) == (0.5, 0.5, 0.5)
+    assert table["mean"][(3.0, "offset")] == 0.9
+    # One seed of twelve tells nothing apart.
+    spread = spread_of(numbers)
+    spread.loc[0, [(trial.read_subject(SUBTRACTED, "offset", 3.0), f"missed_{trial.READ_AT[0]}")]] = 4.0
+    assert claims.over_windows(spread)["tied"].all()
+    assert claims.over_windows(spread.head(2))["tied"].all()
 
 
 def test_words_on_windows_turn():
-    names = ["width", "reading", *PRINTED, "before", "after"]
-    rows = [(1.0, "floor", 0.5, 0.5, 0.5, 0.9, 0.5), (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.8)]
-    words = text.windows_words(pd.DataFrame(rows, columns=names))
+    names = ["width", "reading", *PRINTED, "before", "after", "mean", "tied", "fall", "fall_low", "fall_high"]
+    rows = [
+        (1.0, "floor", 0.5, 0.5, 0.5, 0.9, 0.5, 0.58, False, 0.44, 0.4, 0.5),
+        (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.8, 0.88, True, 0.11, 0.05, 0.15),
+    ]
+
+    def said():
+        return text.windows_words(pd.DataFrame(rows, columns=names))
+
+    words = said()
     assert "the level” with 1 times (0.58)" in words and "by the level” with 2 times (0.88)" in words
-    assert "copes when the sun comes out: F1 goes from 0.90 to 0.80" in words
-    rows[1] = (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.5)
-    rows.append((2.0, "floor", 0.1, 0.1, 0.1, 0.7, 0.2))
-    worse = text.windows_words(pd.DataFrame(rows, columns=names))
+    assert (
+        "F1 goes from 0.90 to 0.80 when the sun comes out: it copes and loses 11 % of it (5 to 15 %)" in words
+    )
+    rows[1] = (*rows[1][:-3], 0.11, 0.05, 0.3)
+    assert "it loses 11 % of it (5 to 30 %): whether it copes is not told" in said()
+    rows[1] = (2.0, "offset", 0.9, 0.9, 0.9, 0.9, 0.5, 0.82, True, 0.44, 0.3, 0.5)
+    rows.append((2.0, "floor", 0.1, 0.1, 0.1, 0.7, 0.2, 0.24, False, 0.7, 0.6, 0.8))
+    worse = said()
     assert "does not cope" in worse and worse.endswith("read the other way, from 0.70 to 0.20.")
-    rows.append((3.0, "floor", 0.9, 0.9, 0.9, 0.9, 0.5))
-    tied = text.windows_words(pd.DataFrame(rows, columns=names))
-    assert "With the best of 4," in tied and "1 more of which is equal to two digits" in tied
-    assert "equal to two digits" not in worse
+    rows.append((3.0, "floor", 0.9, 0.9, 0.9, 0.9, 0.5, 0.82, True, 0.44, 0.3, 0.5))
+    tied = said()
+    assert "With the best of 4," in tied and "1 more of which is not told from it" in tied
+    assert "not told from it" not in worse
     assert "taken" not in text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
 
 

@@ -222,6 +222,10 @@ def test_the_same_seed_is_the_same_land():
         (lambda: rolling_land(Weather(), shares=(0.5, 0.6, 0.1)), "three that sum to one"),
         (lambda: animal("whale", Weather()), "use one of: rhinoceros"),
         (lambda: render_land(LandScene(EVEN_LAND), CAMERA, [0, 0, 1.0], R_MC_DOWN), "raise the camera"),
+        (
+            lambda: render_land(LandScene(hilly()), CAMERA, [32.0, 0, -3.5], R_MC_DOWN),
+            "-0.5 m above the ground. .*below -4 m",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(make, words):

@@ -210,7 +210,7 @@ def test_outlines_are_exact_projections():
 
 
 def test_a_camera_under_water_is_refused():
-    with pytest.raises(WildlabError, match="negative down coordinate") as error:
+    with pytest.raises(WildlabError, match="camera -1 m above the sea") as error:
         render(Scene(EVEN), CAMERA, [0.0, 0.0, 1.0], R_MC_DOWN)
     assert error.value.field == "p_nc"
 

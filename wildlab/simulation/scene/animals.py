@@ -14,7 +14,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.simulation.scene.bodies import Body, Hot, Layer, rectangle
+from wildlab.simulation.scene.bodies import Body, Hot, Layer, oval, rectangle
 from wildlab.simulation.scene.ground import ROCK, SHADOW_DEPTH, Cover, Weather
 
 #: Temperature of the blood, K.
@@ -23,6 +23,8 @@ BLOOD = 310.15
 LEAVES = Cover(heating=4.0, cooling=0.5, lag=0.3, texture_sd=0.3)
 #: How much of its height an animal's trunk has, from the belly up; the rest is legs.
 _BELLY_TO_BACK = 0.65
+#: How warm head and tail are, as shares of the trunk's back: extremities are cooler.
+HEAD, TAIL = 0.75, 0.5
 #: What the sun adds to an animal's back, K, for a sun straight above.
 SUNNED = 4.0
 
@@ -56,15 +58,6 @@ ANIMALS = {
 }
 
 
-def _oval(
-    length: float, width: float, ahead: float = 0.0, right: float = 0.0, corners: int = 10
-) -> tuple[tuple[float, float], ...]:
-    angles = 2 * np.pi * np.arange(corners) / corners
-    return tuple(
-        (float(ahead + length / 2 * np.cos(a)), float(right + width / 2 * np.sin(a))) for a in angles
-    )
-
-
 def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
     """An animal: a trunk, warmest over the shoulders, with a cooler head and tail.
 
@@ -94,23 +87,23 @@ def animal(kind: str, weather: Weather, seed: int = 0) -> Body:
     skin = k.bare * (BLOOD - weather.air) + sun
     uneven = 0.06 * k.bare * (BLOOD - weather.air)
     front = k.length / 2
-    head = _oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.2 * k.head * k.length, corners=8)
-    tail = _oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.05 * k.length, corners=4)
+    head = oval(k.head * k.length, 0.5 * k.width, ahead=front + 0.2 * k.head * k.length, corners=8)
+    tail = oval(0.2 * k.length, 0.1 * k.width, ahead=-front - 0.05 * k.length, corners=4)
     shoulders = Hot(0.2 * k.length, 0.0, 0.3 * k.width, 0.12 * skin)
     # The trunk in as many levels that a camera 60 degrees aside sees no ground between them.
     levels = int(np.ceil(_BELLY_TO_BACK * k.height * np.tan(np.radians(60)) / (0.6 * k.width)))
     trunk = []
     for share in np.linspace(0.0, 1.0, levels):
         slim = 1 - 0.2 * share**2
-        outline = _oval(slim * k.length, slim * k.width)
+        outline = oval(slim * k.length, slim * k.width, corners=10)
         high = (1 - _BELLY_TO_BACK * (1 - share)) * k.height
         hot = (shoulders,) if share == 1 else ()
         trunk.append(
             Layer(outline, float(high), float(0.85 + 0.15 * share) * skin, uneven, 0.2 * k.length, hot)
         )
     ends = (
-        Layer(tail, 0.65 * k.height, 0.5 * skin),
-        Layer(head, 0.65 * k.height, 0.75 * skin, uneven, 0.1 * k.length),
+        Layer(tail, 0.65 * k.height, TAIL * skin),
+        Layer(head, 0.65 * k.height, HEAD * skin, uneven, 0.1 * k.length),
     )
     layers = tuple(sorted((*ends, *trunk), key=lambda layer: layer.height))
     return Body(kind, layers, texture_seed=seed)
@@ -184,7 +177,7 @@ def tree(crown: float, weather: Weather, seed: int = 0) -> Body:
     """
     excess = weather.level(LEAVES) - weather.air
     layers = tuple(
-        Layer(_oval(share * crown, share * crown), high * crown, excess, 0.5, 0.15 * crown)
+        Layer(oval(share * crown, share * crown, corners=10), high * crown, excess, 0.5, 0.15 * crown)
         for share, high in ((1.0, 0.5), (0.7, 0.85))
     )
     return Body("tree", layers, texture_seed=seed)

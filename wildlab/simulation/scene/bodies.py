@@ -172,9 +172,12 @@ def hull(length: float, beam: float, bow: float = 0.25) -> tuple[tuple[float, fl
     return tuple((float(a - ahead), float(b)) for a, b in corners)
 
 
-def _disc(radius: float, corners: int = 12, stretch: float = 1.0) -> tuple[tuple[float, float], ...]:
+def oval(
+    length: float, width: float, ahead: float = 0.0, corners: int = 12
+) -> tuple[tuple[float, float], ...]:
+    """Corners on an ellipse, its middle so far ahead, m in the body's axes."""
     angles = 2 * np.pi * np.arange(corners) / corners
-    return tuple((float(stretch * radius * np.cos(a)), float(radius * np.sin(a))) for a in angles)
+    return tuple((float(ahead + length / 2 * np.cos(a)), float(width / 2 * np.sin(a))) for a in angles)
 
 
 def vessel(
@@ -267,22 +270,24 @@ def boat(seed: int = 0) -> Body:
 
 def person(seed: int = 0) -> Body:
     """Somebody in the water: head and shoulders above it."""
-    shoulders = _disc(0.25, stretch=0.7)
-    return Body("person", (Layer(shoulders, 0.05, 6.0), Layer(_disc(0.12), 0.3, 12.0)), texture_seed=seed)
+    shoulders = oval(0.35, 0.5)
+    return Body(
+        "person", (Layer(shoulders, 0.05, 6.0), Layer(oval(0.24, 0.24), 0.3, 12.0)), texture_seed=seed
+    )
 
 
 def buoy(seed: int = 0) -> Body:
     """A buoy of a metre and a half, warmed by the sun."""
     return Body(
         "buoy",
-        (Layer(_disc(0.75), 0.0, 5.0, 0.3, 0.5), Layer(_disc(0.6), 0.8, 7.0, 0.3, 0.5)),
+        (Layer(oval(1.5, 1.5), 0.0, 5.0, 0.3, 0.5), Layer(oval(1.2, 1.2), 0.8, 7.0, 0.3, 0.5)),
         texture_seed=seed,
     )
 
 
 def mammal(seed: int = 0) -> Body:
     """The wet back of a whale at the surface: large, and hardly warmer than the sea."""
-    return Body("mammal", (Layer(_disc(0.9, stretch=3.2), 0.15, 1.6, 0.3, 0.8),), texture_seed=seed)
+    return Body("mammal", (Layer(oval(5.76, 1.8), 0.15, 1.6, 0.3, 0.8),), texture_seed=seed)
 
 
 #: Small things by name.

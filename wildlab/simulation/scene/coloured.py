@@ -20,7 +20,7 @@ from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.simulation.clipped_outlines import visible_part
-from wildlab.simulation.scene.render import pixel_coordinates
+from wildlab.simulation.scene.render import check_above, pixel_coordinates
 
 Colour = tuple[float, float, float]
 
@@ -170,12 +170,7 @@ def render_colour(
     ([31.5, 17.5], 128)
     """
     p, R = np.asarray(p_nc, float), np.asarray(R_nc, float)
-    if not p[2] < 0:
-        raise WildlabError(
-            f"a camera {-p[2] + 0.0:g} m above the ground",
-            "give a position with a negative down coordinate",
-            field="p_nc",
-        )
+    check_above(p, "ground")
     rays = _rays(camera)
     down = _component(rays, R[2])
     sky = np.asarray(down <= 1e-6)

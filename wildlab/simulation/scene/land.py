@@ -12,13 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
 from wildlab.simulation.scene import ground_kernels as kernels
 from wildlab.simulation.scene.bodies import Body
 from wildlab.simulation.scene.ground import CLOUDS, SHADOW_DEPTH, SUNLIT_UNEVEN, UNEVEN, Land
-from wildlab.simulation.scene.render import Seen, draw_bodies, pixel_coordinates
+from wildlab.simulation.scene.render import Seen, check_above, draw_bodies, pixel_coordinates
 
 #: How much colder than the air a clear sky is, and a closed cover of clouds, K.
 CLEAR_SKY, CLOUDED_SKY = 35.0, 4.0
@@ -94,11 +93,7 @@ def render_land(scene: LandScene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLi
     (160.0, [31.5, 23.5])
     """
     p, R, land = np.asarray(p_nc, float), np.asarray(R_nc, float), scene.land
-    below = height_at(land, p[:2])
-    if not -p[2] > below:
-        raise WildlabError(
-            f"a camera at {-p[2]:g} m over ground of {below:g} m", "raise the camera", field="p_nc"
-        )
+    check_above(p, "ground", height_at(land, p[:2]))
     shape = (camera.height, camera.width)
     kelvin, ground = np.empty(shape, np.float32), np.empty(shape, bool)
     tiles = (land.relief, land.warmth, land.uneven[..., None], land.shadow[..., None])

@@ -133,12 +133,7 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
     (160.0, [31.5, 23.5])
     """
     p, R = np.asarray(p_nc, float), np.asarray(R_nc, float)
-    if not p[2] < 0:
-        raise WildlabError(
-            f"a camera {-p[2]:g} m above the sea",
-            "give a position with a negative down coordinate",
-            field="p_nc",
-        )
+    check_above(p, "sea")
     rays = pixel_coordinates(camera)
     kelvin = np.empty((camera.height, camera.width), np.float32)
     water = np.empty(kelvin.shape, bool)
@@ -153,6 +148,32 @@ def render(scene: Scene, camera: Camera, p_nc: ArrayLike, R_nc: ArrayLike, time:
     places = [p] * len(scene.bodies)
     seen = draw_bodies(scene.bodies, camera, places, R, time, sea.temperature, kelvin, labels)
     return View(kelvin, labels, water, seen)
+
+
+def check_above(p: Array, what: str, height: float = 0.0) -> None:
+    """Refuses a camera that is not above what it looks at.
+
+    Parameters
+    ----------
+    p
+        (3,) position of the camera, m.
+    what
+        It looks at, for the sentence.
+    height
+        Of that below the camera, m above zero down.
+
+    Raises
+    ------
+    WildlabError
+        Where the camera is not above it.
+    """
+    over = float(-p[2] - height) + 0.0  # no minus zero
+    if not over > 0:
+        raise WildlabError(
+            f"a camera {over:g} m above the {what}",
+            f"raise the camera: down counts from zero, and must be below {0.0 - height:g} m",
+            field="p_nc",
+        )
 
 
 def draw_bodies(

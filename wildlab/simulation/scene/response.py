@@ -121,10 +121,15 @@ def expose(
     seen = seen + sensor.offset
     if response.noise > 0:
         seen += np.float32(response.noise) * rng.standard_normal(seen.shape, np.float32)
-    counts = response.counts_level + (seen - np.float32(response.counts_at)) * response.counts_per_kelvin
-    counts = np.clip(np.rint(counts), 0, LARGEST).astype(np.uint16)
+    counts = np.clip(np.rint(to_counts(seen, response)), 0, LARGEST).astype(np.uint16)
     counts[sensor.dead] = sensor.stuck[sensor.dead]
     return np.asarray(counts)
+
+
+def to_counts(kelvin: ArrayLike, response: CameraResponse) -> NDArray[Any]:
+    """Counts of kelvin, by the gain and the level of ``response``, neither rounded nor cut."""
+    above = np.asarray(kelvin) - np.float32(response.counts_at)
+    return np.asarray(response.counts_level + above * response.counts_per_kelvin)
 
 
 def to_kelvin(counts: NDArray[np.integer], response: CameraResponse) -> NDArray[np.float32]:

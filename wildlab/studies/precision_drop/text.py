@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from wildlab.evaluation.matching import group_draws, percentile
 from wildlab.evaluation.runs import Interval, mean_interval, share_interval
 from wildlab.reporting.text import percent
 from wildlab.studies.precision_drop.trial import COUNTS, FEW_PX, FOUND, HORIZON, MEAN, SINGLE
@@ -20,13 +21,13 @@ on the ground by H (5.13), with the poses that the autopilot states at the compu
 positions is where one would drop. A detection whose pixel is not on the tarpaulin is a false alarm, and so is
 one in an image without it.
 
-Images with the horizon are rendered apart: the twin's camera never sees it. They show ground and sky from
+Images with the horizon are rendered apart, whatever the twin's camera sees. They show ground and sky from
 100 m, the horizon level and anywhere in the upper half, and no tarpaulin. Intervals of shares of images take
 the images for independent, and those of one flight are alike: they are rather too narrow."""
+#: What the detector's ellipses are to hold.
+ELLIPSE = 0.9
 #: From which share of the detections on their mean is worth about as many independent ones.
 NEARLY_ALL = 0.7
-#: How often flights are drawn again for an interval.
-DRAWN_AGAIN = 2000
 
 
 def pooled(spread: pd.DataFrame, count: str, of: str) -> Interval:
@@ -47,13 +48,13 @@ def worth(spread: pd.DataFrame) -> float:
 
 
 def worth_interval(spread: pd.DataFrame) -> tuple[float, float] | None:
-    """95 % interval of `worth`, from flights drawn again and again; None where there are fewer than three."""
-    if len(spread) < 3:
+    """95 % interval of `worth`, from flights drawn with replacement; None of too few."""
+    weights = group_draws(len(spread))
+    if weights is None:
         return None
     single, mean = (spread[one].to_numpy(float) ** 2 for one in ((SINGLE, "rms_error"), (MEAN, "error")))
-    drawn = np.random.default_rng(0).integers(0, len(spread), (DRAWN_AGAIN, len(spread)))
-    low, high = np.percentile(single[drawn].mean(axis=1) / mean[drawn].mean(axis=1), [2.5, 97.5])
-    return float(low), float(high)
+    drawn = (weights @ single) / (weights @ mean)
+    return percentile(drawn, 2.5), percentile(drawn, 97.5)
 
 
 def common(spread: pd.DataFrame) -> float:
@@ -120,25 +121,34 @@ def pixel_words(spread: pd.DataFrame) -> str:
     """How well the centre is found, what that is on the ground, and whether the ellipses know it."""
     error, off = (float(spread[FOUND, name].median()) for name in ("pixel_error", "off_centre"))
     few = float(spread[FOUND, "few_pixels"].median())
-    share, coverage = (float(spread[FOUND, name].median()) for name in ("area_share", "ellipse_coverage_90"))
+    share = float(spread[FOUND, "area_share"].median())
     seen = (
-        f"What is found covers {percent(share)} of the tarpaulin on the median flight (its rim is too pale); "
+        f"What is found covers {percent(share)} of the tarpaulin on the median flight; "
         if share < 1
         else "All of the tarpaulin is found; "
-    )
-    known = (
-        "wider than the errors ask for: they allow for a part that is missed on one side only"
-        if coverage > 0.95
-        else "about right"
-        if coverage >= 0.85
-        else "too narrow"
     )
     return (
         f"{seen}its centre is {error:.2f} px from that of the tarpaulin on average, and the mean of these "
         f"differences is {off:.2f} px. {FEW_PX:.0f} px are {few:.1f} m on the ground. The detector's own "
-        f"ellipses (90 %) hold the true centre in {percent(coverage)} of the images of the median flight: "
-        f"they are {known}."
+        f"ellipses ({percent(ELLIPSE)}) hold the true centre in {_coverage(spread)}."
     )
+
+
+def _coverage(spread: pd.DataFrame) -> str:
+    """In which share of a flight's images an ellipse holds the centre, and what that says of it."""
+    shares = spread[FOUND, "ellipse_coverage_90"]
+    if len(spread) < 2:
+        return f"{percent(float(shares.mean()))} of the images of the one flight"
+    found = mean_interval(shares)
+    found = found._replace(low=max(found.low, 0.0), high=min(found.high, 1.0))
+    known = (
+        "wider than the errors ask for: they allow for a part that is missed on one side only"
+        if found.low > ELLIPSE
+        else "too narrow"
+        if found.high < ELLIPSE
+        else "not told from right"
+    )
+    return f"{with_interval(found)} of a flight's images, on the mean: they are {known}"
 
 
 def horizon_words(spread: pd.DataFrame) -> str:

@@ -18,7 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
-from wildlab.geometry.frames import Array
+from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
 from wildlab.geometry.uncertainty import inside_ellipse
@@ -224,7 +224,7 @@ def horizon_views(camera: Camera, look: Look, seed: int, images: int) -> list[Co
     for _ in range(images):
         row = rng.uniform(0.0, camera.height / 2)
         tilt = np.pi / 2 - np.arctan2(camera.cy - row, camera.fy)
-        turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+        turn = euler_to_matrix(0.0, float(tilt), 0.0)
         views.append(render_colour(look.ground, None, camera, [0.0, 0.0, -100.0], turn @ R_MC_DOWN, rng))
     return views
 

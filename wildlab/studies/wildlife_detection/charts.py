@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from wildlab.detection.warm import Warm
+from wildlab.evaluation.runs import Interval
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, new_figure
 from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_detection import text as words
@@ -147,7 +148,8 @@ def by_weather_shown(spread: pd.DataFrame) -> list[Shown]:
     """Recall, and false alarms an image, by weather and method with their intervals."""
     methods = (CONSTANT, OVER_MEAN, SUBTRACTED, ENHANCED, BY_SIZE)
     shown: list[Shown] = []
-    for what in ("recall", "false"):
+    kinds: tuple[Literal["recall", "false"], ...] = ("recall", "false")
+    for what in kinds:
         fig, ax = new_figure(5.6, 3.9)
         values: dict[str, list[float]] = {}
         for k, method in enumerate(methods):
@@ -172,18 +174,14 @@ def by_weather_shown(spread: pd.DataFrame) -> list[Shown]:
                 values[method].append(one.estimate)
         ax.set_yticks(range(len(WEATHERS)), [words.WHEN[one] for one in WEATHERS])
         ax.set_ylim(len(WEATHERS) - 0.5, -0.5)
-        order = list(WEATHERS)
-        mean = np.array([np.nanmean([values[m][k] for m in methods]) for k in range(len(order))])
         if what == "recall":
-            worst = words.AT[order[int(np.nanargmin(mean))]]
             ax.set(xlabel="animals found (%)", xlim=(-2, 102))
-            title, of = f"Fewest animals are found {worst}", "Share of animals found"
+            of = "Share of animals found"
         else:
-            worst = words.AT[order[int(np.nanargmax(mean))]]
             ax.set(xlabel="false alarms an image")
-            ax.set_xlim(left=-0.02 * max(float(np.nanmax(mean)), 1.0))
-            title, of = f"Most false alarms come {worst}", "False alarms an image"
-        ax.set_title(title)
+            ax.set_xlim(left=-0.02 * max(float(np.nanmax([*values.values()])), 1.0))
+            of = "False alarms an image"
+        ax.set_title(words.worst_words(spread, methods, what))
         fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         said = "; ".join(
             f"{_SHORT[m]} " + ", ".join(percent(v, 0) if what == "recall" else f"{v:.1f}" for v in values[m])
@@ -192,7 +190,7 @@ def by_weather_shown(spread: pd.DataFrame) -> list[Shown]:
         shown.append(
             (
                 fig, f"weather-{what}",
-                f"{of} by weather ({', '.join(words.WHEN[one] for one in order)}): {said}.",
+                f"{of} by weather ({', '.join(words.WHEN[one] for one in WEATHERS)}): {said}.",
                 "Bars: 95 % interval over images of all heights.",
             )
         )  # fmt: skip
@@ -205,21 +203,21 @@ def heights_shown(
     """F1 by height without sun."""
     dark = [weather for weather in WEATHERS if weather != NOON]
     fig, ax = new_figure(5.6, 3.4)
-    best: dict[int, tuple[str, float]] = {}
+    best: dict[int, tuple[str, Interval]] = {}
     for k, method in enumerate(methods):
         found = [rates_of(spread, method, places(dark, [height])).f1 for height in VIEWS]
         x = np.arange(len(VIEWS)) + 0.08 * (k - 1.5)
         ax.vlines(x, [one.low for one in found], [one.high for one in found], color=_COLOURS[method], lw=2)
         ax.plot(x, [one.estimate for one in found], "o-", color=_COLOURS[method], label=_SHORT[method])
         for height, one in zip(VIEWS, found, strict=True):
-            if height not in best or one.estimate > best[height][1]:
-                best[height] = (method, one.estimate)
+            if height not in best or one.estimate > best[height][1].estimate:
+                best[height] = (method, one)
     ax.set_xticks(range(len(VIEWS)), [f"{height} m" for height in VIEWS])
     ax.set(ylabel="F1", ylim=(-0.02, 1.02), xlabel="height above the ground")
-    lowest = min(best, key=lambda one: best[one][1])
-    ax.set_title(f"The best comes to {best[lowest][1]:.2f} at least, at {lowest} m")
+    lowest = min(best, key=lambda one: best[one][1].estimate)
+    ax.set_title(f"From {lowest} m the best F1 is {words.ranged(best[lowest][1])}")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
-    said = ", ".join(f"{height} m {_SHORT[m]} ({value:.2f})" for height, (m, value) in best.items())
+    said = ", ".join(f"{height} m {_SHORT[m]} {words.ranged(value)}" for height, (m, value) in best.items())
     return (
         fig, "heights", f"F1 by height without noon's sun; the best are: {said}.",
         "Night, morning and clouds together; bars are 95 % intervals over images.",

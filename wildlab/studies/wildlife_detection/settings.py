@@ -2,58 +2,125 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
+from wildlab.simulation.scene.animals import ANIMALS, HEAD, TAIL
+from wildlab.simulation.scene.drawn_land import LandDraw
+from wildlab.simulation.scene.ground import (
+    CLOUD_BLANKET,
+    GRASS,
+    ROCK,
+    SAND,
+    SHADOW_DEPTH,
+    Cover,
+    Weather,
+    rolling_land,
+)
 from wildlab.studies.wildlife_detection.text import NAMES, READ_AS
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
+    AREA,
     BY_MEAN,
     BY_MEDIAN,
     CONSTANT,
     ENHANCED,
+    HOTTEST,
     LARGE,
     METHODS,
+    MORNING,
+    NIGHT,
+    NOON,
     OVER_MEAN,
     SMALL,
+    SMALLEST,
     SUBTRACTED,
+    VIEWS,
+    WEATHERS,
+    WINDOW,
 )
 
-#: What F leaves open about scenes and pictures, its value here, and why.
-CHOSEN = (
-    ("hours", "night 2, morning 8, noon 13", "before dawn, two hours after sunrise, and when ground is hot"),
-    (
-        "ground",
-        "70 % grass, 20 % sand, 10 % rock",
-        "an enclosure: mostly meadow, with trodden and stony places",
-    ),
-    (
-        "relief",
-        "2 m standard deviation, hills of some 60 m",
-        "gently rolling, so that no hill hides an animal",
-    ),
-    ("grass", "+12 K in full sun, -4 K at night, 0.5 h", "it evaporates water and radiates freely"),
-    ("sand", "+26 K, -3 K, 1 h", "dry and dark ground becomes hottest"),
-    ("rock and stones", "+24 K, -0.5 K, 4 h", "they keep the day's heat into the night"),
-    ("clouds", "take 75 % of the sun's heat and 80 % of the night's cooling", "the rest is diffuse light"),
-    ("air", "288 K, 5 K up and down over the day", "a mild day; the sun is 55 degrees high at noon"),
-    ("animals' skin", "35 to 50 % of the way from air to blood", "thick coats keep nearer to the air"),
-    ("head and tail", "75 % and 50 % of the trunk's warmth", "extremities are cooler"),
-    ("kinds", "rhinoceros 3.2 m, its calf 1.6 m, antelope 1.5 m", "lengths of trunks of such animals"),
-    (
-        "gondola",
-        "15 m above the ground, 45 degrees from straight down",
-        "between 3 and 20 m, turned aside (F 8.2)",
-    ),
-    (
-        "window",
-        "the middle between ground and animals, twice as wide",
-        "F 3.1 sets the middle, and a high contrast",
-    ),
-    ("smallest contour", "50 pixels", "F 3.2.6: sufficient size; an antelope from 60 m has about 150"),
-    ("apart", "10 pixels", "F 3.2.6: detections too close are one"),
-    ("sizes from the ground", "0.2 to 8 m2", "half a small antelope's area, twice a rhinoceros'"),
-    ("too hot", "mean above 37 degrees C", "no skin is warmer than the blood below it"),
-)
+#: As `LandDraw.shares` has them.
+COVERS = ("grass", "sand", "rock")
+
+
+def _cover(one: Cover) -> str:
+    return f"+{one.heating:g} K in full sun, -{one.cooling:g} K at night, {one.lag:g} h"
+
+
+def _chosen() -> tuple[tuple[str, str, str], ...]:
+    """What F leaves open about scenes and pictures, its value here, and why."""
+    shares = [f"{100 * share:.0f} % {name}" for share, name in zip(LandDraw().shares, COVERS, strict=True)]
+    bare = [100 * kind.bare for kind in ANIMALS.values()]
+    air, near = Weather(), VIEWS[min(VIEWS)]
+    return (
+        (
+            "hours",
+            ", ".join(f"{name} {WEATHERS[name].hour:g}" for name in (NIGHT, MORNING, NOON)),
+            "before dawn, two hours after sunrise, and when ground is hot",
+        ),
+        ("ground", ", ".join(shares), "an enclosure: mostly meadow, with trodden and stony places"),
+        (
+            "relief",
+            f"{rolling_land(air).heights.std():.0f} m standard deviation, hills of some 60 m",
+            "gently rolling, so that no hill hides an animal",
+        ),
+        ("grass", _cover(GRASS), "it evaporates water and radiates freely"),
+        ("sand", _cover(SAND), "dry and dark ground becomes hottest"),
+        ("rock and stones", _cover(ROCK), "they keep the day's heat into the night"),
+        (
+            "clouds",
+            f"take {100 * SHADOW_DEPTH:.0f} % of the sun's heat and {100 * CLOUD_BLANKET:.0f} % of the "
+            "night's cooling",
+            "the rest is diffuse light",
+        ),
+        (
+            "air",
+            f"{air.air_mean:g} K, {air.air_swing:g} K up and down over the day",
+            f"a mild day; the sun is {np.degrees(air.noon_elevation):.0f} degrees high at noon",
+        ),
+        (
+            "animals' skin",
+            f"{min(bare):.0f} to {max(bare):.0f} % of the way from air to blood",
+            "thick coats keep nearer to the air",
+        ),
+        (
+            "head and tail",
+            f"{100 * HEAD:.0f} % and {100 * TAIL:.0f} % of the trunk's warmth",
+            "extremities are cooler",
+        ),
+        (
+            "kinds",
+            ", ".join(f"{name} {kind.length:g} m" for name, kind in ANIMALS.items()),
+            "lengths of trunks of such animals",
+        ),
+        (
+            "gondola",
+            f"{near.height:g} m above the ground, {np.degrees(near.tilt):.0f} degrees from straight down",
+            "between 3 and 20 m, turned aside (F 8.2)",
+        ),
+        (
+            "window",
+            f"the middle between ground and animals, {WINDOW:g} times as wide as what is between",
+            "F 3.1 sets the middle, and a high contrast",
+        ),
+        (
+            "smallest contour",
+            f"{SMALLEST:g} pixels",
+            "F 3.2.6: sufficient size; an antelope from 60 m has about 150",
+        ),
+        ("apart", f"{METHODS[CONSTANT].apart_px:g} pixels", "F 3.2.6: detections too close are one"),
+        (
+            "sizes from the ground",
+            f"{AREA[0]:g} to {AREA[1]:g} m2",
+            "half a small antelope's area, twice a rhinoceros'",
+        ),
+        (
+            "too hot",
+            f"mean above {HOTTEST - 273.15:.0f} degrees C",
+            "no skin is warmer than the blood below it",
+        ),
+    )
 
 
 #: Where the numbers of each setting are printed, or why they are as they are.
@@ -90,4 +157,4 @@ def settings_table() -> pd.DataFrame:
 
 def chosen_table() -> pd.DataFrame:
     """What was chosen for the scenes and the pictures, and why."""
-    return pd.DataFrame(CHOSEN, columns=["what", "value", "reason"])
+    return pd.DataFrame(_chosen(), columns=["what", "value", "reason"])

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.matching import Rates
-from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.runs import Interval, mean_interval, share_interval
 from wildlab.reporting.text import percent
-from wildlab.studies.wildlife_detection.claims import fall, false_alarms, places, rates_of
+from wildlab.studies.wildlife_detection.claims import (
+    SAME,
+    extremes,
+    false_alarms,
+    herd_gain,
+    over_weathers,
+    places,
+    rates_of,
+    sun_falls,
+)
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_BLOCK,
@@ -112,7 +122,9 @@ def equals(every: dict[str, Interval]) -> list[str]:
     value = {name: float(np.nan_to_num(one.estimate)) for name, one in every.items()}
     order = sorted(value, key=lambda name: -value[name])
     best = every[order[0]]
-    least = value[order[0]] - 0.005 if not np.isfinite(best.low) else min(best.low, value[order[0]] - 0.005)
+    least = value[order[0]] - SAME
+    if np.isfinite(best.low):
+        least = min(best.low, least)
     return [order[0], *(name for name in order[1:] if value[name] >= least)]
 
 
@@ -247,19 +259,30 @@ def change_words(spread: pd.DataFrame) -> str:
     said = "; ".join(
         f"{NAMES[one]} from {ranged(found[one, 'before'])} to {ranged(found[one, 'after'])}" for one in shown
     )
-    constant, adaptive = (
-        float(fall(found[one, "before"].estimate, found[one, "after"].estimate))
-        for one in (CONSTANT, OVER_MEAN)
+    lost = (
+        f"the adaptive threshold {copes_words(sun_falls(spread, OVER_MEAN))}, "
+        f"the constant one {copes_words(sun_falls(spread, CONSTANT))}"
     )
-    if not np.isfinite(adaptive) or not np.isfinite(constant):
-        both = "where nothing was found before, nothing can be said to cope"
-    elif adaptive < FALL:
-        both = "the adaptive threshold copes" + ("" if constant < FALL else ", the constant one does not")
-    else:
-        both = f"the adaptive threshold loses {percent(adaptive, 0)} of its F1, the constant one " + (
-            f"{percent(constant, 0)}" if constant > 0 else "nothing"
-        )
-    return f"When the sun comes out, the ground rises by {rise:.0f} grey levels, and F1 goes: {said}; {both}."
+    way = "rises" if rise >= 0 else "falls"
+    moved = f"{way} by {abs(rise):.0f} grey levels"
+    return f"When the sun comes out, the ground {moved}, and F1 goes: {said}; {lost}."
+
+
+def copes_words(lost: Interval) -> str:
+    """Whether a threshold copes that loses such a part of its F1, as far as the interval tells it."""
+    if not np.isfinite(lost.estimate):
+        return "cannot be said to cope, as it found nothing before"
+    part = f"{percent(lost.estimate)} of it" if lost.estimate > SAME else "nothing"
+    if not np.isfinite(lost.low):
+        return f"loses {part} (too few flights to say whether it copes)"
+    part += f" ({100 * max(lost.low, 0):.0f} to {100 * max(lost.high, 0):.0f} %)"
+    if lost.high < FALL:
+        return f"copes and loses {part}"
+    return (
+        f"does not cope and loses {part}"
+        if lost.low >= FALL
+        else f"loses {part}: whether it copes is not told"
+    )
 
 
 def best_of(spread: pd.DataFrame, method: str) -> tuple[list[str], Interval]:
@@ -302,16 +325,15 @@ def readings_words(spread: pd.DataFrame) -> str:
 
 def windows_words(windows: pd.DataFrame) -> str:
     """Which width and reading find most in these images, and whether the adaptive one then copes."""
-    sense = windows[[*PRINTED, "before", "after"]].fillna(0.0).mean(axis=1)
+    sense = windows["mean"]
     best = windows.loc[sense.idxmax()]
     rivals = [
         f"“{READ_AS[str(reading)]}” with {windows.loc[own.idxmax(), 'width']:g} times ({own.max():.2f})"
         for reading, own in sense.groupby(windows["reading"])
     ]
-    tied = int((sense > sense.max() - 0.005).sum()) - 1
-    among = f", {tied} more of which {'is' if tied == 1 else 'are'} equal to two digits" if tied else ""
-    lost = float(fall(best["before"], best["after"]))
-    copes = "copes" if lost < FALL else "does not cope"
+    tied = int(windows["tied"].sum()) - 1
+    among = f", {tied} more of which {'is' if tied == 1 else 'are'} not told from it" if tied else ""
+    copes = copes_words(Interval(*(float(best[one]) for one in ("fall", "fall_low", "fall_high"))))
     same = windows[(windows["width"] == best["width"]) & (windows["reading"] != best["reading"])]
     beside = "".join(
         f"; read the other way, from {row.before:.2f} to {row.after:.2f}" for row in same.itertuples()
@@ -320,8 +342,8 @@ def windows_words(windows: pd.DataFrame) -> str:
         "The window's width was chosen, and the levels hang on it. The mean F1 of the printed settings and "
         f"of the sequence is largest for {'; for '.join(rivals)} the difference between animals and ground. "
         f"With the best of {len(windows)}, taken from the images it is told of{among}, the adaptive "
-        f"threshold {copes} when the sun comes out: F1 goes from {best['before']:.2f} to "
-        f"{best['after']:.2f}{beside}."
+        f"threshold's F1 goes from {best['before']:.2f} to {best['after']:.2f} when the sun comes out: it "
+        f"{copes}{beside}."
     )
 
 
@@ -362,40 +384,67 @@ def pieces_table(spread: pd.DataFrame) -> pd.DataFrame:
 
 def pieces_words(spread: pd.DataFrame) -> str:
     """Which reading of the missing level gives what figures 7.7 and 7.8 show, and how often."""
-    shown = {}
+    shown, counted = {}, {}
     for kind, level in PIECES:
         small, large = _pieces(spread, kind, level)
-        shown[kind, level] = (int(((small > 1) & (large == 1)).sum()), len(small))
-    best = max(shown, key=lambda one: shown[one][0] / max(shown[one][1], 1))
-    count, of = shown[best]
+        count, words = int(((small > 1) & (large == 1)).sum()), level_words(kind, level)
+        counted[words] = (count, len(small))
+        shown[words] = share_interval(count, len(small)) if len(small) else Interval(*[np.nan] * 3)
+    best, *more = equals(shown)
+    count, of = counted[best]
     start = "Animals longer than 51 pixels, seen from the gondola; the figures print no level. "
     if not count:
         return f"{start}With no reading of it a small region splits an animal that a large one leaves whole."
+    beside = (
+        f"not told from {' and '.join(f'“{one}”' for one in more)}"
+        if more
+        else "more often than with the other readings"
+    )
     return (
         f"{start}That the small region splits some and the large one none comes on {count} of {of} images "
-        f"with “{level_words(*best)}”, more often than with the other readings."
-        if sum(value[0] / max(value[1], 1) == count / of for value in shown.values()) == 1
-        else f"{start}That the small region splits some and the large one none comes on {count} of {of} "
-        "images with more than one reading."
+        f"({100 * shown[best].low:.0f} to {100 * shown[best].high:.0f} %) with “{best}”, {beside}."
     )
 
 
 def herd_words(spread: pd.DataFrame) -> str:
     """What a herd does to mean and median, and what that costs."""
-    mean, median = (float(spread["herd", f"{name}_rise"].mean()) for name in ("mean", "median"))
+    mean, median = (_change(spread["herd", f"{name}_rise"]) for name in ("mean", "median"))
     share = float(spread["herd", "share"].mean())
     found = {one: rates_of(spread, one, ["herd"]) for one in (BY_MEAN, BY_MEDIAN)}
-    matter = found[BY_MEDIAN].recall.estimate - found[BY_MEAN].recall.estimate
-    cost = (
-        f"the median finds {100 * matter:.0f} in a hundred more"
-        if matter > 0.005
-        else "the median finds no more"
+    gain = herd_gain(spread)
+    many = f"{abs(100 * gain.estimate):.0f} in a hundred {'more' if gain.estimate >= 0 else 'fewer'}"
+    if abs(gain.estimate) < SAME:
+        cost = "the median finds as many"
+    elif gain.low > 0 or gain.high < 0:
+        cost = f"the median finds {many}"
+    else:
+        cost = f"that the median finds {many} is not told from chance"
+    within = (
+        f" ({100 * gain.low:+.0f} to {100 * gain.high:+.0f})".replace("-", "−")
+        if np.isfinite(gain.low)
+        else ""
     )
     return (
-        f"A herd over {percent(share, 0)} of the image raises the mean by {mean:.1f} grey levels and the "
-        f"median by {median:.1f}; {cost}, with F1 of {ranged(found[BY_MEDIAN].f1)} beside "
+        f"A herd over {percent(share, 0)} of the image changes the mean by {mean} grey levels and the "
+        f"median by {median}; {cost}{within}, with F1 of {ranged(found[BY_MEDIAN].f1)} beside "
         f"{ranged(found[BY_MEAN].f1)}."
     )
+
+
+def _change(values: pd.Series) -> str:
+    """The mean of changes with its sign, and Student's interval where there is one."""
+    low, high = mean_interval(values)[1:] if values.notna().sum() > 1 else (np.nan, np.nan)
+    beside = f" ({low:+.1f} to {high:+.1f})" if np.isfinite(low) else ""
+    return f"{values.mean():+.1f}{beside}".replace("-", "−")
+
+
+def worst_words(spread: pd.DataFrame, methods: Sequence[str], of: Literal["recall", "false"]) -> str:
+    """In which weather the fewest animals are found, or most false alarms come, where it is told."""
+    few, come = ("Fewest animals", "are found") if of == "recall" else ("Most false alarms", "come")
+    weathers = extremes(over_weathers(spread, methods, of), -1.0 if of == "recall" else 1.0)
+    if len(weathers) > 2:
+        return f"In no one weather clearly the {few.lower()} {come}"
+    return f"{few} {come} {' or '.join(words for key, words in AT.items() if key in weathers)}"
 
 
 def sun_words(spread: pd.DataFrame) -> str:

@@ -28,7 +28,7 @@ from wildlab.simulation.scene.animals import ANIMALS, animal
 from wildlab.simulation.scene.drawn_land import LandDraw, Layout, draw_layout
 from wildlab.simulation.scene.ground import Weather
 from wildlab.simulation.scene.land import LandView, render_land
-from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of
+from wildlab.simulation.scene.response import CameraResponse, Sensor, expose, sensor_of, to_counts
 
 #: When images are taken. F's were mostly taken under clouds, some in sunlight (F 7.4).
 NIGHT, MORNING, NOON, CLOUDY = "night", "morning", "noon", "cloudy"
@@ -242,12 +242,7 @@ def proposed(name: str, picture: Picture, camera: Camera, response: CameraRespon
         return replace(base, smallest_px=smallest, largest_px=largest)
     if name == BY_BLOCK:
         return replace(base, block_px=block_from_distance(picture.distance, focal))
-    return replace(base, hottest=to_counts(HOTTEST, response))
-
-
-def to_counts(kelvin: float, response: CameraResponse) -> float:
-    """Counts of a temperature."""
-    return response.counts_level + (kelvin - response.counts_at) * response.counts_per_kelvin
+    return replace(base, hottest=float(to_counts(HOTTEST, response)))
 
 
 def read_as(thresholds: Warm, reading: str) -> Warm:
@@ -275,7 +270,8 @@ class Operator(NamedTuple):
         warm = weather.air + float(np.mean(skins))
         half = max(WINDOW * abs(warm - ground), LEAST_WINDOW) / 2
         middle = (warm + ground) / 2
-        return to_counts(middle - half, self.response), to_counts(middle + half, self.response)
+        low, high = to_counts([middle - half, middle + half], self.response)
+        return float(low), float(high)
 
     def take(
         self,
