@@ -14,7 +14,7 @@ from wildlab.simulation.scene import (
     CameraResponse,
     sensor_of,
 )
-from wildlab.studies.wildlife_detection import STUDY, charts, claims, settings, text, trial
+from wildlab.studies.wildlife_detection import STUDY, charts, claims, level_text, settings, text, trial
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_EMPTY,
@@ -287,7 +287,7 @@ def test_the_reading_is_that_with_the_largest_rates(numbers):
                 spread[f"{method}-{one}", f"missed_{height}"] = 0.0 if one == "offset" else 9.0
     names, found = text.best_of(spread, ADAPTIVE)
     assert names == ["offset"] and found.estimate == 1.0
-    words = text.readings_words(spread)
+    words = level_text.readings_words(spread)
     assert words.count("above the mean of its block by the level") == 3 and "not told from" not in words
     assert "held against the thesis's own pictures" in words
     last = text.summary(spread)[2]
@@ -303,23 +303,25 @@ def test_the_reading_is_that_with_the_largest_rates(numbers):
     for height in trial.READ_AT:
         spread[f"{ADAPTIVE}-white", f"missed_{height}"] = 0.0
     tied = f"not told from “{text.READ_AS['white']}”; for figure 7.10a"
-    assert tied in text.readings_words(spread)
+    assert tied in level_text.readings_words(spread)
     assert f"“{text.READ_AS['floor']}” or “{text.READ_AS['white']}” with" in text.summary(spread)[2]
-    assert len(text.readings_table(spread)) == 4
+    assert len(level_text.readings_table(spread)) == 4
 
 
 def test_words_on_pieces_herd_and_sun_turn(numbers):
-    assert "With no reading of it" in text.pieces_words(spread_of(numbers))
+    assert "With no reading of it" in level_text.pieces_words(spread_of(numbers))
     split = spread_of(numbers, adaptive_51__pieces_offset=2.5, adaptive_51__pieces_floor_0=np.nan)
-    alone = text.pieces_words(split)
+    alone = level_text.pieces_words(split)
     assert "12 of 12 images (76 to 100 %) with “above the mean of the block by 65”, more often" in alone
-    table = text.pieces_table(split).set_index("reading")
+    table = level_text.pieces_table(split).set_index("reading")
     assert table.loc["above the mean of the block by 65", "small"] == "2.50"
     assert table["seeds"].tolist() == [12, 12, 0]
     more = spread_of(numbers, adaptive_51__pieces=2.5)
-    assert "not told from “above the mean of the block, and above 150”" in text.pieces_words(more)
+    assert "not told from “above the mean of the block, and above 150”" in level_text.pieces_words(more)
     more.loc[:1, [(SMALL, "pieces_offset_65")]] = 1.0
-    assert "12 of 12 images" in text.pieces_words(more) and "not told from" in text.pieces_words(more)
+    assert "12 of 12 images" in level_text.pieces_words(more) and "not told from" in level_text.pieces_words(
+        more
+    )
     words = text.herd_words(spread_of(numbers))
     assert "changes the mean by +20.0 (+20.0 to +20.0) grey levels and the median by +2.0 (" in words
     assert "the median finds as many (+0 to +0)" in words
@@ -421,7 +423,7 @@ def test_words_on_windows_turn():
     ]
 
     def said():
-        return text.windows_words(pd.DataFrame(rows, columns=names))
+        return level_text.windows_words(pd.DataFrame(rows, columns=names))
 
     words = said()
     assert "the level” with 1 times (0.58)" in words and "by the level” with 2 times (0.88)" in words
@@ -438,7 +440,7 @@ def test_words_on_windows_turn():
     tied = said()
     assert "With the best of 4," in tied and "1 more of which is not told from it" in tied
     assert "not told from it" not in worse
-    assert "taken" not in text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
+    assert "taken" not in level_text.windows_table(pd.DataFrame(rows, columns=names))["reading"][0]
 
 
 def test_settings_say_where_they_are_printed():

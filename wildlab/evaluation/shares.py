@@ -98,7 +98,7 @@ class Check:
             If it needs a threshold and there is none, has no use for one, or nothing was counted by this one.
         """
         if self.by_threshold is not None:
-            if threshold not in self.by_threshold:
+            if threshold is None or threshold not in self.by_threshold:
                 raise WildlabError(
                     f"nothing was counted for the threshold {threshold}",
                     f"use one of {', '.join(f'{one:g}' for one in self.by_threshold)}",

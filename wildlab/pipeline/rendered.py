@@ -249,7 +249,7 @@ class Marks(NamedTuple):
 
     def take(self, rows: slice) -> Marks:
         """The marks of some of the images."""
-        return Marks(*(part[rows] for part in self))
+        return Marks(**{name: part[rows] for name, part in self._asdict().items()})
 
 
 def marks_of(

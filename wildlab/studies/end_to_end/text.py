@@ -10,7 +10,7 @@ import pandas as pd
 from wildlab.evaluation.runs import mean_interval, mean_share_interval
 from wildlab.evaluation.shares import Check, Decision, decide
 from wildlab.reporting.text import percent
-from wildlab.studies.end_to_end.trial import DRAWN, KINDS, MARGIN, PIXEL_UNITS, RENDERED, followed_by
+from wildlab.studies.end_to_end.trial import DRAWN, KINDS, MARGIN, RENDERED, followed_by
 
 FILTERS = {
     "kf": "linear filter, on the ground",

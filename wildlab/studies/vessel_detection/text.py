@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
+from wildlab.evaluation.runs import Interval, mean_share_interval, share_interval
 from wildlab.reporting.text import percent
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 

@@ -20,6 +20,7 @@ from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_detection import text as words
 from wildlab.studies.wildlife_detection import trial
 from wildlab.studies.wildlife_detection.claims import false_alarms, places, rates_of
+from wildlab.studies.wildlife_detection.level_text import level_words
 from wildlab.studies.wildlife_detection.trial import (
     ADAPTIVE,
     BY_SIZE,
@@ -138,8 +139,8 @@ def blocks_shown(picture: Picture, kind: Literal["floor", "offset"], level: floa
         said.append(f"{_SHORT[method]}: {one}")
     return (
         fig, f"blocks-{kind}-{level:g}",
-        f"One animal after an adaptive threshold, {words.level_words(kind, level)}. {'; '.join(said)}.",
-        f"White: {words.level_words(kind, level)}; F prints no level for these. Counterpart of F figures 7.7 "
+        f"One animal after an adaptive threshold, {level_words(kind, level)}. {'; '.join(said)}.",
+        f"White: {level_words(kind, level)}; F prints no level for these. Counterpart of F figures 7.7 "
         "and 7.8.",
     )  # fmt: skip
 
