@@ -301,7 +301,7 @@ def test_rates_are_followed_over_flights_for_their_images_are_alike():
 
 
 def test_false_alarms_are_told_with_what_they_leave_open():
-    assert text.alarmed_words(spread_of()) == "1600 images (in 0 % (0 % to 0.2 %) of these)"
+    assert text.alarmed_words(spread_of()) == "1600 images, some in 0 % (0 % to 0.2 %) of them"
     assert "in 5.0 % (4.0 % to 6.2 %)" in text.alarmed_words(spread_of(boats__images_with_false=2.0))
 
 

@@ -123,7 +123,7 @@ def alarmed_words(spread: pd.DataFrame) -> str:
     """How many images were looked at, and in which share of such there is a false alarm, by the interval."""
     some = sum(spread[one, "images_with_false"].sum() for one in (SHIP, BOATS))
     images = false_alarms(spread, SHIP, BOATS)[1]
-    return f"{images} images (in {percent_within(share_interval(round(float(some)), images))} of these)"
+    return f"{images} images, some in {percent_within(share_interval(round(float(some)), images))} of them"
 
 
 def flights_words(spread: pd.DataFrame) -> str:
