@@ -165,6 +165,7 @@ from wildlab.geometry.uncertainty import (
     ray_flatness,
     sample_ground,
 )
+from wildlab.geometry.visibility import Seen, lines_clear, visible_nodes
 
 __all__ = [
     "BECAME",
@@ -197,6 +198,7 @@ __all__ = [
     "PosesAt",
     "Projected",
     "RobustFit",
+    "Seen",
     "Terrain",
     "Twist",
     "Velocity",
@@ -251,6 +253,7 @@ __all__ = [
     "intersect_terrain",
     "lens_velocity",
     "linear_enu_error",
+    "lines_clear",
     "local_earth",
     "matrix_to_euler",
     "matrix_to_quaternion",
@@ -288,6 +291,7 @@ __all__ = [
     "velocity_covariance",
     "velocity_from_pair",
     "view_errors",
+    "visible_nodes",
     "with_covariance",
     "wrap",
 ]

@@ -1,0 +1,110 @@
+"""What a camera sees of a terrain, beside lines followed in small steps and beside the whole map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, in_image
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount
+from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.visibility import lines_clear, visible_nodes
+
+CAMERA = Camera(160, 128, 250.0, 250.0, 80.0, 64.0)
+
+
+def rough(seed, cells=24, high=6.0):
+    rng = np.random.default_rng(seed)
+    return Terrain(rng.uniform(0, high, (cells, cells)).astype(np.float32), -23.0, -31.0, 2.0)
+
+
+def least_clearance(terrain, start, point):
+    """The smallest height of a line above the ground, in steps of a hundredth of a cell, but for its end."""
+    length = np.linalg.norm(point - start)
+    along = np.linspace(0, 1 - 1e-3, int(length / terrain.step * 100) + 2)[:, None]
+    way = start + along * (point - start)
+    return np.nanmin(-way[:, 2] - terrain.heights_at(way[:, :2]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.floats(1, 30))
+def test_a_clear_line_is_above_the_ground_all_along(seed, height):
+    terrain, rng = rough(seed), np.random.default_rng(seed + 1)
+    least, most, west, east = terrain.extent
+    where = rng.uniform([least, west], [most, east], (40, 2))
+    points = np.column_stack([where, -terrain.heights_at(where) - rng.uniform(0, 2, 40)])
+    start = np.array([*rng.uniform([least, west], [most, east]), 0.0])
+    start[2] = -terrain.heights_at(start[None, :2])[0] - height
+    clear = lines_clear(terrain, points, start)
+    for one, point in zip(clear, points, strict=True):
+        gap = least_clearance(terrain, start, point)
+        assert gap > -1e-6 if one else gap < 0.05, "hidden by what comes as near as the steps are wide"
+
+
+def test_a_wall_hides_what_is_below_the_line_over_its_edge():
+    height = np.zeros((3, 101), np.float32)
+    height[:, 50] = 10.0
+    wall = Terrain(height, -1.0, 0.0, 1.0)
+    # From 20 m above 0 over the edge at 50, 10 m: the ground is met at 100.
+    for east, down, clear in (
+        (99.0, 0.0, False),
+        (99.0, -0.19, False),
+        (99.0, -0.21, True),
+        (40.0, 0.0, True),
+    ):
+        assert lines_clear(wall, [[0.0, east, down]], [0.0, 0.0, -20.0]).tolist() == [clear], (east, down)
+
+
+def test_what_is_unknown_hides_and_so_does_a_camera_below_the_ground():
+    height = np.zeros((3, 11), np.float32)
+    height[:, 5], height[:, 8] = np.nan, 3.0
+    terrain = Terrain(height, -1.0, 0.0, 1.0)
+    assert not lines_clear(terrain, [[0.0, 9.0, -2.0]], [0.0, 1.0, -2.0]).any()
+    assert lines_clear(terrain, [[0.0, 9.0, -4.0]], [0.0, 1.0, -4.0]).all(), (
+        "it passes over all that is known"
+    )
+    assert not lines_clear(terrain, [[0.0, 2.0, -1.0]], [0.0, 1.0, 1.0]).any()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 10**6), st.floats(-0.6, 0.6), st.floats(-0.9, 1.3), st.floats(-3.1, 3.1),
+    st.sampled_from([0.0, 1.5]), st.sampled_from([15.0, 60.0, np.inf]),
+)  # fmt: skip
+def test_the_block_leaves_nothing_out(seed, roll, pitch, yaw, above, furthest):
+    terrain = rough(seed)
+    p = np.array([3.0, -5.0, -20.0])
+    pose = CameraPoses(CAMERA, Mount("down"), p, euler_to_matrix(roll, pitch, yaw))
+    seen = visible_nodes(terrain, pose, above, furthest)
+    whole = np.zeros(terrain.height.shape, bool)
+    whole[seen.rows, seen.columns] = seen.visible
+    north, east = (at + terrain.step * np.arange(24) for at in (terrain.north, terrain.east))
+    points = np.stack([*np.meshgrid(north, east, indexing="ij"), -terrain.height - above], axis=-1)
+    points = points.reshape(-1, 3).astype(float)
+    uv = ground_to_pixel(CAMERA, points, pose.p_nc, pose.R_nc)
+    expected = in_image(CAMERA, uv) & lines_clear(terrain, points, p)
+    expected &= np.linalg.norm(points - p, axis=1) <= furthest
+    assert np.array_equal(whole.ravel(), expected)
+
+
+def test_a_lens_that_folds_back_shows_nothing_behind_its_edge():
+    folds = Camera(160, 128, 100.0, 100.0, 80.0, 64.0, distortion=(-0.2, 0.0, 0.0, 0.0, 0.0))
+    flat = Terrain(np.zeros((201, 201), np.float32), -400.0, -400.0, 4.0)
+    pose = CameraPoses(folds, Mount("down"), np.array([0.0, 0.0, -40.0]), np.eye(3))
+    seen = visible_nodes(flat, pose)
+    at = np.argwhere(seen.visible) + np.array([seen.rows.start, seen.columns.start])
+    assert len(at) > 100 and np.hypot(*(at * 4.0 - 400.0).T).max() < 60
+    behind = ground_to_pixel(folds, [[80.0, 0.0, 0.0]], pose.p_nc, pose.R_nc)
+    assert in_image(folds, behind).all(), "the polynomial alone would show it"
+
+
+def test_one_image_at_a_time():
+    two = CameraPoses(CAMERA, Mount("down"), np.zeros((2, 3)), np.eye(3))
+    with pytest.raises(WildlabError, match="Give one pose"):
+        visible_nodes(rough(1), two)

@@ -1,0 +1,87 @@
+"""Land for flights over terrain: rolling ground of a stated relief, the same for the same seed.
+
+The map of the safari area of Kolmården (F 2.1) was not published. What is known of it is kept: about 1000 m
+by 500 m, a cell every 2 m, and heights from 71 to 122 m (F 6.1). How its hills lie is drawn: a random field
+whose power falls with the wave number as that of natural ground does, without trees or houses, as F's map.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import fft
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+
+#: F 2.1 and 6.1: metres north and east, metres between nodes, metres above the sea.
+NORTH_M, EAST_M, STEP_M, LOWEST_M, HIGHEST_M = 500.0, 1000.0, 2.0, 71.0, 122.0
+#: How fast the power of heights falls with the wave number; 3 to 4 is usual for natural ground. Chosen.
+ROUGHNESS = 3.6
+#: The longest waves, metres: hills, no tilt of the whole. Chosen.
+LONGEST_M = 600.0
+
+
+def synthetic_landscape(
+    seed: int,
+    *,
+    north: float = NORTH_M,
+    east: float = EAST_M,
+    step: float = STEP_M,
+    relief: float = HIGHEST_M - LOWEST_M,
+) -> Terrain:
+    """Rolling land about the origin of n, its lowest node at zero.
+
+    Parameters
+    ----------
+    seed
+        The same gives the same land.
+    north, east
+        Size, metres; the origin is in the middle.
+    step
+        Between nodes, metres.
+    relief
+        From the lowest node to the highest, metres.
+
+    Returns
+    -------
+    Terrain
+        Its heights are exact: ``sd`` is zero.
+
+    Raises
+    ------
+    WildlabError
+        Where a size is not above zero, or the map is smaller than two steps.
+
+    Examples
+    --------
+    >>> land = synthetic_landscape(1)
+    >>> land.height.shape, float(land.height.min()), round(float(land.height.max()), 3)
+    ((251, 501), 0.0, 51.0)
+    """
+    if not (step > 0 and relief >= 0 and min(north, east) >= 2 * step and max(north, east) < np.inf):
+        raise WildlabError(
+            f"land of {north:g} m by {east:g} m with {relief:g} m of relief, a node every {step:g} m",
+            "give metres above zero, and two steps each way at least",
+        )
+    shape = (round(north / step) + 1, round(east / step) + 1)
+    height = _field(shape, step, np.random.default_rng(seed))
+    height *= relief / max(float(np.ptp(height)), 1e-12)
+    height = (height - height.min()).astype(np.float32)
+    corner = (-(shape[0] - 1) / 2 * step, -(shape[1] - 1) / 2 * step)
+    return Terrain(height, north=corner[0], east=corner[1], step=step, sd=0.0)
+
+
+def _field(shape: tuple[int, int], step: float, rng: np.random.Generator) -> Array:
+    """(R, C) a random field whose power falls with the wave number, of no particular scale."""
+    # Twice as large as what is used: the field repeats itself.
+    rows, columns = (fft.next_fast_len(2 * n, real=True) for n in shape)
+    k = (
+        2
+        * np.pi
+        * np.hypot(*np.meshgrid(fft.fftfreq(rows, step), fft.rfftfreq(columns, step), indexing="ij"))
+    )
+    amplitude = np.hypot(k, 2 * np.pi / LONGEST_M) ** (-ROUGHNESS / 2)
+    amplitude[0, 0] = 0.0
+    noise = fft.rfft2(rng.standard_normal((rows, columns)))
+    return np.asarray(fft.irfft2(noise * amplitude, s=(rows, columns)))[: shape[0], : shape[1]]
