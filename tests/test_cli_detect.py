@@ -106,6 +106,12 @@ def test_a_fit_says_what_it_is_worth_and_its_thresholds_can_be_used_again(capsys
                           "--group", "scene")  # fmt: skip
     assert code == 0, err
     assert "On frames that thresholds were not chosen from: F1 1.00" in out and "With the defaults" in out
+    fit = json.loads((tmp_path / "out" / "result.json").read_text())["fit"]["ellipses"]
+    kept = json.loads((tmp_path / "out" / "thresholds.json").read_text())["thresholds"]["part"]
+    if fit["labels_found"] < 9:
+        assert fit["part"] is None and kept == 0.12 and "keep the default part" in " ".join(out.split())
+    else:
+        assert kept == pytest.approx(fit["part"], abs=1e-5) and "not seen" in " ".join(out.split())
     code, out, err = call(capsys, "detect", path, "--into", tmp_path / "again", "--thresholds",
                           tmp_path / "out" / "thresholds.json", "--labels", path / "labels.csv")  # fmt: skip
     assert code == 0 and "F1 1.00" in out

@@ -10,10 +10,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from wildlab.detection.detections import PART
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.clocks import frame_times
@@ -38,6 +40,7 @@ from wildlab.pipeline.detection_judged import (
     rates_sentence,
 )
 from wildlab.pipeline.detection_methods import METHODS, for_distance
+from wildlab.pipeline.detection_part_fit import PartFit, fit_part, part_sentence, with_part
 from wildlab.pipeline.detection_pictures import write_pictures
 from wildlab.pipeline.detection_said import frames_said, not_judged, too_few_or_many
 from wildlab.pipeline.detection_shape_fit import fit_shapes
@@ -156,7 +159,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
     if wanted.thresholds:
         thresholds = read_thresholds(wanted.thresholds, wanted.method)
     wanted.into.mkdir(parents=True, exist_ok=True)
-    fitted = None
+    fitted, part = None, None
     if to_fit is not None:
         with _progress(console, "choosing thresholds", None) as tell:
             samples = samples_of(frames, to_fit)
@@ -167,6 +170,9 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
                 else fit_thresholds(wanted.method, samples, tell=tell)
             )
         thresholds = fitted.thresholds
+        part = fit_part(wanted.method, samples, thresholds)
+        if part is not None and np.isfinite(part.part):
+            thresholds = with_part(thresholds, part.part)
     write_thresholds(wanted.into / "thresholds.json", wanted.method, thresholds)
     with _progress(console, "detecting", frames.count) as tell:
         detected = run_detection(
@@ -179,7 +185,7 @@ def detect_images(wanted: Wanted, console: Console) -> dict[str, Any]:
         pictures = write_pictures(
             frames, names, things, wanted.into, wanted.overlays, lambda done: tell(done, None)
         )
-    result = _result(wanted, thresholds, detected, judged, fitted, pictures, labels)
+    result = _result(wanted, thresholds, detected, judged, fitted, part, pictures, labels)
     usable = result["frames"]["usable"]
     chosen = bool(wanted.fit or wanted.thresholds or wanted.distance_m is not None)
     result["notes"] = [
@@ -290,6 +296,7 @@ def _result(
     detected: Detected,
     judged: Judged | None,
     fitted: Fitted | None,
+    part: PartFit | None,
     pictures: dict[str, int],
     labels: Labels | None,
 ) -> dict[str, Any]:
@@ -326,6 +333,9 @@ def _result(
         say.append(f"Where they were chosen: {rates_sentence(result['fit']['where_chosen'])}")
         without = "Without a classifier" if wanted.method == "shape" else "With the defaults"
         say.append(f"{without}: {rates_sentence(result['fit']['defaults'])}")
+        if part is not None:
+            result["fit"]["ellipses"] = part.as_plain()
+            say.append(part_sentence(part, PART))
     if judged is not None and labels is not None:
         result["judged"] = judged.as_plain()
         chosen_here = fitted is not None and wanted.labels == wanted.fit
@@ -336,7 +346,8 @@ def _result(
             else "Beside the labels"
         )
         say.append(f"{where}: {rates_sentence(result['judged'])}")
-        if "ellipse_coverage_90" in result["judged"]:
+        by_these = chosen_here and part is not None and np.isfinite(part.part)
+        if "ellipse_coverage_90" in result["judged"] and not by_these:
             say.append(ellipse_sentence(result["judged"]["ellipse_coverage_90"]))
         say += labels_sentences(labels)
         kinds = labels.marked.known_kinds

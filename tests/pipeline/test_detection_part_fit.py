@@ -1,0 +1,166 @@
+"""How wide ellipses have to be: identities, draws with a known part, and labelled frames."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from wildlab.detection.contrast import Contrast, find_by_contrast
+from wildlab.detection.shape import Shape
+from wildlab.detection.thresholds import FloatingThresholds
+from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.flight.readers.frames import Frame
+from wildlab.pipeline.detection_fit import Sample
+from wildlab.pipeline.detection_part_fit import (
+    Found,
+    PartFit,
+    fit_part,
+    found_labels,
+    part_of,
+    part_sentence,
+    parts_needed,
+    with_part,
+)
+from wildlab.studies.wildlife_detection.trial import (
+    BY_MEAN,
+    METHODS,
+    find,
+    judge,
+    operator_of,
+    take_pictures,
+)
+
+#: For animals that fill much of the image.
+LARGE = Contrast(window_px=151, largest_px=6000.0, longest=8.0)
+
+
+def drawn(rng, count, part):
+    """Labels that lie off by what covariance and part say."""
+    half = rng.normal(size=(count, 2, 2))
+    bare = half @ half.transpose(0, 2, 1) * 0.1 + 0.02 * np.eye(2)
+    major = rng.uniform(5, 40, count)
+    whole = bare + (part * major)[:, None, None] ** 2 * np.eye(2)
+    off = np.einsum("nij,nj->ni", np.linalg.cholesky(whole), rng.normal(size=(count, 2)))
+    return Found(off, bare, major)
+
+
+def test_with_the_part_that_is_needed_the_ellipse_just_reaches_its_label():
+    found = drawn(np.random.default_rng(1), 300, 0.1)
+    needed = parts_needed(found)
+    inside = found.inside(0.0)
+    assert (needed[inside] == 0).all() and (needed[~inside] > 0).all() and 0 < inside.sum() < 300
+    for row in np.flatnonzero(~inside):
+        C = found.covariance[row] + (needed[row] * found.major[row]) ** 2 * np.eye(2)
+        squared = found.off[row] @ np.linalg.solve(C, found.off[row])
+        assert squared == pytest.approx(-2 * np.log(0.1), rel=1e-9)
+
+
+def test_the_next_label_is_held_as_often_as_is_said():
+    rng, held, parts = np.random.default_rng(2), [], []
+    for _ in range(300):
+        part = part_of(parts_needed(drawn(rng, 19, 0.08)))
+        held.append(drawn(rng, 20, 0.08).inside(part).mean())
+        parts.append(part)
+    # 19 ellipses: the 18th part of 20 places, which is nine in ten exactly.
+    assert np.mean(held) == pytest.approx(0.9, abs=0.02)
+    assert part_of(parts_needed(drawn(rng, 20_000, 0.08))) == pytest.approx(0.08, rel=0.05)
+
+
+def test_of_too_few_nothing_is_chosen():
+    assert np.isnan(part_of(np.zeros(8))) and part_of(np.zeros(9)) == 0
+
+
+def samples_of(rng, frames, shift):
+    """Warm blobs, and labels whose middle is off by a share of the length, as each group has it."""
+    made = []
+    for number in range(frames):
+        image = rng.normal(100, 1, (120, 160)).astype(np.float32)
+        boxes = []
+        for at in (30, 110):
+            u, v = at + rng.integers(-8, 8), 60 + rng.integers(-20, 20)
+            image[v - 4 : v + 4, u - 8 : u + 8] += 40
+            # A label lies off by a share of 20 px, its size, one way or the other.
+            du = 20 * shift * rng.choice([-1, 1])
+            boxes.append([u - 10 + du, v - 6, 20, 12])
+        valid = np.ones(image.shape, bool)
+        frame = Frame(f"{number}.png", None, image, "grey", "white-hot", valid)
+        made.append(Sample(frame, np.array(boxes, float), np.zeros((0, 4)), f"clip {number // 4}"))
+    return made
+
+
+def test_labels_that_lie_off_widen_the_ellipses_and_others_do_not():
+    rng = np.random.default_rng(3)
+    off, exact = (fit_part("contrast", samples_of(rng, 16, shift), Contrast()) for shift in (0.15, 0.0))
+    assert off.labels == exact.labels == 32
+    found = found_labels("contrast", samples_of(rng, 4, 0.15), Contrast())
+    # 3 px over 20 by the root of chi-square's nine tenths, of a major axis of about 18 px.
+    assert off.part == pytest.approx(3 / np.sqrt(-2 * np.log(0.1)) / np.median(found.major), rel=0.2)
+    assert off.held_out is not None and off.held_out.estimate > 0.8
+    assert exact.part < 0.05
+
+
+def test_thresholds_without_a_part_have_none():
+    assert fit_part("floating", [], FloatingThresholds()) is None
+    assert with_part(Shape(), 0.03).regions.part == 0.03 and with_part(Contrast(), 0.03).part == 0.03
+
+
+def test_sentences_follow_the_numbers():
+    said = part_sentence(PartFit(0.034, 40, Interval(0.91, 0.8, 0.97)), 0.12)
+    assert "3.4 % of the length" in said and "they hold 91 % (80 to 97)" in said
+    few = part_sentence(PartFit(float("nan"), 5, None), 0.12)
+    assert "keep the default part of 12 %" in few and "5 labels were found" in few
+    assert part_sentence(PartFit(0.01, 9, None), 0.12).endswith("what it holds of others is not known.")
+    assert PartFit(float("nan"), 5, None).as_plain() == {
+        "part": None, "labels_found": 5, "held_out_coverage_90": None,
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("method", "thresholds"), [("contrast", LARGE), ("warm", METHODS[BY_MEAN])])
+def test_ellipses_hold_true_centres_of_animals_in_scenes_that_the_part_was_not_chosen_from(
+    method, thresholds
+):
+    """Rendered animals wholly in view, their true outlines' centres; half of the seeds choose, half judge."""
+    halves = [Found(*(np.concatenate(one) for one in zip(*parts, strict=True))) for parts in (
+        [found_in(seed, method, thresholds) for seed in range(first, 8, 2)] for first in (0, 1)
+    )]  # fmt: skip
+    held = [
+        judged.inside(part_of(parts_needed(chosen)))
+        for chosen, judged in (halves, halves[::-1])
+    ]  # fmt: skip
+    share = share_interval(int(np.concatenate(held).sum()), sum(map(len, held)))
+    assert 0.85 <= share.estimate <= 0.95 and share.low < 0.9 < share.high, share
+    assert share.high - share.low < 0.12, "enough of them to tell"
+
+
+@cache
+def pictures_of(seed):
+    """The rendered pictures of a seed, once for all methods."""
+    return list(take_pictures(operator_of("gondola", seed), seed).plain.values())
+
+
+def found_in(seed, method, thresholds):
+    """Animals found in the rendered pictures of a seed, with the true centres of their outlines."""
+    off, covariance, major = [], [], []
+    for picture in pictures_of(seed):
+        bare = with_part(thresholds, 0.0)
+        if method == "warm":
+            found = find(picture, bare)
+        else:
+            found = find_by_contrast(picture.counts, picture.view.ground, bare)
+        seen = {one.number: one for one in picture.view.seen}
+        height, width = picture.view.labels.shape
+        for number, rows in judge(picture, found).rows.items():
+            if len(rows) != 1 or picture.view.visible(number) < 0.95:
+                continue
+            left, top, wide, high = found.box[rows[0]]
+            if min(left, top) < 3 or left + wide > width - 3 or top + high > height - 3:
+                continue
+            off.append(seen[number].centre - found.uv[rows[0]])
+            covariance.append(found.covariance[rows[0]])
+            major.append(found.axes[rows[0], 0])
+    return Found(
+        np.reshape(off, (-1, 2)), np.reshape(covariance, (-1, 2, 2)), np.asarray(major, float)
+    )  # fmt: skip
