@@ -16,6 +16,7 @@ from wildlab.flight.readers.labels import read_labels
 from wildlab.pipeline.detect import detect_frame
 from wildlab.pipeline.detect_command import samples_of
 from wildlab.pipeline.detection_fit import Fitted, Sample, fit_thresholds
+from wildlab.pipeline.detection_part_fit import fit_part
 from wildlab.pipeline.detection_shape_fit import fit_shapes
 
 pytestmark = pytest.mark.slow
@@ -99,3 +100,12 @@ def test_a_list_of_labels_that_is_longer_than_its_clip_is_no_error(shared_data: 
     clip = shared_data("imagery", "ir_tracks", "IR_BIRD_070.mp4")
     assert len(pd.read_csv(clip.with_suffix(".csv"))) == 322
     assert len(clip_samples(clip, 1)) == 321
+
+
+def test_ellipses_hold_labels_that_their_width_was_not_chosen_from(
+    at_night: tuple[list[Sample], Fitted],
+) -> None:
+    samples, fitted = at_night
+    fit = fit_part("warm", samples, fitted.thresholds)
+    assert fit is not None and fit.labels > 80 and fit.held_out is not None
+    assert 0.85 <= fit.held_out.estimate <= 0.95, fit
