@@ -1,0 +1,200 @@
+"""What a wrong height of the ground costs: a wrong level, a plane over hills, a coarse map, by pitch."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import ndimage
+
+from wildlab.evaluation.runs import mean_interval
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.simulation.landscape import synthetic_landscape
+
+#: Degrees below the horizon that a ray looks.
+PITCHES_DEG = (15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
+#: Metres above the ground below; metres between the nodes of a coarse map, as of free ones of all the Earth.
+ABOVE_M, COARSE_M = 60.0, 30.0
+#: Landscapes, and rays on each.
+LANDS, RAYS = 12, 300
+#: Rays start this far from the border of the map, metres, so that few leave it.
+MARGIN_M = 120.0
+#: What may be wrong, by its column.
+WRONG = {
+    "level": "the ground 1 m too high",
+    "plane": "a plane at the height below the camera",
+    "coarse": f"a map with a node every {COARSE_M:.0f} m",
+}
+
+CAPTION = (
+    f"Distance from the true point, {ABOVE_M:.0f} m above land drawn {LANDS} times with {RAYS} rays each: "
+    "medians over rays, mean over landscapes with its interval. A ray that meets the true ground and not the "
+    "coarse map is in no median."
+)
+
+
+class Shift(NamedTuple):
+    """How far points move, for one pitch.
+
+    Attributes
+    ----------
+    pitch
+        Degrees below the horizon.
+    off
+        By `WRONG`: (LANDS,) median distance on each landscape, metres; NaN where no ray met both.
+    lost
+        By `WRONG`: share of the rays that meet the true ground and not the wrong one.
+    used
+        How many rays met the true ground, of ``drawn``.
+    drawn
+        All rays.
+    """
+
+    pitch: float
+    off: dict[str, Array]
+    lost: dict[str, float]
+    used: int
+    drawn: int
+
+
+def shifts(seed: int = 0, lands: int = LANDS, rays: int = RAYS) -> list[Shift]:
+    """Points on rolling land beside those that a wrong height of the ground gives.
+
+    Parameters
+    ----------
+    seed
+        Of landscapes and rays.
+    lands, rays
+        How many, and how many on each.
+
+    Returns
+    -------
+    list of Shift
+        One for each of `PITCHES_DEG`.
+    """
+    worlds = [synthetic_landscape(seed + number) for number in range(lands)]
+    coarse = [coarser(one, COARSE_M) for one in worlds]
+    found = []
+    for pitch in PITCHES_DEG:
+        off: dict[str, list[float]] = {name: [] for name in WRONG}
+        lost = dict.fromkeys(WRONG, 0)
+        used = 0
+        for number, (land, rough) in enumerate(zip(worlds, coarse, strict=True)):
+            # The same rays for every pitch: pitches are compared, not draws.
+            starts, directions = _rays(land, np.radians(pitch), rays, np.random.default_rng([seed, number]))
+            below = land.heights_at(starts[:, :2])
+            true = intersect_terrain(land, directions, starts).points
+            met = np.isfinite(true[:, 0])
+            used += int(met.sum())
+            raised = Terrain(land.height + np.float32(1.0), land.north, land.east, land.step)
+            wrong = {
+                "level": intersect_terrain(raised, directions, starts).points,
+                "plane": starts + ((-below - starts[:, 2]) / directions[:, 2])[:, None] * directions,
+                "coarse": intersect_terrain(rough, directions, starts).points,
+            }
+            for name, points in wrong.items():
+                distance = np.hypot(*(points - true)[met, :2].T)
+                lost[name] += int((~np.isfinite(distance)).sum())
+                known = distance[np.isfinite(distance)]
+                off[name].append(float(np.median(known)) if len(known) else np.nan)
+        found.append(
+            Shift(
+                pitch,
+                {name: np.array(values) for name, values in off.items()},
+                {name: count / max(used, 1) for name, count in lost.items()},
+                used,
+                lands * rays,
+            )
+        )
+    return found
+
+
+def coarser(terrain: Terrain, step: float) -> Terrain:
+    """The same land from a map with fewer nodes: each the mean of what lies about it.
+
+    Parameters
+    ----------
+    terrain
+        The land.
+    step
+        Between nodes, metres: a whole number of the land's own steps.
+
+    Returns
+    -------
+    Terrain
+    """
+    by = round(step / terrain.step)
+    mean = ndimage.uniform_filter(terrain.height.astype(float), by, mode="nearest")
+    return Terrain(mean[::by, ::by].astype(np.float32), terrain.north, terrain.east, by * terrain.step)
+
+
+def _rays(land: Terrain, pitch: float, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """(N, 3) starts above the ground, and (N, 3) directions at a pitch (rad) towards any side."""
+    least_north, most_north, least_east, most_east = land.extent
+    low, high = (np.array(one) for one in ((least_north, least_east), (most_north, most_east)))
+    place = rng.uniform(low + MARGIN_M, high - MARGIN_M, (count, 2))
+    course = rng.uniform(-np.pi, np.pi, count)
+    starts = np.column_stack([place, -land.heights_at(place) - ABOVE_M])
+    flat = np.cos(pitch)
+    directions = np.column_stack(
+        [flat * np.cos(course), flat * np.sin(course), np.full(count, np.sin(pitch))]
+    )
+    return starts, directions
+
+
+def shifts_table(found: list[Shift]) -> pd.DataFrame:
+    """Medians with the interval of their mean over landscapes, and what was lost, by pitch."""
+    rows = []
+    for one in found:
+        row: dict[str, object] = {"pitch": one.pitch}
+        for name in WRONG:
+            estimate, low, high = mean_interval(one.off[name])
+            row[name] = f"{estimate:.2f} ({max(low, 0):.2f} to {high:.2f})"
+            row[f"{name}_lost"] = 100 * one.lost[name]
+        row["rays"] = one.used
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def heights_words(found: list[Shift]) -> tuple[str, str]:
+    """A heading and a paragraph on what wrong heights cost at the steepest and the flattest pitch.
+
+    Parameters
+    ----------
+    found
+        Of `shifts`.
+
+    Returns
+    -------
+    tuple of str
+    """
+    flat, steep = min(found, key=lambda one: one.pitch), max(found, key=lambda one: one.pitch)
+    per_metre, straight = (float(np.nanmean(one.off["level"])) for one in (flat, steep))
+    plane = {one.pitch: mean_interval(one.off["plane"]) for one in found}
+    coarse = {one.pitch: mean_interval(one.off["coarse"]) for one in found}
+    growing = per_metre > 2 * max(straight, 0.05)
+    heading = (
+        f"A metre of height costs {per_metre:.1f} m at {flat.pitch:.0f} degrees"
+        if growing
+        else f"A metre of height costs at most {max(per_metre, straight):.1f} m"
+    )
+    unlike = coarse[flat.pitch].high < plane[flat.pitch].low
+    beside = (
+        f"a map with a node every {COARSE_M:.0f} m takes most of that away"
+        if coarse[flat.pitch].estimate < 0.5 * plane[flat.pitch].estimate and unlike
+        else f"a map with a node every {COARSE_M:.0f} m helps"
+        if unlike
+        else f"a map with a node every {COARSE_M:.0f} m is not told from a plane"
+    )
+    drawn = sum(one.drawn for one in found)
+    used = sum(one.used for one in found)
+    return heading, (
+        f"From {ABOVE_M:.0f} m above rolling land a ray {flat.pitch:.0f} degrees below the horizon "
+        f"lands {plane[flat.pitch].estimate:.0f} m off ({plane[flat.pitch].low:.0f} to "
+        f"{plane[flat.pitch].high:.0f}) on a plane at the height below the camera, and one straight down "
+        f"{plane[steep.pitch].estimate:.1f} m; {beside}: {coarse[flat.pitch].estimate:.1f} m "
+        f"({coarse[flat.pitch].low:.1f} to {coarse[flat.pitch].high:.1f}). {drawn - used} of {drawn} rays "
+        "leave the land without meeting it, and count nowhere."
+    )
