@@ -1,0 +1,105 @@
+"""Polygons: what is refused, what lies inside, ways that stay inside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.planning.areas import (
+    area_of,
+    check_area,
+    contains,
+    distance_to_border,
+    is_convex,
+    rectangle,
+    stays_inside,
+    way_inside,
+)
+
+SQUARE = [[0.0, 0.0], [0.0, 10.0], [10.0, 10.0], [10.0, 0.0]]
+#: A U open to the north: two arms and a bridge.
+U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100], [0, 100]]
+
+
+@pytest.mark.parametrize(
+    ("corners", "problem"),
+    [
+        ([[0, 0], [1, 1]], "2 different corners"),
+        ([[0, 0], [5, 5], [5, 5], [0, 0]], "2 different corners"),
+        ([[0, 0], [10, 10], [0, 10], [10, 0]], "crosses itself"),
+        ([[0, 0], [10, 0], [10, 10], [5, 0], [0, 10]], "crosses itself"),
+        ([[0, 0], [10, 0], [20, 0], [5, 0]], "crosses itself"),
+        ([[0, 0], [10, 0], [20, 0]], "an area of 0 m2"),
+        ([[0, 0], [np.nan, 10], [10, 10]], "corner 2 is not a number"),
+        ([[0, 0, 0], [1, 1, 1], [2, 0, 0]], "shape (3, 3)"),
+    ],
+)
+def test_what_is_no_area_is_refused_by_name(corners: list[list[float]], problem: str) -> None:
+    with pytest.raises(WildlabError, match="field") as caught:
+        check_area(corners, "field")
+    assert problem in caught.value.problem
+
+
+def test_either_sense_and_a_closed_ring_give_the_same_area() -> None:
+    one, other = check_area(SQUARE), check_area([*SQUARE[::-1], SQUARE[-1]])
+    assert {tuple(p) for p in one} == {tuple(p) for p in other}
+    for fence in (one, other):
+        p, q = fence - fence[0], np.roll(fence - fence[0], -1, axis=0)
+        assert (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() > 0
+    assert area_of(SQUARE) == area_of(SQUARE[::-1]) == 100.0
+
+
+def test_area_far_from_the_origin_keeps_its_digits() -> None:
+    assert area_of(np.add(SQUARE, [6e6, 5e5])) == pytest.approx(100.0, rel=1e-9)
+
+
+def test_what_lies_inside_is_what_winds_round() -> None:
+    """Against the winding number, whose sum of angles is another way to count."""
+    rng = np.random.default_rng(2)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, 9))
+    star = rng.uniform(20, 60, (9, 1)) * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    points = rng.uniform(-70, 70, (500, 2))
+    to = star[None] - points[:, None]
+    bearing = np.arctan2(to[..., 1], to[..., 0])
+    turned = np.angle(np.exp(1j * (np.roll(bearing, -1, axis=1) - bearing))).sum(axis=1)
+    assert (contains(star, points) == (np.abs(turned) > np.pi)).all()
+    assert not contains(star, [[np.nan, 0.0]]).any()
+
+
+def test_convex_or_not() -> None:
+    assert is_convex(check_area(SQUARE))
+    assert is_convex(rectangle(5.0, 6.0, 20.0, 10.0, 0.7))
+    assert not is_convex(check_area(U_SHAPE))
+
+
+def test_a_rectangle_has_its_sides_and_its_course() -> None:
+    corners = rectangle(3.0, 4.0, 20.0, 10.0, 0.3)
+    assert np.allclose(corners.mean(axis=0), [3.0, 4.0])
+    assert area_of(corners) == pytest.approx(200.0)
+    along = np.array([np.cos(0.3), np.sin(0.3)])
+    assert np.ptp(corners @ along) == pytest.approx(20.0)
+
+
+def test_distance_to_the_border() -> None:
+    assert np.allclose(distance_to_border(SQUARE, [[5, 5], [5, 12], [-3, -4]]), [5, 2, 5])
+
+
+def test_a_way_along_the_border_is_inside_and_one_across_the_gap_is_not() -> None:
+    fence = check_area(U_SHAPE)
+    assert stays_inside(fence, [0, 0], [0, 100])
+    assert stays_inside(fence, [30, 30], [30, 70])
+    assert stays_inside(fence, [10, 10], [10, 90])
+    assert not stays_inside(fence, [90, 15], [90, 85])
+    assert not stays_inside(fence, [100, 30], [100, 70])
+
+
+def test_the_way_inside_goes_round_the_two_corners_of_the_gap() -> None:
+    way = way_inside(check_area(U_SHAPE), [90, 15], [90, 85])
+    assert np.allclose(way, [[90, 15], [30, 30], [30, 70], [90, 85]])
+    length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
+    assert length == pytest.approx(40 + 2 * np.hypot(60, 15))
+
+
+def test_a_way_from_outside_is_straight() -> None:
+    assert np.allclose(way_inside(check_area(U_SHAPE), [200, 15], [90, 85]), [[200, 15], [90, 85]])

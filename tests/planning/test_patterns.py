@@ -1,0 +1,180 @@
+"""Lawn-mower patterns: no point is further than half a row distance from a row, whatever the area's form."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, project
+from wildlab.planning.areas import check_area, contains, rectangle, stays_inside
+from wildlab.planning.patterns import (
+    Pattern,
+    footprint,
+    lawn_mower,
+    lawn_mowers,
+    row_distance,
+    rows_over,
+)
+from wildlab.planning.visits import Way, visit_order
+
+U_SHAPE = [[0, 0], [100, 0], [100, 30], [30, 30], [30, 70], [100, 70], [100, 100], [0, 100]]
+CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
+
+
+def star(seed: int, corners: int = 9) -> NDArray[np.float64]:
+    """A polygon that is not convex and does not cross itself."""
+    rng = np.random.default_rng(seed)
+    angles = 2 * np.pi * (np.arange(corners) + rng.uniform(0.1, 0.9, corners)) / corners
+    return check_area(rng.uniform(60, 200, (corners, 1)) * np.stack([np.cos(angles), np.sin(angles)], -1))
+
+
+def away_from_rows(pattern: Pattern, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far points are to the side of the nearest row that they lie beside."""
+    nearest = np.full(len(points), np.inf)
+    for start, end in pattern.rows:
+        length = np.linalg.norm(end - start)
+        along = (end - start) / length
+        to = points - start
+        beside = (to @ along >= -1e-6) & (to @ along <= length + 1e-6)
+        aside = np.abs(to[:, 0] * along[1] - to[:, 1] * along[0])
+        nearest = np.where(beside, np.minimum(nearest, aside), nearest)
+    return nearest
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("direction", [None, 0.0, 0.9])
+def test_every_point_is_beside_a_row_within_half_the_distance(seed: int, direction: float | None) -> None:
+    fence = star(seed)
+    pattern = lawn_mower(fence, 25.0, direction=direction)
+    points = np.random.default_rng(seed).uniform(-200, 200, (2000, 2))
+    points = np.concatenate([points[contains(fence, points)], fence])
+    assert pattern.distance[0] <= 25.0
+    assert away_from_rows(pattern, points).max() <= pattern.distance[0] / 2 + 1e-6
+
+
+def test_rows_that_end_at_a_slanted_fence_leave_its_tips() -> None:
+    """Why rows reach on: F's sentence on convex areas is not true of rows that end at the fence."""
+    triangle = check_area([[0, 0], [0, 100], [100, 0]])
+    points = np.random.default_rng(1).uniform(0, 100, (4000, 2))
+    points = points[contains(triangle, points)]
+    cover = lawn_mower(triangle, 20.0, direction=0.0)
+    inside = lawn_mower(triangle, 20.0, direction=0.0, ends="inside")
+    assert away_from_rows(cover, points).max() <= 10.0 + 1e-6
+    assert np.isinf(away_from_rows(inside, points)).any()
+
+
+@pytest.mark.parametrize("shape", [U_SHAPE, *[star(seed).tolist() for seed in range(4)]])
+def test_a_way_that_is_to_stay_inside_stays_inside(shape: list[list[float]]) -> None:
+    fence = check_area(shape)
+    pattern = lawn_mower(fence, 22.0, ends="inside")
+    assert all(stays_inside(fence, a, b) for a, b in itertools.pairwise(pattern.waypoints))
+
+
+def test_pieces_of_rows_make_blocks_that_are_flown_each_at_once() -> None:
+    pattern = lawn_mower(U_SHAPE, 10.0, direction=np.pi / 2)
+    middles = pattern.rows.mean(axis=1)
+    arm = np.where(middles[:, 0] < 30, 0, np.where(middles[:, 1] < 50, 1, 2))
+    changes = (np.diff(arm) != 0).sum()
+    assert changes == 2
+    assert sorted(np.bincount(arm)) == [3, 7, 7]
+
+
+def test_rows_run_back_and_forth_and_keep_the_twins_count() -> None:
+    pattern = lawn_mower(rectangle(0, 0, 240, 180, np.pi / 2), 25.0, direction=np.pi / 2)
+    assert len(pattern.rows) == 8 and pattern.distance[0] == pytest.approx(180 / 8)
+    assert np.allclose(np.cos(np.diff(pattern.directions)), -1)
+    assert pattern.length == pytest.approx(8 * 240 + 7 * 22.5)
+
+
+def test_the_chosen_direction_is_along_the_longer_side() -> None:
+    pattern = lawn_mower(rectangle(0, 0, 200, 60, 0.4), 20.0)
+    assert np.abs(np.sin(pattern.directions - 0.4)).max() < 1e-9
+
+
+def test_the_start_says_at_which_corner_rows_begin() -> None:
+    fence = rectangle(0, 0, 100, 40, 0.0)
+    for corner in fence:
+        pattern = lawn_mower(fence, 20.0, start=3 * corner)
+        assert np.linalg.norm(pattern.waypoints[0] - corner) <= 10.0 + 1e-9
+
+
+def test_several_areas_are_visited_in_the_shortest_order() -> None:
+    """Against every order and every way, by hand."""
+    rng = np.random.default_rng(5)
+    ways = [[Way(np.zeros((0, 2, 2)), rng.uniform(0, 100, (2, 2))) for _ in range(2)] for _ in range(5)]
+
+    def length(order: tuple[int, ...], chosen: tuple[int, ...], back: bool, start: bool) -> float:
+        points = np.concatenate([ways[k][w].points for k, w in zip(order, chosen, strict=True)])
+        points = np.concatenate([[[0.0, 0.0]], points]) if start else points
+        points = np.concatenate([points, points[:1]]) if back else points
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+    for back, start in itertools.product((False, True), repeat=2):
+        least = min(
+            length(order, chosen, back, start)
+            for order in itertools.permutations(range(5))
+            for chosen in itertools.product(range(2), repeat=5)
+        )
+        found = visit_order(ways, start=[0.0, 0.0] if start else None, back=back)
+        order, chosen = zip(*found, strict=True)
+        assert length(order, chosen, back, start) == pytest.approx(least)
+
+
+def test_many_areas_are_not_far_from_the_shortest() -> None:
+    """Ten on a circle: the shortest way round is known."""
+    angles = np.random.default_rng(3).permutation(10) * 2 * np.pi / 10
+    spots = [np.tile([100 * np.cos(a), 100 * np.sin(a)], (2, 1)) for a in angles]
+    order = [k for k, _ in visit_order([[Way(np.zeros((0, 2, 2)), spot)] for spot in spots])]
+    turned = np.abs(np.angle(np.exp(1j * np.diff(angles[order]))))
+    assert np.allclose(turned, 2 * np.pi / 10)
+
+
+def test_a_given_order_is_kept_and_a_wrong_one_refused() -> None:
+    fields = [rectangle(0.0, east, 100.0, 40.0, 0.0) for east in (0.0, 200.0, 100.0)]
+    assert lawn_mowers(fields, 20.0, order=[1, 0, 2]).area.tolist() == [1, 1, 0, 0, 2, 2]
+    with pytest.raises(WildlabError, match="Name each of 0 to 2 once"):
+        lawn_mowers(fields, 20.0, order=[0, 0, 2])
+
+
+def test_the_footprint_is_the_largest_rectangle_that_every_edge_allows() -> None:
+    """Its corners and the middles of its sides project into the image, and its sides touch the edges."""
+    seen = footprint(CAMERA, 60.0)
+    assert footprint(CAMERA, 30.0).width == pytest.approx(seen.width / 2)  # F 8.2: linear with altitude
+    x, y = np.meshgrid(np.linspace(-60, 60, 1201), np.linspace(-60, 60, 1201))
+    uv = project(CAMERA, np.stack([x.ravel(), y.ravel(), np.full(x.size, 60.0)], axis=-1))
+    inside = ((uv >= 0) & (uv <= [719, 479])).all(axis=1).reshape(x.shape)
+    columns = inside[np.abs(y[:, 0]) < 5].all(axis=0)
+    assert columns.sum() * 0.1 >= seen.width - 0.2
+    # Nowhere does the image see less across than the rectangle, and somewhere nearly as little.
+    across = [row.sum() * 0.1 for row in inside[np.abs(y[:, 0]) < 0.4 * seen.length]]
+    assert seen.width - 0.2 <= min(across) < 1.1 * seen.width
+
+
+@pytest.mark.parametrize(
+    ("call", "problem"),
+    [
+        (lambda: footprint(CAMERA, -1.0), "a height of -1.0 m"),
+        (lambda: row_distance(0.0), "a strip of 0.0 m"),
+        (lambda: row_distance(10.0, 1.0), "an overlap of 1.0"),
+        (lambda: lawn_mower(U_SHAPE, 0.0), "a row distance of 0.0 m"),
+        (lambda: lawn_mower(U_SHAPE, 1e-4), "more than 5000"),
+        (lambda: lawn_mowers([], 10.0), "there is no area"),
+        (lambda: lawn_mowers([U_SHAPE], [10.0, 20.0]), "2 values for 1 areas"),
+        (lambda: visit_order([[]]), "an area has no way"),
+    ],
+)
+def test_wrong_use_is_said(call: object, problem: str) -> None:
+    with pytest.raises(WildlabError) as caught:
+        call()  # type: ignore[operator]
+    assert problem in caught.value.problem
+
+
+def test_rows_over_share_the_extent_evenly() -> None:
+    rows, step = rows_over(check_area(U_SHAPE), 30.0, 0.0)
+    assert step == 25.0 and [len(row) for row in rows] == [1, 1, 1, 1]
+    rows, _ = rows_over(check_area(U_SHAPE), 10.0, np.pi / 2)
+    assert [len(row) for row in rows] == [2, 2, 2, 2, 2, 2, 2, 1, 1, 1]

@@ -1,0 +1,312 @@
+"""Areas on the ground: polygons of north and east, checked before anything is planned on them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+
+#: Corners nearer to one another than this are one corner, metres; and what counts as on a border.
+SAME = 1e-6
+#: Areas below this cannot be searched, square metres.
+LEAST = 1e-3
+
+
+def check_area(corners: ArrayLike, name: str = "area") -> Array:
+    """A polygon that can be searched: clockwise as seen from above, not closed, no corner twice.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) north and east, metres, in either sense; the first may stand at the end once more.
+    name
+        Of the area, for messages.
+
+    Returns
+    -------
+    (K', 2) metres.
+
+    Raises
+    ------
+    WildlabError
+        Where it has fewer than three corners, corners that are not numbers, no extent, or crosses itself.
+
+    Examples
+    --------
+    >>> print(check_area([[0, 0], [0, 10], [20, 10], [20, 0], [0, 0]]))
+    [[20.  0.]
+     [20. 10.]
+     [ 0. 10.]
+     [ 0.  0.]]
+    """
+    points = np.asarray(corners, float)
+    if points.ndim != 2 or points.shape[-1] != 2:
+        raise WildlabError(f"corners of the shape {points.shape}", "give rows of north and east", field=name)
+    if not np.isfinite(points).all():
+        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise WildlabError(
+            f"corner {row + 1} is not a number", "give north and east of every corner in metres", field=name
+        )
+    points = points[np.linalg.norm(points - np.roll(points, -1, axis=0), axis=1) > SAME]
+    if len(points) < 3:
+        raise WildlabError(
+            f"the polygon has {len(points)} different corner{'s' * (len(points) != 1)}",
+            "give three at least",
+            field=name,
+        )
+    crossing = _crossing_edges(points)
+    if crossing is not None:
+        a, b = crossing
+        raise WildlabError(
+            f"the polygon crosses itself: its edge after corner {a + 1} meets that after corner {b + 1}",
+            "give the corners in the order in which one walks along the fence",
+            field=name,
+        )
+    signed = _signed_area(points)
+    if abs(signed) < LEAST:
+        raise WildlabError(
+            f"the polygon has an area of {abs(signed):.2g} m2",
+            "its corners lie on one line: move one",
+            field=name,
+        )
+    # North to the first axis, east to the second: positive is clockwise from above.
+    return points if signed > 0 else np.ascontiguousarray(points[::-1])
+
+
+def area_of(corners: ArrayLike) -> float:
+    """Area of a polygon (K, 2) in square metres, by the sum of its cross products.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres, in either sense.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> area_of([[0, 0], [0, 10], [20, 10], [20, 0]])
+    200.0
+    """
+    return abs(_signed_area(np.asarray(corners, float)))
+
+
+def is_convex(corners: ArrayLike) -> bool:
+    """Whether no inner angle of a checked polygon is above 180 degrees (F 5.2, footnote).
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres, from `check_area`.
+
+    Returns
+    -------
+    bool
+    """
+    edges = np.roll(np.asarray(corners, float), -1, axis=0) - np.asarray(corners, float)
+    following = np.roll(edges, -1, axis=0)
+    turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
+    lengths = np.linalg.norm(edges, axis=1) * np.linalg.norm(following, axis=1)
+    return bool((turns >= -1e-9 * lengths).all())
+
+
+def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
+    """Which points lie in a polygon, by counting the edges that a line to the north crosses.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres.
+    points
+        (N, 2) metres, north and east. On the border either answer may come out.
+
+    Returns
+    -------
+    (N,) bool; False of NaN.
+
+    Examples
+    --------
+    >>> contains([[0, 0], [0, 10], [20, 10], [20, 0]], [[5, 5], [25, 5]])
+    array([ True, False])
+    """
+    fence = np.asarray(corners, float)
+    asked = np.atleast_2d(np.asarray(points, float))
+    inside = np.zeros(len(asked), bool)
+    for a, b in zip(fence, np.roll(fence, -1, axis=0), strict=True):
+        spans = (a[1] > asked[:, 1]) != (b[1] > asked[:, 1])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            at = a[0] + (asked[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            inside ^= spans & (asked[:, 0] < at)
+    return inside
+
+
+def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:
+    """Corners of a rectangle about its middle, (4, 2) metres, clockwise.
+
+    Parameters
+    ----------
+    north, east
+        Of its middle, metres.
+    length, width
+        Along the course and across it, metres.
+    course
+        From north to the east, radians.
+
+    Returns
+    -------
+    (4, 2) metres.
+
+    Examples
+    --------
+    >>> print(rectangle(0.0, 0.0, 4.0, 2.0, 0.0))
+    [[ 2.  1.]
+     [-2.  1.]
+     [-2. -1.]
+     [ 2. -1.]]
+    """
+    along = np.array([np.cos(course), np.sin(course)])
+    across = np.array([-along[1], along[0]])
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2
+    corners = np.array([north, east]) + length * signs[:, :1] * along + width * signs[:, 1:] * across
+    return check_area(corners, "rectangle")
+
+
+def stays_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> bool:
+    """Whether a straight way stays within a polygon; its border belongs to it.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres.
+    start, end
+        (2,) metres.
+
+    Returns
+    -------
+    bool
+    """
+    fence, a, b = np.asarray(corners, float), np.asarray(start, float), np.asarray(end, float)
+    along = b - a
+    length = float(np.linalg.norm(along))
+    edges = np.roll(fence, -1, axis=0) - fence
+    cross = along[0] * edges[:, 1] - along[1] * edges[:, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        to = fence - a
+        t = (to[:, 0] * edges[:, 1] - to[:, 1] * edges[:, 0]) / cross
+    # Corners of the fence cut the way as well: an edge along the way crosses it nowhere.
+    s = (to @ along) / max(length**2, 1e-300)
+    cuts = np.concatenate([t[np.isfinite(t)], s])
+    cuts = np.unique(np.concatenate([[0.0, 1.0], cuts[(cuts > 0) & (cuts < 1)]]))
+    middles = a + ((cuts[:-1] + cuts[1:]) / 2)[:, None] * along
+    pieces = np.diff(cuts) * length > 10 * SAME
+    near = distance_to_border(fence, middles) <= 10 * SAME
+    return bool((contains(fence, middles) | near | ~pieces).all())
+
+
+def distance_to_border(corners: ArrayLike, points: ArrayLike) -> Array:
+    """How far points are from the border of a polygon, inside or outside.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres.
+    points
+        (N, 2) metres.
+
+    Returns
+    -------
+    (N,) metres.
+    """
+    fence = np.asarray(corners, float)
+    asked = np.atleast_2d(np.asarray(points, float))
+    nearest = np.full(len(asked), np.inf)
+    for a, b in zip(fence, np.roll(fence, -1, axis=0), strict=True):
+        edge = b - a
+        t = np.clip((asked - a) @ edge / max(edge @ edge, 1e-300), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(asked - a - t[:, None] * edge, axis=1))
+    return nearest
+
+
+def way_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> Array:
+    """Shortest way between two points that stays within a polygon, by way of its corners.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres, checked.
+    start, end
+        (2,) metres. Where one of them lies outside, the way is straight.
+
+    Returns
+    -------
+    (M, 2) metres, from start to end.
+    """
+    fence, a, b = np.asarray(corners, float), np.asarray(start, float), np.asarray(end, float)
+    ends = np.stack([a, b])
+    held = contains(fence, ends) | (distance_to_border(fence, ends) <= 10 * SAME)
+    if not held.all() or stays_inside(fence, a, b):
+        return ends
+    nodes = np.concatenate([ends, fence])
+    far = np.full(len(nodes), np.inf)
+    far[0], before, todo = 0.0, np.zeros(len(nodes), int), set(range(len(nodes)))
+    while todo:
+        here = min(todo, key=lambda one: far[one])
+        todo.remove(here)
+        if here == 1 or not np.isfinite(far[here]):
+            break
+        for there in todo:
+            length = far[here] + float(np.linalg.norm(nodes[there] - nodes[here]))
+            if length < far[there] and stays_inside(fence, nodes[here], nodes[there]):
+                far[there], before[there] = length, here
+    if not np.isfinite(far[1]):
+        return ends  # rounding alone: a checked polygon is connected
+    path = [1]
+    while path[-1] != 0:
+        path.append(int(before[path[-1]]))
+    return np.asarray(nodes[path[::-1]])
+
+
+def _signed_area(points: Array) -> float:
+    # About the first corner: far from the origin a cross product loses digits.
+    p = points - points[0]
+    q = np.roll(p, -1, axis=0)
+    return float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum() / 2)
+
+
+def _crossing_edges(points: Array) -> tuple[int, int] | None:
+    """Two edges that meet elsewhere than at the corner they share, or None."""
+    count = len(points)
+    ends = np.roll(points, -1, axis=0)
+    for i in range(count):
+        for j in range(i + 1, count):
+            if j == i + 1 or (i == 0 and j == count - 1):
+                # Neighbours share a corner; they overlap where one turns straight back.
+                first, second = (i, j) if j == i + 1 else (j, i)
+                u, v = ends[first] - points[first], ends[second] - points[second]
+                cross = u[0] * v[1] - u[1] * v[0]
+                if abs(cross) <= 1e-12 * np.linalg.norm(u) * np.linalg.norm(v) and u @ v < 0 and count > 3:
+                    return first, second
+            elif _meet(points[i], ends[i], points[j], ends[j]):
+                return i, j
+    return None
+
+
+def _meet(a: Array, b: Array, c: Array, d: Array) -> bool:
+    """Whether two closed segments have a point in common."""
+
+    def side(p: Array, q: Array, r: Array) -> float:
+        u, v = q - p, r - p
+        value = u[0] * v[1] - u[1] * v[0]
+        return 0.0 if abs(value) <= SAME * float(np.linalg.norm(u)) else float(value)
+
+    sides = side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)
+    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
+        return True
+    for value, p, q, r in zip(sides, (a, a, c, c), (b, b, d, d), (c, d, a, b), strict=True):
+        if value == 0 and (r >= np.minimum(p, q) - SAME).all() and (r <= np.maximum(p, q) + SAME).all():
+            return True
+    return False
