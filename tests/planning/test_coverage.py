@@ -1,0 +1,179 @@
+"""Coverage: all images at once as each alone, and times and probabilities counted by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.mount import R_MC_DOWN, Mount
+from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.visibility import visible_nodes
+from wildlab.planning.areas import area_of, rectangle
+from wildlab.planning.coverage import coverage, nodes_in, share_seen
+from wildlab.planning.sightings import see
+
+CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
+#: 90 degrees each way, without distortion.
+WIDE = Camera(100, 100, 50.0, 50.0, 50.0, 50.0)
+
+
+def hills(seed: int, holes: bool = False) -> Terrain:
+    rng = np.random.default_rng(seed)
+    n, e = np.meshgrid(np.arange(60), np.arange(80), indexing="ij")
+    height = sum(
+        rng.uniform(3, 8) * np.sin(rng.uniform(0.1, 0.5) * n + rng.uniform(0.1, 0.5) * e + rng.uniform(0, 6))
+        for _ in range(4)
+    )
+    height = np.asarray(height + rng.uniform(0, 1, n.shape), np.float32)
+    if holes:
+        height[20:25, 30:40] = np.nan
+    return Terrain(height, north=-60.0, east=-80.0, step=2.0)
+
+
+def poses_over(terrain: Terrain, seed: int, count: int = 40) -> CameraPoses:
+    """Cameras anywhere above the terrain and a little beyond it, looking anywhere from down to level."""
+    rng = np.random.default_rng(seed)
+    p = np.stack(
+        [rng.uniform(-80, 80, count), rng.uniform(-100, 100, count), -rng.uniform(25, 70, count)], -1
+    )
+    R = euler_to_matrix(0.0, rng.uniform(0.0, 1.5, count), rng.uniform(-3, 3, count)) @ R_MC_DOWN
+    return CameraPoses.at_lens(CAMERA, p, R, np.eye(3))
+
+
+@pytest.mark.parametrize("holes", [False, True])
+def test_many_images_show_what_each_shows_alone(holes: bool) -> None:
+    terrain = hills(3, holes)
+    poses = poses_over(terrain, 4)
+    found = see(terrain, poses, 150.0)
+    some = 0
+    for k in range(poses.rows[0]):
+        alone = visible_nodes(terrain, poses.take(k), furthest=150.0)
+        shown = np.zeros(terrain.height.shape, bool)
+        shown[alone.rows, alone.columns] = alone.visible
+        assert np.array_equal(np.sort(found.node[found.image == k]), np.flatnonzero(shown))
+        some += int(shown.sum())
+    assert some > 2000
+
+
+def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
+    """1 m/s north at 10 m over a plane: a square of 20 m is in view."""
+    flat = Terrain(np.zeros((201, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
+    p = np.stack([times, 0 * times, 0 * times - 10.0], axis=-1)
+    return flat, CameraPoses(WIDE, Mount("down"), p, np.eye(3))
+
+
+def test_times_and_gaps_are_those_of_a_square_that_moves() -> None:
+    times = np.arange(0.0, 61.0)
+    flat, poses = flat_flight(times)
+    shown = coverage(flat, poses, times, furthest=100.0)
+    north = flat.north + np.arange(201)
+    column = 50  # below the way
+    seen = [times[np.abs(n - times) <= 10] for n in north]
+    assert shown.looks[:, column].tolist() == [len(one) for one in seen]
+    for k, one in enumerate(seen):
+        if len(one):
+            assert shown.last[k, column] == one[-1]
+            assert shown.longest_gap[k, column] == max(one[0], 60 - one[-1], 1.0 if len(one) > 1 else 0)
+            assert shown.revisit_age[k, column] == 60 - one[-1]
+        else:
+            assert np.isnan(shown.last[k, column]) and shown.longest_gap[k, column] == 60
+    assert not shown.looks[:, 50 + 11].any() and shown.looks[:, 50 + 10].any()
+
+
+def test_probability_is_that_of_independent_looks() -> None:
+    times = np.arange(0.0, 5.0)
+    flat, poses = flat_flight(times)
+    shown = coverage(flat, poses, times, furthest=100.0, range_scale=12.0)
+    n, e = 3.0, 4.0
+    each = np.exp(-((n - times) ** 2 + e**2 + 10.0**2) / 12.0**2)
+    assert shown.detected[53, 54] == pytest.approx(1 - np.prod(1 - each))
+    perfect = coverage(flat, poses, times, furthest=100.0)
+    assert np.array_equal(perfect.detected, (perfect.looks > 0).astype(float))
+
+
+def test_a_blurred_image_is_not_counted_and_told() -> None:
+    times = np.arange(0.0, 61.0)
+    flat, poses = flat_flight(times)
+    sharp = times < 30
+    shown = coverage(flat, poses, times, furthest=100.0, sharp=sharp)
+    half = coverage(flat, poses.take(sharp), times[sharp], furthest=100.0)
+    assert np.array_equal(shown.looks, half.looks)
+    where = np.zeros(flat.height.shape, bool)
+    where[:, 45:56] = True
+    share = share_seen(shown, where)
+    assert share.seen == pytest.approx((shown.looks[:, 45:56] > 0).mean())
+    # Seen up to 39 m, in blurred images alone from there to 70 m.
+    assert share.only_blurred == pytest.approx(31 / 201)
+    assert share.looks == pytest.approx(shown.looks[:, 45:56][shown.looks[:, 45:56] > 0].mean())
+
+
+def test_a_border_is_a_smaller_image() -> None:
+    terrain = hills(5)
+    poses = poses_over(terrain, 6)
+    inner = replace(CAMERA, width=520, height=280, cx=256.0, cy=116.6)
+    smaller = CameraPoses.at_lens(inner, poses.p_nc, poses.R_nc, np.eye(3))
+    one, other = see(terrain, poses, 150.0, border=100.0), see(terrain, smaller, 150.0)
+    assert np.array_equal(one.node, other.node) and np.array_equal(one.image, other.image)
+    assert len(one.node) < len(see(terrain, poses, 150.0).node)
+
+
+def test_trees_hide_the_ground_behind_and_below_them() -> None:
+    flat = Terrain(np.zeros((101, 101), np.float32), north=-50.0, east=-50.0, step=1.0)
+    raised = flat.height.copy()
+    raised[60:63, :] = 8.0
+    trees = Terrain(raised, north=-50.0, east=-50.0, step=1.0)
+    pose = CameraPoses(WIDE, Mount("down"), np.array([[0.0, 0.0, -20.0]]), np.eye(3))
+    bare = coverage(flat, pose, [0.0], furthest=200.0).seen
+    hidden = coverage(flat, pose, [0.0], furthest=200.0, surface=trees).seen
+    north = flat.north + np.arange(101)
+    column = 50
+    lost = north[bare[:, column] & ~hidden[:, column]]
+    # The flanks rise from 9 m; the last tree at 12 m of 8 m hides up to 12 x 20 / 12 = 20 m.
+    assert lost.min() == 10.0 and lost.max() in (19.0, 20.0)
+    assert hidden[:60, column].sum() == bare[:60, column].sum()
+
+
+def test_nodes_of_areas_have_their_area() -> None:
+    flat = Terrain(np.zeros((401, 401), np.float32), north=-100.0, east=-100.0, step=0.5)
+    fences = [rectangle(0, 0, 60, 40, 0.4), rectangle(40, 50, 30, 30, 1.0)]
+    owner = nodes_in(flat, fences)
+    for k, fence in enumerate(fences):
+        assert (owner == k).sum() * 0.25 == pytest.approx(area_of(fence), rel=0.02)
+
+
+def test_of_no_nodes_nothing_is_said() -> None:
+    flat, poses = flat_flight(np.array([0.0]))
+    nothing = share_seen(coverage(flat, poses, [0.0], furthest=100.0), np.zeros(flat.height.shape, bool))
+    assert nothing.area == 0 and np.isnan(nothing.seen)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"furthest": np.inf}, "a furthest distance of inf m"),
+        ({"furthest": 0.0}, "a furthest distance of 0.0 m"),
+        ({"times": [0.0]}, "times of the shape (1,) for 2 poses"),
+        ({"times": [1.0, 0.0]}, "not in order"),
+        ({"sharp": [True]}, "1 marks of sharpness for 2 images"),
+    ],
+)
+def test_wrong_use_is_said(change: dict[str, object], problem: str) -> None:
+    flat, poses = flat_flight(np.array([0.0, 1.0]))
+    given = {"times": [0.0, 1.0], "furthest": 100.0} | change
+    times = given.pop("times")
+    with pytest.raises(WildlabError) as caught:
+        coverage(flat, poses, times, **given)  # type: ignore[arg-type]
+    assert problem in caught.value.problem
+
+
+def test_one_pose_for_all_is_no_row_of_instants() -> None:
+    flat, _ = flat_flight(np.array([0.0, 1.0]))
+    with pytest.raises(WildlabError, match="row of instants"):
+        see(flat, CameraPoses(WIDE, Mount("down"), np.zeros(3), np.eye(3)), 10.0)
