@@ -8,5 +8,6 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 - `wildlab.planning.areas`: polygons, checked; what lies in them.
 - `wildlab.planning.patterns`: lawn-mower patterns over one area and over several (F 5.2); `visits`: the
   order of the shortest way.
+- `wildlab.planning.sea`: when tracked vessels have to be seen again, and level passes over them (H 8.2).
 - `wildlab.planning.courses`: the way that is flown through a pattern, with turns, wind and times.
 """
