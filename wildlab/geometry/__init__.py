@@ -132,6 +132,13 @@ from wildlab.geometry.intrinsics import (
     view_errors,
 )
 from wildlab.geometry.lens_choice import LensChoice, choose_lens
+from wildlab.geometry.line_of_sight import (
+    Looked,
+    cast_rays,
+    compare_angles,
+    field_of_view,
+    in_field_of_view,
+)
 from wildlab.geometry.mount import (
     Mount,
     camera_pose,
@@ -190,6 +197,7 @@ __all__ = [
     "GroundJacobians",
     "Intrinsics",
     "LensChoice",
+    "Looked",
     "Met",
     "Mount",
     "Mounting",
@@ -217,7 +225,9 @@ __all__ = [
     "camera_rates",
     "camera_rotation",
     "camera_twist",
+    "cast_rays",
     "choose_lens",
+    "compare_angles",
     "confused",
     "direction_differences",
     "direction_sd",
@@ -228,6 +238,7 @@ __all__ = [
     "enu_to_ned",
     "euler_errors_to_body",
     "euler_to_matrix",
+    "field_of_view",
     "fit_linear",
     "fit_points",
     "flat_earth",
@@ -247,6 +258,7 @@ __all__ = [
     "helgesen_misalignment",
     "homography",
     "image_raster",
+    "in_field_of_view",
     "in_image",
     "inside_ellipse",
     "intersect_plane",

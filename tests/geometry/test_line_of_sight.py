@@ -1,0 +1,238 @@
+"""Line of sight as F has it, beside slow twins in numpy, hand-made ground, and the exact walk."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera, in_image, project
+from wildlab.geometry.flodell import R_CAMERA, camera_rotation
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
+from wildlab.geometry.terrain import Terrain
+
+CAMERA = Camera(640, 512, 1000.0, 900.0, 320.0, 256.0)
+
+
+def all_nodes(terrain: Terrain) -> np.ndarray:
+    return np.argwhere(np.ones(terrain.height.shape, bool))
+
+
+def points_of(terrain: Terrain, nodes: np.ndarray) -> np.ndarray:
+    """Nodes as points in n."""
+    rows, columns = nodes.T
+    north, east = terrain.north + rows * terrain.step, terrain.east + columns * terrain.step
+    return np.column_stack([north, east, -terrain.height[rows, columns].astype(float)])
+
+
+def cast_slowly(terrain, nodes, p_nc, step, tolerance, top):
+    """F algorithm 1 in its own words, one ray after the other."""
+    clear, steps = [], []
+    for poi in points_of(terrain, nodes):
+        way = poi - p_nc
+        length = np.linalg.norm(way)
+        ray = way / length
+        begin = max(0.0, (-top - p_nc[2]) / ray[2]) if ray[2] > 0 else 0.0
+        count = 0
+        while True:
+            at = p_nc + (begin + count * step) * ray
+            ground = terrain.heights_at(at[None, :2])[0]
+            outside = np.isnan(ground)
+            if (outside and begin + count * step >= length) or -at[2] <= ground:
+                break
+            count += 1
+        clear.append(np.linalg.norm(at - poi) <= tolerance)
+        steps.append(count)
+    return np.array(clear), np.array(steps)
+
+
+def depression(terrain, node, p_nc):
+    """F (2.24), radians."""
+    point = points_of(terrain, np.atleast_2d(node))[0]
+    return np.arctan2(point[2] - p_nc[2], np.hypot(*(point - p_nc)[:2]))
+
+
+def compare_slowly(terrain, nodes, p_nc):
+    """The prose of F's extended Bresenham, in its sense."""
+    clear = []
+    for node in nodes:
+        towards = (p_nc[:2] - [terrain.north, terrain.east]) / terrain.step - node
+        longer = np.abs(towards).max()
+        seen = True
+        if longer > 0:
+            for k in range(1, int(np.ceil(longer))):
+                between = np.floor(node + k * towards / longer + 0.5).astype(int)
+                inside = (between >= 0).all() and (between < terrain.height.shape).all()
+                if inside and depression(terrain, between, p_nc) <= depression(terrain, node, p_nc):
+                    seen = False
+        clear.append(seen)
+    return np.array(clear)
+
+
+@st.composite
+def scenes(draw):
+    """A rough terrain, and a camera above it or beside it."""
+    shape = draw(st.tuples(st.integers(2, 11), st.integers(2, 11)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    step = float(rng.choice([0.5, 2.0, 10.0]))
+    height = rng.normal(0, draw(st.sampled_from([0.3, 2.0, 9.0])), shape).astype(np.float32)
+    terrain = Terrain(height, *rng.normal(0, 50, 2), step=step)
+    north, far_north, east, far_east = terrain.extent
+    at = [rng.uniform(north - step, far_north + step), rng.uniform(east - step, far_east + step)]
+    return terrain, np.array([*at, -float(height.max() + rng.uniform(0.5, 25.0))])
+
+
+@settings(max_examples=30)
+@given(scenes())
+def test_rays_in_steps_are_those_of_the_slow_twin(scene):
+    terrain, p_nc = scene
+    nodes = all_nodes(terrain)
+    step, tolerance = 0.37 * terrain.step, 0.9 * terrain.step
+    for shorten, top in ((True, float(terrain.height.max())), (False, np.inf)):
+        found = cast_rays(terrain, nodes, p_nc, step, tolerance, shorten=shorten)
+        clear, steps = cast_slowly(terrain, nodes, p_nc, step, tolerance, min(top, -p_nc[2]))
+        # To the highest node a shortened ray begins at that itself, above it or below by rounding.
+        but_one = terrain.height.ravel() < (terrain.height.max() if shorten else np.inf)
+        np.testing.assert_array_equal(found.clear[but_one], clear[but_one])
+        np.testing.assert_array_equal(found.steps[but_one], steps[but_one])
+
+
+@settings(max_examples=50)
+@given(scenes())
+def test_angles_are_those_of_the_slow_twin(scene):
+    terrain, p_nc = scene
+    nodes = all_nodes(terrain)
+    np.testing.assert_array_equal(
+        compare_angles(terrain, nodes, p_nc).clear, compare_slowly(terrain, nodes, p_nc)
+    )
+
+
+@settings(max_examples=30)
+@given(scenes())
+def test_by_the_letter_every_point_hides_itself(scene):
+    """Of (2.24): no angle is larger than itself."""
+    terrain, p_nc = scene
+    for signed in (False, True):
+        found = compare_angles(terrain, all_nodes(terrain), p_nc, itself=True, signed=signed)
+        assert not found.clear.any()
+
+
+def test_without_absolute_values_a_line_to_the_other_side_leaves_its_wall_out():
+    """The camera west of the point: dx < 0 < dy, so the line is scaled to the shorter side."""
+    height = np.zeros((12, 40), np.float32)
+    height[:, 22] = 30.0
+    terrain = Terrain(height, 0.0, 0.0, 1.0)
+    west, east = np.array([8.0, 3.0, -40.0]), np.array([8.0, 36.0, -40.0])
+    assert not compare_angles(terrain, [[4, 36]], west).clear[0]
+    assert compare_angles(terrain, [[4, 36]], west, signed=True).clear[0]
+    # From the east dx > dy, which is the longer side in the sense, too.
+    assert not compare_angles(terrain, [[4, 3]], east, signed=True).clear[0]
+    assert compare_angles(terrain, [[8, 36]], west, signed=True).steps[0] == -1  # dy is zero: no direction
+    assert compare_angles(terrain, [[8, 36]], west).steps[0] > 0
+
+
+def test_both_see_over_even_ground_and_not_through_a_wall():
+    height = np.zeros((31, 31), np.float32)
+    height[:, 15] = 8.0
+    terrain = Terrain(height, 0.0, 0.0, 2.0)
+    p_nc = np.array([30.0, 10.0, -12.0])
+    nodes = all_nodes(terrain)
+    # The shadow of a wall 8 m high, 20 m off, from 12 m: three times as long as the way from 12 to 8 m.
+    behind = (nodes[:, 1] > 15) & (nodes[:, 1] * 2 - 10 < 20 * 12 / 4)
+    before = nodes[:, 1] < 14
+    for found in (compare_angles(terrain, nodes, p_nc), cast_rays(terrain, nodes, p_nc, 0.2, 1.0)):
+        assert not found.clear[behind].any()
+        assert found.clear[before].all()
+
+
+def test_a_ray_runs_over_a_crest_and_through_ground_thinner_than_its_step():
+    """What a fixed step costs, as F's algorithm stands."""
+    north = np.abs(np.arange(41) - 20.0)
+    ridge = Terrain(np.tile(20.0 - north, (3, 1)).astype(np.float32), 0.0, 0.0, 1.0)
+    lens = np.array([1.0, 0.0, -21.0])
+    assert compare_angles(ridge, [[1, 20]], lens).clear[0]
+    assert not any(cast_rays(ridge, [[1, 20]], lens, s, 1.0, shorten=False).clear[0] for s in (3.0, 0.7))
+    wall = np.zeros((3, 41), np.float32)
+    wall[:, 20] = 3.0
+    thin = Terrain(wall, 0.0, 0.0, 1.0)
+    through, held = (
+        cast_rays(thin, [[1, 38]], [1.0, 0.0, -4.0], step, 3.0, shorten=False).clear[0] for step in (8.0, 0.1)
+    )
+    assert through and not held
+
+
+def test_from_the_highest_ground_the_same_is_seen_in_fewer_steps():
+    rng = np.random.default_rng(3)
+    terrain = Terrain(rng.normal(0, 2, (25, 25)).astype(np.float32), 0.0, 0.0, 2.0)
+    nodes, p_nc = all_nodes(terrain), [24.0, 20.0, -90.0]
+    short = cast_rays(terrain, nodes, p_nc, 0.02, 1.0)
+    whole = cast_rays(terrain, nodes, p_nc, 0.02, 1.0, shorten=False)
+    assert (short.clear == whole.clear).mean() > 0.99  # the steps fall elsewhere
+    assert short.steps.sum() < whole.steps.sum() / 5
+
+
+def test_a_missing_node_is_not_seen_and_hides():
+    height = np.zeros((3, 21), np.float32)
+    height[:, 10], height[:, 20] = np.nan, 1.5
+    terrain = Terrain(height, 0.0, 0.0, 1.0)
+    nodes = np.array([[1, 10], [1, 18], [1, 5]])
+    for found in (
+        compare_angles(terrain, nodes, [1.0, 0.0, -3.0]),
+        cast_rays(terrain, nodes, [1.0, 0.0, -3.0], 0.1, 0.5, shorten=False),
+    ):
+        assert found.clear.tolist() == [False, False, True]
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_the_field_of_view_is_the_image_of_a_centred_camera(seed):
+    rng = np.random.default_rng(seed)
+    R_nc = euler_to_matrix(*rng.uniform(-3, 3, 3))
+    p_nc = rng.normal(0, 10, 3)
+    points = p_nc + rng.normal(0, 20, (200, 3))
+    uv = project(CAMERA, (points - p_nc) @ R_nc)
+    # The image as (2.23) has it reaches from 0 to its width, both ends included.
+    edge = np.nanmin(np.abs(np.concatenate([uv, uv - [640, 512]], axis=1)), axis=1, initial=np.inf)
+    clearly = ~(edge < 1.0)
+    found = in_field_of_view(field_of_view(CAMERA), points, p_nc, R_nc)
+    np.testing.assert_array_equal(found[clearly], in_image(CAMERA, uv)[clearly])
+
+
+def test_the_field_of_view_in_the_axes_of_f():
+    """(2.22) as printed, in F's camera frame, of points before the camera."""
+    rng = np.random.default_rng(5)
+    angles = (np.radians(32), np.radians(26))
+    roll, pitch, yaw = 0.1, -0.9, 2.0
+    points = rng.normal(0, 10, (500, 3))
+    in_f = points @ euler_to_matrix(roll, pitch, yaw)
+    u, v = in_f[:, 1] / in_f[:, 0], in_f[:, 2] / in_f[:, 0]
+    area = (np.abs(np.arctan(u)) <= angles[0] / 2) & (np.abs(np.arctan(v)) <= angles[1] / 2)
+    found = in_field_of_view(angles, points, np.zeros(3), camera_rotation(roll, pitch, yaw))
+    ahead = in_f[:, 0] > 0
+    np.testing.assert_array_equal(found, area & ahead)
+    assert (area & ~ahead).any()  # the print takes some that lie behind
+    np.testing.assert_allclose(R_CAMERA @ [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+
+
+FLAT = Terrain(np.zeros((3, 4)), 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: compare_angles(FLAT, [[3, 0]], [0, 0, -1]), "beyond the map of 3 by 4"),
+        (lambda: compare_angles(FLAT, [[0, 0]], [0, np.nan, -1]), "Give one known point"),
+        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 0.0, 1.0), "a step of 0.0 m"),
+        (lambda: cast_rays(FLAT, [[0, 0]], [0, 0, -1], 1.0, np.nan), "a tolerance of nan m"),
+        (
+            lambda: in_field_of_view((0.0, 1.0), [[0, 0, 1]], [0, 0, 0], np.eye(3)),
+            "Give two between 0 and 180",
+        ),
+    ],
+)
+def test_what_cannot_be_looked_at_is_refused(call, says):
+    with pytest.raises(WildlabError, match=says):
+        call()
