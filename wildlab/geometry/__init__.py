@@ -172,6 +172,15 @@ from wildlab.geometry.uncertainty import (
     ray_flatness,
     sample_ground,
 )
+from wildlab.geometry.viewshed import (
+    Footprint,
+    Hidden,
+    Viewshed,
+    footprint,
+    ground_per_pixel,
+    hidden_by,
+    viewshed,
+)
 from wildlab.geometry.visibility import Seen, lines_clear, visible_nodes
 
 __all__ = [
@@ -193,8 +202,10 @@ __all__ = [
     "Fit",
     "FlowErrors",
     "FlowJacobians",
+    "Footprint",
     "GroundCovariance",
     "GroundJacobians",
+    "Hidden",
     "Intrinsics",
     "LensChoice",
     "Looked",
@@ -211,6 +222,7 @@ __all__ = [
     "Twist",
     "Velocity",
     "Views",
+    "Viewshed",
     "apply_calibration",
     "attraction",
     "calibrate",
@@ -245,6 +257,7 @@ __all__ = [
     "flow_between",
     "flow_jacobians",
     "flow_matrix",
+    "footprint",
     "free_columns",
     "geodetic_to_ecef",
     "geodetic_to_enu_linear",
@@ -254,8 +267,10 @@ __all__ = [
     "gimbal_axes",
     "ground_covariance",
     "ground_jacobians",
+    "ground_per_pixel",
     "ground_to_pixel",
     "helgesen_misalignment",
+    "hidden_by",
     "homography",
     "image_raster",
     "in_field_of_view",
@@ -303,6 +318,7 @@ __all__ = [
     "velocity_covariance",
     "velocity_from_pair",
     "view_errors",
+    "viewshed",
     "visible_nodes",
     "with_covariance",
     "wrap",
