@@ -19,8 +19,6 @@ from wildlab import paths
 NOT_IMPORTED = {
     "ipykernel": "the kernel that runs the notebooks; Jupyter starts it by name",
     "jupyterlab": "what `make lab` opens",
-    "pyproj": "map projections and heights; given from the start for terrain models and maps",
-    "rasterio": "raster files; given from the start for terrain models",
     "rerun-sdk": "replay of a flight in time and space; given from the start for that",
 }
 

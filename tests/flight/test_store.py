@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import rasterio
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +18,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checksums import accept_changes
 from wildlab.flight.schema import NAV, TABLES, conform
 from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.geometry.terrain import Terrain
 
 
 def _same(one: Flight, other: Flight) -> None:
@@ -231,11 +233,38 @@ def test_an_interrupted_write_leaves_the_old_flight(
 
 
 def test_terrain_goes_along(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
-    first = save_flight(make_flight(), tmp_path / "one")
-    (tmp_path / "one" / "terrain.tif").write_bytes(b"II*")
-    second = save_flight(first, tmp_path / "two")
-    assert second.terrain is not None
-    assert second.terrain.read_bytes() == b"II*"
+    height = np.arange(12, dtype=np.float32).reshape(3, 4)
+    height[1, 2] = np.nan
+    flight = make_flight()
+    flight.terrain = Terrain(height, -10.1, 20.3, 0.7, 0.25)
+    first = load_flight(save_flight(flight, tmp_path / "one").folder or "")
+    second = load_flight(save_flight(first, tmp_path / "two").folder or "")
+    for found in (first.terrain, second.terrain):
+        assert found is not None
+        np.testing.assert_array_equal(found.height, height)
+        assert (found.north, found.east, found.step, found.sd) == (-10.1, 20.3, 0.7, 0.25)
+    assert load_flight(save_flight(make_flight(), tmp_path / "three").folder or "").terrain is None
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "other"])
+def test_a_terrain_that_is_none_is_refused(
+    make_flight: Callable[..., Flight], tmp_path: Path, damage: str
+) -> None:
+    flight = make_flight()
+    flight.terrain = Terrain(
+        np.random.default_rng(0).normal(0, 9, (300, 300)).astype(np.float32), 0.0, 0.0, 1.0
+    )
+    save_flight(flight, tmp_path / "one")
+    path = tmp_path / "one" / "terrain.tif"
+    whole = path.read_bytes()
+    if damage == "other":
+        with rasterio.open(path, "w", driver="GTiff", width=9, height=9, count=3, dtype="uint8") as data:
+            data.write(np.zeros((3, 9, 9), np.uint8))
+    else:
+        path.write_bytes(whole[: len(whole) // 2] if damage == "cut" else b"II*")
+    accept_changes(tmp_path / "one")
+    with pytest.raises(WildlabError, match=r"terrain\.tif: is not a .*Lay the terrain again"):
+        load_flight(tmp_path / "one")
 
 
 def test_choice_of_pose_source(make_flight: Callable[..., Flight]) -> None:

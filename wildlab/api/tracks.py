@@ -130,7 +130,9 @@ def navigate(flight: Flight, method: Method = "mekf", tuning: MekfTuning | None 
     found = (
         navigate_mekf(flight, times, tuning=tuning) if method == "mekf" else navigate_observer(flight, times)
     )
-    more = Flight(flight.manifest, flight.nav | {method: found.nav}, flight.tables, flight.folder)
+    more = Flight(
+        flight.manifest, flight.nav | {method: found.nav}, flight.tables, flight.folder, flight.terrain
+    )
     errors = None
     if reference is not None:
         errors = errors_against(flight.nav[reference], found.nav, compared, found.velocity_covariance)

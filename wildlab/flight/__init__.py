@@ -51,7 +51,7 @@ else:
             "schema": ("NAV", "TABLES", "conform"),
             "store": ("Flight", "load_flight", "save_flight"),
         },
-        folders=("checks", "readers", "recipe"),
+        folders=("checks", "readers", "recipe", "terrain"),
     )
 
 __all__ = [

@@ -15,6 +15,7 @@ from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, parse_toml, read_toml
+from wildlab.flight.terrain_model import TerrainPart
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Origin
@@ -264,6 +265,7 @@ class Manifest(Strict):
     time: TimePart
     clocks: ClocksPart = ClocksPart()
     vertical: VerticalPart = VerticalPart()
+    terrain: TerrainPart | None = None
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
     twin: TwinPart | None = None

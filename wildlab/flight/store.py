@@ -23,6 +23,8 @@ from wildlab.flight.files import inside, is_safe_name, regular_size
 from wildlab.flight.learnt import Learnt, write_learnt
 from wildlab.flight.manifest import FILE_NAME, Manifest, manifest_toml, read_manifest
 from wildlab.flight.schema import NAV, TABLES, Table, conform
+from wildlab.flight.terrain_file import read_terrain, write_terrain
+from wildlab.geometry.terrain import Terrain
 
 # pyarrow carries no types.
 arrow: Any = pyarrow
@@ -43,12 +45,15 @@ class Flight(Brief):
         The other tables by name (see `wildlab.flight.schema.TABLES`), those that are there.
     folder
         Where it was loaded from or saved to; None while it only exists in memory.
+    terrain
+        The ground, in n; None where the flight has no elevation map.
     """
 
     manifest: Manifest
     nav: dict[str, pd.DataFrame] = field(default_factory=dict)
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     folder: Path | None = None
+    terrain: Terrain | None = None
 
     @property
     def name(self) -> str:
@@ -77,12 +82,6 @@ class Flight(Brief):
     @property
     def truth(self) -> pd.DataFrame | None:
         return self.tables.get("truth")
-
-    @property
-    def terrain(self) -> Path | None:
-        """The elevation model, where the flight has one."""
-        path = self.folder / TERRAIN if self.folder is not None else None
-        return path if path is not None and path.is_file() else None
 
     @property
     def calibration(self) -> Path | None:
@@ -205,7 +204,8 @@ def load_flight(folder: Path | str) -> Flight:
     for name in (TERRAIN, CALIBRATION):
         if os.path.lexists(folder / name):
             _present(inside(folder, name, file=folder, field=name))
-    return Flight(manifest.model_copy(update={"checksums": {}}), nav, tables, folder)
+    terrain = read_terrain(folder / TERRAIN) if os.path.lexists(folder / TERRAIN) else None
+    return Flight(manifest.model_copy(update={"checksums": {}}), nav, tables, folder, terrain)
 
 
 def _present(path: Path) -> None:
@@ -301,14 +301,14 @@ def save_flight(
         for name, table in tables.items():
             _write(table, folder_now / f"{name}.parquet")
         if flight.terrain is not None:
-            shutil.copyfile(flight.terrain, folder_now / TERRAIN)
+            write_terrain(flight.terrain, folder_now / TERRAIN)
         if calibration is not None:
             write_learnt(calibration, folder_now / CALIBRATION)
         elif flight.calibration is not None:
             shutil.copyfile(flight.calibration, folder_now / CALIBRATION)
         text = with_checksums(manifest_toml(flight.manifest), checksums_of(folder_now))
         (folder_now / FILE_NAME).write_text(text, encoding="utf-8")
-    return Flight(flight.manifest, nav, tables, target)
+    return Flight(flight.manifest, nav, tables, target, flight.terrain)
 
 
 def _write(table: pd.DataFrame, path: Path) -> None:

@@ -161,6 +161,14 @@ from wildlab.geometry.terrain import (
     intersect_terrain,
     pixels_to_terrain,
 )
+from wildlab.geometry.terrain_uncertainty import (
+    TerrainCovariance,
+    TerrainJacobians,
+    sample_terrain,
+    terrain_covariance,
+    terrain_flatness,
+    terrain_jacobians,
+)
 from wildlab.geometry.uncertainty import (
     GroundCovariance,
     GroundJacobians,
@@ -219,6 +227,8 @@ __all__ = [
     "RobustFit",
     "Seen",
     "Terrain",
+    "TerrainCovariance",
+    "TerrainJacobians",
     "Twist",
     "Velocity",
     "Views",
@@ -305,6 +315,7 @@ __all__ = [
     "ray_flatness",
     "rotation_vector_to_matrix",
     "sample_ground",
+    "sample_terrain",
     "skew",
     "split_images",
     "start_camera",
@@ -313,6 +324,9 @@ __all__ = [
     "student_scale",
     "student_weights",
     "target_velocity",
+    "terrain_covariance",
+    "terrain_flatness",
+    "terrain_jacobians",
     "undistort",
     "undistort_approximately",
     "velocity_covariance",

@@ -16,6 +16,8 @@ from wildlab.geometry.calibration import Calibration, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.geometry.terrain_uncertainty import terrain_covariance
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 
 Array = NDArray[np.float64]
@@ -47,13 +49,20 @@ class Observations:
         The camera's, one a detection; NaN where the log has none, a covariance where it states one. The mount
         is calibrated or not.
     plane_down
-        Down coordinate of the ground at each detection, (N,); NaN where it is not known.
+        Down coordinate of the ground at each detection, (N,); NaN where it is not known. Over terrain, of the
+        point where the ray meets it.
+    terrain
+        The flight's, where it has one.
+    level
+        Over terrain, what `plane_down` would be without it, (N,).
     """
 
     table: pd.DataFrame
     uv: Array
     poses: CameraPoses
     plane_down: Array
+    terrain: Terrain | None = None
+    level: Array | None = None
 
     def take(self, rows: NDArray[np.bool_]) -> Observations:
         """The observations of some rows."""
@@ -62,6 +71,8 @@ class Observations:
             self.uv[rows],
             self.poses.take(rows),
             self.plane_down[rows],
+            self.terrain,
+            None if self.level is None else self.level[rows],
         )
 
 
@@ -70,8 +81,8 @@ def observe(
 ) -> Observations:
     """Collect the pixel detections of a flight with the poses of one navigation source.
 
-    The ground of a detection is the height of the target it names, else the detection's own
-    ``plane_down_m``.
+    The ground of a detection is the flight's terrain; without one, the height of the target it names, else
+    the detection's own ``plane_down_m``.
 
     Parameters
     ----------
@@ -136,12 +147,24 @@ def observe(
         }
     )
     manifest = flight.manifest
-    return Observations(
+    level = _ground_heights(flight, table, pixels)
+    seen = Observations(
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
         CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance),
-        _ground_heights(flight, table, pixels),
+        level,
+        flight.terrain,
+        None if flight.terrain is None else level,
     )
+    return _grounded(seen)
+
+
+def _grounded(observations: Observations) -> Observations:
+    """Over terrain, the plane of each observation is level at the point where its ray meets the ground."""
+    o = observations
+    if o.terrain is None:
+        return o
+    return replace(o, plane_down=pixels_to_terrain(o.poses, o.uv, o.terrain).points[:, 2])
 
 
 def shifted_poses(
@@ -177,7 +200,7 @@ def calibrated(
     """The observations with an estimated calibration applied to mount, camera, position, and their times."""
     poses = calibrated_poses(calibration, partial(shifted_poses, flight, source, observations))
     times = observations.table["time_s"] + calibration.value("clock")
-    return replace(observations, table=observations.table.assign(time_s=times), poses=poses)
+    return _grounded(replace(observations, table=observations.table.assign(time_s=times), poses=poses))
 
 
 def pose_errors(
@@ -186,7 +209,8 @@ def pose_errors(
     """Covariances of what the ground points are computed from.
 
     The pose's covariance is the log's where it has one; all else comes from ``assumed``, then the manifest's
-    ``[uncertainty]``, then :data:`USUAL`, in that order. ``assumed`` overrides the log too.
+    ``[uncertainty]``, then :data:`USUAL`, in that order. ``assumed`` overrides the log too. The height of
+    terrain is as good as its map is said to be.
 
     Parameters
     ----------
@@ -202,7 +226,9 @@ def pose_errors(
     PoseErrors
         Of the N observations.
     """
-    sd = assumed_deviations(flight) | (assumed or {})
+    ground = observations.terrain
+    of_map = {} if ground is None or np.isnan(ground.sd) else {"plane_height_m": ground.sd}
+    sd = assumed_deviations(flight) | of_map | (assumed or {})
     pose = observations.poses.covariance
     if pose is None or assumed is not None:
         pose = assumed_pose_covariance(observations.poses.R_nb, sd)
@@ -261,10 +287,15 @@ def georeference(
         ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found).
     """
     o = observations
-    ground = georeference_pixels(o.poses, o.uv, o.plane_down)
     if errors is None:
         errors = pose_errors(flight, o)
-    covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
+    if o.terrain is not None:
+        met = pixels_to_terrain(o.poses, o.uv, o.terrain)
+        ground = met.points
+        covariance, method = terrain_covariance(o.poses, o.uv, o.terrain, errors, rng, met)
+    else:
+        ground = georeference_pixels(o.poses, o.uv, o.plane_down)
+        covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
     return o.table.assign(
         north_m=ground[:, 0],
         east_m=ground[:, 1],

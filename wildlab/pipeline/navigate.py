@@ -260,7 +260,7 @@ def likelihoods_of_latency(flight: Flight, latencies: ArrayLike) -> Array:
     found = []
     for latency in np.atleast_1d(np.asarray(latencies, float)):
         late = replace_in_manifest(flight.manifest, {"gnss": {"latency_s": float(latency)}})
-        given = inputs_of(Flight(late, flight.nav, flight.tables, flight.folder), noise=noise)
+        given = inputs_of(Flight(late, flight.nav, flight.tables, flight.folder, flight.terrain), noise=noise)
         end = given.imu.times[-1:]
         earth = local_earth(latitude, height)
         run = run_mekf(given.imu, given.start, noise, earth, list(given.aiding.values()), end, axes=axes)

@@ -12,6 +12,7 @@ from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense.sense import sense
+from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
@@ -66,6 +67,7 @@ def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
         *findings_seen.identity(flight),
         *findings_seen.image(flight),
         *findings_inertial.inertial(flight),
+        *terrain_findings(flight),
         *_missing(flight),
         *_uncertainty(flight),
         *_clocks(flight),

@@ -17,7 +17,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.camera_file import parse_camera
 from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.files import TOML_LIMIT, check_model
+from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.learnt import read_learnt, refuse_other_camera
 from wildlab.flight.manifest import (
     CameraPart,
@@ -39,6 +39,8 @@ from wildlab.flight.recipe.tables import (
     read_truth,
 )
 from wildlab.flight.store import Flight, save_flight
+from wildlab.flight.terrain.laying import lay_terrain
+from wildlab.flight.terrain_model import TerrainSays
 
 
 def import_flight(
@@ -47,6 +49,7 @@ def import_flight(
     into: Path | str,
     overwrite: bool = False,
     calibration: Path | None = None,
+    terrain: TerrainSays | None = None,
 ) -> Flight:
     """Make a flight folder from plain tables, whole or not at all. The tables are only read.
 
@@ -62,6 +65,8 @@ def import_flight(
         Whether a flight that is there already may be replaced.
     calibration
         What `wildlab calibrate` learnt on another flight: kept with this one, applied when it is evaluated.
+    terrain
+        An elevation map, in place of the one that the recipe may name.
 
     Returns
     -------
@@ -72,7 +77,8 @@ def import_flight(
     ------
     WildlabError
         Naming the file, the column and the part of the recipe where something is missing or wrong, or what
-        `check_flight` calls a problem; or where the calibration is of another camera.
+        `check_flight` calls a problem; or where the calibration is of another camera, or the elevation map
+        cannot be used.
 
     Examples
     --------
@@ -89,6 +95,12 @@ def import_flight(
     _refuse_problems(flight, recipe, folder)
     if learnt is not None:
         refuse_other_camera(flight.manifest, learnt)
+    if terrain is not None:
+        flight = lay_terrain(flight, Path(terrain.file), terrain)
+    elif recipe.terrain is not None:
+        name = recipe.terrain.file
+        path = inside(folder, name, file=recipe_path, field="terrain.file")
+        flight = lay_terrain(flight, path, recipe.terrain)
     return save_flight(flight, into, overwrite=overwrite, calibration=learnt)
 
 

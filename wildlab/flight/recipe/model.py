@@ -42,6 +42,7 @@ from wildlab.flight.recipe.series import (
     Series,
     check_table_names,
 )
+from wildlab.flight.terrain_model import TerrainSays
 
 
 class Poses(Series):
@@ -153,6 +154,7 @@ class Recipe(Strict):
     time: RecipeTime
     clocks: ClocksPart = ClocksPart()
     vertical: RecipeVertical = RecipeVertical()
+    terrain: TerrainSays | None = None
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
     files: dict[str, str] = Field(default_factory=dict)

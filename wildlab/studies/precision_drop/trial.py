@@ -211,7 +211,9 @@ def with_detections(flight: Flight, drop: Drop) -> Flight:
     """The flight with what was found in its rendered images in place of the detections that it came with."""
     target = str(flight.table("truth")["target_id"].iloc[0])
     table = numbered([marks(flight.table("frames"), drop.exposures, drop.uv, "detector", target, 0.0)])
-    return Flight(flight.manifest, flight.nav, flight.tables | {"detections": table}, flight.folder)
+    return Flight(
+        flight.manifest, flight.nav, flight.tables | {"detections": table}, flight.folder, flight.terrain
+    )
 
 
 def horizon_views(camera: Camera, look: Look, seed: int, images: int) -> list[ColourView]:

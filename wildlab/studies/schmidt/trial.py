@@ -165,7 +165,7 @@ def first_part(flight: Flight, seconds: float) -> Flight:
     end = float(frame_times(flight).min()) + seconds
     cut = {name: flight.table(name) for name in ("imu", "gnss")}
     tables = {name: table[table["time_s"] <= end] for name, table in cut.items()}
-    return Flight(flight.manifest, flight.nav, flight.tables | tables, flight.folder)
+    return Flight(flight.manifest, flight.nav, flight.tables | tables, flight.folder, flight.terrain)
 
 
 def only(covariance: ArrayLike, attitude: bool) -> Array:

@@ -76,7 +76,7 @@ def navigate_observers(flight: Flight) -> None:
         early = frames["time_onboard_s"].to_numpy(float) - frames["time_s"].to_numpy(float)
         times = np.concatenate([times, times + early])
     own_axes = flight.tables | {"imu": as_mounted(flight.table("imu"), turn)}
-    uncalibrated = Flight(flight.manifest, flight.nav, own_axes, flight.folder)
+    uncalibrated = Flight(flight.manifest, flight.nav, own_axes, flight.folder, flight.terrain)
     flight.nav |= {
         OBSERVER: navigate_observer(flight, times).nav,
         UNCALIBRATED: navigate_observer(uncalibrated, times).nav,

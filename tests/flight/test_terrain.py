@@ -1,0 +1,306 @@
+"""Elevation maps under flights: what is read, how it comes into n, and every kind of map that is refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import rasterio
+from pyproj import Transformer
+from rasterio.transform import Affine
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import make_manifest
+from wildlab.flight.store import Flight
+from wildlab.flight.terrain.laying import lay_terrain
+from wildlab.flight.terrain_model import TerrainSays
+from wildlab.geometry.frames import geodetic_to_ned
+
+#: Where the made flights are: 46.8 north, 14.6 east, in zone 33, 700 m above the ellipsoid.
+LATITUDE, LONGITUDE, HEIGHT = 46.8, 14.6, 700.0
+UTM = 32633
+#: Places in n to compare terrains at, metres.
+AT = np.random.default_rng(0).uniform(-150, 150, (100, 2))
+
+
+def hills(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights above the ellipsoid by longitude and latitude: smooth, 620 to 680 m within the maps below."""
+    return 650 + 20 * np.sin(2000 * (x - LONGITUDE)) + 10 * np.cos(3000 * (y - LATITUDE))
+
+
+def write_map(
+    path: Path,
+    *,
+    crs: Any = UTM,
+    cell: float = 4.0,
+    side: int = 400,
+    turn: float = 0.0,
+    height: Callable[[np.ndarray, np.ndarray], np.ndarray] = hills,
+    off: tuple[float, float] = (0.0, 0.0),
+    **more: Any,
+) -> Path:
+    """A map of `height` about the place, cells of ``cell`` units of its CRS, turned by degrees."""
+    there = Transformer.from_crs(4326, crs, always_xy=True)
+    x0, y0 = there.transform(LONGITUDE, LATITUDE)
+    transform = (
+        Affine.translation(x0 + off[0], y0 + off[1])
+        @ Affine.rotation(turn)
+        @ Affine(cell, 0.0, -cell * side / 2, 0.0, -cell, cell * side / 2)
+    )
+    columns, rows = np.meshgrid(np.arange(side) + 0.5, np.arange(side) + 0.5)
+    x = transform.a * columns + transform.b * rows + transform.c
+    y = transform.d * columns + transform.e * rows + transform.f
+    longitude, latitude = there.transform(x, y, direction="INVERSE")
+    values = height(np.asarray(longitude), np.asarray(latitude))
+    given = {"crs": crs, "transform": transform, "dtype": "float32", "count": 1} | more
+    given = {key: value for key, value in given.items() if value is not None}
+    units = given.pop("units", None)
+    with rasterio.open(path, "w", driver="GTiff", width=side, height=side, **given) as data:
+        for band in range(given["count"]):
+            data.write(values.astype(given["dtype"]), band + 1)
+        if units:
+            data.units = (units,) * given["count"]
+    return path
+
+
+@pytest.fixture
+def flown() -> Callable[..., Flight]:
+    """``flown(height_m=..., latitude_deg=...)``: level flight over 400 m, 50 m above its origin."""
+
+    def make(**origin: float) -> Flight:
+        n = 30
+        nav = pd.DataFrame({"time_s": np.arange(n), "north_m": np.linspace(-200, 200, n), "east_m": 20.0})
+        nav = nav.assign(down_m=-50.0, q_w=1.0, q_x=0.0, q_y=0.0, q_z=0.0)
+        place = {"latitude_deg": LATITUDE, "longitude_deg": LONGITUDE, "height_m": HEIGHT} | origin
+        parts = {"origin": place, "platform": {"name": "kite"}, "time": {"kind": "sequence"}}
+        return Flight(make_manifest({"name": "lake", "kind": "logged"} | parts), {"logged": nav})
+
+    return make
+
+
+def lay(flight: Flight, path: Path, **says: Any) -> Flight:
+    return lay_terrain(flight, path, TerrainSays(**({"file": "map", "heights": "ellipsoid"} | says)))
+
+
+@pytest.mark.parametrize(
+    ("crs", "cell", "turn"),
+    [(UTM, 4.0, 0.0), (UTM, 4.0, 30.0), (4326, 4e-5, 0.0), (2056, 4.0, 0.0), (3857, 6.0, 180.0)],
+)
+def test_the_surface_in_n_is_the_surface_on_the_earth(
+    tmp_path: Path, flown: Callable[..., Flight], crs: int, cell: float, turn: float
+) -> None:
+    """Points of the formula, taken to n by themselves, lie on the terrain: whatever the CRS and its turn."""
+    flight = lay(flown(), write_map(tmp_path / "dem.tif", crs=crs, cell=cell, turn=turn))
+    assert flight.terrain is not None
+    rng = np.random.default_rng(0)
+    longitude, latitude = LONGITUDE + rng.uniform(-4e-3, 4e-3, 500), LATITUDE + rng.uniform(-3e-3, 3e-3, 500)
+    p = geodetic_to_ned(
+        np.radians(latitude), np.radians(longitude), hills(longitude, latitude),
+        flight.manifest.origin_tuple(),
+    )  # fmt: skip
+    off = -p[:, 2] - flight.terrain.heights_at(p[:, :2])
+    assert np.isfinite(off).all()
+    # Bilinear patches of 4 m cut the crests of waves of 240 m and 235 m by up to 0.05 m.
+    assert np.abs(off).max() < 0.08
+    record = flight.manifest.terrain
+    assert record is not None
+    assert record.error_rms_m < 0.02
+    assert np.abs(off).mean() < record.error_max_m + 0.05
+
+
+def test_curvature_is_taken_off(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    """Level ground falls by d^2 / 2R. (That grid north is not true north, the test above sees.)"""
+    level = lay(
+        flown(),
+        write_map(tmp_path / "level.tif", cell=100.0, height=lambda x, y: np.full(x.shape, 600.0)),
+        margin_m=12_000.0,
+    )
+    assert level.terrain is not None
+    d = np.array([[0.0, 0.0], [10_000.0, 0.0], [0.0, 10_000.0]])
+    fall = -100.0 - level.terrain.heights_at(d)
+    np.testing.assert_allclose(fall, [0.0, 7.85, 7.83], atol=0.03)
+
+
+def test_holes_stay_holes_and_are_counted(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    def holed(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.where((x > LONGITUDE) & (y > LATITUDE), -9999.0, hills(x, y))
+
+    path = write_map(tmp_path / "dem.tif", height=holed, nodata=-9999.0)
+    flight = lay(flown(), path)
+    assert flight.terrain is not None and flight.manifest.terrain is not None
+    north, east = np.array([100.0, -100.0, 100.0]), np.array([100.0, 100.0, -100.0])
+    heights = flight.terrain.heights_at(np.column_stack([north, east]))
+    np.testing.assert_array_equal(np.isnan(heights), [True, False, False])
+    assert flight.manifest.terrain.holes == np.isnan(flight.terrain.height).sum() > 0
+    undeclared = write_map(tmp_path / "bare.tif", height=holed)
+    with pytest.raises(WildlabError, match=r"heights of -9999 m.*state it as nodata"):
+        lay(flown(), undeclared)
+    again = lay(flown(), undeclared, nodata=-9999.0)
+    assert again.terrain is not None
+    np.testing.assert_array_equal(again.terrain.height, flight.terrain.height)
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [({"units": "ft"}, {}), ({}, {"unit": "ft"}), ({"crs": "EPSG:32633+6360"}, {"heights": 0.0})],
+)
+def test_feet_are_feet(
+    tmp_path: Path, flown: Callable[..., Flight], written: dict[str, Any], said: dict[str, Any]
+) -> None:
+    """By the band's unit, by the vertical CRS (EPSG:6360, US feet), or by what the user says."""
+    foot = 1200 / 3937 if "crs" in written else 0.3048
+    metres = lay(flown(), write_map(tmp_path / "m.tif"))
+    feet = lay(
+        flown(), write_map(tmp_path / "ft.tif", height=lambda x, y: hills(x, y) / foot, **written), **said
+    )
+    assert metres.terrain is not None and feet.terrain is not None
+    np.testing.assert_allclose(feet.terrain.height, metres.terrain.height, atol=2e-4)
+
+
+def test_heights_count_from_what_is_said(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    path = write_map(tmp_path / "dem.tif")
+    plain, above = lay(flown(), path), lay(flown(), path, heights=20.0)
+    assert plain.terrain is not None and above.terrain is not None and above.manifest.terrain is not None
+    np.testing.assert_allclose(above.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 20.0, atol=1e-3)
+    assert above.manifest.terrain.heights == "geoid" and above.manifest.terrain.added_m == 20.0
+    recorded = flown()
+    vertical = {"reference": "barometer", "correction_m": -30.0}
+    data = recorded.manifest.model_dump(exclude_none=True) | {"vertical": vertical}
+    recorded.manifest = make_manifest(data)
+    same = lay(recorded, path, heights="flight")
+    assert same.terrain is not None
+    np.testing.assert_allclose(same.terrain.heights_at(AT) - plain.terrain.heights_at(AT), 30.0, atol=1e-3)
+    with pytest.raises(WildlabError, match="does not say what its heights count from, and nobody guesses"):
+        lay(flown(), path, heights=None)
+    egm = write_map(tmp_path / "egm.tif", crs="EPSG:32633+5773")
+    with pytest.raises(WildlabError, match=r"count from 'EGM96 height', as its CRS says"):
+        lay(flown(), egm)
+    with pytest.raises(WildlabError, match=r"'EGM96 height', and the grid of that is not on this machine"):
+        lay(flown(), egm, heights=None)
+    three = write_map(tmp_path / "three.tif", crs=4979, cell=4e-5)
+    assert lay(flown(), three, heights=None).manifest.terrain.heights == "ellipsoid"  # type: ignore[union-attr]
+
+
+def test_standard_deviations_add_up(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    flight = lay(flown(), write_map(tmp_path / "dem.tif", cell=20.0), sd_m=0.4)
+    assert flight.terrain is not None and flight.manifest.terrain is not None
+    assert flight.terrain.sd == math.hypot(0.4, flight.manifest.terrain.error_rms_m) > 0.4
+    assert math.isnan(lay(flown(), write_map(tmp_path / "b.tif")).terrain.sd)  # type: ignore[union-attr]
+
+
+def test_a_picture_as_f_has_it(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    """Equation 6.1: PNG = 5 (M - 71)."""
+    grey = np.random.default_rng(0).integers(100, 110, (300, 300)).astype(np.uint8)
+    path = tmp_path / "map.png"
+    with rasterio.open(path, "w", driver="PNG", width=300, height=300, count=1, dtype="uint8") as data:
+        data.write(grey, 1)
+    x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(LONGITUDE, LATITUDE)
+    says = {"crs": f"EPSG:{UTM}", "cell_m": 3.0, "corner": (x - 450.0, y + 450.0)}
+    flight = lay(flown(height_m=100.0), path, heights=0.0, **says)
+    assert flight.terrain is not None
+    known = flight.terrain.height[np.isfinite(flight.terrain.height)]
+    assert known.min() >= 71 + 100 / 5 - 100 - 0.1 and known.max() <= 71 + 109 / 5 - 100 + 0.01
+    with pytest.raises(WildlabError, match="does not say where its cells lie"):
+        lay(flown(height_m=100.0), path, crs=f"EPSG:{UTM}")
+    with pytest.raises(WildlabError, match="states no CRS"):
+        lay(flown(height_m=100.0), path, cell_m=3.0, corner=(x, y))
+
+
+def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    path = write_map(tmp_path / "dem.tif", cell=2.0, side=900)
+    fine, coarse = lay(flown(), path), lay(flown(), path, step_m=11.0)
+    assert fine.terrain is not None and coarse.terrain is not None and coarse.manifest.terrain is not None
+    assert coarse.manifest.terrain.averaged == 5
+    at = np.random.default_rng(0).uniform(-200, 200, (300, 2))
+    np.testing.assert_allclose(coarse.terrain.heights_at(at), fine.terrain.heights_at(at), atol=0.7)
+    assert coarse.manifest.terrain.error_rms_m > fine.manifest.terrain.error_rms_m  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("origin", "written", "words"),
+    [
+        ({"latitude_deg": 47.8}, {}, r"nearest cell is 110\.\d km away\. Give"),
+        ({"latitude_deg": -LATITUDE}, {}, "with the other sign of latitude it would"),
+        ({"longitude_deg": -LONGITUDE}, {}, "with the other sign of longitude it would"),
+        ({}, {"off": (0.0, 1e7)}, "with the zone of the other hemisphere"),
+        ({"height_m": 400.0}, {}, r"whole flight is below the ground of this map, 2\d\d m in the middle"),
+    ],
+)
+def test_a_map_of_elsewhere_is_refused(
+    tmp_path: Path,
+    flown: Callable[..., Flight],
+    origin: dict[str, float],
+    written: dict[str, Any],
+    words: str,
+) -> None:
+    with pytest.raises(WildlabError, match=words):
+        lay(flown(**origin), write_map(tmp_path / "dem.tif", **written))
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ({"crs": None}, "states no CRS"),
+        ({"count": 2}, "has 2 bands, and a map of heights has one"),
+        ({"dtype": "complex64"}, "holds complex64, and heights are real numbers"),
+        ({"nodata": 5.0, "height": lambda x, y: np.full(x.shape, 5.0)}, "no height anywhere near the flight"),
+        ({"height": lambda x, y: 1e5 + x}, r"heights of 100\d\d\d m, and on Earth land lies between"),
+        ({"units": "fathom"}, "its heights are in 'fathom', which is no unit of length known here"),
+    ],
+)
+def test_what_is_no_map_of_heights_is_refused(
+    tmp_path: Path, flown: Callable[..., Flight], written: dict[str, Any], words: str
+) -> None:
+    if written.get("crs", UTM) is None:
+        path = write_map(tmp_path / "dem.tif")
+        with rasterio.open(path) as data:
+            values, transform = data.read(1), data.transform
+        given = {"width": 400, "height": 400, "count": 1, "dtype": "float32", "transform": transform}
+        with rasterio.open(tmp_path / "bare.tif", "w", driver="GTiff", **given) as data:
+            data.write(values, 1)
+        path = tmp_path / "bare.tif"
+    else:
+        path = write_map(tmp_path / "dem.tif", **written)
+    with pytest.raises(WildlabError, match=words):
+        lay(flown(), path)
+
+
+def test_what_is_no_file_or_damaged_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    path = write_map(tmp_path / "dem.tif", compress="deflate", tiled=True, blockxsize=64, blockysize=64)
+    whole = path.read_bytes()
+    with pytest.raises(WildlabError, match=r"gone\.tif: there is no such file"):
+        lay(flown(), tmp_path / "gone.tif")
+    (tmp_path / "text.tif").write_text("no raster")
+    with pytest.raises(WildlabError, match="neither a TIFF nor a PNG"):
+        lay(flown(), tmp_path / "text.tif")
+    (tmp_path / "cut.tif").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(
+        WildlabError, match=r"is not a GeoTIFF or PNG that can be read|breaks off or is damaged"
+    ):
+        lay(flown(), tmp_path / "cut.tif")
+    with pytest.raises(WildlabError, match="CRS nonsense is not known to PROJ"):
+        lay(flown(), path, crs="nonsense")
+    with pytest.raises(WildlabError, match=r"CRS \(.*\) is not one of places on Earth"):
+        lay(flown(), path, crs='LOCAL_CS["site",UNIT["metre",1]]')
+
+
+def test_a_claim_beyond_belief_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    """A small file that claims blocks of a gigabyte: one of them would have to be unpacked as a whole."""
+    x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(LONGITUDE, LATITUDE)
+    given = {"crs": UTM, "count": 1, "dtype": "float32", "SPARSE_OK": True, "tiled": True}
+    side, block = 100_000, 16_384
+    transform = Affine(0.02, 0, x - 1000, 0, -0.02, y + 1000)
+    with rasterio.open(
+        tmp_path / "bomb.tif", "w", driver="GTiff", width=side, height=side, transform=transform,
+        blockxsize=block, blockysize=block, **given,
+    ):  # fmt: skip
+        pass
+    assert (tmp_path / "bomb.tif").stat().st_size < 10_000
+    words = r"claims 100,000 x 100,000 cells in blocks of 1,073,741,824 bytes"
+    with pytest.raises(WildlabError, match=words):
+        lay(flown(), tmp_path / "bomb.tif")

@@ -1,0 +1,122 @@
+"""`wildlab terrain`, `wildlab import --terrain` and `wildlab georeference`, through the real command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import rasterio
+from pyproj import Transformer
+from rasterio.transform import Affine
+
+from tests.pipeline.survey_twin import Survey, simulate
+from wildlab import cli
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.geometry.frames import ned_to_geodetic
+
+UTM = 25833
+
+
+def call(capsys: Any, *arguments: Any) -> tuple[Any, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([str(one) for one in arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def write_slope(path: Path, latitude: float, longitude: float, height: float, rise: float) -> Path:
+    """A slope that rises by so much a metre to the east, as high as said at the place; cells of 5 m."""
+    x, y = Transformer.from_crs(4326, UTM, always_xy=True).transform(longitude, latitude)
+    side = 400
+    columns = np.arange(side) + 0.5 - side / 2
+    heights = np.tile(height + rise * 5.0 * columns, (side, 1)).astype(np.float32)
+    transform = Affine(5.0, 0.0, x - 5.0 * side / 2, 0.0, -5.0, y + 5.0 * side / 2)
+    given = {
+        "width": side,
+        "height": side,
+        "count": 1,
+        "dtype": "float32",
+        "crs": UTM,
+        "transform": transform,
+    }
+    with rasterio.open(path, "w", driver="GTiff", **given) as data:
+        data.write(heights, 1)
+    return path
+
+
+@pytest.fixture
+def surveyed(tmp_path: Path) -> tuple[Path, Path]:
+    """A flight over marks on level ground, and a map of level ground as high as these, tilted by a tenth."""
+    flight = simulate(Survey(images=8))
+    flight.manifest = replace_in_manifest(
+        flight.manifest, {"origin": {"latitude_deg": 61.0, "longitude_deg": 15.0, "height_m": 300.0}}
+    )
+    down = float(flight.table("truth")["down_m"].median())
+    save_flight(flight, tmp_path / "flight")
+    return tmp_path / "flight", write_slope(tmp_path / "dem.tif", 61.0, 15.0, 300.0 - down, 0.1)
+
+
+def test_a_map_is_laid_under_a_flight_and_its_points_lie_on_it(
+    capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path
+) -> None:
+    folder, dem = surveyed
+    code, out, err = call(capsys, "georeference", folder, "--into", tmp_path / "level.csv")
+    assert code == 0, err
+    assert "lie on level ground" in out
+    code, out, err = call(capsys, "terrain", folder, dem, "--heights", "ellipsoid", "--sd", "0.3")
+    assert code == 0, err
+    assert "at 1.25 m" in out and "0 % holes" in out
+    flight = load_flight(folder)
+    assert flight.terrain is not None and flight.manifest.terrain is not None
+    assert flight.manifest.terrain.crs == "EPSG:25833"
+    code, out, err = call(capsys, "georeference", folder, "--into", tmp_path / "slope.csv")
+    assert code == 0, err
+    level, slope = pd.read_csv(tmp_path / "level.csv"), pd.read_csv(tmp_path / "slope.csv")
+    assert f"Of {len(slope)} rays, over terrain: {len(slope)} met the ground." in out
+    shift = np.hypot(slope["north_m"] - level["north_m"], slope["east_m"] - level["east_m"])
+    assert f"{shift.median():.2f} m elsewhere in the median, {shift.max():.2f} m at most" in out
+    # On the slope, convergence of the grid aside: it leans to the east.
+    rise = -(slope["down_m"] - level["down_m"])
+    np.testing.assert_allclose(rise, 0.1 * slope["east_m"], atol=0.1)
+    code, out, _ = call(capsys, "check", folder)
+    assert code == 0 and "terrain.tif: " in out and "m above the ground of the terrain" in out
+
+
+def test_a_geojson_has_the_places(capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path) -> None:
+    folder, _ = surveyed
+    assert call(capsys, "georeference", folder, "--into", tmp_path / "p.csv")[0] == 0
+    assert call(capsys, "georeference", folder, "--into", tmp_path / "p.geojson")[0] == 0
+    points = pd.read_csv(tmp_path / "p.csv")
+    found = json.loads((tmp_path / "p.geojson").read_text())["features"]
+    origin = load_flight(folder).manifest.origin_tuple()
+    llh = ned_to_geodetic(points[["north_m", "east_m", "down_m"]].to_numpy(), origin)
+    places = np.array([one["geometry"]["coordinates"] for one in found])
+    np.testing.assert_allclose(places[:, 0], np.degrees(llh[:, 1]), atol=2e-8)
+    np.testing.assert_allclose(places[:, 1], np.degrees(llh[:, 0]), atol=2e-8)
+    assert [one["properties"]["detection_id"] for one in found] == list(points["detection_id"])
+    code, _, err = call(capsys, "georeference", folder, "--into", tmp_path / "p.csv")
+    assert code == 2 and "this file is there already. Name another, or add --overwrite" in err
+    code, _, err = call(capsys, "georeference", folder, "--into", tmp_path / "p.shp")
+    assert code == 2 and "nobody knows how to write '.shp'. End it with .csv or .geojson" in err
+
+
+def test_what_is_wrong_is_said_before_anything_is_written(
+    capsys: Any, surveyed: tuple[Path, Path], tmp_path: Path
+) -> None:
+    folder, dem = surveyed
+    before = (folder / "flight.toml").read_bytes()
+    for options, words in (
+        ([], "nobody guesses that. State heights"),
+        (["--heights", "sea"], "--heights: 'sea' is nothing that heights count from"),
+        (["--heights", "5000"], "a geoid 5000 m above the ellipsoid"),
+        (["--heights", "ellipsoid", "--sd", "-1"], "--sd: "),
+        (["--heights", "ellipsoid", "--cell", "2"], "cell_m and corner belong together"),
+    ):
+        code, _, err = call(capsys, "terrain", folder, dem, *options)
+        assert code == 2 and words in err
+    assert (folder / "flight.toml").read_bytes() == before and not (folder / "terrain.tif").exists()

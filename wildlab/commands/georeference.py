@@ -1,0 +1,55 @@
+"""A flight's detections on the ground, as a table or for a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from wildlab.commands.shared import FILE, FOLDER
+from wildlab.errors import WildlabError
+from wildlab.terminal import shown, stopped
+
+
+@click.command(short_help="Where a flight's detections lie on the ground.")
+@click.argument("flight", type=FOLDER)
+@click.option(
+    "--into", type=FILE, required=True, help="The file to write: .csv (metres), or .geojson (places)."
+)
+@click.option("--overwrite", is_flag=True, help="Replace the file that is there.")
+@click.option("--source", help="Which poses, where the flight has several (its nav/NAME.parquet).")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=1, show_default=True)
+def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, seed: int) -> None:
+    """Put the pixel detections of FLIGHT on the ground, each with its 90 % ellipse.
+
+    On its terrain where it has one, else on a level plane at the height of each target. A CSV holds metres
+    north and east of the flight's origin and no coordinates; a GeoJSON holds the places themselves, so send
+    it to nobody who may not know them.
+
+    \b
+    Examples:
+      wildlab georeference flights/tuesday --into points.csv
+      wildlab georeference flights/tuesday --into points.geojson
+    """
+    import numpy as np
+
+    from wildlab.flight.store import load_flight
+    from wildlab.pipeline.georeference import georeference as to_ground
+    from wildlab.pipeline.georeference import observe
+    from wildlab.pipeline.ground import ground_sentences
+    from wildlab.pipeline.ground_file import SUFFIXES, write_points
+
+    if into.suffix not in SUFFIXES:
+        raise WildlabError(
+            f"nobody knows how to write {into.suffix!r}", f"end it with {' or '.join(SUFFIXES)}", file=into
+        )
+    if into.exists() and not overwrite:
+        raise WildlabError("this file is there already", "name another, or add --overwrite", file=into)
+    data = load_flight(flight)
+    name, _ = data.pose_source(source)
+    observations = observe(data, name)
+    points = to_ground(data, observations, np.random.default_rng(seed))
+    write_points(data, points, into)
+    for line in ground_sentences(observations, points):
+        click.echo(stopped(line))
+    click.echo(shown(into))

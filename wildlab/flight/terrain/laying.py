@@ -1,0 +1,363 @@
+"""An elevation map laid under a flight: the part about it, in its frame n, with a record of what was done."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.readers.terrain import ElevationMap, open_elevation
+from wildlab.flight.store import Flight
+from wildlab.flight.terrain.resampling import (
+    Extent,
+    Places,
+    bilinear,
+    lattice_of,
+    places_of,
+    resample,
+    resampling_error,
+)
+from wildlab.flight.terrain_file import MOST_NODES
+from wildlab.flight.terrain_model import TerrainPart, TerrainSays
+from wildlab.geometry.terrain import Terrain
+
+Array = NDArray[np.float64]
+
+#: How far the terrain reaches beyond the flight: a ray 10 deg below the horizon goes that many heights above
+#: ground; at least and at most so many metres.
+HEIGHTS_ABOVE, LEAST, MOST = 6.0, 200.0, 5000.0
+#: Poses that the ground is looked up under, at most.
+LOOKED_UP = 300
+#: Cells of the file that are averaged to a side, at most.
+COARSEST = 1000
+#: Nodes up to which a grid may be finer than its map.
+FEW_NODES = 1_000_000
+
+
+def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
+    """A flight with the part of an elevation map that lies about it.
+
+    Parameters
+    ----------
+    flight
+        With poses, or truth.
+    path
+        Of the map.
+    says
+        What the user says of it.
+
+    Returns
+    -------
+    Flight
+        With ``terrain``, and ``manifest.terrain`` that says where it comes from. In memory alone.
+
+    Raises
+    ------
+    WildlabError
+        Where the map cannot be used, does not lie under the flight, or the flight lies under the ground.
+
+    Examples
+    --------
+    >>> says = TerrainSays(file="dem.tif", heights="ellipsoid")
+    >>> lay_terrain(flight, Path("dem.tif"), says).terrain.step  # doctest: +SKIP
+    1.0
+    """
+    elevation = open_elevation(path, says)
+    origin = flight.manifest.origin_tuple()
+    heights, added = _vertical(elevation, says, flight)
+    places = places_of(elevation, origin, added)
+    positions, is_pose = _positions(flight)
+    above = _above_ground(places, positions[is_pose]) if is_pose.any() else np.zeros(0)
+    _refuse_elsewhere(places, positions)
+    if len(above) and (above < 0).all():
+        raise WildlabError(
+            f"the whole flight is below the ground of this map, {-np.median(above):.0f} m in the middle",
+            "check what the map's heights and those of the flight count from, and their units",
+            file=path,
+            field="terrain.heights",
+        )
+    margin = says.margin_m
+    if margin is None:
+        margin = float(np.clip(HEIGHTS_ABOVE * max(above, default=0.0), LEAST, MOST))
+    low, high = positions[:, :2].min(axis=0) - margin, positions[:, :2].max(axis=0) + margin
+    cell = _cell_sides(places, positions)
+    about = _within(places, Extent(*(float(side) for side in (low[0], high[0], low[1], high[1]))))
+    extent, step, every = _grid(about, says.step_m, cell)
+    row, column, rows, columns = _window(places, extent, every, path)
+    found, cells, values = elevation.window(row, column, rows, columns, every)
+    if not np.isfinite(found).any():
+        raise WildlabError(
+            "has no height anywhere near the flight: holes alone",
+            "give another map",
+            file=path,
+            field="terrain",
+        )
+    span = (float(np.nanmin(found)), float(np.nanmax(found)))
+    lattice = lattice_of(places, extent, span, max(cell))
+    terrain = _cropped(resample(found, (row, column), every, lattice, extent, step))
+    rms, largest = resampling_error(terrain, places, cells, values)
+    # What is known of a height at a node is known no better between nodes.
+    sd = math.hypot(says.sd_m, rms) if says.sd_m is not None else math.nan
+    terrain = Terrain(terrain.height, terrain.north, terrain.east, terrain.step, sd)
+    record = TerrainPart(
+        source=path.name,
+        sha256=elevation.digest,
+        crs=_named(elevation),
+        heights=heights,
+        added_m=added,
+        unit=elevation.unit,
+        cell_m=cell,
+        averaged=every,
+        step_m=step,
+        rows=terrain.height.shape[0],
+        columns=terrain.height.shape[1],
+        holes=int(np.isnan(terrain.height).sum()),
+        error_rms_m=rms,
+        error_max_m=largest,
+        sd_m=says.sd_m,
+    )
+    manifest = replace_in_manifest(flight.manifest, {"terrain": record.model_dump(exclude_none=True)})
+    return Flight(manifest, flight.nav, flight.tables, flight.folder, terrain)
+
+
+def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
+    """Where the flight and what it saw were, (N, 3) m, and which of these are poses."""
+    names = ["north_m", "east_m", "down_m"]
+    poses = [table[names].to_numpy(float) for table in flight.nav.values()]
+    truth = [] if flight.truth is None else [flight.truth[names].to_numpy(float)]
+    every = np.concatenate([*poses, *truth, np.zeros((0, 3))])
+    is_pose = np.arange(len(every)) < sum(map(len, poses))
+    known = np.isfinite(every).all(axis=1)
+    if not known.any():
+        raise WildlabError(
+            "the flight has no position, so that no part of a map belongs to it",
+            "add poses or truth",
+            file=flight.folder,
+            field="nav",
+        )
+    return every[known], is_pose[known]
+
+
+def _vertical(
+    elevation: ElevationMap, says: TerrainSays, flight: Flight
+) -> tuple[Literal["ellipsoid", "flight", "geoid"], float]:
+    """What the map's heights count from, and what takes them above the ellipsoid, metres."""
+    stated = says.heights
+    if isinstance(stated, float):
+        return "geoid", stated
+    if stated == "flight":
+        return "flight", -flight.manifest.vertical.correction_m
+    if stated == "ellipsoid" and elevation.vertical not in ("", "ellipsoid"):
+        raise WildlabError(
+            f"its heights count from {elevation.vertical!r}, as its CRS says, and not from the ellipsoid",
+            "state as heights how many metres that lies above the ellipsoid there",
+            file=elevation.path,
+            field="terrain.heights",
+        )
+    if "ellipsoid" in (stated, elevation.vertical):
+        return "ellipsoid", 0.0
+    if not elevation.vertical:
+        raise WildlabError(
+            "does not say what its heights count from, and nobody guesses that",
+            'state heights: "ellipsoid", "flight" (what the flight\'s own counted from), or how many metres '
+            "the geoid is above the ellipsoid there",
+            file=elevation.path,
+            field="terrain.heights",
+        )
+    return "geoid", _geoid_by_grid(elevation, flight)
+
+
+def _geoid_by_grid(elevation: ElevationMap, flight: Flight) -> float:
+    """How high the map's vertical datum is above the ellipsoid at the flight's origin, by a grid of PROJ."""
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import ProjError
+
+    latitude, longitude, _ = flight.manifest.origin_tuple()
+    there = (math.degrees(longitude), math.degrees(latitude))
+    undulation = math.inf
+    try:
+        flat = Transformer.from_crs(CRS.from_epsg(4326), elevation.crs, always_xy=True)
+        up = Transformer.from_crs(elevation.whole, CRS.from_epsg(4979), always_xy=True, allow_ballpark=False)
+        undulation = float(up.transform(*flat.transform(*there), 0.0)[2])
+    except ProjError:
+        pass
+    if not math.isfinite(undulation):
+        raise WildlabError(
+            f"its heights count from {elevation.vertical!r}, and the grid of that is not on this machine",
+            "state as heights how many metres that lies above the ellipsoid there",
+            file=elevation.path,
+            field="terrain.heights",
+        )
+    return undulation
+
+
+def _above_ground(places: Places, poses: Array) -> Array:
+    """Heights of poses above the ground, of those that are over it."""
+    some = poses[:: max(1, len(poses) // LOOKED_UP)]
+    found = places.of_points(some)
+    elevation, ground = places.map, np.full(len(some), np.nan)
+    with elevation.opened() as data:
+        for k, (column, row, _height) in enumerate(found):
+            if not (0.5 <= column < elevation.shape[1] - 0.5 and 0.5 <= row < elevation.shape[0] - 0.5):
+                continue
+            i, j = int(row - 0.5), int(column - 0.5)
+            four = elevation.read(data, i, j, 2, 2)
+            elevation.refuse_absurd(four)
+            ground[k] = bilinear(four, np.array([row - 0.5 - i]), np.array([column - 0.5 - j]))[0]
+    above = found[:, 2] - ground
+    return np.asarray(above[np.isfinite(above)])
+
+
+def _cell_sides(places: Places, positions: Array) -> tuple[float, float]:
+    """Sides of the map's cell nearest to the middle of the flight, metres: across columns, across rows."""
+    column, row, _ = places.of_points(positions.mean(axis=0)[None])[0]
+    rows, columns = places.map.shape
+    middle = np.array([np.clip(column, 0, columns - 1), np.clip(row, 0, rows - 1)])
+    corners = middle + np.array([(0, 0), (1, 0), (0, 1)])
+    p = places.of_cells(corners, np.zeros(3))
+    sides = np.linalg.norm(p[1:] - p[0], axis=1)
+    if not (np.isfinite(sides).all() and (sides > 0).all()):
+        raise WildlabError(
+            "its cells have no size near the flight",
+            "check its CRS",
+            file=places.map.path,
+            field="terrain.crs",
+        )
+    return float(sides[0]), float(sides[1])
+
+
+def _within(places: Places, extent: Extent) -> Extent:
+    """The part of an extent that the map reaches, which lies over some of it."""
+    rows, columns = places.map.shape
+    edge = np.linspace(0, 1, 65)
+    border = [
+        np.column_stack([x.ravel(), y.ravel()])
+        for x, y in (np.meshgrid(edge * columns, [0, rows]), np.meshgrid([0, columns], edge * rows))
+    ]
+    p = places.of_cells(np.concatenate(border), np.zeros(4 * len(edge)))
+    if not np.isfinite(p).all():  # a map beyond the reach of its own CRS
+        return extent
+    low, high = p.min(axis=0), p.max(axis=0)
+    if np.abs(p).max() > 100_000:  # a border of so wide a map is no straight line
+        return extent
+    return Extent(
+        max(extent.north, float(low[0])), min(extent.far_north, float(high[0])),
+        max(extent.east, float(low[1])), min(extent.far_east, float(high[1])),
+    )  # fmt: skip
+
+
+def _grid(extent: Extent, step: float | None, cell: tuple[float, float]) -> tuple[Extent, float, int]:
+    """Extent, step and cells averaged a side: as fine as the map, but for the most nodes that are kept.
+
+    Nodes of a grid that is turned against the map fall between the map's. Where there are few, a step of half
+    or a quarter of the cell keeps its peaks.
+    """
+    area = (extent.far_north - extent.north) * (extent.far_east - extent.east)
+    if step is None:
+        finer = (part for part in (4, 2) if area * (part / min(cell)) ** 2 <= FEW_NODES)
+        step = min(cell) / next(finer, 1)
+    step = max(step, math.sqrt(area / (0.9 * MOST_NODES)))
+    every = min(max(1, int(step / max(cell) + 1e-9)), COARSEST)
+    # Nodes at whole steps of n.
+    low = [math.floor(side / step) * step for side in (extent.north, extent.east)]
+    high = [math.ceil(side / step) * step for side in (extent.far_north, extent.far_east)]
+    low = [min(a, b - step) for a, b in zip(low, high, strict=True)]
+    return Extent(low[0], high[0], low[1], high[1]), step, every
+
+
+def _cropped(terrain: Terrain) -> Terrain:
+    """A terrain without what is holes alone along its borders."""
+    known = np.isfinite(terrain.height)
+    rows, columns = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    # A surface takes two nodes each way.
+    i, j = min(rows[0], len(known) - 2), min(columns[0], known.shape[1] - 2)
+    height = terrain.height[i : max(rows[-1], i + 1) + 1, j : max(columns[-1], j + 1) + 1]
+    return Terrain(height, terrain.north + i * terrain.step, terrain.east + j * terrain.step, terrain.step)
+
+
+def _window(places: Places, extent: Extent, every: int, path: Path) -> tuple[int, int, int, int]:
+    """Row, column, rows and columns of the file that lie under an extent."""
+    edge = np.linspace(0, 1, 33)
+    north = extent.north + edge * (extent.far_north - extent.north)
+    east = extent.east + edge * (extent.far_east - extent.east)
+    N, E = (grid.ravel() for grid in np.meshgrid(north, east, indexing="ij"))
+    found = places.of_points(np.column_stack([N, E, np.zeros(N.size)]))[:, :2]
+    found = found[np.isfinite(found).all(axis=1)]
+    shape = places.map.shape
+    margin = 2 * every + 2
+    low, high = np.floor(found.min(axis=0)) - margin, np.ceil(found.max(axis=0)) + margin
+    column, row = (int(max(0, value)) for value in low)
+    far_column, far_row = (int(min(most, value)) for most, value in zip(shape[::-1], high, strict=True))
+    rows, columns = ((far_row - row) // every * every, (far_column - column) // every * every)
+    if rows < 2 * every or columns < 2 * every:
+        raise WildlabError(
+            "only touches the flight's surroundings",
+            "give a map that lies under it",
+            file=path,
+            field="terrain",
+        )
+    return row, column, rows, columns
+
+
+def _refuse_elsewhere(places: Places, positions: Array) -> None:
+    """Refuse a map that no position of the flight lies over, and say how far off it is."""
+    rows, columns = places.map.shape
+
+    def over(found: Array) -> bool:
+        inside = (found[:, 0] >= 0) & (found[:, 0] <= columns) & (found[:, 1] >= 0) & (found[:, 1] <= rows)
+        return bool(inside.any())
+
+    found = places.of_points(positions)
+    if over(found):
+        return
+    from pyproj import Geod
+
+    latitude, longitude, _ = (math.degrees(value) for value in places.origin)
+    middle = found[len(found) // 2, :2]
+    if not np.isfinite(middle).all():
+        middle = np.array([columns / 2, rows / 2])
+    nearest = np.clip(middle, [0, 0], [columns, rows])
+    x, y = places.map.to_crs(nearest[:1], nearest[1:])
+    lon, lat = places.from_map(x, y)
+    distance = math.nan
+    if np.isfinite(lon[0]) and np.isfinite(lat[0]):
+        distance = Geod(ellps="WGS84").inv(longitude, latitude, lon[0], lat[0])[2]
+    far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
+    far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
+    raise WildlabError(
+        f"the flight does not lie over this map, whose nearest cell is {far}{_mirrored(places)}",
+        "give a map of the place, or check its CRS and the flight's origin",
+        file=places.map.path,
+        field="terrain",
+    )
+
+
+def _mirrored(places: Places) -> str:
+    """A clause where the flight would lie over the map with another sign of a coordinate, or another zone."""
+    latitude, longitude, _ = (math.degrees(value) for value in places.origin)
+    rows, columns = places.map.shape
+
+    def over(x: Array, y: Array) -> bool:
+        column, row = places.map.to_cells(x, y)
+        return bool(0 <= column[0] <= columns and 0 <= row[0] <= rows)
+
+    for signs, what in (((-1, 1), "latitude"), ((1, -1), "longitude"), ((-1, -1), "latitude and longitude")):
+        x, y = places.to_map(np.array([signs[1] * longitude]), np.array([signs[0] * latitude]))
+        if over(x, y):
+            return f"; with the other sign of {what} it would"
+    x, y = places.to_map(np.array([longitude]), np.array([latitude]))
+    for shift in (-1e7, 1e7):
+        if over(x, y + shift):
+            return "; it would with the zone of the other hemisphere as CRS"
+    return ""
+
+
+def _named(elevation: ElevationMap) -> str:
+    """A short name of a CRS: its code, or what it calls itself."""
+    code = elevation.whole.to_authority(min_confidence=70)
+    return ":".join(code) if code is not None else elevation.whole.name[:100]
