@@ -1,0 +1,216 @@
+"""Information of a grid, held against numerical derivatives, plain inverses and the letter of appendix A."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.frames import ned_to_enu, wrap
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.planning.information import (
+    SearchSensor,
+    add_image,
+    as_printed,
+    azimuth_elevation,
+    bearing_information,
+    bearing_jacobian,
+    detection_probability,
+    grow_old,
+    in_field_of_view,
+    initial_information,
+    left_to_know,
+    sensor_of,
+    trace_of_inverse,
+)
+
+SENSOR = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=1e-6)
+EAST_NORTH_UP = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+coordinate = st.floats(-300, 300)
+point = st.tuples(coordinate, coordinate, st.floats(-50, 50)).filter(lambda p: np.hypot(p[0], p[1]) > 1.0)
+camera_at = np.array([0.0, 0.0, -80.0])
+
+
+def matrices(seed: int, count: int = 20) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    half = rng.normal(size=(count, 3, 3)) * 10 ** rng.uniform(-2, 1, (count, 1, 3))
+    return half @ np.swapaxes(half, 1, 2) + 1e-4 * np.eye(3)
+
+
+@settings(deadline=None, max_examples=200)
+@given(point)
+def test_the_jacobian_is_the_numerical_derivative(p):
+    p = np.array(p)
+    H = bearing_jacobian(p[None], camera_at)[0]
+    step = 1e-3
+    for axis in range(3):
+        by = step * np.eye(3)[axis]
+        before, after = (azimuth_elevation([q], camera_at)[0] for q in (p - by, p + by))
+        numeric = wrap(after - before) / (2 * step)
+        assert numeric == pytest.approx(H[:, axis], abs=1e-6)
+
+
+@settings(deadline=None)
+@given(point)
+def test_what_is_told_is_a_projection_but_for_what_the_azimuth_tells_more(p):
+    """Across the view 1 / (sd r)^2 in the vertical plane, and that over cos^2 level; nothing along it."""
+    d = np.array(p) - camera_at
+    r, rho = np.linalg.norm(d), np.hypot(d[0], d[1])
+    Y = bearing_information([p], camera_at, SENSOR)[0] * SENSOR.sd**2 * r**2
+    across = np.array([-d[1], d[0], 0.0]) / rho
+    upward = np.cross(d / r, across)
+    cos2 = (rho / r) ** 2
+    assert Y @ d == pytest.approx(0, abs=1e-6 * r / cos2)
+    assert across @ Y @ across == pytest.approx(1 / cos2)
+    assert upward @ Y @ upward == pytest.approx(1)
+    assert across @ Y @ upward == pytest.approx(0, abs=1e-9 / cos2)
+
+
+def test_the_axes_of_the_thesis_tell_the_same():
+    """(5.7) in east-north-up, its azimuth from east, by numerical derivatives of the print."""
+    p = np.array([40.0, -70.0, 5.0])
+    d = ned_to_enu(p - camera_at)
+
+    def printed(d):
+        return np.array([np.arctan2(d[1], d[0]), np.arctan2(d[2], np.hypot(d[0], d[1]))])
+
+    H = np.stack([(printed(d + e) - printed(d - e)) / 2e-4 for e in 1e-4 * np.eye(3)], axis=1)
+    ours = EAST_NORTH_UP @ bearing_information([p], camera_at, SENSOR)[0] @ EAST_NORTH_UP.T
+    assert ours == pytest.approx(H.T @ H / SENSOR.sd**2, rel=1e-6)
+
+
+def test_straight_below_the_azimuth_tells_no_more_than_from_nearest():
+    below = np.array([[0.0, 0.0, 0.0]])
+    assert np.isnan(bearing_jacobian(below, camera_at)).any()
+    sensor = SearchSensor(0.3, 0.2, sd=0.02, reach=100.0, nearest=5.0)
+    Y = bearing_information(below, camera_at, sensor)[0]
+    assert np.diag(Y) == pytest.approx([1 / (0.02 * 80) ** 2, 1 / (0.02 * 5) ** 2, 0])
+    beside = bearing_information([[5.0, 0.0, 0.0]], camera_at, sensor)[0]
+    assert beside[1, 1] == pytest.approx(Y[1, 1])
+    assert bearing_information([[50.0, 0.0, 0.0]], camera_at, sensor)[0, 1, 1] == pytest.approx(1)
+
+
+def test_the_print_takes_elements_13_and_23_for_an_elevation_that_counts_downwards():
+    rng = np.random.default_rng(1)
+    p = rng.uniform(-100, 100, (50, 3)) * [1, 1, 0.1]
+    letter = as_printed(p, camera_at, SENSOR.sd)
+    d = ned_to_enu(p - camera_at)
+    r = np.linalg.norm(d, axis=1)
+    projection = (np.eye(3) - d[:, :, None] * d[:, None, :] / r[:, None, None] ** 2) / (
+        SENSOR.sd * r[:, None, None]
+    ) ** 2
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        assert letter[:, i, j] == pytest.approx(projection[:, i, j])
+    for i in (0, 1):
+        assert letter[:, i, 2] == pytest.approx(-projection[:, i, 2])
+    # A camera above the ground looks down, and the print then says that heights are known worse than not.
+    assert (letter[:, 2, 2] < 0).all() and (projection[:, 2, 2] > 0).all()
+
+
+def test_the_print_is_no_projection_and_leaves_out_what_the_azimuth_tells_more():
+    p = np.array([[60.0, 0.0, 0.0]])
+    q = (SENSOR.sd * 100.0) ** 2
+    letter = as_printed(p, camera_at, SENSOR.sd)[0] * q
+    assert np.abs(letter @ letter - letter).max() > 0.1
+    mended = letter * np.array([[1, 1, -1], [1, 1, -1], [-1, -1, 1]])
+    mended[2, 2] = 0.6**2  # cos(theta)^2, where the print has sin(theta)
+    assert mended @ mended == pytest.approx(mended)
+    ours = EAST_NORTH_UP @ bearing_information(p, camera_at, SENSOR)[0] @ EAST_NORTH_UP.T * q
+    # The point is due north: the azimuth tells of east, 1 / cos(theta)^2 times what the print says.
+    assert ours[0, 0] == pytest.approx(mended[0, 0] / 0.6**2)
+    assert ours[1:, 1:] == pytest.approx(mended[1:, 1:])
+
+
+def test_the_field_of_view_is_that_of_a_camera_without_distortion():
+    camera = Camera(720, 480, 1267.0, 1117.0, 360.0, 240.0)
+    sensor = sensor_of(camera, sd=0.01, reach=100.0)
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-60, 60, (400, 3)) * [1, 1, 0.1]
+    x, y, z = ((points - camera_at) @ R_MC_DOWN).T
+    u, v = 360 + 1267 * x / z, 240 + 1117 * y / z
+    inside = (u >= 0) & (u <= 720) & (v >= 0) & (v <= 480)
+    assert 20 < inside.sum() < 380
+    assert (in_field_of_view(points, camera_at, R_MC_DOWN, sensor) == inside).all()
+    behind = points * [1, 1, 0] - [0, 0, 160]
+    assert not in_field_of_view(behind, camera_at, R_MC_DOWN, sensor).any()
+
+
+def test_what_is_hidden_or_outside_is_not_found_and_the_rest_by_its_distance():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [200.0, 0.0, 0.0]])
+    found = detection_probability(points, camera_at, R_MC_DOWN, SENSOR)
+    assert found == pytest.approx([np.exp(-0.64), np.exp(-0.6402), 0])
+    hidden = detection_probability(points, camera_at, R_MC_DOWN, SENSOR, np.array([True, False, True]))
+    assert hidden == pytest.approx([np.exp(-0.64), 0, 0])
+
+
+def test_an_image_adds_what_it_tells_by_its_probability():
+    Y = initial_information(2, 100.0)
+    points = np.array([[10.0, 0.0, 0.0], [20.0, 5.0, 0.0]])
+    after = add_image(Y, points, camera_at, [0.25, 0.0], SENSOR)
+    assert after[0] - Y[0] == pytest.approx(0.25 * bearing_information(points, camera_at, SENSOR)[0])
+    assert (after[1] == Y[1]).all()
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10**6), st.floats(0, 1e3), st.floats(0, 1e3))
+def test_growing_old_is_the_print_wherever_that_has_an_inverse(seed, north, east):
+    Y = matrices(seed, 3)
+    Q = np.diag([north, east])
+    whole = np.diag([north, east, 0.0])
+    by_inverse = np.linalg.inv(np.linalg.inv(Y) + whole)
+    after = grow_old(Y, Q)
+    assert after == pytest.approx(by_inverse, rel=1e-5, abs=1e-9 * np.abs(Y).max())
+    assert (np.linalg.eigvalsh(after) >= -1e-9 * np.abs(Y).max()).all()
+    assert (np.trace(after, axis1=1, axis2=2) <= np.trace(Y, axis1=1, axis2=2) * (1 + 1e-12)).all()
+
+
+def test_growing_old_needs_no_inverse_and_forgets_no_height():
+    assert (grow_old(np.zeros((1, 3, 3)), 4.0) == 0).all()
+    one_image = bearing_information([[50.0, 20.0, 0.0]], camera_at, SENSOR)
+    after = grow_old(one_image, 1e12)
+    assert np.isfinite(after).all() and np.abs(after[0, :2, :2]).max() < 1e-9
+    assert grow_old(np.diag([1.0, 1.0, 4.0])[None], 1e12)[0, 2, 2] == 4
+    twice = grow_old(grow_old(one_image, 1.0), 2.0)
+    assert twice == pytest.approx(grow_old(one_image, 3.0))
+
+
+def test_the_trace_of_the_inverse_by_plain_inverses():
+    Y = matrices(5, 500)
+    assert trace_of_inverse(Y) == pytest.approx(np.trace(np.linalg.inv(Y), axis1=1, axis2=2), rel=1e-6)
+    assert np.isinf(trace_of_inverse(np.zeros((3, 3))))
+    assert np.isinf(trace_of_inverse(np.diag([1.0, -1.0, 1.0])))
+
+
+def test_the_trace_of_the_inverse_keeps_its_digits_where_directions_differ_a_lot():
+    d = np.array([0.36, 0.48, 0.8])
+    along = np.outer(d, d)
+    Y = 1e6 * along + 1e-4 * (np.eye(3) - along)
+    assert float(trace_of_inverse(Y)) == pytest.approx(2e4, rel=1e-5)
+
+
+def test_what_is_left_counts_each_point_by_its_weight():
+    Y = np.stack([np.eye(3), 0.5 * np.eye(3), np.zeros((3, 3))])
+    assert left_to_know(Y[:2]) == pytest.approx(9)
+    assert left_to_know(Y, [2, 1, 0]) == pytest.approx(12)
+    assert np.isinf(left_to_know(Y))
+
+
+@pytest.mark.parametrize("name", ["half_width", "half_height", "sd", "reach", "nearest"])
+def test_a_sensor_without_size_is_refused(name):
+    good = {"half_width": 0.3, "half_height": 0.2, "sd": 0.02, "reach": 100.0, "nearest": 1.0}
+    with pytest.raises(WildlabError, match=f"{name} is 0.0"):
+        SearchSensor(**(good | {name: 0.0}))
+
+
+def test_a_start_that_knows_all_is_refused():
+    with pytest.raises(WildlabError, match="standard deviations"):
+        initial_information(3, [50.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("walk", [-1.0, np.nan, np.eye(3), np.diag([1.0, -1.0])])
+def test_a_walk_that_is_no_covariance_is_refused(walk):
+    with pytest.raises(WildlabError, match="a walk of"):
+        grow_old(np.eye(3)[None], walk)

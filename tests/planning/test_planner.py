@@ -1,0 +1,234 @@
+"""The receding-horizon planner: its compiled sums against plain ones, and what it does in plain worlds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.terrain import Terrain
+from wildlab.planning.followers import PatternPlanner, RandomWalk
+from wildlab.planning.information import (
+    SearchSensor,
+    add_image,
+    detection_probability,
+    grow_old,
+    initial_information,
+    left_to_know,
+    trace_of_inverse,
+)
+from wildlab.planning.information_kernels import gains_of_steps, worth_beyond
+from wildlab.planning.legs import (
+    Flying,
+    Leg,
+    Platform,
+    look_attitude,
+    sideways_limit,
+    turn_between,
+)
+from wildlab.planning.planner import Horizon, InformationPlanner
+
+SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=80.0, nearest=5.0)
+FLYING = Flying(5.0, 50.0)
+FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
+DOWN = Platform(np.zeros(2), 0.0, look_attitude(0.0, 0.0, 0.0))
+
+
+def grid(north: tuple[float, float], east: tuple[float, float]) -> np.ndarray:
+    axes = np.meshgrid(np.arange(*north, 10.0), np.arange(*east, 10.0), indexing="ij")
+    return np.column_stack([axes[0].ravel(), axes[1].ravel(), np.zeros(axes[0].size)])
+
+
+def planner(
+    points: np.ndarray, terrain: Terrain = FLAT, hides: bool = False, **horizon
+) -> InformationPlanner:
+    Y = initial_information(len(points), [60.0, 60.0, 1.0])
+    return InformationPlanner(points, Y, terrain, SENSOR, FLYING, Horizon(**horizon), hides=hides)
+
+
+@pytest.fixture(scope="module")
+def legs():
+    """Legs over a grid, with every kind of image: sideways, ahead, not at rest."""
+    rng = np.random.default_rng(3)
+    made = []
+    for _ in range(6):
+        heading, side, ahead = rng.uniform(-np.pi, np.pi), rng.uniform(-0.8, 0.8), rng.uniform(0, 0.8)
+        p = np.column_stack([rng.uniform(-60, 60, (3, 2)), rng.uniform(-70, -40, 3)])
+        made.append(Leg(p, look_attitude(heading, side, ahead)[None], rng.random(3) < 0.7, heading))
+    return made
+
+
+def plain(Y: np.ndarray, points: np.ndarray, leg: Leg) -> np.ndarray:
+    for p, counts in zip(leg.p_nc, leg.counts, strict=True):
+        if counts:
+            Y = add_image(Y, points, p, detection_probability(points, p, leg.R_nc[0], SENSOR), SENSOR)
+    return Y
+
+
+def test_compiled_sums_are_the_plain_ones(legs):
+    one = planner(grid((-80, 80), (-80, 80)))
+    Y = one.Y.copy()
+    for leg in legs:
+        one.add(leg)
+        Y = plain(Y, one.points, leg)
+    one.wait(0.7)
+    Y = grow_old(Y, 0.7)
+    np.testing.assert_allclose(one.Y, Y, rtol=1e-9, atol=1e-15)
+    assert one.left == pytest.approx(trace_of_inverse(Y), rel=1e-9)
+    assert one.left_to_know == pytest.approx(left_to_know(Y))
+
+
+def test_gains_of_candidates_are_differences_of_the_objective(legs):
+    one = planner(grid((-80, 80), (-80, 80)))
+    one.add(legs[0])
+    one.weights[::3] = 0.5
+    cams = np.stack([leg.p_nc for leg in legs])
+    R = np.stack([leg.R_nc for leg in legs])
+    counts = np.stack([leg.counts for leg in legs])[:, None]
+    reach = one._reach(cams, R).max(axis=1) + 120.0
+    gains = gains_of_steps(
+        one.Y[None], one.left[None], one.weights, one.points, np.zeros(6, np.int64), cams, R, counts, reach,
+        np.zeros((0, 0, 0), bool), np.array([0.3, 0.2]), SENSOR.sd, SENSOR.reach, SENSOR.nearest,
+    )  # fmt: skip
+    for leg, gain in zip(legs, gains[:, 0], strict=True):
+        expected = one.left_to_know - left_to_know(plain(one.Y, one.points, leg), one.weights)
+        assert gain == pytest.approx(expected, rel=1e-9, abs=1e-6)
+    assert gains.max() > 100
+
+
+def test_what_is_far_is_worth_less():
+    points = np.array([[30.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
+    worth = worth_beyond(
+        np.array([[2.0, 5.0]]), np.array([1.0, 0.5]), points, np.zeros(1, np.int64), np.zeros((1, 3)), 50.0
+    )
+    assert worth == pytest.approx([2 * np.exp(-0.6) + 2.5 * np.exp(-0.8)])
+
+
+def test_it_flies_to_what_is_not_known_yet():
+    chosen = planner(grid((150, 250), (-50, 50))).choose(DOWN)
+    assert chosen.leg.p_nc[-1, 0] == pytest.approx(15.0)
+    east = planner(grid((-50, 50), (150, 250))).choose(DOWN)
+    assert east.leg.p_nc[-1, 1] == pytest.approx(15.0, abs=0.6)
+
+
+def test_it_looks_aside_where_that_shows_more():
+    looks = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0))
+    right = planner(grid((-50, 50), (20, 60)), looks=looks, turns=(0.0,), steps=1, beyond=0.0).choose(DOWN)
+    assert right.leg.R_nc[0, 1, 2] == pytest.approx(np.sin(0.6))
+    left = planner(grid((-50, 50), (-60, -20)), looks=looks, turns=(0.0,), steps=1, beyond=0.0).choose(DOWN)
+    assert left.leg.R_nc[0, 1, 2] == pytest.approx(-np.sin(0.6))
+    assert left.gain == pytest.approx(right.gain, rel=0.2)
+
+
+def test_points_that_count_nothing_draw_nobody():
+    one = planner(np.concatenate([grid((100, 200), (-20, 20)), grid((-200, -100), (-20, 20))]))
+    one.weights[one.points[:, 0] > 0] = 0
+    assert one.choose(DOWN).leg.p_nc[-1, 0] < 0
+
+
+def test_looking_further_ahead_finds_what_one_step_cannot_see():
+    """A little nearby on the left, much to the right that no single step reaches."""
+    near, far = grid((-5, 15), (-90, -70)), grid((-60, 60), (75, 200))
+    points = np.concatenate([near, far])
+    turns = (-np.pi / 2, np.pi / 2)
+    short = planner(points, turns=turns, steps=1, beyond=0.0)
+    short.horizon = Horizon(turns=turns, looks=((0.0, 0.0), (0.0, 0.9)), steps=1, beyond=0.0)
+    long = planner(points, turns=turns, looks=((0.0, 0.0), (0.0, 0.9)), steps=4, beam=50, beyond=0.0)
+    one, four = short.choose(DOWN), long.choose(DOWN)
+    assert four.gain > one.gain and four.asked > one.asked
+
+
+def test_a_wall_hides_what_is_behind_it():
+    height = np.zeros((101, 101), np.float32)
+    height[:, 53] = 45.0  # a wall 30 m to the east
+    walled = Terrain(height, north=-500.0, east=-500.0, step=10.0)
+    behind = grid((-50, 50), (40, 60))
+    looks, turns = ((0.7, 0.0),), (0.0,)
+    free = planner(behind, walled, looks=looks, turns=turns, steps=1, beyond=0.0).choose(DOWN)
+    hidden = planner(behind, walled, hides=True, looks=looks, turns=turns, steps=1, beyond=0.0).choose(DOWN)
+    assert free.gain > 1000 and hidden.gain < 0.2 * free.gain
+    one = planner(behind, walled, hides=True)
+    before = one.left_to_know
+    one.add(free.leg)
+    assert before - one.left_to_know < 0.2 * free.gain
+
+
+def test_it_turns_back_at_the_edge_of_the_map_and_refuses_what_leads_off_it():
+    edge = Platform(np.array([495.0, 0.0]), 0.0, look_attitude(0.0, 0.0, 0.0))
+    assert planner(grid((400, 480), (-20, 20))).choose(edge).leg.p_nc[-1, 0] <= 500
+    with pytest.raises(WildlabError, match="leads off the map"):
+        planner(grid((600, 700), (-20, 20)), turns=(0.0,)).choose(edge)
+
+
+def test_the_same_twice():
+    points = grid((-80, 80), (-80, 80))
+    one, other = (planner(points).choose(DOWN) for _ in range(2))
+    assert (one.leg.p_nc == other.leg.p_nc).all() and one.gain == other.gain
+
+
+def test_a_grid_that_does_not_fit_is_refused():
+    points = grid((-50, 50), (-50, 50))
+    with pytest.raises(WildlabError, match="matrices of the shape"):
+        InformationPlanner(points, np.eye(3)[None], FLAT, SENSOR, FLYING, Horizon())
+    with pytest.raises(WildlabError, match="nothing is known in some direction"):
+        InformationPlanner(points, np.zeros((len(points), 3, 3)), FLAT, SENSOR, FLYING, Horizon())
+    with pytest.raises(WildlabError, match=r"speed is 0\.0"):
+        Flying(0.0, 50.0)
+
+
+def test_images_count_from_when_the_camera_is_at_rest():
+    flying = Flying(5.0, 50.0, slew=np.radians(60))
+    assert flying.ready(np.radians([0, 50, 90, 170, 200])).tolist() == [
+        [True, True, True], [True, True, True], [False, True, True], [False, False, True], [False] * 3,
+    ]  # fmt: skip
+    assert turn_between(look_attitude(0.3, 0.0, 0.0), look_attitude(1.5, 0.0, 0.0)) == pytest.approx(1.2)
+    assert turn_between(look_attitude(0.3, -0.2, 0.0), look_attitude(0.3, 0.5, 0.0)) == pytest.approx(0.7)
+
+
+def test_how_far_sideways_an_image_reaches():
+    rng = np.random.default_rng(4)
+    points = np.column_stack([rng.uniform(-300, 300, (5000, 2)), rng.uniform(-20, 0, 5000)])
+    for side, ahead in ((0.0, 0.0), (0.6, 0.2), (0.0, 0.8)):
+        R = look_attitude(0.7, side, ahead)
+        seen = detection_probability(points, [0, 0, -50.0], R, SENSOR) > 0
+        limit = sideways_limit(R, 50.0, SENSOR)
+        assert 0 < np.hypot(*points[seen, :2].T).max() <= limit
+    assert np.isinf(sideways_limit(look_attitude(0.0, 0.0, 1.5), 50.0, SENSOR))
+
+
+def test_way_points_are_visited_in_their_order_and_once():
+    flying = Flying(5.0, 50.0, images=4)
+    pattern = PatternPlanner([[10.0, 0.0], [10.0, 12.0], [30.0, 12.0]], FLAT, flying)
+    leg = pattern.choose(DOWN)
+    assert leg.p_nc[:, :2].tolist() == [[5, 0], [10, 0], [10, 5], [10, 10]]
+    assert pattern.visited == 1 and leg.heading == pytest.approx(np.pi / 2)
+    # A turn of 90 deg takes 1.5 s, and an image comes every second.
+    assert leg.counts.tolist() == [True, True, False, True]
+    elsewhere = Platform(np.array([10.0, 2.0]), 0.0, leg.R_nc[-1])
+    back = pattern.choose(elsewhere)
+    assert back.p_nc[0, :2].tolist() == [10, 7] and pattern.visited == 2
+    assert not pattern.done
+    pattern.choose(back.end)
+    last = pattern.choose(back.end)
+    assert pattern.done and (pattern.choose(last.end).p_nc[:, :2] == last.p_nc[-1, :2]).all()
+
+
+def test_a_pattern_turns_the_camera_from_side_to_side():
+    pattern = PatternPlanner([[100.0, 0.0]], FLAT, FLYING, sides=[0.4, -0.4])
+    leg = pattern.choose(DOWN)
+    assert leg.R_nc[:, 1, 2] == pytest.approx(np.sin([0.4, -0.4, 0.4]))
+    assert pattern.choose(leg.end).R_nc[0, 1, 2] == pytest.approx(-np.sin(0.4))
+    with pytest.raises(WildlabError, match="no way point"):
+        PatternPlanner([], FLAT, FLYING)
+
+
+def test_a_random_walk_stays_in_its_areas_and_repeats_with_its_generator():
+    area = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 80.0], [0.0, 80.0]])
+    ways = []
+    for seed in (1, 1, 2):
+        walk, at = RandomWalk([area], FLAT, FLYING, np.random.default_rng(seed)), DOWN
+        way = [(at := walk.choose(at).end).north_east for _ in range(200)]
+        ways.append(np.array(way))
+    assert (ways[0] == ways[1]).all() and not (ways[0] == ways[2]).all()
+    assert (ways[0] > -15.1).all() and (ways[0] < [115.1, 95.1]).all()
+    assert np.ptp(ways[0], axis=0).min() > 50
