@@ -11,6 +11,6 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 - `wildlab.planning.sea`: when tracked vessels have to be seen again, and level passes over them (H 8.2).
 - `wildlab.planning.courses`: the way that is flown through a pattern, with turns, wind and times.
 - `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
-- `wildlab.planning.legs`, `wildlab.planning.planner`, `wildlab.planning.followers`: where to fly and look next, by
-  what is to be learnt, along way points, or by chance.
+- `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `followers`: along way
+  points, or by chance; `legs`: what platform and gimbal can do.
 """

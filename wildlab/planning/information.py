@@ -201,7 +201,7 @@ def as_printed(points: ArrayLike, p_nc: ArrayLike, sd: float) -> Array:
     Y[..., 1, 1] = np.cos(phi) ** 2 + np.sin(phi) ** 2 * np.sin(theta) ** 2
     Y[..., 1, 2] = Y[..., 2, 1] = np.cos(theta) * np.sin(phi) * np.sin(theta)
     Y[..., 2, 2] = np.sin(theta)
-    return Y * q[..., None, None]
+    return np.asarray(Y * q[..., None, None])
 
 
 def in_field_of_view(
