@@ -22,6 +22,7 @@ from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
 from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
+from wildlab.commands.plan import plan
 from wildlab.commands.shared import FILE, FOLDER
 from wildlab.commands.terrain import says_of, terrain, terrain_options
 from wildlab.errors import WildlabError, system_error
@@ -65,7 +66,7 @@ def wildlab() -> None:
 
 for _command in (
     *(studies.list_, studies.run, studies.vary, studies.evaluate),
-    *(georeference, camera, detect, calibrate, terrain),
+    *(georeference, camera, detect, calibrate, terrain, plan),
 ):
     wildlab.add_command(_command)
 

@@ -1,0 +1,265 @@
+"""Plans held against what must be: heights, times by hand, batteries, and what forbids a flight."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.flight.test_area import collection, feature, polygon
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan import make_plan
+from wildlab.pipeline.plan_files import missions
+from wildlab.pipeline.plan_heights import TOLERANCE, follow
+from wildlab.pipeline.plan_said import plan_result
+from wildlab.pipeline.plan_sorties import fly_rows
+from wildlab.pipeline.plan_view import look
+from wildlab.pipeline.plan_wanted import LIMITS, Wanted
+
+CAMERA = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)
+#: 200 m east and 400 m north.
+FIELD = [[0, 0], [0, 200], [400, 200], [400, 0], [0, 0]]
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    path = tmp_path_factory.mktemp("areas") / "field.geojson"
+    other = [[-300, 0], [-300, 150], [-100, 150], [-100, 0], [-300, 0]]
+    content = collection(feature(polygon(FIELD), name="field"), feature(polygon(other), name="wood"))
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+def plan(area, **given):
+    return make_plan(Wanted(area, CAMERA, **given))
+
+
+# -- what is seen
+
+
+def test_the_strip_is_what_the_image_spans():
+    view = look(CAMERA, 90.0)
+    assert view.width == pytest.approx(639 / 800) and view.slant == pytest.approx(1.0, rel=1e-3)
+    assert view.pixels(CAMERA, 1.5, 60.0) == pytest.approx(800 * 1.5 / 60, rel=1e-3)
+
+
+def test_a_tilted_camera_sees_further_and_wider():
+    view = look(CAMERA, 45.0)
+    half = math.atan(255.5 / 800)
+    assert view.ahead[0] == pytest.approx(1 / math.tan(math.pi / 4 + half), rel=1e-6)
+    assert view.ahead[1] == pytest.approx(1 / math.tan(math.pi / 4 - half), rel=1e-6)
+    assert view.slant == pytest.approx(math.sqrt(2), rel=1e-3)
+    assert view.width == pytest.approx(639 / 800 * math.sqrt(2), rel=1e-3)
+
+
+def test_a_camera_that_cannot_see_the_ground_is_told_where_it_looks():
+    with pytest.raises(
+        WildlabError, match=r"sees no ground near enough: the lowest it looks is 11 degrees above"
+    ):
+        look(CAMERA, -30.0)  # its lower corners: asin(0.2234 / 1.1231)
+    # The lower edge is 17.7 degrees below the middle: 2 below the horizon is ground 11 heights away.
+    with pytest.raises(WildlabError, match="the lowest it looks is 8 degrees below the horizon"):
+        look(CAMERA, -10.0)
+
+
+# -- height, rows, times
+
+
+def test_the_height_follows_from_the_animal_and_the_rule(field):
+    assert plan(field, animal_m=1.0, pixels=10.0).height == 80.0
+    assert plan(field, animal_m=3.0, pixels=10.0).height == 115.0
+    assert plan(field, height_m=42.5).height == 42.5
+    assert plan(field, height_m=120.0).height == 120.0
+    with pytest.raises(WildlabError, match="a height of 121 m, and the rules allow 120 m"):
+        plan(field, height_m=121.0)
+    assert plan(field, height_m=150.0, max_height_m=200.0).height == 150.0
+    with pytest.raises(WildlabError, match=r"from 8\.0 m above the ground only"):
+        plan(field, animal_m=0.1, pixels=10.0)
+
+
+def test_rows_are_no_further_apart_than_the_overlap_leaves(field):
+    made = plan(field, height_m=60.0, overlap=0.25)
+    assert made.strip == pytest.approx(60 * 639 / 800)
+    assert (made.pattern.distance <= 0.75 * made.strip + 1e-9).all()
+
+
+def test_times_are_those_of_the_way(field):
+    made = plan(field, height_m=60.0, speed_m_s=8.0, turn_s=4.0, climb_m_s=2.0, direction_deg=0.0)
+    one = made.sorties[0]
+    legs = np.diff(one.way.points, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    along = legs / lengths[:, None]
+    corners = int(((along[1:] * along[:-1]).sum(axis=1) < 1 - 1e-9).sum())
+    expected = lengths.sum() / 8.0 + 4.0 * corners + 2 * 60.0 / 2.0
+    assert one.duration == pytest.approx(expected, rel=1e-6)
+    seconds = made.area_seconds()
+    assert (seconds > 0).all() and seconds.sum() < one.duration
+    rows = np.linalg.norm(np.diff(made.pattern.rows, axis=1)[:, 0], axis=1)
+    for area in (0, 1):
+        assert seconds[area] > rows[made.pattern.area == area].sum() / 8.0
+
+
+def test_wind_along_the_rows_costs_what_the_triangle_says(field):
+    still = plan(field, height_m=60.0, direction_deg=0.0)
+    windy = plan(field, height_m=60.0, direction_deg=0.0, wind_m_s=6.0, wind_from_deg=0.0)
+    rows = np.linalg.norm(np.diff(still.pattern.rows, axis=1)[:, 0], axis=1)
+    up = np.cos(still.pattern.directions) > 0
+
+    def on_rows(made):
+        one = made.sorties[0]
+        pieces = np.flatnonzero(one.row_of >= 0)
+        return (one.course.times[pieces + 1] - one.course.times[pieces])[np.argsort(one.row_of[pieces])]
+
+    assert np.allclose(on_rows(still), rows / 10.0)
+    # From the north: against it on rows to the north, with it on those to the south.
+    assert np.allclose(on_rows(windy), np.where(up, rows / 4.0, rows / 16.0))
+
+
+def test_an_aircraft_that_cannot_stop_turns_no_tighter_than_it_can(field):
+    made = plan(field, height_m=60.0, turn_radius_m=35.0)
+    points = made.sorties[0].course.points
+    steps = np.diff(points, axis=0)
+    heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    lengths = np.linalg.norm(steps, axis=1)
+    bends = np.abs(np.diff(heading))
+    curved = bends > 1e-6
+    assert curved.any()
+    assert ((lengths[:-1] + lengths[1:]) / 2 / np.maximum(bends, 1e-12))[curved].min() > 0.45 * 35.0
+    assert made.wanted.vehicle == "fixed-wing"
+    # Way points stay near the arcs, and hold every row from its beginning to its end.
+    way = made.sorties[0].way.points
+    for row in made.pattern.rows:
+        for end in row:
+            assert np.linalg.norm(way - end, axis=1).min() < 1e-6
+    assert len(way) < len(points) / 2
+
+
+# -- batteries
+
+
+def test_longer_plans_become_flights_that_each_last(field):
+    whole = plan(field, height_m=40.0)
+    made = plan(field, height_m=40.0, battery_min=8.0, reserve=0.25)
+    assert len(made.sorties) > 1 and len(whole.sorties) == 1
+    assert all(one.duration <= 8 * 60 * 0.75 for one in made.sorties)
+    assert np.concatenate([one.rows for one in made.sorties]).tolist() == list(range(len(made.pattern.rows)))
+    for before, after in zip(made.sorties[:-1], made.sorties[1:], strict=True):
+        assert np.allclose(before.way.points[-1], made.home) and np.allclose(after.way.points[0], made.home)
+        # Not one row fewer than fits.
+        more = [*before.rows, before.rows[-1] + 1]
+        longer = fly_rows("longer", more, made.pattern, made.home, made.wanted, None, made.height)
+        assert longer.duration > 8 * 60 * 0.75
+    assert plan_result(made)["sorties"][0]["of_battery"] <= 0.75
+
+
+def test_a_battery_too_small_for_one_row_is_said(field):
+    with pytest.raises(
+        WildlabError, match=r"one row with the way there and back takes \d+\.\d minutes, and of a"
+    ):
+        plan(field, height_m=60.0, battery_min=1.5)
+
+
+def test_where_one_takes_off(field):
+    made = plan(field, height_m=60.0, home=(58.659, 16.46))
+    assert np.allclose(made.sorties[0].way.points[0], made.home)
+    assert made.home[0] == pytest.approx(
+        -161.4, abs=0.5
+    )  # 0.001 deg below the field, about the areas' middle
+    with pytest.raises(WildlabError, match="latitude and longitude are swapped"):
+        plan(field, home=(16.46, 58.66))
+    with pytest.raises(WildlabError, match=r"km from the areas\. Give"):
+        plan(field, home=(-58.66, 16.46))
+
+
+# -- the ground below
+
+
+def hills(n=120, step=10.0):
+    x, y = np.meshgrid(np.arange(n) * step, np.arange(n) * step)
+    height = 40 * np.sin(x / 90) * np.cos(y / 130) + 0.05 * x
+    return Terrain(height.astype(np.float32), north=-n * step / 2, east=-n * step / 2, step=step)
+
+
+def test_a_way_stays_near_its_height_everywhere():
+    terrain = hills()
+    way = np.array([[-500.0, -500.0], [500.0, -480.0], [480.0, 500.0], [-400.0, 100.0]])
+    found = follow(way, terrain, 60.0, 62.0)
+    assert np.allclose(found.points[found.corner >= 0], way)
+    t = np.linspace(0, 1, 4001)[:, None]
+    total = 0
+    for k in range(len(found.points) - 1):
+        a, b = found.points[k], found.points[k + 1]
+        flown = found.height[k] + t[:, 0] * (found.height[k + 1] - found.height[k])
+        above = flown - terrain.heights_at(a + t * (b - a))
+        # Looked at every few metres: between these places, the ground bends by less than half a metre.
+        assert above.min() > 60 - TOLERANCE - 0.5 and above.max() < 62 + 0.5
+        total += 1
+    assert np.allclose(found.height - found.ground, 60.0)
+    straight = int(np.linalg.norm(np.diff(way, axis=0), axis=1).sum() / 5)
+    assert total < straight / 4, "far fewer way points than places"
+
+
+def test_ground_that_is_not_known_is_counted():
+    terrain = hills()
+    height = terrain.height.copy()
+    height[40:60, 40:60] = np.nan
+    holed = Terrain(height, terrain.north, terrain.east, terrain.step)
+    found = follow(np.array([[-100.0, -500.0], [-100.0, 500.0]]), holed, 60.0)
+    assert found.unknown == pytest.approx(210, abs=15) and np.isfinite(found.height).all()
+
+
+def test_flat_ground_is_flat():
+    way = np.array([[0.0, 0.0], [100.0, 0.0]])
+    found = follow(way, None, 50.0)
+    assert len(found.points) == 2 and found.height.tolist() == [50.0, 50.0] and found.unknown == 0
+
+
+def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
+    cliff = np.zeros((200, 200), np.float32)
+    cliff[100:] = 90.0
+    terrain = Terrain(cliff, north=-1000.0, east=-1000.0, step=10.0)
+    wanted = Wanted(field, CAMERA, height_m=60.0, direction_deg=0.0, climb_m_s=2.0)
+    flat, steep = make_plan(wanted), make_plan(wanted, lambda areas: terrain)
+    assert steep.duration > flat.duration + 2 * 90 / 2.0
+    said = plan_result(steep)["warnings"]
+    assert any("would have to climb or sink" in one and "it can do 2:" in one for one in said)
+    assert not plan_result(flat)["warnings"]
+
+
+def test_heights_above_take_off_are_differences_of_ground(field):
+    terrain = hills()
+    wanted = Wanted(field, CAMERA, height_m=60.0)
+    made = make_plan(wanted, lambda areas: terrain)
+    flight = missions(made)[0]
+    way = made.sorties[0].way
+    assert np.allclose(flight.above_ground, 60.0)
+    # The Earth's curvature over some hundred metres is a centimetre or two.
+    assert np.allclose(flight.above_home, 60 + way.ground - way.ground[0], atol=0.05)
+    assert np.ptp(flight.above_home) > 20
+    assert flight.above_home[0] == pytest.approx(60.0, abs=1e-3)
+
+
+# -- numbers that are none
+
+
+@pytest.mark.parametrize("name", LIMITS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e9])
+def test_absurd_numbers_are_refused_by_name(name, value):
+    with pytest.raises(WildlabError) as caught:
+        Wanted(Path("x"), CAMERA, **{name: value})
+    assert caught.value.field == LIMITS[name][0] and "give a number from" in str(caught.value).lower()
+
+
+def test_winds_that_forbid():
+    with pytest.raises(WildlabError, match="a wind of 12 m/s against an airspeed of 10 m/s"):
+        Wanted(Path("x"), CAMERA, wind_m_s=12.0, wind_from_deg=90.0)
+    with pytest.raises(WildlabError, match="Say with --wind-from whence"):
+        Wanted(Path("x"), CAMERA, wind_m_s=3.0)
+    with pytest.raises(WildlabError, match="is said twice"):
+        Wanted(Path("x"), CAMERA, animals=3, density_km2=2)
+    with pytest.raises(WildlabError, match="no place on the Earth"):
+        Wanted(Path("x"), CAMERA, home=(95.0, 16.0))
+    assert np.allclose(Wanted(Path("x"), CAMERA, wind_m_s=5.0, wind_from_deg=270.0).wind, [0, 5])

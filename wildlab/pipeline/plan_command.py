@@ -1,0 +1,53 @@
+"""What `wildlab plan` does: plan, and leave way points, maps and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from wildlab.files import write_json
+from wildlab.pipeline.plan import Plan, make_plan
+from wildlab.pipeline.plan_files import RESULT, clear_folder, refuse_folder, write_plan
+from wildlab.pipeline.plan_said import plan_result
+from wildlab.pipeline.plan_wanted import Wanted
+
+
+def plan_flight(
+    wanted: Wanted, into: Path, console: Console, *, overwrite: bool = False
+) -> tuple[Plan, dict[str, Any]]:
+    """Plan, and write what a pilot takes along.
+
+    Parameters
+    ----------
+    wanted
+        What is asked for.
+    into
+        The folder; made where it is not there.
+    console
+        Where progress is shown.
+    overwrite
+        Whether an earlier plan there may be replaced.
+
+    Returns
+    -------
+    plan
+        For its page.
+    result
+        For JSON, also in ``result.json``: numbers, sentences, and ``places``, the files that hold positions.
+
+    Raises
+    ------
+    WildlabError
+        Where nothing can be flown as it is wanted, or the folder is not free.
+    """
+    refuse_folder(into, overwrite)
+    with console.status("planning"):
+        plan = make_plan(wanted)
+        result = plan_result(plan)
+    into.mkdir(parents=True, exist_ok=True)
+    clear_folder(into)
+    result["places"] = write_plan(plan, into)
+    write_json(into / RESULT, result)
+    return plan, result

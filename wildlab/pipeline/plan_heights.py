@@ -1,0 +1,146 @@
+"""Heights along a way: as few way points as keep a flight near its height above the ground."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+
+#: Metres above or below its height that a way may be between way points.
+TOLERANCE = 5.0
+#: Metres between places at which the ground below a way is looked at, where the map is no coarser.
+SPACING = 5.0
+#: Places along a way at most; a longer one is looked at more coarsely.
+MOST_PLACES = 100_000
+
+
+class Followed(NamedTuple):
+    """A way in three dimensions.
+
+    Attributes
+    ----------
+    points
+        (N, 2) north and east of the way points, metres.
+    ground
+        (N,) height of the ground below each, above the plane down = 0 of n, metres.
+    height
+        (N,) of the way points, above the same plane.
+    corner
+        (N,) which point of the given way each is; -1 for those put between them.
+    least, most
+        Heights above the ground anywhere on the way, metres.
+    unknown
+        Metres of the way below which the ground is not known; there it is taken to be as at the nearest place
+        of the way where it is.
+    """
+
+    points: Array
+    ground: Array
+    height: Array
+    corner: NDArray[np.intp]
+    least: float
+    most: float
+    unknown: float
+
+
+def follow(way: Array, terrain: Terrain | None, above: float, most_above: float = math.inf) -> Followed:
+    """Way points that follow the ground.
+
+    Parameters
+    ----------
+    way
+        (M, 2) north and east, metres: corners of the way, all of which are kept.
+    terrain
+        In the same n; None is flat ground at zero.
+    above
+        Height above the ground, metres.
+    most_above
+        What may not be passed, by the rules; between way points, too.
+
+    Returns
+    -------
+    Followed
+        Between way points the height runs straight and stays within `TOLERANCE` of what was asked for, and
+        below ``most_above``, at every place that was looked at.
+    """
+    if terrain is None:
+        zero, high = np.zeros(len(way)), np.full(len(way), above)
+        return Followed(way, zero, high, np.arange(len(way)), above, above, 0.0)
+    places, corner, along = _places(way, max(SPACING, terrain.step / 2))
+    ground = terrain.heights_at(places)
+    known = np.isfinite(ground)
+    if not known.any():
+        ground, unknown = np.zeros(len(places)), float(along[-1])
+    else:
+        steps = np.diff(along)
+        unknown = float(steps[~(known[1:] & known[:-1])].sum())
+        nearest = (
+            np.abs(np.subtract.outer(along[~known], along[known])).argmin(axis=1) if not known.all() else []
+        )
+        ground = ground.copy()
+        ground[~known] = ground[known][nearest]
+    wanted = ground + above
+    up = min(TOLERANCE, max(most_above - above, 0.0))
+    kept = _thinned(along, wanted - TOLERANCE, wanted, wanted + up, corner >= 0)
+    flown = np.interp(along, along[kept], wanted[kept])
+    over = flown - ground
+    return Followed(
+        places[kept], ground[kept], wanted[kept], corner[kept], float(over.min()), float(over.max()), unknown
+    )
+
+
+def _places(way: Array, spacing: float) -> tuple[Array, NDArray[np.intp], Array]:
+    """Places along a way, which corner of it each is, and how far along it."""
+    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    spacing = max(spacing, float(steps.sum()) / MOST_PLACES)
+    points, corner = [way[:1]], [0]
+    for k, length in enumerate(steps):
+        count = max(int(np.ceil(length / spacing)), 1)
+        share = (np.arange(count) + 1)[:, None] / count
+        points.append(way[k] + share * (way[k + 1] - way[k]))
+        corner += [-1] * (count - 1) + [k + 1]
+    places = np.concatenate(points)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    return places, np.array(corner), along
+
+
+def _thinned(
+    along: Array, low: Array, wanted: Array, high: Array, kept: NDArray[np.bool_]
+) -> NDArray[np.intp]:
+    """Places between which a straight line stays between low and high, each at the height wanted there.
+
+    From a place kept, the slopes that clear all places so far make a wedge; the last place that a line
+    within the wedge reaches is kept next.
+    """
+    chosen = [0]
+    begin, steepest, flattest, reached = 0, math.inf, -math.inf, 0
+    k = 1
+    while k < len(along):
+        far = along[k] - along[begin]
+        if far > 0:
+            slope = (wanted[k] - wanted[begin]) / far
+            fits = flattest - 1e-12 <= slope <= steepest + 1e-12
+        else:
+            fits = True
+        if fits:
+            reached = k
+        ends = kept[k] or k == len(along) - 1
+        # The next place may fit again although this one does not: the wedge alone decides when to stop.
+        if far > 0:
+            steepest = min(steepest, (high[k] - wanted[begin]) / far)
+            flattest = max(flattest, (low[k] - wanted[begin]) / far)
+        if flattest > steepest or (ends and not fits):
+            begin = reached if reached > begin else begin + 1
+            chosen.append(begin)
+            steepest, flattest, reached, k = math.inf, -math.inf, begin, begin + 1
+            continue
+        if ends:
+            chosen.append(k)
+            begin, steepest, flattest, reached = k, math.inf, -math.inf, k
+        k += 1
+    return np.unique(chosen)

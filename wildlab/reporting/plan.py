@@ -1,0 +1,236 @@
+"""The page of a plan: a map, how long it takes, what it rests on, and what speaks against it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+
+from wildlab.flight.readers.area import Area
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.plan import Plan
+from wildlab.pipeline.plan_files import origin_text
+from wildlab.pipeline.plan_said import count, hectares, minutes
+from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.figures import png_bytes as png
+from wildlab.reporting.html import examine
+from wildlab.reporting.page import page
+from wildlab.reporting.text import NOTHING, escape
+
+#: Colours of flights, over and over.
+FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+#: Flights that a key names one by one.
+NAMED = 6
+
+
+def plan_page(plan: Plan, result: Mapping[str, Any], *, exact: bool = False) -> str:
+    """The whole page, without anything that has to be fetched.
+
+    Parameters
+    ----------
+    plan
+        From `wildlab.pipeline.plan.make_plan`.
+    result
+        From `wildlab.pipeline.plan_said.plan_result`.
+    exact
+        Whether it may tell where on the Earth this is.
+
+    Returns
+    -------
+    str
+        HTML.
+
+    Raises
+    ------
+    WildlabError
+        If the page would break a promise of `wildlab.reporting.html.examine`.
+    """
+    n = len(result["sorties"])
+    title = f"{count(n, 'flight')} of {minutes(result['duration_s'])} in all"
+    names = ", ".join(one["name"] for one in result["areas"][:4])
+    more = len(result["areas"]) - 4
+    names += f" and {count(more, 'more area')}" if more > 0 else ""
+    place = f"n begins at {origin_text(plan)} (latitude, longitude)" if exact else "where it is, is withheld"
+    parts = [
+        f'<header><h1>{escape(title)}</h1><p class="sub">{escape(names)}; {escape(place)}</p></header>',
+        _summary(result),
+        _tiles(result),
+        "<h2>Where it flies</h2>",
+        _figure(*_map(plan)),
+        "<h2>Flights</h2>",
+        _flights(result),
+        "<h2>Areas</h2>",
+        _areas(result),
+    ]
+    parts += ["<h2>What this rests on</h2>", _points(result["assumed"])]
+    whole = page(title=title, body="\n".join(parts), kicker="wildlab › plan")
+    examine(whole, "plan")
+    return whole
+
+
+def _summary(result: Mapping[str, Any]) -> str:
+    first, *then = result["sentences"]
+    level = "warn" if result["warnings"] else "neutral"
+    against = "".join(f"<p>{escape(one)}</p>" for one in result["warnings"])
+    return (
+        f'<section class="summary {level}" aria-label="Summary"><p><b>{escape(first)}</b> '
+        f"{escape(' '.join(then))}</p>{against}</section>"
+    )
+
+
+def _tiles(result: Mapping[str, Any]) -> str:
+    longest = max(one["duration_s"] for one in result["sorties"])
+    tiles = [
+        (minutes(longest), "the longest flight, from take-off to landing"),
+        (f"{result['height_m']:.0f} m", "above the ground"),
+        (f"{result['animal_pixels']:.0f} px", "across what is looked for"),
+        (f"{result['furthest_m']:.0f} m", "from take-off at the most"),
+    ]
+    return (
+        '<ul class="tiles">'
+        + "".join(f"<li><b>{escape(big)}</b><span>{escape(small)}</span></li>" for big, small in tiles)
+        + "</ul>"
+    )
+
+
+def _map(plan: Plan) -> tuple[Figure, str, str]:
+    fig, ax = new_figure(5.8, 5.2)
+    for area in plan.areas.areas:
+        _draw_area(ax, area)
+    many = len(plan.sorties) > NAMED
+    for k, one in enumerate(plan.sorties):
+        points, colour = one.course.points, FLIGHTS[k % len(FLIGHTS)]
+        ax.plot(points[:, 1], points[:, 0], color=colour, lw=1.0, label=None if many else one.name)
+        for row in one.rows:
+            _arrow(ax, plan.pattern.rows[row], colour)
+    ax.plot(plan.home[1], plan.home[0], "^", color=INK, ms=8, label="take-off", zorder=5)
+    ax.autoscale_view()
+    ax.margins(0.06)
+    map_axes(ax)
+    rows = len(plan.pattern.rows)
+    ax.set_title(f"{count(rows, 'row')} in {count(len(plan.sorties), 'flight')}")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
+    spread = _extent(plan)
+    alt = (
+        f"Map, north up, of {count(len(plan.areas.areas), 'area')} over {spread[0]:.0f} m by "
+        f"{spread[1]:.0f} m with {count(rows, 'row')} of "
+        f"{count(len(plan.sorties), 'flight')} and the take-off point."
+    )
+    return fig, alt, "North is up. Arrows show which way a row is flown; the triangle is the take-off point."
+
+
+def _draw_area(ax: Axes, area: Area) -> None:
+    rings = [area.outline, *area.holes]
+    corners = np.concatenate([np.concatenate([ring, ring[:1]])[:, ::-1] for ring in rings])
+    codes = np.concatenate(
+        [[Outline.MOVETO, *([Outline.LINETO] * (len(ring) - 1)), Outline.CLOSEPOLY] for ring in rings]
+    )
+    # Holes show only where they run the other way round; a line round each says where they are.
+    ax.add_patch(PathPatch(Outline(corners, codes), facecolor="none", edgecolor=INK, lw=1.4, zorder=3))
+    middle = area.outline.mean(axis=0)
+    ax.annotate(
+        area.name,
+        xy=(float(middle[1]), float(middle[0])),
+        ha="center",
+        va="center",
+        fontsize=9,
+        color=INK,
+        zorder=6,
+        bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.75},
+    )
+
+
+def _arrow(ax: Axes, row: Array, colour: str) -> None:
+    begin, end = row[0], row[1]
+    middle, step = (begin + end) / 2, (end - begin) / max(float(np.linalg.norm(end - begin)), 1e-9)
+    ax.annotate(
+        "",
+        xy=(float(middle[1] + step[1]), float(middle[0] + step[0])),
+        xytext=(float(middle[1]), float(middle[0])),
+        arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.0},
+    )
+
+
+def _extent(plan: Plan) -> Array:
+    points = np.concatenate([area.outline for area in plan.areas.areas])
+    return np.asarray(np.ptp(points, axis=0))
+
+
+def _flights(result: Mapping[str, Any]) -> str:
+    battery = any(one["of_battery"] is not None for one in result["sorties"])
+    heads = ["flight", "areas", "time", "of a battery", "rows", "way points", "km", "above ground, m"]
+    rows = []
+    for one in result["sorties"]:
+        low, high = one["least_above_ground_m"], one["most_above_ground_m"]
+        span = f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+        rows.append(
+            [
+                one["name"],
+                ", ".join(one["areas"]),
+                minutes(one["duration_s"]),
+                NOTHING if one["of_battery"] is None else f"{100 * one['of_battery']:.0f} %",
+                str(one["rows"]),
+                str(one["way_points"]),
+                f"{one['length_m'] / 1000:.1f}",
+                span,
+            ]
+        )
+    if not battery:
+        heads, rows = _without(3, heads, rows)
+    return _table(heads, rows, text=2)
+
+
+def _areas(result: Mapping[str, Any]) -> str:
+    heads = ["area", "size", "rows", "row distance, m", "time"]
+    rows = [
+        [
+            one["name"],
+            hectares(one["size_m2"]),
+            str(one["rows"]),
+            f"{one['row_distance_m']:.1f}",
+            minutes(one["seconds"]),
+        ]
+        for one in result["areas"]
+    ]
+    note = (
+        '<p class="note">Times are of rows and the turns between them, without the ways there and back.</p>'
+    )
+    return _table(heads, rows, text=1) + note
+
+
+def _without(column: int, heads: list[str], rows: list[list[str]]) -> tuple[list[str], list[list[str]]]:
+    return heads[:column] + heads[column + 1 :], [row[:column] + row[column + 1 :] for row in rows]
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], text: int) -> str:
+    """A table whose first columns are words."""
+
+    def kind(column: int) -> str:
+        return ' class="text"' if column < text else ""
+
+    head = "".join(f'<th scope="col"{kind(k)}>{escape(one)}</th>' for k, one in enumerate(heads))
+    body = "".join(
+        f'<tr><th scope="row" class="text">{escape(row[0])}</th>'
+        + "".join(f"<td{kind(k)}>{escape(one)}</td>" for k, one in enumerate(row[1:], start=1))
+        + "</tr>"
+        for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _points(sentences: Sequence[str]) -> str:
+    return "<ul>" + "".join(f"<li>{escape(one)}</li>" for one in sentences) + "</ul>"
+
+
+def _figure(figure: Figure, alt: str, caption: str) -> str:
+    encoded = base64.b64encode(png(figure)).decode("ascii")
+    return (
+        f'<figure><img alt="{escape(alt)}" src="data:image/png;base64,{encoded}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
