@@ -129,6 +129,8 @@ def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses()
     fields = ("plain", "ridge", "meadow", "lake", "wood")
     animals = {f"enclosures.{name}.animals": 5 for name in fields}
     gondola = {"flight.duration": 1800, "flight.airspeed": 1.5, "cable.lowest": 3, "cable.highest": 20}
+    place = {"place.latitude": 58.662064, "place.longitude": 16.433337, "land.step": 2, "land.relief": 51}
+    camera |= place
     assert published("gondola") == camera | animals | gondola
     search = {"flight.altitude": 60, "survey.row_distance": 25}
     assert published("uav-search") == camera | search

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import pandas as pd
 
 from wildlab.geometry.frames import Array
 from wildlab.simulation.error_models import stream
+from wildlab.simulation.land import ground_heights
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.target_parameters import Animals, Enclosure
 from wildlab.simulation.trajectory import Signal
@@ -32,11 +36,17 @@ def reflected(walk: Array, limit: float) -> Array:
     return np.asarray(np.where(lap < 2 * limit, lap, 4 * limit - lap) - limit)
 
 
-def animal_path(enclosure: Enclosure, animals: Animals, duration: float, rng: np.random.Generator) -> Signal:
+def animal_path(
+    enclosure: Enclosure,
+    animals: Animals,
+    duration: float,
+    rng: np.random.Generator,
+    ground: Callable[[Array], Array] | None = None,
+) -> Signal:
     """One animal's walk: times (N,) s from 0 to the duration -> (N, 3) m, the middle of its body.
 
     A new velocity every step, as (4.5) has it with the noise of (4.8); a fence reflects it. It starts
-    anywhere in its enclosure (F 7.5.1).
+    anywhere in its enclosure (F 7.5.1). ``ground`` gives the heights of the ground at (N, 2) places.
     """
     middle, along, across = enclosure_axes(enclosure)
     half = np.array([enclosure.length.si, enclosure.width.si]) / 2
@@ -50,7 +60,7 @@ def animal_path(enclosure: Enclosure, animals: Animals, duration: float, rng: np
         x, y = (reflected(np.interp(t, at, walk[:, i]), half[i]) for i in range(2))
         p = np.empty((len(t), 3))
         p[:, :2] = middle + np.outer(x, along) + np.outer(y, across)
-        p[:, 2] = -animals.height.si
+        p[:, 2] = -animals.height.si - (0.0 if ground is None else ground(p[:, :2]))
         return p
 
     return path
@@ -65,7 +75,8 @@ def animal_paths(twin: TwinParameters, seed: int) -> dict[str, Signal]:
         for number in range(1, int(enclosure.animals.number) + 1):
             animal = f"{name}-{number}"
             rng = stream(seed, f"motion of {animal}")
-            named[animal] = animal_path(enclosure, twin.animals, twin.flight.duration.si, rng)
+            ground = partial(ground_heights, twin)
+            named[animal] = animal_path(enclosure, twin.animals, twin.flight.duration.si, rng, ground)
     return named
 
 

@@ -42,7 +42,7 @@ class Exposures:
 
 
 def marks(
-    frames: pd.DataFrame, images: Numbers, marked: Array, source: str, target: str, plane_down: float
+    frames: pd.DataFrame, images: Numbers, marked: Array, source: str, target: str, plane_down: float | Array
 ) -> pd.DataFrame:
     """Rows of detections of one target: in which of the images, (K,), and where, (K, 2) px."""
     return pd.DataFrame(

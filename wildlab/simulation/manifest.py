@@ -8,6 +8,7 @@ from typing import Any
 
 from wildlab.flight.manifest import Manifest, make_manifest
 from wildlab.geometry.mount import Mount, helgesen_misalignment
+from wildlab.simulation.land import land_record
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.sensor_parameters import Gnss, Imu, TwinMount
 
@@ -54,7 +55,13 @@ def twin_manifest(twin: TwinParameters, seed: int) -> Manifest:
             "imu": {} if twin.imu is None else _imu(twin.imu),
             "gnss": {} if twin.gnss is None else _gnss(twin.gnss),
             "time": {"kind": "utc", "epoch": twin.place.epoch.text},
-            "vertical": {"reference": "ellipsoid", "note": "the ground or the sea lies at the origin of n"},
+            "vertical": {
+                "reference": "ellipsoid",
+                "note": "the ground or the sea lies at the origin of n"
+                if twin.land is None
+                else "the lowest ground lies as high as the origin of n",
+            },
+            **({} if twin.land is None else {"terrain": land_record(twin)}),
             "uncertainty": {
                 "pixel_px": assumed.pixel.number,
                 "position_horizontal_m": assumed.horizontal.number,

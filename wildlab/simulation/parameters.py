@@ -18,7 +18,16 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, did_you_mean, is_safe_name, read_toml
 from wildlab.paths import DATA
 from wildlab.simulation.parameter_quantities import Parameter
-from wildlab.simulation.platform_parameters import AirframeFlight, Cable, Climb, Loiter, Place, Route, Survey
+from wildlab.simulation.platform_parameters import (
+    AirframeFlight,
+    Cable,
+    Climb,
+    Land,
+    Loiter,
+    Place,
+    Route,
+    Survey,
+)
 from wildlab.simulation.sensor_parameters import (
     Assumed,
     Autopilot,
@@ -61,6 +70,7 @@ class TwinParameters(Strict):
     pair: Pair | None = None
     subset: Subset | None = None
     segments: Segments | None = None
+    land: Land | None = None
     enclosures: dict[str, Enclosure] = Field(default_factory=dict)
     animals: Animals | None = None
     camera: TwinCamera
@@ -142,6 +152,14 @@ class TwinParameters(Strict):
         others = (self.second_target, self.pair, self.subset, self.segments)
         if self.target is None and any(part is not None for part in others):
             raise ValueError("second_target, pair, subset and segments go with a target; add target")
+        return self
+
+    @model_validator(mode="after")
+    def _on_land(self) -> TwinParameters:
+        if self.land is not None and self.animals is None:
+            raise ValueError("land lies under animals; take out land, or describe animals")
+        if self.land is not None and self.loiter is not None:
+            raise ValueError("a loiter does not follow the ground; describe a survey or a route")
         return self
 
     @model_validator(mode="after")

@@ -119,6 +119,21 @@ class Cable(Strict):
         return self
 
 
+class Land(Strict):
+    """Ground that is not level (see `wildlab.simulation.landscape`), and how courses follow it.
+
+    ``follow`` is the length of way over which an autopilot, or a cable's pylons, average the ground's height;
+    altitudes are above that.
+    """
+
+    seed: Count
+    north: Length
+    east: Length
+    step: Length
+    relief: Length
+    follow: Length
+
+
 class Climb(Strict):
     """One change of altitude during the flight."""
 

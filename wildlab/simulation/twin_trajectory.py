@@ -15,6 +15,7 @@ from wildlab.simulation.attitudes import (
     thrust_aligned_trajectory,
 )
 from wildlab.simulation.disturbances import AttitudeDisturbance, Disturbance, band_limited_disturbance
+from wildlab.simulation.land import even_times, heights_along
 from wildlab.simulation.loiter import Turn, loiter_path
 from wildlab.simulation.manifest import true_mount, twin_manifest
 from wildlab.simulation.parameters import TwinParameters
@@ -91,7 +92,7 @@ def _laps_path(twin: TwinParameters, errors: ControlErrors) -> FlightPath:
     """
     try:
         laps = _laps(twin)
-        return laps_path(laps, _altitudes(twin, laps), errors)
+        return laps_path(laps, _above_ground(twin, laps, _altitudes(twin, laps)), errors)
     except ValueError as error:
         raise WildlabError(
             f"this course cannot be flown: {error}",
@@ -146,8 +147,18 @@ def _drift(twin: TwinParameters) -> Array:
     return twin.route.drift_speed.si * np.array([math.cos(along), math.sin(along)])
 
 
+def _above_ground(twin: TwinParameters, laps: Laps, altitudes: Array) -> Array:
+    """Times and altitudes, (K, 2) s and m, of a course whose altitudes are over the ground."""
+    if twin.land is None:
+        return altitudes
+    times = even_times(twin.flight.duration.si)
+    place = laps_path(laps, altitudes)(times)[0][:, :2]
+    above = np.interp(times, altitudes[:, 0], altitudes[:, 1])
+    return np.column_stack([times, above + heights_along(twin, times, place, laps.airspeed)])
+
+
 def _altitudes(twin: TwinParameters, laps: Laps) -> Array:
-    """Times and altitudes, (K, 2) s and m."""
+    """Times and altitudes over the ground, (K, 2) s and m."""
     f = twin.flight
     if twin.cable is not None:
         return cable_heights(twin.cable, _lap_time(laps), f.duration.si)

@@ -21,6 +21,7 @@ from wildlab.simulation.camera_detections import exposure_times, frames_and_dete
 from wildlab.simulation.camera_sway import camera_motion
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.gimbal import gimbal_table
+from wildlab.simulation.land import twin_land
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.onboard_sensors import (
     autopilot_tables,
@@ -139,4 +140,4 @@ def simulate(twin: TwinParameters, seed: int, without: Collection[str] = ()) -> 
             tables["imu"] = imu_table(flown, payload, seed)
         if twin.gnss is not None and "gnss" not in without:
             tables["gnss"] = gnss_table(flown, payload, seed, twin.gnss)
-    return Flight(twin_manifest(twin, seed), nav, tables)
+    return Flight(twin_manifest(twin, seed), nav, tables, terrain=twin_land(twin))
