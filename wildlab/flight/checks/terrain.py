@@ -11,6 +11,8 @@ from wildlab.flight.store import Flight
 
 #: Poses that far below the ground are said, metres: a terrain's cell rounds the place it takes off from.
 DEEP = 5.0
+#: Fewer of them are what the noise of low flights does, as a share.
+FEW = 0.01
 
 
 def terrain_sentence(flight: Flight) -> str:
@@ -63,7 +65,7 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
                 "give a map that reaches further",
             )
         below = above[over] < -DEEP
-        if below.any():
+        if below.mean() > FEW:
             yield Finding(
                 "problem" if below.all() else "warning",
                 f"nav/{name}",
