@@ -183,11 +183,17 @@ def heights_left_in(flight: Flight, observations: Observations) -> Observations:
     """The observations as they would be had the vertical correction not been taken off on import.
 
     The ground of a labelled target comes from its survey and stays; any other came from the same source as
-    the heights of the aircraft, and rises with them.
+    the heights of the aircraft, and rises with them. So does terrain whose heights count from what the
+    flight's do; any other stays.
     """
     raised = flight.manifest.vertical.correction_m
     poses = observations.poses
     poses = replace(poses, p_nb=poses.p_nb - np.array([0.0, 0.0, raised]))
+    terrain, record = observations.terrain, flight.manifest.terrain
+    if terrain is not None:
+        if record is not None and record.heights == "flight":
+            terrain = replace(terrain, height=terrain.height + np.float32(raised))
+        return _grounded(replace(observations, poses=poses, terrain=terrain))
     surveyed = np.isfinite(truth_of(flight, observations.table)[:, 2])
     return replace(
         observations, poses=poses, plane_down=observations.plane_down - np.where(surveyed, 0.0, raised)

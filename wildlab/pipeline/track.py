@@ -150,7 +150,9 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
         manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance
     )
     uv = np.full((len(times), 2), np.nan)
-    uv[row - first] = seen.uv
+    # Over terrain a ray that meets no ground is no sighting: whatever plane it were put on would be invented.
+    met = np.isfinite(seen.plane_down) if seen.terrain is not None else np.ones(len(row), bool)
+    uv[row - first] = np.where(met[:, None], seen.uv, np.nan)
     plane = np.full(len(times), np.nan)
     plane[row - first] = seen.plane_down
     known = np.isfinite(plane)

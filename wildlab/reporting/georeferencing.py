@@ -31,13 +31,9 @@ ERROR_COLUMNS = {
 }
 ERROR_DIGITS = dict.fromkeys(ERROR_COLUMNS, 2) | {"n": 0, "max": 1}
 
-METHOD = r"""Pinhole camera with Brown distortion (exact inverse by Newton's method), rotation
+_METHOD = r"""Pinhole camera with Brown distortion (exact inverse by Newton's method), rotation
 $\mathbf{R}_c^n = \mathbf{R}_b^n\mathbf{R}_m^b\mathbf{R}_c^m$ from the logged attitude and the mount (H 5.9 to
-5.12), ray cut with the horizontal plane at the height of the ground (H 5.13).
-
-Ellipses: covariances of pixel, pose, mount and plane height through the derivatives of the ground point.
-Where the depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to
-be wrong, and 1000 samples decide its size.
+5.12), ray GROUND
 
 Blocks: points of neighbouring images, in time order; a minute where the images have times and last for six,
 otherwise three images where that leaves six blocks. Errors of one block are not taken for independent.
@@ -64,6 +60,24 @@ Shares of the squared error: one-way analysis of variance with images as groups.
 the top: as many blocks with replacement as there are, a thousand times, middle 90 %. They say how far these
 images decide the figure, not what another day would bring."""
 
+_ON_PLANE = """cut with the horizontal plane at the height of the ground (H 5.13).
+
+Ellipses: covariances of pixel, pose, mount and plane height through the derivatives of the ground point.
+Where the depression's standard deviation times its cotangent exceeds one tenth the linear ellipse is known to
+be wrong, and 1000 samples decide its size."""
+
+_ON_TERRAIN = """followed from cell to cell of the flight's terrain, whose surface is bilinear between its
+nodes, to where it first meets the ground. A ray that leaves the map, comes to a hole of it, or starts below
+the ground has no point.
+
+Ellipses: covariances of pixel, pose, mount and terrain height through the derivatives of where the ray meets
+the plane that touches the ground. Rays to 16 points of each ellipse are followed, too: where one meets the
+ground a fifth of the ellipse or more from that plane, or not at all, or where the ray is flat against the
+slope (as for level ground: one tenth), 1000 samples decide its size. They are called split where they fall
+into a near and a far group. No ellipse is given where more than 5 % of them meet no ground.
+
+What follows looks for causes and noise on level ground as high as each point on the terrain."""
+
 _NOISE = {
     "position_horizontal": ("position_horizontal_m", "position, horizontal", "m"),
     "position_vertical": ("position_vertical_m", "position, vertical", "m"),
@@ -74,8 +88,15 @@ _NOISE = {
 _ELLIPSES = {
     "linear": "computed by linearisation",
     "sampled": "found by sampling, the ray being flat",
+    "split": "found by sampling, a ridge parting the samples",
     "unbounded": "not given, the ray being too near the horizon",
     "none": "without a point on the ground",
+}
+
+
+_OVER_TERRAIN = {
+    "sampled": "found by sampling, the ray being flat or the ground bent",
+    "unbounded": "not given, too many of the samples meeting no ground",
 }
 
 
@@ -266,10 +287,16 @@ def groups_table(groups: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     )
 
 
-def ellipse_words(scored: pd.DataFrame) -> str:
-    """How the ellipses of a scored table were found, in words."""
+def ellipse_words(scored: pd.DataFrame, *, terrain: bool = False) -> str:
+    """How the ellipses of a scored table were found, in words; over ``terrain`` for other reasons."""
+    words = _ELLIPSES | (_OVER_TERRAIN if terrain else {})
     counts = scored["ellipse"].value_counts()
-    return ", ".join(f"{count} were {_ELLIPSES[str(kind)]}" for kind, count in counts.items())
+    return ", ".join(f"{count} were {words[str(kind)]}" for kind, count in counts.items())
+
+
+def method_words(*, terrain: bool) -> str:
+    """How it was computed, on level ground or over terrain."""
+    return _METHOD.replace("GROUND", _ON_TERRAIN if terrain else _ON_PLANE)
 
 
 def assumed_words(stated: Mapping[str, float]) -> str:
@@ -307,15 +334,15 @@ def limits_of(
     timed: bool,
     enough: bool,
     certain: bool = False,
+    terrain: bool = False,
 ) -> list[str]:
     """What a report on these points does not tell; ``certain``: a cause gained something for certain."""
+    ground = "an elevation map" if terrain else "the survey of each target" if labelled else "the log"
     missed = int(points["north_m"].isna().sum())
     limits = [
         "Whoever or whatever marked the points is part of these errors; another observer or detector "
         "adds its own.",
-        "The height of the ground was taken from "
-        + ("the survey of each target" if labelled else "the log")
-        + "; where it is not known, the error grows.",
+        f"The height of the ground was taken from {ground}; where it is not known, the error grows.",
     ]
     if np.isfinite(height_m).any():
         limits.insert(
@@ -326,7 +353,7 @@ def limits_of(
     if missed:
         limits.append(
             f"{missed} of {len(points)} points have no position: no pose, no ground height, or a ray "
-            "above the horizon."
+            + ("that meets no ground." if terrain else "above the horizon.")
         )
     if not timed:
         limits.append(

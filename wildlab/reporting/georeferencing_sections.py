@@ -11,6 +11,7 @@ from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting.ground import ground_height_words
 from wildlab.reporting.report import Report
 
 
@@ -150,11 +151,13 @@ def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) 
         if learnt_elsewhere
         else "assumed"
     )
+    ground = found.observations.terrain
     report.section("Does it know how wrong it is?")
+    how = words.ellipse_words(found.scored, terrain=ground is not None)
     report.text(
-        f"{cause.ellipse_sentence(found.ellipses)}\n\nOf {len(found.scored)} ellipses "
-        f"{words.ellipse_words(found.scored)}. The uncertainty of the pose is {pose}: "
-        f"{words.assumed_words(found.assumed)}."
+        f"{cause.ellipse_sentence(found.ellipses)}\n\nOf {len(found.scored)} ellipses {how}. The uncertainty "
+        f"of the pose is {pose}: {words.assumed_words(found.assumed)}."
+        f"{ground_height_words(ground, found.assumed)}"
     )
     if found.noise is None:
         return

@@ -181,6 +181,8 @@ def _ground(flight: Flight, pixel: np.ndarray) -> Iterator[Finding]:
     detections = flight.detections
     if detections is None or flight.frames is None or not flight.nav:
         return
+    if flight.terrain is not None:
+        return  # the ground is that of the map
     if "plane_down_m" not in detections or not np.isfinite(detections.loc[pixel, "plane_down_m"]).any():
         yield Finding(
             "note",

@@ -8,11 +8,14 @@ import numpy as np
 
 from wildlab.flight.checks.findings import POSITION, Finding
 from wildlab.flight.store import Flight
+from wildlab.geometry.terrain import Terrain
 
 #: Poses that far below the ground are said, metres: a terrain's cell rounds the place it takes off from.
 DEEP = 5.0
 #: Fewer of them are what the noise of low flights does, as a share.
 FEW = 0.01
+#: Known points off the ground by more than that, metres, and by so many times their spread, are said.
+OFF, SPREAD = 3.0, 2.0
 
 
 def terrain_sentence(flight: Flight) -> str:
@@ -49,6 +52,7 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
         if np.isnan(ground.sd)
         else f"its standard deviation is taken for {ground.sd:.2g} m",
     )
+    yield from _known_points(flight, ground)
     for name, nav in flight.nav.items():
         p = nav[list(POSITION)].to_numpy(float)
         p = p[np.isfinite(p).all(axis=1)]
@@ -83,6 +87,39 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
                 f"{above[over].min():.0f} to {above[over].max():.0f} m",
                 "compare that with what was flown",
             )
+
+
+def _known_points(flight: Flight, ground: Terrain) -> Iterator[Finding]:
+    """Whether points of the truth that never move lie on the ground."""
+    truth = flight.truth
+    if truth is None:
+        return
+    still = truth[truth["time_s"].isna()].drop_duplicates("target_id")[list(POSITION)].to_numpy(float)
+    above = -still[:, 2] - ground.heights_at(still[:, :2])
+    above = above[np.isfinite(above)]
+    if len(above) < 3:
+        return
+    middle = float(np.median(above))
+    spread = 1.4826 * float(np.median(np.abs(above - middle)))
+    where = "above" if middle >= 0 else "below"
+    if abs(middle) > max(OFF, SPREAD * spread):
+        yield Finding(
+            "warning",
+            "terrain.tif",
+            "",
+            f"{len(above)} known points lie {abs(middle):.1f} m {where} its ground in the median, give or "
+            f"take {spread:.1f} m: another vertical reference, or things that stand above the ground",
+            "check what the map's heights count from",
+        )
+    else:
+        yield Finding(
+            "note",
+            "terrain.tif",
+            "",
+            f"{len(above)} known points lie {abs(middle):.1f} m {where} its ground in the median, give or "
+            f"take {spread:.1f} m",
+            "that is how far map and survey agree",
+        )
 
 
 def _length(metres: float) -> str:

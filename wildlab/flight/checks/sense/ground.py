@@ -14,6 +14,8 @@ from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.ray_ends import BELOW
+from wildlab.geometry.terrain import pixels_to_terrain
 
 #: A mark is where something was marked, so its ray goes down: more that do not than this share are a fault.
 LOST = 0.5
@@ -31,7 +33,7 @@ def ground(flight: Flight) -> Iterator[Finding]:
     if pixel.sum() < 4 or flight.frames["frame_id"].duplicated().any():
         return
     yield from _rays(flight, detections[pixel])
-    if truth is None or not len(truth) or "plane_down_m" not in detections:
+    if truth is None or not len(truth) or "plane_down_m" not in detections or flight.terrain is not None:
         return
     down = detections["plane_down_m"].to_numpy(float)
     heights = truth.groupby("target_id")["down_m"].median()
@@ -72,6 +74,7 @@ def _rays(flight: Flight, pixels: pd.DataFrame) -> Iterator[Finding]:
     )
     if flight.truth is not None and len(flight.truth):
         plane = np.where(np.isfinite(plane), plane, float(flight.truth["down_m"].median()))
+    terrain = flight.terrain
     frame = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
     for name, nav in flight.nav.items():
         try:
@@ -81,16 +84,23 @@ def _rays(flight: Flight, pixels: pd.DataFrame) -> Iterator[Finding]:
             poses = CameraPoses(
                 flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), p, R, pan, tilt
             )
-            met = georeference_pixels(poses, pixels[["u_px", "v_px"]].to_numpy(float), plane)
+            uv = pixels[["u_px", "v_px"]].to_numpy(float)
+            if terrain is None:
+                met, under = georeference_pixels(poses, uv, plane), p[:, 2] >= plane
+            else:
+                found = pixels_to_terrain(poses, uv, terrain)
+                met, under = found.points, found.became == BELOW
         except ValueError:  # said by the checks of times
             continue
-        known = np.isfinite(plane) & np.isfinite(p).all(axis=1) & (frame >= 0)
+        known = np.isfinite(p).all(axis=1) & (frame >= 0)
+        if terrain is None:
+            known &= np.isfinite(plane)
         if known.sum() < 4:
             continue
         lost = 1 - float(np.isfinite(met[known, 0]).mean())
         if lost > LOST:
             other = "forward" if flight.manifest.mount.looks == "down" else "down"
-            below = float(np.mean(p[known, 2] >= plane[known]))
+            below = float(np.mean(under[known]))
             why = (
                 "the poses lie below the ground: check the vertical reference of both and [vertical]"
                 if below > LOST
