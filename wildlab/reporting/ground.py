@@ -7,16 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.errors import summarise
+from wildlab.evaluation.errors import bootstrap_interval
 from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.evaluate import errors_of, score_points
+from wildlab.pipeline.evaluate import blocks_of, score_points
 from wildlab.pipeline.georeference import Observations, georeference
-from wildlab.pipeline.ground import ground_sentences, on_level, rays_of, shift_from_level
+from wildlab.pipeline.ground import ground_sentences, on_level, shift_from_level
 from wildlab.reporting.report import Report
 
-#: Medians that differ by less than this share of the smaller are called alike.
-ALIKE = 0.05
+#: Fewer images than this give no interval.
+FEWEST_IMAGES = 6
 
 
 def ground_section(report: Report, flight: Flight, observations: Observations, points: pd.DataFrame) -> None:
@@ -34,38 +34,38 @@ def ground_section(report: Report, flight: Flight, observations: Observations, p
     if observations.terrain is None:
         return
     report.section("The ground", ". ".join(ground_sentences(observations, points)) + ".")
-    met = rays_of(observations).counts()
-    report.table(
-        pd.DataFrame({"became": list(met), "rays": list(met.values())}),
-        columns={"became": "what became of the rays", "rays": "rays"},
-        digits={"rays": 0},
-        caption="Rays of all detections over the terrain. Those that did not meet the ground have no point.",
-    )
-    report.metric("rays_on_ground", "terrain", float(points["north_m"].notna().mean()), "1", n=len(points))
+    placed = points["north_m"].notna()
+    report.metric("rays_on_ground", "terrain", float(placed.mean()), "1", n=len(points))
     shift = shift_from_level(observations, points)
     if shift.n:
         report.metric("shift_from_level_ground", "terrain", shift.median, "m", n=shift.n)
-    if flight.truth is None or not len(flight.truth) or not points["north_m"].notna().any():
+    if flight.truth is None or not len(flight.truth) or not placed.any():
         return
-    level = on_level(observations)
-    flat = score_points(flight, georeference(flight, level, np.random.default_rng(0)))
-    here = score_points(flight, points)
-    both = np.isfinite(flat.set_index("detection_id")["error_m"]) & np.isfinite(
-        here.set_index("detection_id")["error_m"]
-    )
-    if not both.any():
+    flat = georeference(flight, on_level(observations), np.random.default_rng(0))
+    here, there = score_points(flight, points), score_points(flight, flat)
+    both = here.merge(there, on="detection_id", suffixes=("", "_level"))
+    both = both[np.isfinite(both["error_m"]) & np.isfinite(both["error_m_level"])]
+    if both.empty:
         return
-    rows = both.to_numpy()
-    on_map, on_plane = summarise(errors_of(here[rows])), summarise(errors_of(flat[rows]))
-    report.metric("horizontal_error_median", "level-ground", on_plane.median, "m", n=on_plane.n)
-    whose = (
-        "surveyed height of each target" if flight.manifest.scoring.rule == "labelled" else "stated height"
-    )
-    report.text(level_sentence(on_map.median, on_plane.median, on_plane.n, whose))
+    # Two distances in place of north and east: what is drawn again and again is the same.
+    distances = both[["error_m", "error_m_level"]].to_numpy(float)
+    interval = (np.nan, np.nan)
+    if both["frame_id"].nunique() >= FEWEST_IMAGES:
+        interval = bootstrap_interval(
+            _gain, distances, blocks_of(flight, both), np.random.default_rng(0), level=0.95
+        )
+    medians = np.median(distances, axis=0)
+    report.metric("horizontal_error_median", "level-ground", float(medians[1]), "m", n=len(both))
+    report.text(level_sentence(float(medians[0]), float(medians[1]), len(both), interval))
 
 
-def level_sentence(terrain: float, level: float, n: int, whose: str) -> str:
-    """Medians of errors over terrain and on level ground, beside one another.
+def _gain(distances: np.ndarray) -> float:
+    """How much less the median of the first column is than that of the second."""
+    return float(np.median(distances[:, 1]) - np.median(distances[:, 0]))
+
+
+def level_sentence(terrain: float, level: float, n: int, interval: tuple[float, float]) -> str:
+    """Medians of errors over terrain and on level ground beside one another, and which is nearer for certain.
 
     Parameters
     ----------
@@ -73,24 +73,44 @@ def level_sentence(terrain: float, level: float, n: int, whose: str) -> str:
         Median errors, metres.
     n
         Of so many points, the same on both.
-    whose
-        How high the level ground is.
+    interval
+        Of how much less the first is than the second, 95 %; NaN where there is none.
 
     Returns
     -------
     str
     """
     said = (
-        f"Against the truth, {n} points that are on both have a median error of {terrain:.2f} m over terrain "
-        f"and of {level:.2f} m on level ground at the {whose}"
+        f"Against the truth, the {n} points that are on both have a median error of {terrain:.2f} m over "
+        f"terrain and of {level:.2f} m on level ground"
     )
-    if abs(terrain - level) <= ALIKE * min(terrain, level):
-        return f"{said}: alike."
-    return f"{said}: the {'terrain' if terrain < level else 'level ground'} is nearer to it on these points."
+    low, high = interval
+    if np.isnan(low):
+        return f"{said}; too few images to tell whether that is chance."
+    difference = f"{level - terrain:+.2f} m, 95 % interval {low:+.2f} to {high:+.2f} m"
+    if low > 0:
+        return f"{said}: the terrain is nearer to it ({difference})."
+    if high < 0:
+        return (
+            f"{said}: level ground is nearer to it ({difference}). Look at the map's reference and its age."
+        )
+    return f"{said}: which is nearer to it, these images do not decide ({difference})."
 
 
 def ground_height_words(ground: Terrain | None, assumed: Mapping[str, float]) -> str:
-    """How good the terrain's height is taken to be; nothing without terrain."""
+    """How good the terrain's height is taken to be; nothing without terrain.
+
+    Parameters
+    ----------
+    ground
+        The flight's.
+    assumed
+        Standard deviations that are assumed, by name.
+
+    Returns
+    -------
+    str
+    """
     if ground is None:
         return ""
     if np.isnan(ground.sd):

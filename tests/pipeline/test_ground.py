@@ -1,0 +1,206 @@
+"""Detections on terrain: marks on hills are found where they are, and every ray is accounted for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.errors import summarise
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_quaternion, rotation_vector_to_matrix
+from wildlab.geometry.terrain import Terrain, pixels_to_terrain
+from wildlab.pipeline.evaluate import errors_of, score_points
+from wildlab.pipeline.georeference import georeference, heights_left_in, observe
+from wildlab.pipeline.ground import ground_sentences, on_level, rays_of, shift_from_level
+from wildlab.pipeline.track import sighting
+
+MANIFEST = {
+    "name": "hills", "kind": "logged", "platform": {"name": "kite"},
+    "time": {"kind": "sequence"},
+    "origin": {"latitude_deg": 61.0, "longitude_deg": 15.0, "height_m": 300.0},
+    "camera": {"name": "c", "width_px": 640, "height_px": 512, "fx_px": 700.0, "fy_px": 700.0, "cx_px": 320.0,
+               "cy_px": 256.0},
+    "mount": {"looks": "down", "tilt_deg": 40.0},
+    "uncertainty": {"pixel_px": 1.0, "position_horizontal_m": 1.0, "position_vertical_m": 1.0,
+                    "roll_deg": 0.5, "pitch_deg": 0.5, "yaw_deg": 1.0, "plane_height_m": 0.3},
+}  # fmt: skip
+
+
+def hills(seed: int = 0) -> Terrain:
+    height = 40 * 14 * gaussian_filter(np.random.default_rng(seed).normal(size=(150, 150)), 12)
+    return Terrain(height.astype(np.float32), -450.0, -450.0, 6.0)
+
+
+@pytest.fixture
+def flown() -> Callable[..., Flight]:
+    """``flown(noise=1.0)``: marks on hills in 25 images, poses wrong by noise times what is stated."""
+
+    def make(noise: float = 0.0, terrain: Terrain | None = None, per_image: int = 6) -> Flight:
+        ground = terrain or hills()
+        rng = np.random.default_rng(5)
+        manifest = make_manifest(MANIFEST)
+        at = rng.uniform(-120, 120, (25, 2))
+        p = np.column_stack([at, -(ground.heights_at(at) + 80)])
+        R = euler_to_matrix(0 * at[:, 0], 0 * at[:, 0], rng.uniform(-3, 3, 25))
+        poses = CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p, R)
+        rows, truth = [], []
+        for i in range(25):
+            uv = rng.uniform([20, 20], [620, 490], (per_image, 2))
+            one = poses.take(np.full(per_image, i))
+            marks = pixels_to_terrain(one, uv, ground).points
+            for k in np.flatnonzero(np.isfinite(marks[:, 0])):
+                rows.append((f"d{i}-{k}", f"f{i}", "pixel", *uv[k], f"m{i}-{k}"))
+                truth.append((f"m{i}-{k}", np.nan, *marks[k]))
+        logged_p = p + noise * rng.normal(0, 1.0, p.shape)
+        turn = rng.normal(0, 1, (25, 3)) * np.radians([0.5, 0.5, 1.0]) * noise
+        q = matrix_to_quaternion(R @ rotation_vector_to_matrix(turn))
+        nav = pd.DataFrame(logged_p, columns=["north_m", "east_m", "down_m"])
+        nav = nav.assign(**{f"q_{x}": q[:, j] for j, x in enumerate("wxyz")}, time_s=np.arange(25.0))
+        nav["frame_id"] = [f"f{i}" for i in range(25)]
+        names = ["detection_id", "frame_id", "kind", "u_px", "v_px", "target_id"]
+        detections = pd.DataFrame(rows, columns=names).assign(source="click")
+        detections[["u_px", "v_px"]] += noise * rng.normal(0, 1.0, (len(rows), 2))
+        tables = {
+            "frames": nav[["frame_id", "time_s"]].copy(),
+            "detections": detections,
+            "truth": pd.DataFrame(truth, columns=["target_id", "time_s", "north_m", "east_m", "down_m"]),
+        }
+        return Flight(manifest, {"logged": nav}, tables, None, ground)
+
+    return make
+
+
+def test_with_exact_poses_points_are_the_marks(flown: Callable[..., Flight]) -> None:
+    flight = flown()
+    seen = observe(flight)
+    points = georeference(flight, seen, np.random.default_rng(0))
+    marks = flight.table("truth")[["north_m", "east_m", "down_m"]].to_numpy()
+    np.testing.assert_allclose(points[["north_m", "east_m", "down_m"]].to_numpy(), marks, atol=1e-6)
+    assert rays_of(seen).counts() == {"met the ground": len(points)}
+    # Targets' own heights are the best that level ground can have; without them it lies under the camera.
+    assert shift_from_level(seen, points).largest < 1e-6
+    unknown = replace(seen, level=np.full(len(points), np.nan))
+    shift = shift_from_level(unknown, points)
+    level = georeference(flight, on_level(unknown), np.random.default_rng(0))
+    off = np.hypot(level["north_m"] - points["north_m"], level["east_m"] - points["east_m"])
+    assert shift == (int(off.notna().sum()), float(off.median()), float(off.max()))
+    assert shift.median > 3.0
+
+
+def test_ellipses_hold_what_they_should_over_hills(flown: Callable[..., Flight]) -> None:
+    """Poses, pixels and nothing else are wrong, by what the manifest states."""
+    flight = flown(noise=1.0, per_image=24)
+    ground = hills()
+    flight.terrain = Terrain(ground.height, ground.north, ground.east, ground.step, 1e-3)
+    scored = score_points(flight, georeference(flight, observe(flight), np.random.default_rng(0)))
+    assert len(scored) > 500
+    # 25 poses are drawn: 90 % of their points, give or take what so few decide.
+    assert 0.8 <= scored["inside_90"].mean() <= 0.97
+    assert summarise(errors_of(scored)).median < 3.0
+
+
+def test_the_map_decides_how_good_its_heights_are(flown: Callable[..., Flight]) -> None:
+    sizes = []
+    for sd in (np.nan, 0.3, 6.0):
+        flight, ground = flown(), hills()
+        flight.terrain = Terrain(ground.height, ground.north, ground.east, ground.step, sd)
+        points = georeference(flight, observe(flight), np.random.default_rng(0))
+        sizes.append(float((points["cov_nn"] + points["cov_ee"]).median()))
+    assert sizes[0] == sizes[1]  # 0.3 m is what the manifest assumes where the map is silent
+    assert sizes[2] > 3 * sizes[1]
+
+
+def test_rays_that_meet_no_ground_are_counted(flown: Callable[..., Flight]) -> None:
+    flight = flown()
+    height = hills().height.copy()
+    height[60:95, 60:] = np.nan
+    flight.terrain = Terrain(height, -450.0, -450.0, 6.0)
+    nav = flight.nav["logged"]
+    nav.loc[[0, 2, 3, 4], "down_m"] = 500.0
+    nav.loc[1, "east_m"] = 4000.0
+    seen = observe(flight)
+    points = georeference(flight, seen, np.random.default_rng(0))
+    counts = rays_of(seen).counts()
+    lost = points["north_m"].isna()
+    assert set(counts) == {
+        "met the ground", "left the map without meeting the ground", "came to where the map has no height",
+        "started below the ground",
+    }  # fmt: skip
+    assert counts["met the ground"] == (~lost).sum() and sum(counts.values()) == len(points)
+    assert set(points.loc[lost, "ellipse"]) == {"none"} and points.loc[lost, "cov_nn"].isna().all()
+    said = ground_sentences(seen, points)[0]
+    assert all(f"{n} {words}" in said for words, n in counts.items())
+
+
+def test_a_ray_without_ground_is_no_sighting(flown: Callable[..., Flight]) -> None:
+    flight = flown()
+    flight.tables["detections"]["target_id"] = "m0-0"
+    height = hills().height.copy()
+    height[60:95, 60:] = np.nan
+    flight.terrain = Terrain(height, -450.0, -450.0, 6.0)
+    lost = np.isnan(observe(flight).plane_down)
+    found = sighting(flight, "logged")
+    assert lost.any() and np.isnan(found.positions[:, 0]).any()
+    frames = flight.table("detections")["frame_id"].to_numpy()
+    whole = {f for f in set(frames) if lost[frames == f].all()}
+    rows = flight.table("frames")["frame_id"].isin(whole).to_numpy()
+    assert np.isnan(found.uv[rows]).all() and np.isnan(found.positions[rows]).all()
+
+
+def test_heights_left_in_raise_terrain_that_counts_alike(flown: Callable[..., Flight]) -> None:
+    record = {
+        "source": "dem.tif", "sha256": "0" * 64, "crs": "EPSG:4326", "added_m": 0.0, "unit": "m",
+        "cell_m": [6.0, 6.0], "step_m": 6.0, "rows": 150, "columns": 150, "holes": 0, "error_rms_m": 0.0,
+        "error_max_m": 0.0,
+    }  # fmt: skip
+    moved = {}
+    for heights in ("flight", "ellipsoid"):
+        flight = flown()
+        flight.manifest = replace_in_manifest(
+            flight.manifest,
+            {"terrain": record | {"heights": heights}, "vertical": {"reference": "x", "correction_m": 20.0}},
+        )
+        seen = observe(flight)
+        raised = heights_left_in(flight, seen)
+        before, after = (georeference(flight, o, np.random.default_rng(0)) for o in (seen, raised))
+        moved[heights] = np.nanmedian(np.abs(after["north_m"] - before["north_m"]))
+    assert moved["flight"] < 1e-3 < 1.0 < moved["ellipsoid"]
+
+
+def test_a_check_holds_the_survey_against_the_map(flown: Callable[..., Flight]) -> None:
+    flight = flown()
+    said = " ".join(one.sentence for one in check_flight(flight))
+    assert (
+        "known points lie 0.0 m above its ground" in said or "known points lie 0.0 m below its ground" in said
+    )
+    ground = hills()
+    flight.terrain = Terrain(ground.height + 25, ground.north, ground.east, ground.step)
+    warned = [
+        one for one in check_flight(flight) if one.level == "warning" and "known points" in one.sentence
+    ]
+    assert len(warned) == 1 and "25.0 m below its ground" in warned[0].sentence
+    flight.terrain = Terrain(ground.height + 500, ground.north, ground.east, ground.step)
+    problems = [one.sentence for one in check_flight(flight) if one.level == "problem"]
+    assert any("100 % of the poses are more than 5 m below the ground" in one for one in problems)
+    flight.terrain = Terrain(ground.height[:60], ground.north, ground.east, ground.step)
+    warned = [one for one in check_flight(flight) if "are not over the terrain" in one.sentence]
+    assert [one.level for one in warned] == ["warning"]
+
+
+def test_without_terrain_it_is_said(flown: Callable[..., Flight]) -> None:
+    flight = flown()
+    flight.terrain = None
+    seen = observe(flight)
+    points = georeference(flight, seen, np.random.default_rng(0))
+    assert "there is no terrain" in ground_sentences(seen, points)[0]
+    with pytest.raises(WildlabError, match="the flight has no terrain"):
+        rays_of(seen)
