@@ -198,6 +198,18 @@ def test_both_kinds_of_detections_are_tracked_on_two_flights(reports: Path, faul
     assert faults(folder / "report.html") == []
 
 
+def test_the_line_of_sight_is_looked_at_on_two_lands(reports: Path, faults: Faults) -> None:
+    folder = run("line-of-sight", reports, seeds=2)
+    found = values(folder)
+    assert 0.8 < found["agreement_60m", "bresenham"]["value"] < 1
+    assert found["seen_60m", "by-the-letter"]["value"] == 0
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 8)
+    for figure in ("agreement", "map", "times", "steps", "trees"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_survey_markers_beside_the_published_accuracy(
     reports: Path, tmp_path: Path, shared_data: Callable[..., Path], faults: Faults
 ) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.simulation.landscape import synthetic_landscape
+from wildlab.simulation.landscape import TREES_M, UNEVEN, grow_trees, synthetic_landscape
 
 
 def test_it_has_the_size_and_the_relief_that_are_printed():
@@ -32,3 +32,28 @@ def test_land_without_size_is_refused():
     for given in ({"step": 0.0}, {"north": 1.0}, {"relief": -1.0}, {"east": np.inf}):
         with pytest.raises(WildlabError, match="two steps each way"):
             synthetic_landscape(1, **given)
+
+
+def test_trees_stand_on_their_share_of_the_ground_in_groups():
+    land = synthetic_landscape(3)
+    grown = grow_trees(land, 5, share=0.2)
+    trees = grown.height - land.height
+    assert (trees > 0).mean() == pytest.approx(0.2, abs=0.001)
+    assert trees[trees > 0].min() >= (1 - UNEVEN) * TREES_M - 1e-3
+    assert trees.max() <= (1 + UNEVEN) * TREES_M + 1e-3
+    beside = (trees[:, 1:] > 0)[trees[:, :-1] > 0].mean()
+    assert beside > 0.8, "beside a tree stands another"
+    assert np.array_equal(grown.height, grow_trees(land, 5, share=0.2).height)
+    assert grown.extent == land.extent
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.0, 0.0), (1.0, 1.0)])
+def test_no_tree_and_trees_everywhere(share, expected):
+    land = synthetic_landscape(3)
+    assert (grow_trees(land, 5, share=share).height > land.height).mean() == expected
+
+
+@pytest.mark.parametrize("given", [{"share": 1.2}, {"height": 0.0}, {"stand": -1.0}])
+def test_trees_without_a_size_are_refused(given):
+    with pytest.raises(WildlabError, match="a share between 0 and 1"):
+        grow_trees(synthetic_landscape(1, north=20, east=20), 1, **given)

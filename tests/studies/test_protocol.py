@@ -13,6 +13,8 @@ from wildlab.evaluation.whiteness import white_bound
 from wildlab.pipeline.navigation_errors import TUNINGS
 from wildlab.reporting.published import load_claims, load_published
 from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.studies.line_of_sight.timing import WAYS
+from wildlab.studies.line_of_sight.trial import HEIGHTS, VIEW
 from wildlab.studies.protocol import Study, case_names, find_case, run_trial
 
 STUDIES = load_studies()
@@ -20,6 +22,11 @@ CASES = {case: find_case(case) for case in case_names()}
 WITH_TRIAL = {case: study for case, study in CASES.items() if study.trial is not None}
 #: What a notebook tells a case's claims besides the flights.
 TOLD = {
+    "line-of-sight": {
+        "times": pd.DataFrame(
+            1.0, index=range(3), columns=pd.MultiIndex.from_product([(*WAYS, VIEW), HEIGHTS])
+        )
+    },
     "static-point": {"bound": white_bound(551)},
     "navigation": {"tuned": next(iter(TUNINGS))},
 }

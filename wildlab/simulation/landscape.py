@@ -8,7 +8,7 @@ whose power falls with the wave number as that of natural ground does, without t
 from __future__ import annotations
 
 import numpy as np
-from scipy import fft
+from scipy import fft, ndimage
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
@@ -20,6 +20,10 @@ NORTH_M, EAST_M, STEP_M, LOWEST_M, HIGHEST_M = 500.0, 1000.0, 2.0, 71.0, 122.0
 ROUGHNESS = 3.6
 #: The longest waves, metres: hills, no tilt of the whole. Chosen.
 LONGEST_M = 600.0
+#: Trees: share of the ground below them, mean height, and how large a stand is, metres. Chosen.
+TREES_SHARE, TREES_M, STAND_M = 0.15, 12.0, 12.0
+#: By how much of its mean the height of a tree differs from its neighbour's, at most. Chosen.
+UNEVEN = 0.3
 
 
 def synthetic_landscape(
@@ -70,6 +74,54 @@ def synthetic_landscape(
     height = (height - height.min()).astype(np.float32)
     corner = (-(shape[0] - 1) / 2 * step, -(shape[1] - 1) / 2 * step)
     return Terrain(height, north=corner[0], east=corner[1], step=step, sd=0.0)
+
+
+def grow_trees(
+    land: Terrain, seed: int, *, share: float = TREES_SHARE, height: float = TREES_M, stand: float = STAND_M
+) -> Terrain:
+    """The same land with trees on it: the surface that hides what stands below and behind it.
+
+    F's map has none (F 8.2). Here they stand in groups, wherever a smooth random field is highest.
+
+    Parameters
+    ----------
+    land
+        The ground, every height known.
+    seed
+        The same gives the same trees.
+    share
+        Of the ground that is below trees, 0 to 1.
+    height
+        Of a tree, metres on average.
+    stand
+        How far a group reaches, metres.
+
+    Returns
+    -------
+    Terrain
+        Its nodes are those of the land, as high as the tree that stands there.
+
+    Raises
+    ------
+    WildlabError
+        Where the share is not between 0 and 1, or a length is not above zero.
+
+    Examples
+    --------
+    >>> land = synthetic_landscape(1)
+    >>> round(float((grow_trees(land, 1).height > land.height).mean()), 2)
+    0.15
+    """
+    if not (0 <= share <= 1 and 0 < height < np.inf and 0 < stand < np.inf):
+        raise WildlabError(
+            f"trees of {height:g} m on {share:g} of the ground, {stand:g} m across",
+            "give a share between 0 and 1, and metres above zero",
+        )
+    rng = np.random.default_rng([seed, 1])
+    noise = ndimage.gaussian_filter(rng.standard_normal(land.height.shape), stand / land.step, mode="wrap")
+    covered = noise > np.quantile(noise, 1 - share) if share < 1 else np.ones(noise.shape, bool)
+    trees = covered * height * rng.uniform(1 - UNEVEN, 1 + UNEVEN, noise.shape)
+    return Terrain((land.height + trees).astype(np.float32), land.north, land.east, land.step, land.sd)
 
 
 def _field(shape: tuple[int, int], step: float, rng: np.random.Generator) -> Array:

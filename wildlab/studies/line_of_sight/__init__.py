@@ -1,0 +1,26 @@
+"""What the camera can see over terrain, by F's two algorithms and exactly: F 2.5, 7.2."""
+
+from __future__ import annotations
+
+from wildlab.studies.line_of_sight import claims, trial
+from wildlab.studies.protocol import Metric, Study
+
+#: Names of the numbers that are recorded begin with these; and their units.
+_UNITS = {
+    "agreement": "1",
+    "too_many": "1",
+    "too_few": "1",
+    "seen": "1",
+    "steps": "1",
+    "hidden": "1",
+    "width": "m",
+    "exponent": "1",
+}
+
+
+def _metric(subject: str, name: str) -> Metric | None:
+    unit = _UNITS.get(name.rpartition("_")[0] or name)
+    return None if unit is None else Metric(name, subject, unit)
+
+
+STUDY = Study("line-of-sight", trial.SUBJECTS, trial.trial, claims.check_claims, _metric)
