@@ -10,14 +10,16 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.runs import mean_interval
+from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.text import percent
+from wildlab.simulation.landscape import TREES_SHARE
 from wildlab.studies.line_of_sight.claims import at_heights, hidden
 from wildlab.studies.line_of_sight.text import NAMES, time_ratios
-from wildlab.studies.line_of_sight.timing import WAYS
+from wildlab.studies.line_of_sight.timing import WAYS, seconds
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -37,11 +39,11 @@ _COLOURS = {RAYS: BLUE, WHOLE_RAYS: GREEN, ANGLES: VERMILLION, EXACT: INK}
 _SHORT = {RAYS: "rays", WHOLE_RAYS: "rays from the camera", ANGLES: "Bresenham", EXACT: "exact"}
 
 
-def _band(ax: Axes, x: ArrayLike, values: np.ndarray, colour: str, label: str) -> np.ndarray:
+def _band(ax: Axes, x: ArrayLike, values: Array, colour: str, label: str, most: float = np.inf) -> Array:
     """Mean over lands and its 95 % interval; (n,) the means."""
     mean = np.nanmean(values, axis=0)
     if len(values) > 1:
-        ends = np.array([mean_interval(column)[1:] for column in values.T])
+        ends = np.clip([mean_interval(column)[1:] for column in values.T], 0.0, most)
         ax.fill_between(np.asarray(x, float), ends[:, 0], ends[:, 1], color=colour, alpha=0.18, lw=0)
     ax.plot(x, mean, "o-", color=colour, label=label)
     return np.asarray(mean)
@@ -59,7 +61,7 @@ def agreement_shown(spread: pd.DataFrame) -> Shown:
     found = {}
     for way in (RAYS, ANGLES):
         values = 100 * at_heights(spread, way, "agreement")
-        found[way] = _band(ax, HEIGHTS, values, _COLOURS[way], _SHORT[way])
+        found[way] = _band(ax, HEIGHTS, values, _COLOURS[way], _SHORT[way], 100.0)
     _heights(ax)
     ax.set_ylabel("points answered as exactly (%)")
     better = max(found, key=lambda way: float(found[way].mean()))
@@ -77,13 +79,13 @@ def times_shown(times: pd.DataFrame) -> Shown:
     """Time a grid point over height: the counterpart of F figure 7.1."""
     fig, ax = new_figure(5.6, 3.6)
     for way in WAYS:
-        values = 1e6 * np.column_stack([times[way, height] for height in HEIGHTS])
+        values = 1e6 * seconds(times, way)
         low, middle, high = np.nanpercentile(values, [5, 50, 95], axis=0)
         ax.fill_between(HEIGHTS, low, high, color=_COLOURS[way], alpha=0.15, lw=0)
         ax.plot(HEIGHTS, middle, "o-", color=_COLOURS[way], label=_SHORT[way])
     _heights(ax)
     ax.set(yscale="log", ylabel="time a grid point (µs)")
-    ratio = float(time_ratios(times, RAYS).iloc[-1])
+    ratio = float(time_ratios(times, RAYS)[-1])
     ax.set_title(f"From {HEIGHTS[-1]} m rays take {ratio:.2g} times Bresenham's time")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     said = "; ".join(
@@ -127,7 +129,8 @@ def trees_shown(spread: pd.DataFrame) -> Shown:
     return (
         fig, "trees", f"Share of the ground hidden by trees: {mean[0]:.0f} % straight down, "
                       f"{mean[-1]:.0f} % at {INCIDENCES[-1]} degrees.",
-        "Of what is seen without trees; they stand on 15 % of the ground. Mean over lands with its 95 % "
+        f"Of what is seen without trees; they stand on {percent(TREES_SHARE, 0)} of the ground. Mean over "
+        f"lands with its 95 % "
         "interval.",
     )  # fmt: skip
 

@@ -7,9 +7,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.runs import mean_interval
+from wildlab.geometry.frames import Array
 from wildlab.reporting.text import number, percent
+from wildlab.simulation.landscape import TREES_M, TREES_SHARE
 from wildlab.studies.line_of_sight.claims import at_heights, disagreement, hidden, saved
-from wildlab.studies.line_of_sight.timing import WAYS
+from wildlab.studies.line_of_sight.timing import WAYS, seconds
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -59,7 +61,7 @@ at the height of the highest grid point in view (F 2.5.2), or where said at the 
 the angles of (2.24) of the nearest grid points along the line, in the sense: the point itself is not among
 them, and the longer side is found without regard to signs.
 
-Trees stand in groups on 15 % of the ground, 12 m high on average; both are chosen. Points are drawn all
+Trees stand in groups on {percent(TREES_SHARE, 0)} of the ground, {TREES_M:g} m high on average; both are chosen. Points are drawn all
 over the land, each with a bearing, and the camera stands {HEIGHT} m above the point as far off as the
 incidence angle asks for.
 
@@ -89,12 +91,14 @@ def with_interval(values: ArrayLike) -> str:
     if len(known) < 2:
         return percent(float(known.mean())) if len(known) else "none"
     mean, low, high = mean_interval(known)
+    if low == high:
+        return percent(mean)
     return f"{percent(mean)} ({percent(max(low, 0.0))} to {percent(min(high, 1.0))})"
 
 
-def time_ratios(times: pd.DataFrame, way: str) -> pd.Series:
-    """Median over lands, by height, of how many times Bresenham's time a way takes."""
-    return (times[way] / times[ANGLES]).median()
+def time_ratios(times: pd.DataFrame, way: str) -> Array:
+    """(heights,) median over lands of how many times Bresenham's time a way takes."""
+    return np.asarray(np.nanmedian(seconds(times, way) / seconds(times, ANGLES), axis=0))
 
 
 def summary(spread: pd.DataFrame, times: pd.DataFrame) -> list[str]:

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles, field_of_view, in_field_of_view
 from wildlab.geometry.visibility import lines_clear
 from wildlab.simulation.error_models import stream
@@ -80,7 +81,8 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = 5) -> pd.DataFrame:
         _, points = nodes_of(land)
         for height in HEIGHTS:
             view = look(land, camera, rng, height, TILT)
-            some = rng.permutation(len(view.nodes))[:MOST_POINTS]
+            # In the order of the map: to fetch heights from all over it would be what takes the time.
+            some = np.sort(rng.permutation(len(view.nodes))[:MOST_POINTS])
             nodes, ends, lens = view.nodes[some], view.points[some], view.p_nc
             found = best_times(
                 {
@@ -96,13 +98,17 @@ def timed(seeds: Iterable[int], twin: str, repeats: int = 5) -> pd.DataFrame:
                 count = len(points[::PART]) if way == VIEW else len(some)
                 row[way, height] = seconds / count if count >= FEWEST else np.nan
         rows[seed] = row
-    table = pd.DataFrame(list(rows.values()), index=pd.Index(rows, name="seed"))
-    table.columns = pd.MultiIndex.from_tuples(table.columns)
-    return table
+    names = [(way, height) for height in HEIGHTS for way in (*WAYS, VIEW)]
+    values = np.array([[row[name] for name in names] for row in rows.values()])
+    return pd.DataFrame(values, pd.Index(rows, name="seed"), pd.MultiIndex.from_tuples(names))
 
 
-def furthest_ratio(times: pd.DataFrame, way: str, beside: str) -> pd.Series:
-    """Of each land: at the height at which both differ most, how many times the quicker one's the slower's
-    time is."""
-    apart = np.exp(np.log(times[way] / times[beside]).abs())
-    return apart.max(axis=1)
+def seconds(times: pd.DataFrame, way: str) -> Array:
+    """(lands, heights) of one way, s a grid point."""
+    return np.column_stack([times[way, height].to_numpy(float) for height in HEIGHTS])
+
+
+def furthest_ratio(times: pd.DataFrame, way: str, beside: str) -> Array:
+    """(lands,) where both differ most, how many times the quicker's time the slower one takes."""
+    apart = np.abs(np.log(seconds(times, way) / seconds(times, beside)))
+    return np.asarray(np.exp(np.nanmax(apart, axis=1)))

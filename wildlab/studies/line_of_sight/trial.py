@@ -218,7 +218,7 @@ def hidden_by_trees(land: Terrain, grown: Terrain, rng: np.random.Generator) -> 
     return found
 
 
-def _share(values: NDArray[np.generic]) -> float:
+def _share(values: Array) -> float:
     return float(np.mean(values)) if len(values) else np.nan
 
 
