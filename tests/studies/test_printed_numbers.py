@@ -13,6 +13,7 @@ from wildlab.studies.printed_numbers.arithmetic import (
     rescaled_nis,
     rest_of,
 )
+from wildlab.studies.printed_numbers.formulas import FORMULAS, formulas_table, formulas_words
 from wildlab.studies.printed_numbers.item import MARGIN, Item, load_printed
 from wildlab.studies.printed_numbers.items import all_items
 
@@ -151,3 +152,19 @@ def test_the_table_has_a_row_for_each(items):
     assert table.columns.tolist() == list(text.COLUMNS)
     assert table["ratio"].tolist() == [item.ratio for item in items.values()]
     assert set(table["verdict"]) <= {"fit together", "do not fit"}
+
+
+def test_formulas_are_judged_by_what_they_give():
+    found = {make.__name__: make() for make in FORMULAS}
+    assert found["occlusion_of_itself"].letter == 0.0 and 0.2 < found["occlusion_of_itself"].sense < 0.9
+    behind = found["view_behind"]
+    assert behind.letter == pytest.approx(2 * behind.sense, rel=0.1)
+    added = found["metres_added"]
+    # A thousandth of a degree is 111 m north, and 58 m east so far north.
+    assert added.letter == pytest.approx(169.4, abs=0.5) and added.sense == pytest.approx(125.5, abs=0.5)
+    assert found["longer_side"].sense == found["occlusion_of_itself"].sense
+    assert all(one.differs for one in found.values())
+    same = added._replace(letter=1.0, sense=1.0)
+    assert not same.differs and formulas_table([same])["verdict"].tolist() == ["does the same"]
+    assert "1 of 2" in formulas_words([same, added])
+    assert not added._replace(letter=0.0, sense=0.0).differs

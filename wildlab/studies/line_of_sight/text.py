@@ -61,9 +61,9 @@ at the height of the highest grid point in view (F 2.5.2), or where said at the 
 the angles of (2.24) of the nearest grid points along the line, in the sense: the point itself is not among
 them, and the longer side is found without regard to signs.
 
-Trees stand in groups on {percent(TREES_SHARE, 0)} of the ground, {TREES_M:g} m high on average; both are chosen. Points are drawn all
-over the land, each with a bearing, and the camera stands {HEIGHT} m above the point as far off as the
-incidence angle asks for.
+Trees stand in groups on {percent(TREES_SHARE, 0)} of the ground, {TREES_M:g} m high on average; both are
+chosen. Points are drawn all over the land, each with a bearing, and the camera stands {HEIGHT} m above the
+point as far off as the incidence angle asks for.
 
 Intervals are of the mean over lands (Student, 95 %). Times are those of this machine and this code:
 compiled loops for all ways, angles by the arc tangent as (2.24) has it. They are taken in turn, the
