@@ -13,8 +13,9 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
-from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear, visible_nodes
+from wildlab.geometry.ray_ends import MISSED
+from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.visibility import SHORT_OF, lines_clear, visible_nodes
 
 CAMERA = Camera(160, 128, 250.0, 250.0, 80.0, 64.0)
 
@@ -70,6 +71,41 @@ def test_what_is_unknown_hides_and_so_does_a_camera_below_the_ground():
         "it passes over all that is known"
     )
     assert not lines_clear(terrain, [[0.0, 2.0, -1.0]], [0.0, 1.0, 1.0]).any()
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([0.4, 3.0, 30.0]), st.booleans())
+def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high, one):
+    """The walk of rays goes the other way, works out crossings, and does not know what hid the line before."""
+    rng = np.random.default_rng(seed)
+    shape = rng.integers(2, 40, 2)
+    height = np.round(rng.uniform(0, high, shape), rng.integers(0, 5)).astype(np.float32)
+    height[rng.random(shape) < rng.choice([0.0, 0.02])] = np.nan
+    if np.isnan(height).all():
+        height[0, 0] = 1.0
+    terrain = Terrain(height, *rng.normal(0, 20, 2), step=float(rng.choice([0.5, 2.0])))
+    least, most, west, east = terrain.extent
+    count, beyond = 60, terrain.step * rng.choice([0, 3])
+    corners = [least - beyond, west - beyond], [most + beyond, east + beyond]
+    # Some points on nodes, some on the ground between them, some above and below it.
+    points = np.column_stack([rng.uniform(*corners, (count, 2)), -rng.uniform(-1, 2 * high, count)])
+    points[:20, :2] = np.round((points[:20, :2] - corners[0]) / terrain.step) * terrain.step + corners[0]
+    ground = terrain.heights_at(points[:40, :2])
+    points[:40, 2] = np.where(np.isnan(ground), points[:40, 2], -ground)
+    lens = np.column_stack([rng.uniform(*corners, (count, 2)), -rng.uniform(0, 3 * high, count)])
+    lens[::7, :2] = points[::7, :2]  # straight above or below
+    lens = lens[0] if one else lens
+    met = intersect_terrain(terrain, points - lens, lens, furthest=1 - SHORT_OF)
+    np.testing.assert_array_equal(lines_clear(terrain, points, lens), met.became == MISSED)
+
+
+def test_no_line_leads_to_what_is_not_known():
+    terrain = rough(1)
+    points = np.array([[0.0, 0.0, -50.0], [np.nan, 0.0, -50.0], [0.0, 0.0, -50.0]])
+    lenses = [[0.0, 5.0, -60.0], [0.0, 5.0, -60.0], [np.nan, 0.0, 0.0]]
+    assert lines_clear(terrain, points, lenses).tolist() == [True, False, False]
+    with pytest.raises(WildlabError, match="one camera for each point"):
+        lines_clear(terrain, points, np.zeros((2, 3)))
 
 
 @settings(max_examples=60, deadline=None)

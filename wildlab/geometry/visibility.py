@@ -12,8 +12,7 @@ from wildlab.geometry.camera import Camera, distort, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
-from wildlab.geometry.ray_ends import MISSED
-from wildlab.geometry.terrain import Terrain, intersect_terrain
+from wildlab.geometry.terrain import Terrain, _to_grid
 
 #: A line of sight ends this share of its length before the point: the point lies on the ground itself.
 SHORT_OF = 1e-7
@@ -52,7 +51,12 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     Returns
     -------
     (N,) bool. False too where the line leads through what the map does not know, below its highest height,
-    and where the camera is below the ground.
+    where the camera is below the ground, and for what is NaN.
+
+    Raises
+    ------
+    WildlabError
+        Where there are neither as many cameras as points, nor one.
 
     Examples
     --------
@@ -65,9 +69,20 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     >>> print(lines_clear(wall, [[0.0, 4.0, 0.0], [0.0, 4.0, -20.0]], [0.0, 0.0, -5.0]))
     [False  True]
     """
-    targets, starts = np.atleast_2d(np.asarray(points, float)), np.asarray(p_nc, float)
-    met = intersect_terrain(terrain, targets - starts, starts, furthest=1.0 - SHORT_OF)
-    return np.asarray(met.became == MISSED)
+    targets, starts = (np.atleast_2d(np.asarray(each, float)) for each in (points, p_nc))
+    if targets.shape[-1] != 3 or starts.shape[-1] != 3 or len(starts) not in (1, len(targets)):
+        raise WildlabError(
+            f"cameras of the shape {starts.shape} for points of the shape {targets.shape}",
+            "give one camera for each point, or one for all, three columns each",
+            field="p_nc",
+        )
+    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
+    from wildlab.geometry.compilation import announced
+    from wildlab.geometry.sight_kernels import clear_all
+
+    ends = [_to_grid(terrain, each, whole=True) for each in (starts, targets)]
+    with announced("lines of sight"):
+        return np.asarray(clear_all(terrain.height, *terrain._blocks, *ends, SHORT_OF, terrain._top))
 
 
 def visible_nodes(terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf) -> Seen:
