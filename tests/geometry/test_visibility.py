@@ -76,7 +76,7 @@ def test_what_is_unknown_hides_and_so_does_a_camera_below_the_ground():
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from([0.4, 3.0, 30.0]), st.booleans())
 def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high, one):
-    """The walk of rays goes the other way, works out crossings, and does not know what hid the line before."""
+    """The walk of rays goes the other way, works out crossings, and does not know what hid lines before."""
     rng = np.random.default_rng(seed)
     shape = rng.integers(2, 40, 2)
     height = np.round(rng.uniform(0, high, shape), rng.integers(0, 5)).astype(np.float32)

@@ -107,7 +107,7 @@ def view_behind() -> Formula:
 
 def metres_added() -> Formula:
     """F (2.2)-(2.3): the product of a row and a column adds metres east to metres north."""
-    origin = (np.radians(58.66), np.radians(16.46))
+    origin = (np.radians(58.662064), np.radians(16.433337))  # F (2.1)
     away = np.radians(0.001)
     east, north = geodetic_to_enu_linear(origin[0] + away, origin[1] + away, origin)
     k_phi, k_lambda = metres_per_degree(origin[0])
