@@ -1,9 +1,9 @@
 """Rays to terrain beside a march in fixed steps, and lines of sight beside rays.
 
 The land is that of F's map in size: 251 by 501 nodes, 2 m apart. The march is compiled, too, and timed on
-few rays: in steps of the height that F's map resolves (F 2.1), and of a millimetre, to which it then ends; the
-walk ends to rounding, a millionth of that. orthority, which has such a march, takes 131 microseconds a ray by
-its own figures on another machine.
+few rays: in steps of the height that F's map resolves (F 2.1), and of a millimetre, to which it then ends;
+the walk ends to rounding, a millionth of that. orthority, which has such a march, takes 131 microseconds a
+ray by its own figures on another machine.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def _sight(land: Terrain, lens: NDArray[np.float64]) -> list[tuple[str, float, f
     there = np.array([land.north, land.east]) + land.step * nodes
     points = np.column_stack([there, -land.height[tuple(nodes.T)].astype(float)])
     calls = {
-        f"{len(nodes):,} lines of sight": (partial(lines_clear, land, points, lens), "at most 40 ms on an idle core"),
+        f"{len(nodes):,} lines of sight": (
+            partial(lines_clear, land, points, lens), "at most 40 ms on an idle core",
+        ),
         "the same by rays from the camera": (
             partial(intersect_terrain, land, points - lens, lens, 1 - SHORT_OF), "above 1",
         ),

@@ -101,7 +101,7 @@ def test_a_loiter_is_about_a_target_that_stays(tmp_path):
 
 
 def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses():
-    """Typed a second time, from H 4.4.1 and 6.4.1, and F 7.1, 7.3, 7.5 and 8.2."""
+    """Typed a second time, from H 4.4.1 and 6.4.1, and F (2.1), 7.1, 7.3, 7.5 and 8.2."""
 
     def published(name: str) -> dict[str, object]:
         return {
@@ -119,7 +119,9 @@ def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses()
         "camera.frame_rate": 10,
         "autopilot.rate": 10,
     }
-    camera = {
+    place_and_camera = {
+        "place.latitude": 58.662064,
+        "place.longitude": 16.433337,
         "camera.fx": 1267,
         "camera.fy": 1117,
         "camera.cx": 356.0,
@@ -129,8 +131,7 @@ def test_published_numbers_of_the_ship_and_the_animals_are_those_of_the_theses()
     fields = ("plain", "ridge", "meadow", "lake", "wood")
     animals = {f"enclosures.{name}.animals": 5 for name in fields}
     gondola = {"flight.duration": 1800, "flight.airspeed": 1.5, "cable.lowest": 3, "cable.highest": 20}
-    place = {"place.latitude": 58.662064, "place.longitude": 16.433337, "land.step": 2, "land.relief": 51}
-    camera |= place
-    assert published("gondola") == camera | animals | gondola
+    place_and_camera |= {"land.step": 2, "land.relief": 51}
+    assert published("gondola") == place_and_camera | animals | gondola
     search = {"flight.altitude": 60, "survey.row_distance": 25}
-    assert published("uav-search") == camera | search
+    assert published("uav-search") == place_and_camera | search
