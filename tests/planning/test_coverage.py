@@ -16,7 +16,7 @@ from wildlab.geometry.mount import R_MC_DOWN, Mount
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import visible_nodes
 from wildlab.planning.areas import area_of, rectangle
-from wildlab.planning.coverage import coverage, nodes_in, share_seen
+from wildlab.planning.coverage import cover, nodes_in, share_seen
 from wildlab.planning.sightings import see
 
 CAMERA = Camera(720, 480, 1267.0, 1117.0, 356.0, 216.6, 0.0, (0.446, 0.0, 0.0, 0.0, 0.0))
@@ -72,7 +72,7 @@ def flat_flight(times: NDArray[np.float64]) -> tuple[Terrain, CameraPoses]:
 def test_times_and_gaps_are_those_of_a_square_that_moves() -> None:
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
-    shown = coverage(flat, poses, times, furthest=100.0)
+    shown = cover(flat, poses, times, furthest=100.0)
     north = flat.north + np.arange(201)
     column = 50  # below the way
     seen = [times[np.abs(n - times) <= 10] for n in north]
@@ -90,11 +90,11 @@ def test_times_and_gaps_are_those_of_a_square_that_moves() -> None:
 def test_probability_is_that_of_independent_looks() -> None:
     times = np.arange(0.0, 5.0)
     flat, poses = flat_flight(times)
-    shown = coverage(flat, poses, times, furthest=100.0, range_scale=12.0)
+    shown = cover(flat, poses, times, furthest=100.0, range_scale=12.0)
     n, e = 3.0, 4.0
     each = np.exp(-((n - times) ** 2 + e**2 + 10.0**2) / 12.0**2)
     assert shown.detected[53, 54] == pytest.approx(1 - np.prod(1 - each))
-    perfect = coverage(flat, poses, times, furthest=100.0)
+    perfect = cover(flat, poses, times, furthest=100.0)
     assert np.array_equal(perfect.detected, (perfect.looks > 0).astype(float))
 
 
@@ -102,8 +102,8 @@ def test_a_blurred_image_is_not_counted_and_told() -> None:
     times = np.arange(0.0, 61.0)
     flat, poses = flat_flight(times)
     sharp = times < 30
-    shown = coverage(flat, poses, times, furthest=100.0, sharp=sharp)
-    half = coverage(flat, poses.take(sharp), times[sharp], furthest=100.0)
+    shown = cover(flat, poses, times, furthest=100.0, sharp=sharp)
+    half = cover(flat, poses.take(sharp), times[sharp], furthest=100.0)
     assert np.array_equal(shown.looks, half.looks)
     where = np.zeros(flat.height.shape, bool)
     where[:, 45:56] = True
@@ -119,9 +119,21 @@ def test_a_border_is_a_smaller_image() -> None:
     poses = poses_over(terrain, 6)
     inner = replace(CAMERA, width=520, height=280, cx=256.0, cy=116.6)
     smaller = CameraPoses.at_lens(inner, poses.p_nc, poses.R_nc, np.eye(3))
-    one, other = see(terrain, poses, 150.0, border=100.0), see(terrain, smaller, 150.0)
+    every, other = see(terrain, poses, 150.0), see(terrain, smaller, 150.0)
+    one = every.take(every.edge >= 100.0)
     assert np.array_equal(one.node, other.node) and np.array_equal(one.image, other.image)
-    assert len(one.node) < len(see(terrain, poses, 150.0).node)
+    assert 0 < len(one.node) < len(every.node) and (every.edge >= 0).all()
+    times = np.arange(40.0)
+    shown = cover(terrain, poses, times, furthest=150.0, border=100.0)
+    assert shown.looks.sum() == len(one.node)
+
+
+def test_what_is_in_the_image_and_hidden_is_told_from_what_is_not_in_it() -> None:
+    terrain = hills(5)
+    poses = poses_over(terrain, 6)
+    every, clear = see(terrain, poses, 150.0, hidden=False), see(terrain, poses, 150.0)
+    size = terrain.height.size
+    assert set(clear.image * size + clear.node) < set(every.image * size + every.node)
 
 
 def test_trees_hide_the_ground_behind_and_below_them() -> None:
@@ -130,8 +142,8 @@ def test_trees_hide_the_ground_behind_and_below_them() -> None:
     raised[60:63, :] = 8.0
     trees = Terrain(raised, north=-50.0, east=-50.0, step=1.0)
     pose = CameraPoses(WIDE, Mount("down"), np.array([[0.0, 0.0, -20.0]]), np.eye(3))
-    bare = coverage(flat, pose, [0.0], furthest=200.0).seen
-    hidden = coverage(flat, pose, [0.0], furthest=200.0, surface=trees).seen
+    bare = cover(flat, pose, [0.0], furthest=200.0).seen
+    hidden = cover(flat, pose, [0.0], furthest=200.0, surface=trees).seen
     north = flat.north + np.arange(101)
     column = 50
     lost = north[bare[:, column] & ~hidden[:, column]]
@@ -150,7 +162,7 @@ def test_nodes_of_areas_have_their_area() -> None:
 
 def test_of_no_nodes_nothing_is_said() -> None:
     flat, poses = flat_flight(np.array([0.0]))
-    nothing = share_seen(coverage(flat, poses, [0.0], furthest=100.0), np.zeros(flat.height.shape, bool))
+    nothing = share_seen(cover(flat, poses, [0.0], furthest=100.0), np.zeros(flat.height.shape, bool))
     assert nothing.area == 0 and np.isnan(nothing.seen)
 
 
@@ -169,7 +181,7 @@ def test_wrong_use_is_said(change: dict[str, object], problem: str) -> None:
     given = {"times": [0.0, 1.0], "furthest": 100.0} | change
     times = given.pop("times")
     with pytest.raises(WildlabError) as caught:
-        coverage(flat, poses, times, **given)  # type: ignore[arg-type]
+        cover(flat, poses, times, **given)  # type: ignore[arg-type]
     assert problem in caught.value.problem
 
 

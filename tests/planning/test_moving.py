@@ -23,6 +23,12 @@ def test_walks_stay_inside_and_begin_anywhere() -> None:
     assert share == pytest.approx(1000 / 2800, abs=3 * np.sqrt(0.36 * 0.64 / 300))
 
 
+def test_a_convex_fence_holds_too() -> None:
+    fence = rectangle(10, 20, 60, 30, 0.5)
+    ways = walks(fence, np.arange(300.0), 100, 1.0, 1.0, np.random.default_rng(4))
+    assert contains(fence, ways.reshape(-1, 2)).all()
+
+
 def test_far_from_a_fence_the_spread_grows_with_the_root_of_time() -> None:
     big = rectangle(0, 0, 1e4, 1e4, 0.0)
     ways = walks(big, [0.0, 100.0], 2000, 0.5, 4.0, np.random.default_rng(2))
@@ -31,7 +37,7 @@ def test_far_from_a_fence_the_spread_grows_with_the_root_of_time() -> None:
 
 def test_first_seen_is_the_first_sharp_image_with_the_nearest_node() -> None:
     flat = Terrain(np.zeros((5, 5), np.float32), north=0.0, east=0.0, step=10.0)
-    found = Sightings(np.array([0, 1, 1, 2]), np.array([6, 7, 12, 7]), np.zeros(4))
+    found = Sightings(np.array([0, 1, 1, 2]), np.array([6, 7, 12, 7]), np.zeros(4), np.zeros(4))
     times = np.array([0.0, 5.0, 9.0])
     there = np.array(
         [[12.0, 22.0], [18.0, 17.0], [40.0, 40.0], [-50.0, 0.0]]
@@ -43,7 +49,7 @@ def test_first_seen_is_the_first_sharp_image_with_the_nearest_node() -> None:
     assert np.array_equal(
         first_seen(found, flat, times, sharp, ways), [9, np.nan, np.nan, np.nan], equal_nan=True
     )
-    nothing = Sightings(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
+    nothing = Sightings(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     assert np.isnan(first_seen(nothing, flat, times, sharp, ways)).all()
 
 

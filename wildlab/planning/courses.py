@@ -51,6 +51,21 @@ class Course(NamedTuple):
         """Metres over ground."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
+    def distances(self, times: ArrayLike) -> Array:
+        """How far one has come by then, (N,) metres.
+
+        Parameters
+        ----------
+        times
+            (N,) s.
+
+        Returns
+        -------
+        (N,) metres over ground.
+        """
+        far = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+        return np.asarray(np.interp(np.asarray(times, float), self.times, far))
+
     def at(self, times: ArrayLike) -> tuple[Array, Array]:
         """Where one is, (N, 2) metres, and how one heads, (N,) radians; at the ends before and after.
 

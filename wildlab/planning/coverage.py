@@ -86,7 +86,7 @@ class Share(NamedTuple):
     area: float
 
 
-def coverage(
+def cover(
     terrain: Terrain,
     poses: CameraPoses,
     times: ArrayLike,
@@ -134,7 +134,7 @@ def coverage(
     >>> camera = Camera(100, 100, 100.0, 100.0, 50.0, 50.0)
     >>> flat = Terrain(np.zeros((101, 101), np.float32), north=-100.0, east=-100.0, step=2.0)
     >>> poses = CameraPoses(camera, Mount("down"), np.array([[0, 0, -20], [10, 0, -20.0]]), np.eye(3))
-    >>> shown = coverage(flat, poses, [0.0, 5.0], furthest=100.0)
+    >>> shown = cover(flat, poses, [0.0, 5.0], furthest=100.0)
     >>> print(np.bincount(shown.looks.ravel())[1:])
     [110  66]
     """
@@ -151,7 +151,8 @@ def coverage(
         raise WildlabError(
             f"{clear.size} marks of sharpness for {len(t)} images", "give one each", field="sharp"
         )
-    found = see(terrain, poses, furthest, border=border, surface=surface)
+    found = see(terrain, poses, furthest, surface=surface)
+    found = found.take(found.edge >= border) if border > 0 else found
     return from_sightings(found, terrain, t, clear, range_scale)
 
 
@@ -171,7 +172,7 @@ def from_sightings(
     sharp
         (N,) bool.
     range_scale
-        As for `coverage`.
+        As for `cover`.
 
     Returns
     -------
@@ -239,7 +240,7 @@ def share_seen(shown: Coverage, where: NDArray[np.bool_]) -> Share:
     Parameters
     ----------
     shown
-        From `coverage`.
+        From `cover`.
     where
         (R, C) bool: the nodes, as by `nodes_in`.
 

@@ -27,6 +27,22 @@ class Profile(NamedTuple):
     points: Array
     above: Array
 
+    def at(self, distances: ArrayLike) -> Array:
+        """Heights after so many metres of way over ground.
+
+        Parameters
+        ----------
+        distances
+            (N,) metres.
+
+        Returns
+        -------
+        (N,) metres upwards in n.
+        """
+        step = np.linalg.norm(np.diff(self.points[:, :2], axis=0), axis=1)
+        far = np.concatenate([[0.0], np.cumsum(step)])
+        return np.asarray(np.interp(np.asarray(distances, float), far, -self.points[:, 2]))
+
 
 def follow_terrain(
     terrain: Terrain,

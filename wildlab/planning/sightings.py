@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.camera import Camera, in_image, normalise, project
+from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
 
-#: Nodes that are looked at together; what they take is some tens of megabytes.
+#: Lines of sight that are looked at together; what they take is some tens of megabytes.
 _TOGETHER = 250_000
 #: Border rays that sink by less than this share of their length meet no ground worth the name.
 _FLAT = 1e-3
@@ -36,11 +36,18 @@ class Sightings(NamedTuple):
         (S,) which node, counted row by row of the terrain.
     distance
         (S,) from the camera to the node, metres.
+    edge
+        (S,) how far it is from the nearest edge of the image, pixels.
     """
 
     image: NDArray[np.intp]
     node: NDArray[np.intp]
     distance: Array
+    edge: Array
+
+    def take(self, which: NDArray[np.bool_]) -> Sightings:
+        """Some of them, by (S,) bool."""
+        return Sightings(self.image[which], self.node[which], self.distance[which], self.edge[which])
 
 
 def see(
@@ -48,8 +55,8 @@ def see(
     poses: CameraPoses,
     furthest: float,
     *,
-    border: float = 0.0,
     surface: Terrain | None = None,
+    hidden: bool = True,
 ) -> Sightings:
     """All nodes that images show.
 
@@ -61,10 +68,10 @@ def see(
         Of the images, N rows.
     furthest
         Distance up to which anything is looked for, metres.
-    border
-        How far inside the image a node must be, pixels.
     surface
         What hides: the ground with trees on it; None takes the ground alone.
+    hidden
+        Whether anything hides; else all that is in the image is seen.
 
     Returns
     -------
@@ -95,53 +102,33 @@ def see(
         raise WildlabError(f"poses with the rows {poses.rows}", "give one row of instants", field="poses")
     p, R = np.asarray(poses.p_nc, float), np.asarray(poses.R_nc, float)
     first, count = _blocks(terrain, poses.camera, p, R, furthest)
-    sizes = count.prod(axis=1)
-    outermost = _outermost(poses.camera)
-    columns = terrain.height.shape[1]
-    flat_height = terrain.height.ravel()
-    found = []
-    ends = np.cumsum(sizes)
-    begin = 0
-    while begin < len(p):
-        before = ends[begin - 1] if begin else 0
-        end = max(int(np.searchsorted(ends, before + _TOGETHER, side="right")), begin + 1)
-        image = np.repeat(np.arange(begin, end), sizes[begin:end])
-        within = np.arange(len(image)) - np.repeat(
-            ends[begin:end] - sizes[begin:end] - before, sizes[begin:end]
-        )
-        row = first[image, 0] + within // np.maximum(count[image, 1], 1)
-        column = first[image, 1] + within % np.maximum(count[image, 1], 1)
-        node = row * columns + column
-        points = np.stack(
-            [
-                terrain.north + terrain.step * row,
-                terrain.east + terrain.step * column,
-                -flat_height[node].astype(float),
-            ],
-            axis=-1,
-        )
-        distance = np.linalg.norm(points - p[image], axis=1)
-        with np.errstate(invalid="ignore"):
-            kept = np.flatnonzero(distance <= furthest)
-        kept = kept[_in_view(poses.camera, points[kept], p[image[kept]], R[image[kept]], outermost, border)]
-        kept = kept[lines_clear(surface or terrain, points[kept], p[image[kept]])] if len(kept) else kept
-        found.append((image[kept], node[kept], distance[kept]))
-        begin = end
-    if not found:
-        return Sightings(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0))
-    return Sightings(*(np.concatenate([part[k] for part in found]) for k in range(3)))
+    # Compiled functions are imported where they are called: a compiler takes its time to be imported.
+    from wildlab.geometry.compilation import announced
+    from wildlab.planning.view_kernels import in_images
 
-
-def _in_view(
-    camera: Camera, points: Array, p: Array, R: Array, outermost: float, border: float
-) -> NDArray[np.bool_]:
-    offset = points - p
-    seen = R[:, 0] * offset[:, :1] + R[:, 1] * offset[:, 1:2] + R[:, 2] * offset[:, 2:]
-    with np.errstate(invalid="ignore"):
-        # Far outside the image a lens's polynomial may fold back into it.
-        ahead = (seen[:, 2] > 0) & (np.hypot(seen[:, 0], seen[:, 1]) <= outermost * seen[:, 2])
-    ahead[ahead] = in_image(camera, project(camera, seen[ahead]), border)
-    return np.asarray(ahead)
+    camera = poses.camera
+    lens = np.array(
+        [
+            *(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew),
+            *(*camera.distortion, _outermost(camera)),
+        ],
+        float,
+    )
+    grid = np.array([terrain.north, terrain.east, terrain.step])
+    with announced("the view over terrain"):
+        image, node, distance, edge, points = in_images(
+            terrain.height, grid, lens, first, count, p.copy(), R.copy(), furthest
+        )
+    found = Sightings(image, node, distance, edge)
+    if not hidden or not len(node):
+        return found
+    clear = [
+        lines_clear(
+            surface or terrain, points[begin : begin + _TOGETHER], p[image[begin : begin + _TOGETHER]]
+        )
+        for begin in range(0, len(node), _TOGETHER)
+    ]
+    return found.take(np.concatenate(clear))
 
 
 def _border(camera: Camera) -> Array:
@@ -165,7 +152,6 @@ def _blocks(
     What it shows lies within the hull of where its border's rays come to the lowest and to the highest
     ground within the furthest distance; and within that distance, where a ray does not sink.
     """
-    low, high = _bounds(terrain, p, furthest)
     directions = normalise(camera, _border(camera))
     directions = directions[np.isfinite(directions).all(axis=1)]
     # A little more than the border: between two rays a distorted border bulges.
@@ -173,18 +159,21 @@ def _blocks(
     rays = np.einsum("nij,kj->nki", R, rays)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     sinks = (rays[..., 2] > _FLAT).all(axis=1)
-    reach = np.stack([p[:, :2] - furthest, p[:, :2] + furthest])
     with np.errstate(divide="ignore", invalid="ignore"):
         slopes = rays[..., :2] / rays[..., 2:]
-        ends = np.concatenate(
-            [
-                p[:, None, :2] + np.maximum(-p[:, 2] - level, 0.0)[:, None, None] * slopes
-                for level in (high, low)
-            ],
-            axis=1,
-        )
-    reach[0, sinks] = np.maximum(reach[0, sinks], ends[sinks].min(axis=1))
-    reach[1, sinks] = np.minimum(reach[1, sinks], ends[sinks].max(axis=1))
+    window = np.full(len(p), furthest)
+    # The ground about a camera bounds how far it sees, and so which ground about it there is to look at.
+    for _ in range(2):
+        low, high = _bounds(terrain, p, window)
+        reach = np.stack([p[:, :2] - furthest, p[:, :2] + furthest])
+        drops = [np.maximum(-p[:, 2] - level, 0.0)[:, None, None] for level in (high, low)]
+        with np.errstate(invalid="ignore"):
+            ends = np.concatenate([p[:, None, :2] + drop * slopes for drop in drops], axis=1)
+        reach[0, sinks] = np.maximum(reach[0, sinks], ends[sinks].min(axis=1))
+        reach[1, sinks] = np.minimum(reach[1, sinks], ends[sinks].max(axis=1))
+        furthest_corner = np.abs(reach - p[:, :2]).max(axis=(0, 2))
+        # A few sizes of window are enough.
+        window = np.minimum(furthest, furthest * 2.0 ** np.ceil(np.log2(furthest_corner / furthest)))
     corner = np.array([terrain.north, terrain.east])
     shape = np.array(terrain.height.shape)
     reach = np.nan_to_num(reach, nan=-1e9)
@@ -196,20 +185,22 @@ def _blocks(
     return first, count
 
 
-def _bounds(terrain: Terrain, p: Array, furthest: float) -> tuple[Array, Array]:
-    """Lowest and highest ground within the furthest distance of each camera, metres. (N,) each."""
+def _bounds(terrain: Terrain, p: Array, window: Array) -> tuple[Array, Array]:
+    """Lowest and highest ground within so many metres, (N,), of each camera, metres. (N,) each."""
     rows, columns = terrain.height.shape
     known = np.isfinite(terrain.height)
-    half = int(np.ceil(furthest / terrain.step)) + 1
-    size = (min(2 * half + 1, 2 * rows + 1), min(2 * half + 1, 2 * columns + 1))
-    low = minimum_filter(np.where(known, terrain.height, np.inf), size, mode="nearest")
-    high = maximum_filter(np.where(known, terrain.height, -np.inf), size, mode="nearest")
     at = (p[:, :2] - (terrain.north, terrain.east)) / terrain.step
     outside = ~((at >= 0) & (at <= (rows - 1, columns - 1))).all(axis=1)
     i, j = np.clip(np.nan_to_num(np.rint(at)), 0, (rows - 1, columns - 1)).astype(np.intp).T
-    least, most = float(terrain.height[known].min()), float(terrain.height[known].max())
+    low, high = np.full(len(p), np.inf), np.full(len(p), -np.inf)
+    for one in np.unique(window[~outside]):
+        half = int(np.ceil(one / terrain.step)) + 1
+        size = (min(2 * half + 1, 2 * rows + 1), min(2 * half + 1, 2 * columns + 1))
+        which = (window == one) & ~outside
+        for bound, limit, of in ((low, np.inf, minimum_filter), (high, -np.inf, maximum_filter)):
+            bound[which] = of(np.where(known, terrain.height, limit), size, mode="nearest")[
+                i[which], j[which]
+            ]
     # Cameras off the map see what no window about a node bounds.
-    return (
-        np.where(outside | ~np.isfinite(low[i, j]), least, low[i, j]),
-        np.where(outside | ~np.isfinite(high[i, j]), most, high[i, j]),
-    )
+    least, most = float(terrain.height[known].min()), float(terrain.height[known].max())
+    return np.where(np.isfinite(low), low, least), np.where(np.isfinite(high), high, most)

@@ -1,0 +1,179 @@
+"""What the report on the camera of a gondola says, as the computed numbers have it."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from wildlab.evaluation.runs import mean_interval, share_interval
+from wildlab.reporting.text import percent
+from wildlab.studies.gondola_coverage.trial import (
+    ADAPT,
+    CABIN,
+    DOWN,
+    LEAST,
+    NEAR,
+    ROLL,
+    STRATEGIES,
+    YAW,
+    YAW_LIMIT,
+)
+from wildlab.studies.uav_coverage.trial import LOOKS, SIGMAS
+
+METHOD = rf"""The gondola goes along the twin's cable at its speed, 3 to 20 m above the ground (F 8.2). Of
+each strategy the camera's attitude is worked out for every image: straight down; about yaw to
+{YAW_LIMIT:.0f} degrees on either side with a fixed pitch; about roll, the camera straight down in the
+middle; about roll adaptively, turning round at the limit, or from {LEAST:.0f} degrees on where the view is
+not wholly within the enclosures. All swing at the same rate, that of the twin's gimbal.
+
+F Algorithm 2 cannot be run as printed: two limits that it compares with are never set, both comparisons are
+for one direction only, and a set is compared with a size. It is mended as its prose says
+(`wildlab.planning.gimbal`).
+
+A node of the land is seen where an image shows it with nothing before it on the exact line of sight, no
+further than {LOOKS.furthest:.0f} m away, and sharply: the camera turns and moves by less than
+{percent(LOOKS.blur_share, 0)} of an animal's length of {LOOKS.size} m during {1e3 * LOOKS.exposure:.0f} ms.
+There are no trees, as in F's model. *Near* is within {NEAR:.0f} m of the cable.
+
+Each draw has its own land, of the size and relief of F's map, its own phase of the swing, and its own
+errors: the cabin is known to {CABIN} m and the attitude as the twin's autopilot knows it. What lies
+{SIGMAS:.0f} standard deviations of these inside a sharp image is *surely* seen, and the ride with errors is
+asked how much of that it showed."""
+#: Share of what is surely to be seen that a ride has to show.
+HELD = 0.95
+
+
+def name_of(strategy: str) -> str:
+    """A strategy as a reader says it."""
+    if strategy in YAW:
+        return f"yaw, pitch {YAW[strategy]:.0f} deg".replace("-", "\N{MINUS SIGN}")
+    if strategy in ROLL:
+        return f"roll, {ROLL[strategy]:.0f} deg"
+    if strategy in ADAPT:
+        return f"adaptive, {ADAPT[strategy]:.0f} deg"
+    return "straight down"
+
+
+def mean(spread: pd.DataFrame, subject: str, name: str) -> float:
+    """Over the draws."""
+    return float(spread[subject, name].mean())
+
+
+def outside(spread: pd.DataFrame, subject: str) -> float:
+    """Share of the ground that is seen that lies outside of the enclosures."""
+    return float((spread[subject, "outside"] / spread[subject, "ground"]).mean())
+
+
+def share_words(spread: pd.DataFrame, subject: str, name: str) -> str:
+    """A mean share, and its interval over the draws."""
+    values = spread[subject, name]
+    if len(values) < 2:
+        return percent(float(values.mean()))
+    found = mean_interval(values)
+    return f"{percent(found.estimate)} ({percent(max(found.low, 0.0))} to {percent(min(found.high, 1.0))})"
+
+
+def best(spread: pd.DataFrame, name: str) -> str:
+    """The strategy with the largest mean."""
+    return max(STRATEGIES, key=lambda one: mean(spread, one, name))
+
+
+def summary(spread: pd.DataFrame) -> list[str]:
+    """Three sentences on what the trials give, one row for each draw."""
+    most, near = best(spread, "seen"), best(spread, "near")
+    least = min(STRATEGIES, key=lambda one: outside(spread, one))
+    worst = min(float(spread[one, "held"].min()) for one in STRATEGIES)
+    same = "is the same" if near == most else f"is {name_of(near)}"
+    kept = "held" if worst >= HELD else "did not always hold"
+    return [
+        f"Most of the enclosures is seen with {name_of(most)}: {percent(mean(spread, most, 'seen'))}, "
+        f"against {percent(mean(spread, DOWN, 'seen'))} with the camera straight down.",
+        f"Least beside the enclosures is seen with {name_of(least)}, {percent(outside(spread, least))} of "
+        f"what it sees; the best strategy near the cable {same}, with "
+        f"{percent(mean(spread, near, 'near'))} of that ground.",
+        f"What a plan says is surely seen {kept} with errors of the pose: in the worst of "
+        f"{len(spread) * len(STRATEGIES)} rides {percent(worst)} of it was seen.",
+    ]
+
+
+def table(spread: pd.DataFrame) -> pd.DataFrame:
+    """One line for each strategy: means over the draws."""
+    return pd.DataFrame(
+        [
+            {
+                "strategy": name_of(one),
+                "enclosures seen": share_words(spread, one, "seen"),
+                "near the cable": percent(mean(spread, one, "near")),
+                "ground seen (ha)": f"{mean(spread, one, 'ground') / 1e4:.1f}",
+                "of that outside": percent(outside(spread, one)),
+                "in sight (s)": f"{mean(spread, one, 'in_sight'):.1f}",
+                "only blurred": percent(mean(spread, one, "only_blurred")),
+            }
+            for one in STRATEGIES
+        ]
+    )
+
+
+def held_table(spread: pd.DataFrame) -> pd.DataFrame:
+    """What is surely planned, and how much of it rides showed."""
+    return pd.DataFrame(
+        [
+            {
+                "strategy": name_of(one),
+                "surely, of what is seen": percent(mean(spread, one, "sure")),
+                "of that shown": share_words(spread, one, "held"),
+                "least of all draws": percent(float(spread[one, "held"].min())),
+            }
+            for one in STRATEGIES
+        ]
+    )
+
+
+def strategies_words(spread: pd.DataFrame) -> str:
+    """What moving the camera gains, and what the adaptive strategy saves."""
+    pairs = [
+        (ROLL[plain], outside(spread, one), outside(spread, plain))
+        for one, plain in zip(ADAPT, ROLL, strict=True)
+    ]
+    saved = "; ".join(f"{percent(a)} for {percent(b)} at {limit:.0f} degrees" for limit, a, b in pairs)
+    fewer = sum(a < b for _, a, b in pairs)
+    adaptive, roll = "adaptive-60", "roll-60"
+    more = mean(spread, adaptive, "seen") - mean(spread, roll, "seen")
+    often = float((spread[adaptive, "seen"] > spread[roll, "seen"]).sum())
+    share = share_interval(round(often), len(spread))
+    return (
+        "Of what a strategy sees, a smaller share lies outside of the enclosures where it is adaptive at "
+        f"{fewer} of {len(pairs)} limits ({saved}, adaptive for plain). At 60 degrees it sees "
+        f"{percent(abs(more))} {'more' if more > 0 else 'less'} of the enclosures than a plain swing; it "
+        f"sees more in {percent(share.estimate, 0)} of the draws ({percent(share.low, 0)} to "
+        f"{percent(share.high, 0)})."
+    )
+
+
+def near_words(spread: pd.DataFrame) -> str:
+    """Which strategy sees most near the cable, and which turn about yaw does."""
+    first = best(spread, "near")
+    yaw = max(YAW, key=lambda one: mean(spread, one, "near"))
+    beside = (
+        ""
+        if first in YAW
+        else f" Of those that turn about yaw it is {name_of(yaw)}, with "
+        f"{percent(mean(spread, yaw, 'near'))}: F does not say which pitch is low, and with none of these is "
+        "it yaw."
+    )
+    return (
+        f"Within {NEAR:.0f} m of the cable {name_of(first)} sees most, {share_words(spread, first, 'near')}."
+        f"{beside}"
+    )
+
+
+def rate_words(rate: float, frames: float, differences: dict[str, float]) -> str:
+    """How much less is seen with the images that are looked at than with all that the camera takes."""
+    worst = max(differences, key=lambda one: abs(differences[one]))
+    much = abs(differences[worst])
+    verdict = "is enough" if much <= 0.01 else "leaves some out"
+    sense = "larger" if differences[worst] > 0 else "smaller"
+    return (
+        f"Looking at {rate:g} images a second {verdict}: with all {frames:g} that the camera takes, the "
+        f"share of the enclosures that is seen is {percent(much, 2)} {sense} for {name_of(worst)}, and "
+        "differs by less for the others that were tried."
+    )

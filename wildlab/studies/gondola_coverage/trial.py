@@ -1,0 +1,256 @@
+"""Four ways to move the camera of a gondola that goes round five enclosures: what each of them covers.
+
+F 7.5.2 shows maps (figures 7.15 to 7.18) and prints no number of them. The gondola goes where its cable goes;
+the land is drawn for each seed, since F's map is not public, and so is where the swing begins.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, execute
+from wildlab.planning.courses import fly
+from wildlab.planning.coverage import nodes_in, share_seen
+from wildlab.planning.gimbal import (
+    NADIR,
+    GimbalAngles,
+    adapt_roll,
+    camera_on_course,
+    look_down,
+    swing_roll,
+    swing_yaw,
+    view_inside,
+)
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.simulation.survey_courses import cable_heights
+from wildlab.simulation.waypoint_courses import filleted_course, shape_corners
+from wildlab.studies.uav_coverage.trial import (
+    LOOKS,
+    SIGMAS,
+    camera_of,
+    fences_of,
+    land_of,
+    required,
+)
+
+DOWN = "down"
+#: Degrees: 45 on either side is printed (F figure 7.16), the pitches are not; -90 is straight down.
+YAW_LIMIT, PITCHES = 45.0, (-75.0, -60.0, -45.0)
+#: Degrees on either side, not printed: 60 is the limit of F 7.5.1.
+LIMITS = (45.0, 60.0, 75.0)
+#: The least angle at which the adaptive strategy turns round, degrees. Chosen: half of what an image shows.
+LEAST = 15.0
+YAW = {f"yaw-pitch{-pitch:.0f}": pitch for pitch in PITCHES}
+ROLL = {f"roll-{limit:.0f}": limit for limit in LIMITS}
+ADAPT = {f"adaptive-{limit:.0f}": limit for limit in LIMITS}
+STRATEGIES = (DOWN, *YAW, *ROLL, *ADAPT)
+SUBJECTS = STRATEGIES
+RECORDED = {
+    "seen": "1",
+    "near": "1",
+    "in_sight": "s",
+    "ground": "m2",
+    "outside": "m2",
+    "only_blurred": "1",
+    "held": "1",
+}
+#: Within so many metres of the cable is close to it. Chosen: what a swing of 45 degrees reaches from 15 m.
+NEAR = 15.0
+#: How well it is known where the cabin hangs, metres, each axis. Chosen: a cable is surveyed once.
+CABIN = 0.5
+#: Decisions of the adaptive strategy for each second, and degrees between the angles that it looks at.
+DECISIONS, APART = 5.0, 5.0
+
+
+class Ride(NamedTuple):
+    """One lap along the cable.
+
+    Attributes
+    ----------
+    times, headings
+        (N,) s and radians.
+    places
+        (N, 3) of the lens in n, metres.
+    """
+
+    times: Array
+    headings: Array
+    places: Array
+
+
+def ride(twin: TwinParameters, land: Terrain, rate: float, share: float) -> Ride:
+    """The gondola's lap, or a share of it, at ``rate`` (Hz): 3 to 20 m above the ground (F 8.2)."""
+    route, cable = required(twin.route, "route"), required(twin.cable, "cable")
+    corners = shape_corners("racetrack", route.length.si, route.width.si)
+    corners += np.array([route.ahead.si, route.right.si])
+    cos, sin = np.cos(route.course.si), np.sin(route.course.si)
+    way = filleted_course(corners @ np.array([[cos, sin], [-sin, cos]]), route.turn_radius.si)
+    course = fly(way, twin.flight.airspeed.si)
+    times = np.arange(0.0, share * course.duration, 1 / rate)
+    places, headings = course.at(times)
+    profile = cable_heights(cable, course.duration, course.duration)
+    above = np.interp(times, profile[:, 0], profile[:, 1])
+    return Ride(times, headings, np.column_stack([places, -land.heights_at(places) - above]))
+
+
+def errors_of_execution(twin: TwinParameters) -> ExecutionErrors:
+    """The cabin hangs where its cable is; the gimbal holds the attitude as well as the autopilot knows it."""
+    a = twin.autopilot
+    return ExecutionErrors(
+        CABIN, CABIN, a.position_correlation_time.si,
+        a.roll_sd.si, a.pitch_sd.si, a.yaw_sd.si, a.attitude_correlation_time.si,
+    )  # fmt: skip
+
+
+def angles_of(
+    name: str, twin: TwinParameters, land: Terrain, fences: list[Array], there: Ride, start: float
+) -> GimbalAngles:
+    """Where the camera looks along a ride. All swing at the rate of the twin's gimbal."""
+    g = required(twin.gimbal, "gimbal")
+    rate = 4 * g.limit.si / g.period.si
+    if name in YAW:
+        return swing_yaw(there.times, np.radians(YAW_LIMIT), rate, np.radians(YAW[name]), start)
+    if name in ROLL:
+        return swing_roll(there.times, np.radians(ROLL[name]), rate, start=start)
+    if name not in ADAPT:
+        return look_down(there.times)
+    times = np.arange(0.0, there.times[-1] + 1 / DECISIONS, 1 / DECISIONS)
+    places = np.stack([np.interp(times, there.times, there.places[:, k]) for k in range(3)], axis=-1)
+    headings = np.interp(times, there.times, np.unwrap(there.headings))
+    rolls = np.radians(np.arange(-ADAPT[name], ADAPT[name] + APART / 2, APART))
+    inside = view_inside(camera_of(twin), places, headings, rolls, NADIR, fences, land)
+    limits = (np.radians(LEAST), np.radians(ADAPT[name]))
+    return adapt_roll(times, inside, rolls, limits, rate).at(there.times)
+
+
+def run_strategy(
+    name: str, twin: TwinParameters, land: Terrain, fences: list[Array], there: Ride, seed: int
+) -> Executed:
+    """One of `STRATEGIES` along a ride, as planned and as it comes out."""
+    start = float(stream(seed, "swing").uniform())
+    angles = angles_of(name, twin, land, fences, there, start)
+    poses = camera_on_course(camera_of(twin), there.places, there.headings, angles)
+    rng = stream(seed, f"execution of {name}")
+    errors = errors_of_execution(twin)
+    return execute(land, poses, there.headings, there.times, LOOKS, errors, SIGMAS, rng)
+
+
+def near_cable(land: Terrain, there: Ride, within: float = NEAR) -> NDArray[np.bool_]:
+    """(R, C) bool: nodes so near to the way, over ground."""
+    rows, columns = land.height.shape
+    close = np.zeros((rows, columns), bool)
+    reach = int(np.ceil(within / land.step))
+    steps = np.stack(np.meshgrid(*2 * [np.arange(-reach, reach + 1)], indexing="ij"), axis=-1).reshape(-1, 2)
+    at = (there.places[:, :2] - (land.north, land.east)) / land.step
+    nodes = np.rint(at).astype(int)[:, None] + steps
+    far = np.linalg.norm(nodes - at[:, None], axis=-1) * land.step
+    inside = (far <= within) & (nodes >= 0).all(axis=-1) & (nodes < (rows, columns)).all(axis=-1)
+    close[nodes[inside][:, 0], nodes[inside][:, 1]] = True
+    return close
+
+
+def trial(seed: int, *, twin: str, rate: float, percent_of_lap: float) -> dict[tuple[str, str], float]:
+    """All strategies over the land of one seed.
+
+    Parameters
+    ----------
+    seed
+        Of land, swing and errors.
+    twin
+        Whose cable, enclosures, camera and gimbal it is.
+    rate
+        Images that are looked at for each second.
+    percent_of_lap
+        That the gondola goes.
+    """
+    parameters = load_twin(twin)
+    land = land_of(seed)
+    fences = fences_of(parameters, len(parameters.enclosures))
+    there = ride(parameters, land, rate, percent_of_lap / 100)
+    inside = nodes_in(land, fences) >= 0
+    near = near_cable(land, there)
+    numbers: dict[tuple[str, str], float] = {}
+    for name in STRATEGIES:
+        done = run_strategy(name, parameters, land, fences, there, seed)
+        numbers |= {(name, key): value for key, value in numbers_of(done, inside, near, 1 / rate).items()}
+    return numbers
+
+
+def numbers_of(
+    done: Executed, inside: NDArray[np.bool_], near: NDArray[np.bool_], step: float
+) -> dict[str, float]:
+    """What is compared of a strategy, by name; ``step`` is the time between two images, s."""
+    planned = done.planned
+    share, cell = share_seen(planned, inside), planned.step**2
+    return {
+        "seen": share.seen,
+        "near": float(planned.seen[near].mean()),
+        "in_sight": float(planned.looks[planned.seen].mean()) * step,
+        "ground": float(planned.seen.sum()) * cell,
+        "inside": float((planned.seen & inside).sum()) * cell,
+        "outside": float((planned.seen & ~inside).sum()) * cell,
+        "only_blurred": share.only_blurred,
+        "held": done.held,
+        "sure": float(done.sure[planned.seen].mean()),
+        "sharp": float(done.sharp.mean()),
+    }
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the draws give for each claim of F on the camera of a gondola, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each draw.
+    """
+
+    def of(subject: str, name: str) -> NDArray[np.float64]:
+        return spread[subject, name].to_numpy(float)
+
+    adaptive, roll = "adaptive-60", "roll-60"
+    outside = {name: of(name, "outside") / of(name, "ground") for name in STRATEGIES}
+    less = [outside[a] < outside[b] for a, b in zip(ADAPT, ROLL, strict=True)]
+    least = np.min([outside[name] for name in ADAPT], axis=0)
+    others = np.min([outside[name] for name in (*YAW, *ROLL)], axis=0)
+    near = {name: of(name, "near") for name in STRATEGIES}
+    steepest = next(iter(YAW))
+    rest = np.max([near[name] for name in STRATEGIES if name != steepest], axis=0)
+    grows = (np.diff([of(name, "seen") for name in (DOWN, *ROLL)], axis=0) > 0).all(axis=0)
+    return {
+        "adaptive-least-outside": Check(
+            true=np.all(less, axis=0) & (least < others),
+            first=100 * outside[roll],
+            second=100 * outside[adaptive],
+            unit="%",
+        ),
+        "adaptive-sees-more": Check(
+            true=of(adaptive, "seen") > of(roll, "seen"),
+            first=100 * of(adaptive, "seen"),
+            second=100 * of(roll, "seen"),
+            unit="%",
+        ),
+        "yaw-best-near-the-track": Check(
+            true=near[steepest] > rest, first=100 * near[steepest], second=100 * rest, unit="%"
+        ),
+        "larger-rotations-needed": Check(
+            true=np.asarray(grows, bool),
+            first=100 * of(roll, "seen"),
+            second=100 * of(DOWN, "seen"),
+            unit="%",
+        ),
+        "moving-more-less-redundant": Check(
+            true=(of(roll, "ground") > of(DOWN, "ground")) & (of(roll, "in_sight") < of(DOWN, "in_sight")),
+            first=of(DOWN, "in_sight"),
+            second=of(roll, "in_sight"),
+            unit="s",
+        ),
+    }

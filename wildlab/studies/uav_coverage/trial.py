@@ -1,0 +1,263 @@
+"""Rows over five enclosures at two heights, the camera straight down or turning about yaw: what is covered.
+
+F 7.5.1 shows four maps (figure 7.12) and prints no number of them. Here each is flown over land that is drawn
+for each seed, since F's map is not public, and what the plan promises is held against a flight with errors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import Check
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, Looks, execute
+from wildlab.planning.courses import Course, fly
+from wildlab.planning.coverage import nodes_in, share_seen
+from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
+from wildlab.planning.heights import follow_terrain
+from wildlab.planning.moving import first_seen, walks
+from wildlab.planning.patterns import lawn_mowers
+from wildlab.planning.sightings import see
+from wildlab.simulation.animal_motion import enclosure_corners
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.landscape import EAST_M, NORTH_M, synthetic_landscape
+from wildlab.simulation.manifest import twin_manifest
+from wildlab.simulation.parameters import TwinParameters, load_twin
+
+Part = TypeVar("Part")
+
+
+class Case(NamedTuple):
+    """Height above ground and row distance, metres, and whether the camera turns about yaw."""
+
+    height: float
+    rows: float
+    yaw: bool
+
+
+#: F figure 7.12 (a) to (d).
+DOWN, YAW, LOW, LOW_CLOSE = "down-60m-25m", "yaw-60m-25m", "yaw-30m-25m", "yaw-30m-10m"
+CASES = {
+    DOWN: Case(60.0, 25.0, False),
+    YAW: Case(60.0, 25.0, True),
+    LOW: Case(30.0, 25.0, True),
+    LOW_CLOSE: Case(30.0, 10.0, True),
+}
+#: Row distances at which animals that move are looked for, the camera down from 60 m.
+SPACINGS = (25.0, 40.0, 60.0)
+SUBJECTS = (*CASES, *(f"rows-{one:.0f}m" for one in SPACINGS))
+RECORDED = {
+    "seen": "1",
+    "only_blurred": "1",
+    "in_sight": "s",
+    "ground": "m2",
+    "detected": "1",
+    "time": "s",
+    "held": "1",
+    "missed": "1",
+}
+#: Chosen: an animal of 1.5 m; 10 ms is a usual time constant of a microbolometer; a quarter of an animal's
+#: length; animals down to a dozen pixels; r of (5.9) where these are few.
+LOOKS = Looks(size=1.5, exposure=0.01, blur_share=0.25, furthest=150.0, range_scale=150.0)
+#: Standard deviations of pose errors that a plan's margin allows for. Chosen.
+SIGMAS = 2.0
+#: Metres up or down for each metre of way: what a multicopter climbs and sinks at this speed. Chosen.
+CLIMB = 0.4
+#: Animals that walk in each enclosure, for the share that is missed.
+WALKERS = 60
+
+
+class Flown(NamedTuple):
+    """A course over terrain, with the camera's poses at evenly spaced times."""
+
+    course: Course
+    times: Array
+    headings: Array
+    poses: CameraPoses
+
+
+def land_of(seed: int) -> Terrain:
+    """Land of the size of F's map and 50 m more on each side, for the ways and views that leave it."""
+    return synthetic_landscape(seed, north=NORTH_M + 100, east=EAST_M + 100)
+
+
+def camera_of(twin: TwinParameters) -> Camera:
+    """The twin's camera as its sheet states it."""
+    return twin_manifest(twin, 0).geometry_camera()
+
+
+def required(part: Part | None, name: str) -> Part:
+    """A part of a twin without which there is nothing to compute.
+
+    Raises
+    ------
+    WildlabError
+        Where the twin has none.
+    """
+    if part is None:
+        raise WildlabError("the twin has none", "name a twin that searches enclosures", field=name)
+    return part
+
+
+def fences_of(twin: TwinParameters, fields: int) -> list[Array]:
+    """The first so many of the twin's enclosures."""
+    return [enclosure_corners(one) for one in twin.enclosures.values()][:fields]
+
+
+def errors_of_execution(twin: TwinParameters) -> ExecutionErrors:
+    """How far off its plan a flight is: the autopilot's pose, and how well it keeps to its course."""
+    a, f = twin.autopilot, twin.flight
+    return ExecutionErrors(
+        float(np.hypot(a.horizontal_sd.si, f.track_sd.si)),
+        float(np.hypot(a.vertical_sd.si, f.altitude_sd.si)),
+        a.position_correlation_time.si,
+        a.roll_sd.si,
+        a.pitch_sd.si,
+        a.yaw_sd.si,
+        a.attitude_correlation_time.si,
+    )
+
+
+def plan(twin: TwinParameters, land: Terrain, case: Case, fields: int, rate: float) -> Flown:
+    """The course of a case, its heights above ground kept, and where the camera looks at ``rate`` (Hz)."""
+    speed, stop = twin.flight.airspeed.si, required(twin.survey, "survey").turn_time.si
+    along = [one.course.si for one in twin.enclosures.values()][:fields]
+    pattern = lawn_mowers(fences_of(twin, fields), case.rows, directions=along, turn=speed * stop, back=True)
+    course = fly(pattern, speed, turn_time=stop)
+    times = np.arange(0.0, course.duration, 1 / rate)
+    places, headings = course.at(times)
+    way = follow_terrain(land, pattern.waypoints, case.height, climb=CLIMB, descent=CLIMB)
+    p = np.column_stack([places, -way.at(course.distances(times))])
+    angles = look_down(times)
+    if case.yaw:
+        g = required(twin.gimbal, "gimbal")
+        angles = swing_yaw(times, g.limit.si, 4 * g.limit.si / g.period.si, g.tilt.si)
+    return Flown(course, times, headings, camera_on_course(camera_of(twin), p, headings, angles))
+
+
+def run_case(
+    twin: TwinParameters, land: Terrain, name: str, seed: int, fields: int, rate: float
+) -> tuple[Flown, Executed]:
+    """One of `CASES`, planned and flown."""
+    flown = plan(twin, land, CASES[name], fields, rate)
+    rng = stream(seed, f"execution of {name}")
+    errors = errors_of_execution(twin)
+    return flown, execute(land, flown.poses, flown.headings, flown.times, LOOKS, errors, SIGMAS, rng)
+
+
+def trial(seed: int, *, twin: str, fields: int, rate: float) -> dict[tuple[str, str], float]:
+    """All cases over the land of one seed.
+
+    Parameters
+    ----------
+    seed
+        Of land, errors and animals.
+    twin
+        Whose enclosures, camera, gimbal and speed it is.
+    fields
+        How many of its enclosures.
+    rate
+        Images that are looked at for each second.
+    """
+    parameters = load_twin(twin)
+    land = land_of(seed)
+    inside = nodes_in(land, fences_of(parameters, fields)) >= 0
+    numbers: dict[tuple[str, str], float] = {}
+    for name in CASES:
+        flown, done = run_case(parameters, land, name, seed, fields, rate)
+        numbers |= {(name, key): value for key, value in numbers_of(flown, done, inside).items()}
+        if name == DOWN:
+            open_view = see(land, flown.poses, LOOKS.furthest, hidden=False)
+            shown = np.bincount(open_view.node, minlength=land.height.size).reshape(inside.shape) > 0
+            numbers[name, "in_view"] = float(shown[inside].mean())
+    return numbers | _moving(parameters, land, seed, fields, rate)
+
+
+def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[str, float]:
+    """What is compared of a case, by name."""
+    share = share_seen(done.planned, inside)
+    everywhere = float(done.planned.seen.sum()) * done.planned.step**2
+    mean_looks = done.planned.looks[done.planned.seen].mean() if done.planned.seen.any() else np.nan
+    within = done.sure & inside
+    return {
+        "seen": share.seen,
+        "only_blurred": share.only_blurred,
+        "in_sight": float(mean_looks) * float(np.median(np.diff(flown.times))),
+        "ground": everywhere,
+        "outside": float((done.planned.seen & ~inside).sum()) * done.planned.step**2,
+        "detected": share.detected,
+        "time": flown.course.duration,
+        "held": float(done.flown.seen[within].mean()) if within.any() else np.nan,
+        "sure": float(done.sure[inside].mean()),
+        "flown": float(done.flown.seen[inside].mean()),
+        "margin": done.margin_px,
+        "sharp": float(done.sharp.mean()),
+    }
+
+
+def _moving(
+    twin: TwinParameters, land: Terrain, seed: int, fields: int, rate: float
+) -> dict[tuple[str, str], float]:
+    """Time, and share of animals that walk and are never seen, with rows near and far apart."""
+    flights = [plan(twin, land, Case(60.0, spacing, False), fields, rate) for spacing in SPACINGS]
+    longest = max((one.times for one in flights), key=len)
+    animals = required(twin.animals, "animals")
+    herds = [
+        walks(fence, longest, WALKERS, animals.speed_sd.si, animals.step.si, stream(seed, f"herd {k}"))
+        for k, fence in enumerate(fences_of(twin, fields))
+    ]
+    numbers = {}
+    for spacing, flown in zip(SPACINGS, flights, strict=True):
+        found = see(land, flown.poses, LOOKS.furthest)
+        count = len(flown.times)
+        sharp = np.ones(count, bool)
+        seen = [np.isfinite(first_seen(found, land, flown.times, sharp, herd[:, :count])) for herd in herds]
+        numbers[f"rows-{spacing:.0f}m", "time"] = flown.course.duration
+        numbers[f"rows-{spacing:.0f}m", "missed"] = float(1 - np.mean(seen))
+    return numbers
+
+
+def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
+    """What the draws give for each claim of F on rows and yaw, by the claim's id.
+
+    Parameters
+    ----------
+    spread
+        What `trial` gives, one row for each draw.
+    """
+
+    def of(subject: str, name: str) -> NDArray[np.float64]:
+        return spread[subject, name].to_numpy(float)
+
+    down, yaw, low, close = (of(name, "seen") for name in CASES)
+    times = np.stack([of(f"rows-{one:.0f}m", "time") for one in SPACINGS])
+    missed = np.stack([of(f"rows-{one:.0f}m", "missed") for one in SPACINGS])
+    wider = of(YAW, "ground") / of(DOWN, "ground") - 1
+    return {
+        "yaw-covers-more": Check(measured=wider, above=True),
+        "yaw-covers-more-inside": Check(
+            measured=(yaw - down) / np.maximum(1 - down, 1e-9), above=True, premise=down < 0.95
+        ),
+        "moving-more-less-redundant": Check(
+            true=(wider > 0) & (of(YAW, "in_sight") < of(DOWN, "in_sight")),
+            first=of(DOWN, "in_sight"),
+            second=of(YAW, "in_sight"),
+            unit="s",
+        ),
+        "lower-needs-closer": Check(measured=yaw - low, true=close >= yaw - (yaw - low) / 2, above=True),
+        "convex-covered": Check(measured=1 - of(DOWN, "in_view"), reach=(0, 1)),
+        "distance-time-missed": Check(
+            true=(np.diff(times, axis=0) < 0).all(axis=0) & (missed[-1] > missed[0]),
+            first=100 * missed[-1],
+            second=100 * missed[0],
+            unit="%",
+        ),
+    }
