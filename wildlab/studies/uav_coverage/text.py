@@ -120,7 +120,7 @@ def held_table(spread: pd.DataFrame) -> pd.DataFrame:
                 "surely seen": percent(mean(spread, name, "sure")),
                 "of that shown": share_words(spread, name, "held"),
                 "least of all draws": percent(float(spread[name, "held"].min())),
-                "all that flights showed": percent(mean(spread, name, "flown")),
+                "without a margin": share_words(spread, name, "kept"),
             }
             for name, said in NAMES.items()
         ]

@@ -186,7 +186,7 @@ def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[
     share = share_seen(done.planned, inside)
     everywhere = float(done.planned.seen.sum()) * done.planned.step**2
     mean_looks = done.planned.looks[done.planned.seen].mean() if done.planned.seen.any() else np.nan
-    within = done.sure & inside
+    within, hoped = done.sure & inside, done.planned.seen & inside
     return {
         "seen": share.seen,
         "only_blurred": share.only_blurred,
@@ -196,6 +196,7 @@ def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[
         "detected": share.detected,
         "time": flown.course.duration,
         "held": float(done.flown.seen[within].mean()) if within.any() else np.nan,
+        "kept": float(done.flown.seen[hoped].mean()) if hoped.any() else np.nan,
         "sure": float(done.sure[inside].mean()),
         "flown": float(done.flown.seen[inside].mean()),
         "margin": done.margin_px,

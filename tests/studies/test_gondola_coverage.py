@@ -1,0 +1,127 @@
+"""What the study of a gondola's camera computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
+from wildlab.reporting.published import load_claims
+from wildlab.simulation.parameters import load_twin
+from wildlab.studies.gondola_coverage import STUDY, text
+from wildlab.studies.gondola_coverage.trial import (
+    ADAPT,
+    DOWN,
+    ROLL,
+    STRATEGIES,
+    YAW,
+    angles_of,
+    check_claims,
+    near_cable,
+    ride,
+    trial,
+)
+from wildlab.studies.uav_coverage.trial import fences_of, land_of
+
+
+@pytest.fixture(scope="module")
+def draws() -> pd.DataFrame:
+    return frame([trial(seed, twin="gondola", rate=3, percent_of_lap=8) for seed in (1, 2)])
+
+
+def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
+    table = pd.DataFrame(rows)
+    table.columns = pd.MultiIndex.from_tuples(table.columns)
+    return table
+
+
+def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
+    """Draws that are all the same, in which every claim is true, with some numbers changed."""
+    usual = {
+        "seen": 0.3, "near": 0.5, "in_sight": 2.0, "ground": 1e5, "inside": 4e4, "outside": 6e4,
+        "only_blurred": 0.0, "held": 0.99, "sure": 0.7, "sharp": 1.0,
+    }  # fmt: skip
+    row = {(name, key): value for name in STRATEGIES for key, value in usual.items()}
+    for k, name in enumerate((DOWN, *ROLL)):
+        row[name, "seen"] = 0.1 + 0.05 * k
+    for name in ADAPT:
+        row |= {(name, "outside"): 2e4, (name, "seen"): 0.35}
+    row |= {
+        (next(iter(YAW)), "near"): 0.8,
+        (DOWN, "in_sight"): 4.0,
+        (DOWN, "ground"): 1e4,
+        (DOWN, "outside"): 5e3,
+    }
+    row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
+    return frame([row] * count)
+
+
+def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws: pd.DataFrame) -> None:
+    for name in STRATEGIES:
+        assert (draws[name, "held"] >= 0.95).all(), name
+        assert (draws[name, "sure"] > 0.3).all(), name
+
+
+def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
+    for name in STRATEGIES:
+        assert np.allclose(draws[name, "ground"], draws[name, "inside"] + draws[name, "outside"])
+    assert (draws["roll-60", "ground"] > draws[DOWN, "ground"]).all()
+    assert {subject for subject, _ in draws} == set(STUDY.subjects)
+
+
+def test_the_cabin_hangs_as_high_as_printed() -> None:
+    land = land_of(2)
+    there = ride(load_twin("gondola"), land, 1.0, 1.0)
+    above = -there.places[:, 2] - land.heights_at(there.places[:, :2])
+    assert above.min() == pytest.approx(3.0, abs=0.1) and above.max() == pytest.approx(20.0, abs=0.1)
+    assert there.times[-1] == pytest.approx(1800, rel=0.03)  # F 7.5.2: about thirty minutes
+    # What is near is a band of 30 m along 2.7 km, its ends and bends aside.
+    assert near_cable(land, there).sum() * 4.0 == pytest.approx(30 * 1.5 * there.times[-1], rel=0.03)
+
+
+def test_the_adaptive_camera_turns_round_earlier_outside_than_inside() -> None:
+    twin, land = load_twin("gondola"), land_of(2)
+    there = ride(twin, land, 5.0, 0.2)
+    fences = fences_of(twin, 5)
+    roll = np.degrees(angles_of("adaptive-75", twin, land, fences, there, 0.0).roll)
+    nowhere = [np.array([[900.0, 900.0], [901.0, 900.0], [901.0, 901.0]])]
+    outside = np.degrees(angles_of("adaptive-75", twin, land, nowhere, there, 0.0).roll)
+    assert np.abs(outside).max() < 15 + 9 and np.abs(roll).max() > 60
+
+
+def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
+    published = {one["id"]: one for one in load_claims("gondola-coverage")}
+    checks = check_claims(made_up())
+    assert set(checks) == set(published)
+    verdicts = {k: decide_check(c, published[k].get("threshold")).verdict for k, c in checks.items()}
+    assert verdicts == dict.fromkeys(published, HOLDS)
+    steepest = next(iter(YAW))
+    opposed = {
+        "adaptive-least-outside": {"adaptive-75/outside": 7e4},
+        "adaptive-sees-more": {"adaptive-60/seen": 0.1},
+        "yaw-best-near-the-track": {f"{steepest}/near": 0.4},
+        "larger-rotations-needed": {"roll-60/seen": 0.05},
+        "moving-more-less-redundant": {"roll-60/in_sight": 5.0},
+    }
+    for claim, change in opposed.items():
+        assert decide_check(check_claims(made_up(**change))[claim]).verdict == FAILS, claim
+
+
+def test_the_words_turn_with_the_numbers() -> None:
+    first, second, third = text.summary(made_up())
+    assert "adaptive, 45 deg: 35.0 %, against 10.0 %" in first
+    assert "adaptive, 45 deg, 20.0 % of what it sees" in second and "is yaw" in second
+    assert "held" in third and "99.0 %" in third
+    first, second, third = text.summary(
+        made_up(**{"roll-75/seen": 0.6, "roll-75/near": 0.9, f"{DOWN}/held": 0.5})
+    )
+    assert "roll, 75 deg: 60.0 %" in first and "near the cable is the same" in second
+    assert "did not always hold" in third
+    assert "3 of 3 limits" in text.strategies_words(made_up())
+    assert "2 of 3 limits" in text.strategies_words(made_up(**{"adaptive-45/outside": 9e4}))
+    assert "Of those that turn about yaw" not in text.near_words(made_up())
+    assert "Of those that turn about yaw" in text.near_words(made_up(**{"roll-75/near": 0.9}))
+    assert "is enough" in text.rate_words(5, 7.5, {"roll-60": 0.004})
+    assert "leaves some out" in text.rate_words(5, 7.5, {"roll-60": 0.03, "adaptive-60": 0.001})
+    assert len(text.table(made_up())) == len(text.held_table(made_up(1))) == len(STRATEGIES)

@@ -1,0 +1,146 @@
+"""What the study of rows over enclosures computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
+from wildlab.planning.coverage import nodes_in
+from wildlab.reporting.published import load_claims
+from wildlab.simulation.parameters import load_twin
+from wildlab.studies.uav_coverage import STUDY, text
+from wildlab.studies.uav_coverage.trial import (
+    CASES,
+    DOWN,
+    LOW,
+    LOW_CLOSE,
+    SPACINGS,
+    YAW,
+    Case,
+    check_claims,
+    fences_of,
+    land_of,
+    plan,
+    required,
+    trial,
+)
+
+
+@pytest.fixture(scope="module")
+def draws() -> pd.DataFrame:
+    return frame([trial(seed, twin="uav-search", fields=1, rate=1) for seed in (1, 2)])
+
+
+def frame(rows: list[dict[tuple[str, str], float]]) -> pd.DataFrame:
+    table = pd.DataFrame(rows)
+    table.columns = pd.MultiIndex.from_tuples(table.columns)
+    return table
+
+
+def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
+    """Draws that are all the same, in which every claim is true, with some numbers changed."""
+    usual = {
+        "seen": 0.9, "only_blurred": 0.0, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "detected": 0.9,
+        "time": 1000.0, "held": 0.99, "sure": 0.8, "flown": 0.9, "margin": 80.0, "kept": 0.9, "sharp": 1.0,
+    }  # fmt: skip
+    row = {(name, key): value for name in CASES for key, value in usual.items()}
+    row |= {(YAW, "seen"): 0.98, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
+    row |= {(LOW_CLOSE, "seen"): 0.97, (DOWN, "in_view"): 1.0}
+    for k, spacing in enumerate(SPACINGS):
+        row |= {
+            (f"rows-{spacing:.0f}m", "time"): 1000.0 - 100 * k,
+            (f"rows-{spacing:.0f}m", "missed"): 0.1 * k,
+        }
+    row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
+    return frame([row] * count)
+
+
+def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws: pd.DataFrame) -> None:
+    """What has to be shown: 95 % of it at least, in every draw of every case."""
+    for name in CASES:
+        assert (draws[name, "held"] >= 0.95).all(), name
+        assert (draws[name, "sure"] > 0.3).all(), name
+
+
+def test_a_plan_without_a_margin_promises_more_than_flights_show(draws: pd.DataFrame) -> None:
+    assert (draws[LOW, "kept"] < draws[LOW, "held"]).all() and (draws[LOW, "kept"] < 0.95).any()
+    assert (draws[LOW, "sure"] < draws[LOW, "flown"]).all()
+
+
+def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
+    fence = nodes_in(land_of(1), fences_of(load_twin("uav-search"), 1)) >= 0
+    area = fence.sum() * 4.0
+    for name in CASES:
+        inside = draws[name, "ground"] - draws[name, "outside"]
+        assert np.allclose(inside, draws[name, "seen"] * area)
+        assert (draws[name, "detected"] <= draws[name, "seen"]).all()
+    assert (draws[YAW, "ground"] > draws[DOWN, "ground"]).all()
+    assert (draws[LOW_CLOSE, "time"] > 1.8 * draws[LOW, "time"]).all()
+    assert {subject for subject, _ in draws} == set(STUDY.subjects)
+
+
+def test_the_platform_keeps_its_height_above_ground() -> None:
+    twin, land = load_twin("uav-search"), land_of(3)
+    flown = plan(twin, land, Case(60.0, 25.0, False), 1, 1.0)
+    above = -flown.poses.p_nc[:, 2] - land.heights_at(flown.poses.p_nc[:, :2])
+    # Between two points of the profile the way is straight, and the ground is not.
+    assert above.min() > 59.0 and np.median(above) < 65
+
+
+def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
+    published = {one["id"]: one for one in load_claims("uav-coverage")}
+    checks = check_claims(made_up())
+    assert set(checks) == set(published)
+    verdicts = {k: decide_check(c, published[k].get("threshold")).verdict for k, c in checks.items()}
+    assert verdicts == dict.fromkeys(published, HOLDS)
+    opposed = {
+        "yaw-covers-more": {f"{YAW}/ground": 1.05e5},
+        "yaw-covers-more-inside": {f"{YAW}/seen": 0.905},
+        "moving-more-less-redundant": {f"{YAW}/in_sight": 6.0},
+        "lower-needs-closer": {f"{LOW}/seen": 0.97},
+        "convex-covered": {f"{DOWN}/in_view": 0.99},
+        "distance-time-missed": {f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0},
+    }
+    for claim, change in opposed.items():
+        check = check_claims(made_up(**change))[claim]
+        assert decide_check(check, published[claim].get("threshold")).verdict == FAILS, claim
+    # Where rows leave nothing unseen, yaw has nothing to add within the enclosures.
+    check = check_claims(made_up(**{f"{DOWN}/seen": 0.999}))["yaw-covers-more-inside"]
+    assert decide_check(check, 0.1).verdict == NO_PREMISE
+
+
+def test_closer_rows_that_do_not_help_are_no_proof() -> None:
+    check = check_claims(made_up(**{f"{LOW_CLOSE}/seen": 0.82}))["lower-needs-closer"]
+    assert decide_check(check, 0.02).verdict == FAILS
+
+
+def test_the_summary_turns_with_the_numbers() -> None:
+    first, second, third = text.summary(made_up())
+    assert "50 % more ground" in first and "8.0 % more of the enclosures" in first
+    assert "leave 20.0 % of the enclosures unseen" in second and "bring 17.0 % back" in second
+    assert "held" in third and "99.0 %" in third
+    first = text.summary(made_up(**{f"{YAW}/seen": 0.9, f"{YAW}/ground": 1.2e5}))[0]
+    assert "hardly any of the difference lies within the enclosures" in first
+    first = text.summary(made_up(**{f"{YAW}/ground": 0.9e5, f"{YAW}/seen": 0.8}))[0]
+    assert "10 % less ground" in first and "10.0 % less of the enclosures" in first
+    assert "as much of the enclosures" in text.summary(made_up(**{f"{LOW}/seen": 0.98}))[1]
+    assert "did not always hold" in text.summary(made_up(**{f"{LOW}/held": 0.9}))[2]
+
+
+def test_other_words_turn_too() -> None:
+    assert "In every draw of every case" in text.held_words(made_up())
+    assert "in some draw of: 30 m, rows 25 m, yaw" in text.held_words(made_up(**{f"{LOW}/held": 0.9}))
+    assert "which is no more" not in text.moving_words(made_up())
+    same = made_up(**{f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0})
+    assert "which is no more" in text.moving_words(same)
+    assert "is enough" in text.rate_words(2, {DOWN: 0.001, YAW: -0.004})
+    assert "leaves some out" in text.rate_words(2, {DOWN: 0.001, YAW: 0.02})
+    assert len(text.rows_table(made_up())) == len(text.held_table(made_up(1))) == len(CASES)
+
+
+def test_a_twin_without_a_survey_is_refused() -> None:
+    with pytest.raises(WildlabError, match="Name a twin that searches"):
+        required(None, "survey")
