@@ -144,6 +144,26 @@ def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) ->
     assert faults(folder / "report.html") == []
 
 
+@pytest.mark.parametrize(
+    ("study", "claims", "figures"),
+    [
+        ("uav-coverage", 6, ("fig-7-12a", "fig-7-12d", "age", "gap", "land")),
+        ("gondola-coverage", 5, ("fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18")),
+    ],
+)
+def test_what_plans_cover_is_seen_by_flights(
+    study: str, claims: int, figures: tuple[str, ...], reports: Path, faults: Faults
+) -> None:
+    folder = run(study, reports, seeds=2, first_look=True)
+    held = [m for (name, _), m in values(folder).items() if name == "held"]
+    assert held and all(metric["value"] >= 0.95 for metric in held)
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, claims)
+    for figure in figures:
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_a_tarpaulin_is_looked_for_on_one_flight(reports: Path, faults: Faults) -> None:
     folder = run("precision-drop", reports, seeds=1)
     found = values(folder)

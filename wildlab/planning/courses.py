@@ -144,7 +144,9 @@ def fly(
         radius = turn_radius * (1 + float(np.hypot(*air)) / speed) ** 2
         points, on_row = _with_arcs(rows, radius, spacing)
         return _timed(points, on_row, speed, air)
-    on_row = np.array([_is_row(a, b, rows) for a, b in pairwise(points)] + [False])
+    # Rows are way points too, to the last bit.
+    known = {row.tobytes() for row in rows}
+    on_row = np.array([np.stack(leg).tobytes() in known for leg in pairwise(points)] + [False])
     return _timed(points, on_row, speed, air, turn_time)
 
 
@@ -256,10 +258,6 @@ def _rows_and_points(pattern: Pattern | ArrayLike) -> tuple[Array, Array]:
             field="pattern",
         )
     return np.stack([points[:-1], points[1:]], axis=1), points
-
-
-def _is_row(a: Array, b: Array, rows: Array) -> bool:
-    return bool((np.abs(rows - np.stack([a, b])).max(axis=(1, 2)) < 1e-9).any())
 
 
 def _with_arcs(rows: Array, radius: float, spacing: float) -> tuple[Array, Array]:
