@@ -171,17 +171,26 @@ def trial(seed: int, *, twin: str, rate: float, percent_of_lap: float) -> dict[t
     percent_of_lap
         That the gondola goes.
     """
+    return all_runs(seed, twin, rate, percent_of_lap)[1]
+
+
+def all_runs(
+    seed: int, twin: str, rate: float, percent_of_lap: float
+) -> tuple[dict[str, Executed], dict[tuple[str, str], float]]:
+    """Every one of `STRATEGIES` as planned and as it comes out, by name, and the numbers of `trial`."""
     parameters = load_twin(twin)
     land = land_of(seed)
     fences = fences_of(parameters, len(parameters.enclosures))
     there = ride(parameters, land, rate, percent_of_lap / 100)
     inside = nodes_in(land, fences) >= 0
     near = near_cable(land, there)
-    numbers: dict[tuple[str, str], float] = {}
-    for name in STRATEGIES:
-        done = run_strategy(name, parameters, land, fences, there, seed)
-        numbers |= {(name, key): value for key, value in numbers_of(done, inside, near, 1 / rate).items()}
-    return numbers
+    runs = {name: run_strategy(name, parameters, land, fences, there, seed) for name in STRATEGIES}
+    numbers = {
+        (name, key): value
+        for name, done in runs.items()
+        for key, value in numbers_of(done, inside, near, 1 / rate).items()
+    }
+    return runs, numbers
 
 
 def numbers_of(

@@ -167,18 +167,26 @@ def trial(seed: int, *, twin: str, fields: int, rate: float) -> dict[tuple[str, 
     rate
         Images that are looked at for each second.
     """
+    return all_runs(seed, twin, fields, rate)[1]
+
+
+def all_runs(
+    seed: int, twin: str, fields: int, rate: float
+) -> tuple[dict[str, tuple[Flown, Executed]], dict[tuple[str, str], float]]:
+    """Every one of `CASES` planned and flown, by name, and the numbers of `trial`."""
     parameters = load_twin(twin)
     land = land_of(seed)
     inside = nodes_in(land, fences_of(parameters, fields)) >= 0
-    numbers: dict[tuple[str, str], float] = {}
-    for name in CASES:
-        flown, done = run_case(parameters, land, name, seed, fields, rate)
-        numbers |= {(name, key): value for key, value in numbers_of(flown, done, inside).items()}
-        if name == DOWN:
-            open_view = see(land, flown.poses, LOOKS.furthest, hidden=False)
-            shown = np.bincount(open_view.node, minlength=land.height.size).reshape(inside.shape) > 0
-            numbers[name, "in_view"] = float(shown[inside].mean())
-    return numbers | _moving(parameters, land, seed, fields, rate)
+    runs = {name: run_case(parameters, land, name, seed, fields, rate) for name in CASES}
+    numbers = {
+        (name, key): value
+        for name, (flown, done) in runs.items()
+        for key, value in numbers_of(flown, done, inside).items()
+    }
+    open_view = see(land, runs[DOWN][0].poses, LOOKS.furthest, hidden=False)
+    shown = np.bincount(open_view.node, minlength=land.height.size).reshape(inside.shape) > 0
+    numbers[DOWN, "in_view"] = float(shown[inside].mean())
+    return runs, numbers | _moving(parameters, land, seed, fields, rate)
 
 
 def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[str, float]:
