@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.coverage import Coverage
-from wildlab.reporting.figures import BLUE, INK, ORANGE, VERMILLION, map_axes, new_figure
+from wildlab.reporting.figures import GREEN, INK, ORANGE, VERMILLION, map_axes, new_figure
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
+#: What the colours of `coverage_map` mean.
+COLOURS_SAID = "Green is seen sharply at least once, orange only blurred; black are the fences, red the way."
 
 
 def extent(land: Terrain) -> tuple[float, float, float, float]:
@@ -28,17 +30,17 @@ def extent(land: Terrain) -> tuple[float, float, float, float]:
 def coverage_map(
     shown: Coverage, land: Terrain, fences: Sequence[Array], track: Array, title: str, *, wide: float = 5.8
 ) -> Figure:
-    """Where a plan sees the ground sharply, and where only blurred; fences and the way, north up."""
+    """Where a plan sees the ground sharply, and where only blurred; fences and the way: `COLOURS_SAID`."""
     fig, ax = new_figure(wide, 0.72 * wide)
     state = np.full(shown.looks.shape, np.nan)
     state[(shown.blurred > 0) & ~shown.seen] = 0
     state[shown.seen] = 1
-    colours = ListedColormap([ORANGE, VERMILLION])
+    colours = ListedColormap([ORANGE, GREEN])
     ax.imshow(
         state, origin="lower", extent=extent(land), cmap=colours, vmin=0, vmax=1, alpha=0.55,
         interpolation="nearest",
     )  # fmt: skip
-    ax.plot(track[:, 1], track[:, 0], color=BLUE, lw=0.7)
+    ax.plot(track[:, 1], track[:, 0], color=VERMILLION, lw=0.7)
     for fence in fences:
         closed = np.concatenate([fence, fence[:1]])
         ax.plot(closed[:, 1], closed[:, 0], color=INK, lw=1.4)
