@@ -97,11 +97,17 @@ def test_gains_of_candidates_are_differences_of_the_objective(legs):
 
 
 def test_what_is_far_is_worth_less():
-    points = np.array([[30.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
-    worth = worth_beyond(
-        np.array([[2.0, 5.0]]), np.array([1.0, 0.5]), points, np.zeros(1, np.int64), np.zeros((1, 3)), 50.0
-    )
-    assert worth == pytest.approx([2 * np.exp(-0.6) + 2.5 * np.exp(-0.8)])
+    middles, ends = np.array([[30.0, 0.0], [0.0, 40.0]]), np.array([[0.0, 0.0], [30.0, 0.0]])
+    left = np.array([[2.0, 2.5], [0.0, 1.0]])
+    worth = worth_beyond(left, middles, np.array([0, 1]), ends, 50.0)
+    assert worth == pytest.approx([2 * np.exp(-0.6) + 2.5 * np.exp(-0.8), np.exp(-1.0)])
+
+
+def test_blocks_hold_all_that_is_left():
+    one = planner(grid((-80, 80), (-80, 80)))
+    one.weights[::5] = 0
+    blocks = one._in_blocks(np.stack([one.left, 2 * one.left]))
+    assert blocks.sum(axis=1) == pytest.approx([one.left_to_know, 2 * one.left_to_know])
 
 
 def test_it_flies_to_what_is_not_known_yet():

@@ -159,16 +159,18 @@ def after_images(
 
 
 @compiled
-def worth_beyond(
-    left: Array, weights: Array, points: Array, parents: Array, ends: Array, fades: float
-) -> Array:
-    """What is left to know, each point counted less the further it is from where a step ends, (K,) m^2."""
+def worth_beyond(left: Array, middles: Array, parents: Array, ends: Array, length: float) -> Array:
+    """What is left to know in blocks, counted less the further they are from where a step ends, (K,) m^2.
+
+    ``left`` (B, S) of each state's blocks, ``middles`` (S, 2), ``ends`` (K, 2) or more columns, ``length``
+    the distance at which a block counts 1/e.
+    """
     out = np.zeros(len(parents))
     for k in range(len(parents)):
-        for i in range(len(points)):
-            if weights[i] > 0:
-                away = np.hypot(points[i, 0] - ends[k, 0], points[i, 1] - ends[k, 1])
-                out[k] += weights[i] * left[parents[k], i] * np.exp(-away / fades)
+        for i in range(len(middles)):
+            if left[parents[k], i] > 0:
+                away = np.hypot(middles[i, 0] - ends[k, 0], middles[i, 1] - ends[k, 1])
+                out[k] += left[parents[k], i] * np.exp(-away / length)
     return out
 
 

@@ -130,6 +130,14 @@ class InformationPlanner:
         self.weights = np.ones(len(self.points))
         self.terrain, self.sensor, self.flying, self.horizon = terrain, sensor, flying, horizon
         self.hides = hides
+        self._near = horizon.steps * flying.speed * flying.step
+        # What lies beyond the horizon is weighed by blocks, two steps wide.
+        corner = np.floor(self.points[:, :2] / (2 * flying.speed * flying.step)).astype(np.int64)
+        _, self._block = np.unique(corner, axis=0, return_inverse=True)
+        self._block = self._block.ravel()
+        each = np.bincount(self._block)
+        sums = [np.bincount(self._block, self.points[:, axis]) for axis in (0, 1)]
+        self._middles = np.stack(sums, axis=-1) / each[:, None]
         self._half = np.array([sensor.half_width, sensor.half_height])
 
     @property
@@ -192,7 +200,8 @@ class InformationPlanner:
         asked = 0
         length = self.flying.speed * self.flying.step / -np.log(h.fades) if h.fades < 1 else np.inf
         for ahead in range(h.steps):
-            parents, headings = self._headings(states, left)
+            blocks = self._in_blocks(left)
+            parents, headings = self._headings(states, blocks)
             cams = self._positions(states, parents, headings)
             R = self._attitudes(headings)
             before = np.stack([one.R_nc for one in states])[parents]
@@ -206,7 +215,7 @@ class InformationPlanner:
             )  # fmt: skip
             asked += gains.size
             off = ~np.isfinite(cams).all(axis=(1, 2))
-            tail = worth_beyond(left, self.weights, self.points, parents, cams[:, -1], length)
+            tail = worth_beyond(blocks, self._middles, parents, cams[:, -1], length)
             value = worth[parents][:, None] + h.fades**ahead * gains
             # What a step itself learns is no longer left beyond it; where it looks is near where it ends.
             total = value + h.beyond * h.fades ** (ahead + 1) * (tail[:, None] - gains)
@@ -233,18 +242,19 @@ class InformationPlanner:
                 states = [leg.end for leg in legs]
         return Chosen(first[0], float(gained[0]), asked)
 
-    def _headings(self, states: list[Platform], left: Array) -> tuple[NDArray[np.intp], Array]:
+    def _in_blocks(self, left: Array) -> Array:
+        """(B, S) what is left to know in each block of each state."""
+        count = len(self._middles)
+        whole = self._block + count * np.arange(len(left))[:, None]
+        return np.bincount(whole.ravel(), (left * self.weights).ravel(), len(left) * count).reshape(-1, count)
+
+    def _headings(self, states: list[Platform], blocks: Array) -> tuple[NDArray[np.intp], Array]:
         """Candidates (K,): which state each begins in, and its heading."""
-        turns = np.array(self.horizon.turns)
-        each = np.array([one.heading for one in states])[:, None] + turns
-        aims = []
-        for one, known in zip(states, left, strict=True):
-            away = self.points[:, :2] - one.north_east
-            pull = (
-                self.weights * known * np.exp(-np.hypot(*away.T) / (self.flying.speed * self.flying.step * 3))
-            )
-            aims.append(np.arctan2(*away[int(np.argmax(pull)), ::-1]))
-        headings = np.concatenate([each, np.array(aims)[:, None]], axis=1)
+        each = np.array([one.heading for one in states])[:, None] + np.array(self.horizon.turns)
+        away = self._middles - np.stack([one.north_east for one in states])[:, None]
+        pull = blocks * np.exp(-np.hypot(away[..., 0], away[..., 1]) / self._near)
+        best = away[np.arange(len(states)), np.argmax(pull, axis=1)]
+        headings = np.concatenate([each, np.arctan2(best[:, 1], best[:, 0])[:, None]], axis=1)
         parents = np.repeat(np.arange(len(states)), headings.shape[1])
         return parents, headings.ravel()
 

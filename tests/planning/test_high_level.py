@@ -1,0 +1,105 @@
+"""The high-level planner: both objectives, the rules by which animals are lost, and what greed costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.planning.high_level import (
+    SEARCH,
+    all_positioned,
+    best_by_measure,
+    best_goal,
+    greedy_tour,
+    known_measure,
+    lost_by_covariance,
+    lost_by_search,
+    shortest_tour,
+    utilities,
+)
+
+MEASURE = {"alpha": 0.01, "speed": 5.0, "walk": 0.25, "horizon": 60.0}
+GREEDY = {"alpha": 1.0, "c": 400.0, "speed": 5.0, "walk": 0.25}
+
+
+def test_the_measure_counts_animals_and_then_how_well_they_are_known():
+    P = [np.eye(2), 50 * np.eye(2)]
+    assert known_measure(P, 1e-9) == pytest.approx(2)
+    assert known_measure(P, 0.5) == pytest.approx(np.exp(-1) + np.exp(-50))
+    assert known_measure(np.zeros((0, 2, 2)), 0.5) == 0
+
+
+def test_utilities_are_reward_over_distance():
+    worth = utilities([[0, 50], [0, 100]], [8 * np.eye(2), 18 * np.eye(2)], [0, 0], [30, 40], alpha=0.5, c=10)
+    assert worth == pytest.approx([4 / 50, 6 / 100, 10 / 50])
+    assert np.isneginf(utilities([[0, 50]], [np.eye(2)], [0, 0], None, alpha=1, c=1)[-1])
+    assert np.isinf(utilities([[0, 0]], [np.eye(2)], [0, 0], None, alpha=1, c=1)[0])
+
+
+def test_the_greatest_utility_is_the_goal():
+    P = [50 * np.eye(2), 500 * np.eye(2)]
+    at = [[0, 50], [0, 100]]
+    assert best_goal(at, P, [0, 0], [0, 10], alpha=1, c=1) == 1
+    assert best_goal(at, P, [0, 0], [0, 10], alpha=1, c=200) == SEARCH
+    assert best_goal(at, P, [0, 45], [0, 10], alpha=1, c=1) == 0
+    with pytest.raises(WildlabError, match="no goal left"):
+        best_goal(np.zeros((0, 2)), np.zeros((0, 2, 2)), [0, 0], None, alpha=1, c=1)
+
+
+def test_the_measure_sends_back_for_what_is_known_badly_and_on_where_much_can_be_found():
+    at, bad = [[0.0, 50.0]], [200 * np.eye(2)]
+    assert best_by_measure(at, bad, [0, 0], finds=0.0, **MEASURE) == 0
+    assert best_by_measure(at, bad, [0, 0], finds=1.0, **MEASURE) == SEARCH
+    well = [np.eye(2)]
+    assert best_by_measure(at, well, [0, 0], finds=0.02, **MEASURE) == SEARCH
+    assert best_by_measure([[0.0, 400.0]], bad, [0, 0], finds=0.0, **MEASURE) == SEARCH  # not in time
+    two = best_by_measure(
+        [[0.0, 50.0], [0.0, 50.0]], [20 * np.eye(2), 200 * np.eye(2)], [0, 0], finds=0.0, **MEASURE
+    )
+    assert two == 1
+
+
+def test_an_enclosure_is_done_when_all_are_known_at_once():
+    assert all_positioned([5, 4, 0], [5, 5, 0]).tolist() == [True, False, True]
+
+
+def test_both_rules_by_which_an_animal_is_lost():
+    assert lost_by_covariance([10 * np.eye(2), 60 * np.eye(2)], 100.0).tolist() == [False, True]
+    assert lost_by_search([0.5, 0.01], 0.05).tolist() == [False, True]
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6))
+def test_no_order_is_quicker_than_the_shortest(seed):
+    rng = np.random.default_rng(seed)
+    at, here, end = rng.uniform(0, 200, (4, 2)), rng.uniform(0, 200, 2), rng.uniform(0, 200, 2)
+    P = rng.uniform(1, 200, 4)[:, None, None] * np.eye(2)
+    best = shortest_tour(at, here, end, 5.0)
+    greedy = greedy_tour(at, P, here, end, **GREEDY)
+    assert set(greedy.order) == set(best.order) == {0, 1, 2, 3, SEARCH}
+    assert greedy.time >= best.time - 1e-9
+    steps = np.linalg.norm(np.diff(greedy.path, axis=0), axis=1)
+    assert steps.sum() == pytest.approx(5.0 * greedy.time)
+    along = np.linalg.norm(np.diff(best.path, axis=0), axis=1)
+    assert along.sum() == pytest.approx(5.0 * best.time)
+
+
+def test_a_greedy_planner_turns_round_where_a_look_ahead_goes_there_first():
+    """The way point lies far to the north; to the south an animal becomes worth more on the way."""
+    at, end = [[-60.0, 0.0]], [400.0, 0.0]
+    greedy = greedy_tour(at, [235 * np.eye(2)], [0, 0], end, alpha=1.0, c=3200.0, speed=5.0, walk=30.0)
+    best = shortest_tour(at, [0, 0], end, 5.0)
+    assert best.order == greedy.order == (0, SEARCH) and best.time == pytest.approx(104.0)
+    assert greedy.broken_off == 1
+    # One second to the north and back again.
+    assert greedy.time == pytest.approx(106.0) and greedy.path[:, 0].max() == 400
+
+
+def test_a_tour_that_does_not_end_is_given_up_and_too_many_orders_are_refused():
+    given_up = greedy_tour([[0, 1e5]], [np.eye(2)], [0, 0], [0, 10.0], longest=60.0, **GREEDY)
+    assert np.isinf(given_up.time)
+    with pytest.raises(WildlabError, match="too many orders"):
+        shortest_tour(np.zeros((9, 2)), [0, 0], [1, 1], 5.0)

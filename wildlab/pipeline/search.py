@@ -1,0 +1,321 @@
+"""A search for animals, closed: a planner says where to fly, a camera looks, and what it finds is told.
+
+A planner knows the ground, the fences and how many animals each holds (F 5.1); where they are it learns when
+an image shows one. An animal in an image is found with the probability of F (5.8)-(5.9), and where the ground
+hides it, not at all. An enclosure whose animals are all found is done (F 5.3), whoever plans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+from wildlab.geometry.visibility import lines_clear
+from wildlab.planning.areas import contains
+from wildlab.planning.followers import PatternPlanner, RandomWalk
+from wildlab.planning.information import SearchSensor, in_field_of_view
+from wildlab.planning.legs import Flying, Leg, Platform
+from wildlab.planning.patterns import Pattern, lawn_mower
+from wildlab.planning.planner import InformationPlanner
+
+
+class World(NamedTuple):
+    """What is searched.
+
+    Attributes
+    ----------
+    terrain
+        The ground.
+    areas
+        Fences, (K, 2) north and east each, m.
+    animals
+        (T, A, 3) the middle of each animal's body in n at each image, m.
+    area_of
+        (A,) in which area each lives.
+    chance
+        (T, A) from 0 to 1: an animal is found in an image where its probability is above this. The same for
+        all planners, so that luck does not tell them apart.
+    """
+
+    terrain: Terrain
+    areas: tuple[Array, ...]
+    animals: Array
+    area_of: NDArray[np.intp]
+    chance: Array
+
+
+class Searched(NamedTuple):
+    """A search that has ended: all were found, or the time was up.
+
+    Attributes
+    ----------
+    found
+        (A,) s, when each animal was first found; infinite where it was not.
+    p_nc
+        (L, 3) where images were taken, m.
+    counts
+        (L,) images for which the camera was at rest.
+    covered
+        (L,) share of the grid that had been in an image, and not hidden.
+    asked
+        Candidate steps that were weighed, in all.
+    decisions
+        How often the planner was asked.
+    """
+
+    found: Array
+    p_nc: Array
+    counts: NDArray[np.bool_]
+    covered: Array
+    asked: int
+    decisions: int
+
+
+class Searcher(Protocol):
+    """A planner, as the loop asks it."""
+
+    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+        """The next leg, and how many candidate steps were weighed.
+
+        Parameters
+        ----------
+        platform
+            Where it is.
+        open_areas
+            (A,) whether an area still has animals that were not found.
+        """
+        ...
+
+    def flown(self, leg: Leg) -> None:
+        """Told of each leg that was flown."""
+        ...
+
+
+def search(
+    world: World, searcher: Searcher, start: Platform, sensor: SearchSensor, flying: Flying, grid: Array
+) -> Searched:
+    """Let a planner search until all are found or the world ends.
+
+    Parameters
+    ----------
+    world
+        What is searched; as many images as it has can be taken.
+    searcher
+        The planner.
+    start
+        Where the platform begins.
+    sensor
+        The camera; it decides what is found.
+    flying
+        What the platform can do.
+    grid
+        (N, 3) points for the share that was covered, m.
+
+    Returns
+    -------
+    Searched
+    """
+    images, animals = world.chance.shape
+    found = np.full(animals, np.inf)
+    seen = np.zeros(len(grid), bool)
+    platform, taken, asked, decisions = start, 0, 0, 0
+    p_nc, counts, covered = [], [], []
+    while taken + flying.images <= images and np.isinf(found).any():
+        still = np.isinf(found)
+        open_areas = np.array([still[world.area_of == k].any() for k in range(len(world.areas))])
+        leg, weighed = searcher.next_leg(platform, open_areas)
+        asked, decisions = asked + weighed, decisions + 1
+        rows = np.arange(taken, taken + flying.images)
+        shown = found_in(world, leg, rows, sensor) & still
+        for image, hits in zip(rows, shown, strict=True):
+            found[hits & np.isinf(found)] = flying.interval * (image + 1)
+        for image in range(flying.images):
+            if leg.counts[image]:
+                seen |= shown_points(world.terrain, grid, leg, image, sensor, ~seen)
+            covered.append(seen.mean())
+        searcher.flown(leg)
+        platform, taken = leg.end, taken + flying.images
+        p_nc.append(leg.p_nc)
+        counts.append(leg.counts)
+    return Searched(
+        found, np.concatenate(p_nc), np.concatenate(counts), np.array(covered), asked, decisions
+    )  # fmt: skip
+
+
+def found_in(world: World, leg: Leg, rows: NDArray[np.intp], sensor: SearchSensor) -> NDArray[np.bool_]:
+    """(L, A) which animals the images of a leg find; ``rows`` (L,) are its images in the world's count."""
+    hit = np.zeros((len(rows), world.chance.shape[1]), bool)
+    for image, row in enumerate(rows):
+        if not leg.counts[image]:
+            continue
+        at, p = world.animals[row], leg.p_nc[image]
+        away = ((at - p) ** 2).sum(axis=1)
+        likely = world.chance[row] < np.exp(-away / sensor.reach**2)
+        if likely.any():
+            inside = np.flatnonzero(likely)
+            inside = inside[in_field_of_view(at[inside], p, leg.R_nc[min(image, len(leg.R_nc) - 1)], sensor)]
+            hit[image, inside] = lines_clear(world.terrain, at[inside], p) if len(inside) else True
+    return hit
+
+
+def shown_points(
+    terrain: Terrain, points: Array, leg: Leg, image: int, sensor: SearchSensor, asked: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(N,) which of the points that are asked for an image shows, and nothing hides."""
+    p, R = leg.p_nc[image], leg.R_nc[min(image, len(leg.R_nc) - 1)]
+    inside = np.flatnonzero(asked & in_field_of_view(points, p, R, sensor))
+    shown = np.zeros(len(points), bool)
+    if len(inside):
+        shown[inside] = lines_clear(terrain, points[inside], p)
+    return shown
+
+
+class SearchByInformation:
+    """The planner of F 5.3.2 over the grids of all areas that are not done.
+
+    Parameters
+    ----------
+    planner
+        With the grid of all areas.
+    area_of
+        (N,) of which area each point of its grid is.
+    walk
+        Variance of the animals' walk over one step, each way, m^2, by which what is known wears off.
+    """
+
+    def __init__(self, planner: InformationPlanner, area_of: NDArray[np.intp], walk: float) -> None:
+        self.planner, self.area_of, self.walk = planner, area_of, walk
+
+    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+        """As `Searcher` has it."""
+        self.planner.weights[:] = open_areas[self.area_of]
+        chosen = self.planner.choose(platform)
+        return chosen.leg, chosen.asked
+
+    def flown(self, leg: Leg) -> None:
+        """As `Searcher` has it."""
+        self.planner.add(leg)
+        self.planner.wait(self.walk)
+
+
+class SearchInRows:
+    """Rows over one area after the other, again over those where animals are left, F 5.2 with F 5.3's rule.
+
+    Parameters
+    ----------
+    world
+        Its fences and its ground are used, no more.
+    flying
+        What the platform can do.
+    distance
+        Between rows, m.
+    order
+        In which the areas are searched.
+    sides
+        Of the camera, as `PatternPlanner` has them.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        flying: Flying,
+        distance: float,
+        order: Sequence[int],
+        sides: Sequence[float] = (0.0,),
+    ) -> None:
+        self.areas, self.terrain, self.flying = world.areas, world.terrain, flying
+        self.distance, self.order, self.sides = distance, tuple(order), tuple(sides)
+        self._queue: list[int] = []
+        self._now: PatternPlanner | None = None
+        self._area = -1
+
+    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+        """As `Searcher` has it."""
+        if self._now is None or self._now.done or not open_areas[self._area]:
+            self._queue = [one for one in self._queue if open_areas[one]]
+            if not self._queue:
+                self._queue = [one for one in self.order if open_areas[one]]
+            self._area = self._queue.pop(0)
+            rows = rows_from(self.areas[self._area], self.distance, platform.north_east)
+            self._now = PatternPlanner(rows.waypoints, self.terrain, self.flying, self.sides)
+        return self._now.choose(platform), 0
+
+    def flown(self, leg: Leg) -> None:
+        """As `Searcher` has it; rows do not ask what was seen."""
+
+
+def rows_from(area: Array, distance: float, start: Array) -> Pattern:
+    """Rows over an area that begin at the corner nearest to where one is."""
+    return lawn_mower(area, distance, start=start)
+
+
+class SearchByChance:
+    """A random walk over the areas that are not done.
+
+    Parameters
+    ----------
+    world
+        Its fences and its ground are used, no more.
+    flying
+        What the platform can do.
+    rng
+        What chance there is.
+    """
+
+    def __init__(self, world: World, flying: Flying, rng: np.random.Generator) -> None:
+        self.areas = world.areas
+        self._walk = RandomWalk(list(world.areas), world.terrain, flying, rng)
+
+    def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
+        """As `Searcher` has it."""
+        self._walk.areas = [area for area, still in zip(self.areas, open_areas, strict=True) if still]
+        return self._walk.choose(platform), 0
+
+    def flown(self, leg: Leg) -> None:
+        """As `Searcher` has it; chance does not ask what was seen."""
+
+
+def grid_over(areas: Sequence[Array], terrain: Terrain, step: float) -> tuple[Array, NDArray[np.intp]]:
+    """Points inside areas, one for each cell of a grid.
+
+    Parameters
+    ----------
+    areas
+        Fences, (K, 2) each, m.
+    terrain
+        On which the points lie.
+    step
+        Between points, m.
+
+    Returns
+    -------
+    points, area_of
+        (N, 3) in n, m, and (N,) in which area each lies.
+
+    Raises
+    ------
+    WildlabError
+        Where an area lies beyond the map, or is too small for a point.
+    """
+    points, of = [], []
+    for number, area in enumerate(areas):
+        low, high = area.min(axis=0), area.max(axis=0)
+        axes = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]
+        flat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        flat = flat[contains(area, flat)] if len(flat) else flat
+        up = terrain.heights_at(flat)
+        if not len(flat) or not np.isfinite(up).all():
+            raise WildlabError(
+                f"area {number + 1} has {len(flat)} points of the grid, {np.isnan(up).sum()} off the map",
+                "give an area on the map, and a grid finer than the area",
+                field="areas",
+            )
+        points.append(np.column_stack([flat, -up]))
+        of.append(np.full(len(flat), number))
+    return np.concatenate(points), np.concatenate(of)

@@ -1,0 +1,242 @@
+"""One drawn world, searched by planners that know the same and fly the same: F 5.2, 5.3, appendix A."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.search import (
+    SearchByChance,
+    SearchByInformation,
+    Searched,
+    Searcher,
+    SearchInRows,
+    World,
+    grid_over,
+    search,
+)
+from wildlab.planning.areas import rectangle
+from wildlab.planning.information import SearchSensor, initial_information
+from wildlab.planning.legs import Flying, Platform, look_attitude
+from wildlab.planning.planner import Horizon, InformationPlanner
+from wildlab.simulation.animal_motion import reflected
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.landscape import synthetic_landscape
+from wildlab.simulation.parameters import TwinParameters, load_twin
+
+#: The planners: by what is to be learnt, the same with its camera fixed straight down, rows with the camera
+#: straight down and from side to side, and by chance.
+INFORMATION, FIXED, ROWS, SWING, CHANCE = "information", "information-down", "rows", "rows-swing", "chance"
+SUBJECTS = (INFORMATION, FIXED, ROWS, SWING, CHANCE)
+#: Names of the numbers that are recorded, and their units.
+RECORDED = {
+    "first_found": "s",
+    "half_found": "s",
+    "all_found": "s",
+    "mean_found": "s",
+    "share_found": "1",
+    "covered": "1",
+    "weighed": "1",
+}
+#: At which shares of the time budget the share found is kept.
+STATIONS = 24
+
+#: The camera's reach, the r of F (5.9), m: not printed.
+REACH_M = 100.0
+#: Grid of the planner, m.
+CELL_M = 10.0
+#: How long a search may take, s: what a multicopter's battery allows for.
+BUDGET_S = 1200.0
+
+
+class Tuned(NamedTuple):
+    """What was chosen for the planners, on worlds that are not judged (seeds 1001 and after).
+
+    Attributes
+    ----------
+    sd
+        Of the camera's angles as the information planner is told, rad.
+    prior
+        How far off an animal may be before anything is seen, m.
+    looks
+        Of the camera, degrees to the side and ahead.
+    horizon
+        The rest of how steps are chosen.
+    rows, swing_rows
+        Distance between rows, m, with the camera straight down and from side to side.
+    swing
+        Of the camera in rows, degrees to the side, one image each.
+    """
+
+    sd: float = 0.1
+    prior: float = 60.0
+    looks: tuple[tuple[float, float], ...] = ((0.0, 0.0), (30.0, 0.0), (-30.0, 0.0), (0.0, 30.0))
+    horizon: Horizon = Horizon()
+    rows: float = 32.0
+    swing_rows: float = 60.0
+    swing: tuple[float, ...] = (20.0, -20.0)
+
+
+class Scene(NamedTuple):
+    """A world and all that every planner is given.
+
+    Attributes
+    ----------
+    world
+        What is searched.
+    grid, area_of
+        Points (N, 3) m, and of which area each is.
+    start
+        Where the platform begins.
+    sensor, flying
+        The camera and what the platform can do.
+    walk
+        Variance of the animals' walk over a second, each way, m^2.
+    first
+        Area that the platform begins at.
+    """
+
+    world: World
+    grid: Array
+    area_of: NDArray[np.intp]
+    start: Platform
+    sensor: SearchSensor
+    flying: Flying
+    walk: float
+    first: int
+
+
+def draw_scene(seed: int, twin: str) -> Scene:
+    """The world of a seed: land, two enclosures, and animals that walk in them.
+
+    Camera, height, speed, sizes of enclosures, how many animals each holds and how they walk are the twin's;
+    where the enclosures lie, how they are turned and everything about chance is drawn.
+    """
+    given = load_twin(twin)
+    rng = stream(seed, "world")
+    terrain = synthetic_landscape(seed)
+    flying = Flying(given.flight.airspeed.si, given.flight.altitude.si)
+    images = int(BUDGET_S / flying.interval)
+    names = rng.choice(sorted(given.enclosures), 2, replace=False)
+    areas, animals, of = [], [], []
+    for number, (name, side) in enumerate(zip(names, (-1.0, 1.0), strict=True)):
+        size = given.enclosures[name]
+        length, width = size.length.si, size.width.si
+        middle = np.array([rng.uniform(-60.0, 60.0), side * rng.uniform(160.0, 240.0)])
+        course = np.pi / 2 + rng.uniform(-0.35, 0.35)
+        areas.append(rectangle(*middle, length, width, course))
+        count = int(size.animals.number)
+        flat = _walks(middle, length, width, course, (images, count), _step_sd(given, flying), rng)
+        up = terrain.heights_at(flat.reshape(-1, 2)).reshape(images, count) + given_height(given)
+        animals.append(np.concatenate([flat, -up[..., None]], axis=-1))
+        of += [number] * count
+    world = World(
+        terrain, tuple(areas), np.concatenate(animals, axis=1), np.array(of), rng.random((images, len(of)))
+    )
+    grid, area_of = grid_over(world.areas, terrain, CELL_M)
+    first = int(rng.integers(2))
+    corner = world.areas[first][int(rng.integers(4))]
+    heading = float(np.arctan2(*(world.areas[first].mean(axis=0) - corner)[::-1]))
+    start = Platform(corner, heading, look_attitude(heading, 0.0, 0.0))
+    half = (given_half(given, "width"), given_half(given, "height"))
+    sensor = SearchSensor(*half, sd=Tuned().sd, reach=REACH_M, nearest=CELL_M / 2)
+    return Scene(world, grid, area_of, start, sensor, flying, _step_sd(given, flying) ** 2, first)
+
+
+def given_half(given: TwinParameters, side: str) -> float:
+    """Tangent of half an angle of view, F (2.23)."""
+    camera = given.camera
+    size, focal = (camera.width, camera.fx) if side == "width" else (camera.height, camera.fy)
+    return float(size.number / 2 / focal.number)
+
+
+def given_height(given: TwinParameters) -> float:
+    """Of the middle of an animal above the ground, m."""
+    return 0.0 if given.animals is None else float(given.animals.height.si)
+
+
+def _step_sd(given: TwinParameters, flying: Flying) -> float:
+    """Standard deviation of an animal's walk from one image to the next, each way, m."""
+    animals = given.animals
+    if animals is None:
+        return 0.0
+    # A new velocity each step of the walk: variances of steps add.
+    return float(animals.speed_sd.si * np.sqrt(animals.step.si * flying.interval))
+
+
+def _walks(
+    middle: Array, length: float, width: float, course: float, shape: tuple[int, int], sd: float,
+    rng: np.random.Generator,
+) -> Array:  # fmt: skip
+    """(T, A, 2) random walks that fences reflect, from anywhere in the enclosure (F 7.5.1)."""
+    half = np.array([length, width]) / 2
+    walk = rng.uniform(-half, half, (shape[1], 2)) + np.cumsum(sd * rng.standard_normal((*shape, 2)), axis=0)
+    x, y = (reflected(walk[..., axis], half[axis]) for axis in (0, 1))
+    along = np.array([np.cos(course), np.sin(course)])
+    return np.asarray(middle + x[..., None] * along + y[..., None] * np.array([-along[1], along[0]]))
+
+
+def searchers(scene: Scene, seed: int, tuned: Tuned | None = None) -> dict[str, Callable[[], Searcher]]:
+    """Each planner by its name, made anew when called."""
+    t = tuned or Tuned()
+    sensor = SearchSensor(
+        scene.sensor.half_width, scene.sensor.half_height, t.sd, scene.sensor.reach, scene.sensor.nearest
+    )
+    looks = tuple((float(np.radians(side)), float(np.radians(ahead))) for side, ahead in t.looks)
+    order = (scene.first, 1 - scene.first)
+    world, flying = scene.world, scene.flying
+
+    def informed(horizon: Horizon) -> Searcher:
+        Y = initial_information(len(scene.grid), [t.prior, t.prior, 1.0])
+        planner = InformationPlanner(scene.grid, Y, world.terrain, sensor, flying, horizon)
+        return SearchByInformation(planner, scene.area_of, scene.walk * flying.images)
+
+    h = t.horizon
+    free = Horizon(h.turns, looks, h.steps, h.beam, h.fades, h.beyond)
+    down = Horizon(h.turns, ((0.0, 0.0),), h.steps, h.beam, h.fades, h.beyond)
+    swing = tuple(np.radians(t.swing))
+    return {
+        INFORMATION: lambda: informed(free),
+        FIXED: lambda: informed(down),
+        ROWS: lambda: SearchInRows(world, flying, t.rows, order),
+        SWING: lambda: SearchInRows(world, flying, t.swing_rows, order, swing),
+        CHANCE: lambda: SearchByChance(world, flying, stream(seed, "random walk")),
+    }
+
+
+def search_all(seed: int, twin: str, only: tuple[str, ...] = SUBJECTS) -> tuple[Scene, dict[str, Searched]]:
+    """The world of a seed and what each planner made of it."""
+    scene = draw_scene(seed, twin)
+    each = searchers(scene, seed)
+    return scene, {
+        name: search(scene.world, each[name](), scene.start, scene.sensor, scene.flying, scene.grid)
+        for name in only
+    }
+
+
+def numbers_of(found: Searched) -> dict[str, float]:
+    """What is kept of a search; a time of what was not found is the whole budget."""
+    times = np.sort(np.minimum(found.found, BUDGET_S))
+    last = np.minimum(np.arange(1, STATIONS + 1) * BUDGET_S / STATIONS, np.inf)
+    shares = {f"share_{n + 1}": float((found.found <= at).mean()) for n, at in enumerate(last)}
+    return {
+        "first_found": float(times[0]),
+        "half_found": float(times[(len(times) + 1) // 2 - 1]),
+        "all_found": float(times[-1]),
+        "mean_found": float(times.mean()),
+        "share_found": float(np.isfinite(found.found).mean()),
+        "covered": float(found.covered[-1]),
+        "weighed": found.asked / found.decisions,
+        "decisions": float(found.decisions),
+        **shares,
+    }
+
+
+def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
+    """One drawn world, searched by every planner."""
+    _, found = search_all(seed, twin)
+    return {(who, name): value for who, one in found.items() for name, value in numbers_of(one).items()}
