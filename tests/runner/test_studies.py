@@ -176,6 +176,20 @@ def test_a_tarpaulin_is_looked_for_on_one_flight(reports: Path, faults: Faults) 
     assert faults(folder / "report.html") == []
 
 
+def test_two_worlds_are_searched_by_every_planner(reports: Path, faults: Faults) -> None:
+    folder = run("information-planning", reports, seeds=2)
+    found = values(folder)
+    for planner in ("information", "information-down", "rows", "rows-swing", "chance"):
+        metric = found["all_found", planner]
+        assert 0 < metric["low"] <= metric["value"] <= metric["high"] <= 1200
+    assert found["tour_time", "look-ahead"]["value"] <= found["tour_time", "greedy"]["value"]
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 8)
+    for figure in ("share-found", "times", "way-information", "way-rows", "way-chance", "greedy"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_animals_are_looked_for_in_four_kinds_of_weather(reports: Path, faults: Faults) -> None:
     folder = run("wildlife-detection", reports, seeds=2)
     found = values(folder)

@@ -17,6 +17,7 @@ C. Christensson, Wildlife Surveillance Using a UAV and Thermal Imagery, master's
 - `wildlab.planning.information`: what is known of each point of a grid, and what an image adds (F 5.3.2).
 - `wildlab.planning.planner`: where to fly and look next, by what is to be learnt; `followers`: along way
   points, or by chance; `legs`: what platform and gimbal can do.
+- `wildlab.planning.high_level`: search on, or go back to an animal that is known (F 5.3.1).
 
 >>> from wildlab.planning import fly, lawn_mower
 >>> course = fly(lawn_mower([[0, 0], [0, 40], [100, 40], [100, 0]], 20.0), speed=5.0, turn_time=3.0)

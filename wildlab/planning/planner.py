@@ -92,8 +92,8 @@ class InformationPlanner:
     sensor, flying, horizon
         What the camera sees, what the platform can do, and how steps are chosen.
     hides
-        Whether the ground can hide points from where candidate steps look; without, the planner takes all
-        lines of sight for clear, which is exact where no slope is as steep as a line of sight.
+        Whether the ground can hide points from where candidate steps look; without, candidates take all lines
+        of sight for clear, which is exact where no slope is as steep as a line of sight, and far quicker.
 
     Raises
     ------
@@ -153,14 +153,12 @@ class InformationPlanner:
         leg
             As flown.
         clear
-            (L, N) whether nothing hides each point; None works it out.
+            (L, N) whether nothing hides each point; None asks the terrain, whatever candidates do.
         """
         from wildlab.planning.information_kernels import after_images
 
         if clear is None:
-            clear = np.zeros((0, 0), bool)
-            if self.hides:
-                clear = self._clear(leg.p_nc[None], self._reach(leg.p_nc[None], leg.R_nc[None]))[0]
+            clear = self._lines(leg.p_nc[None], self._reach(leg.p_nc[None], leg.R_nc[None]))[0]
         s = self.sensor
         after_images(
             self.Y, self.left, self.weights, self.points, leg.p_nc, leg.R_nc, leg.counts, clear, self._half,
@@ -273,9 +271,11 @@ class InformationPlanner:
         return np.asarray(sideways_limit(R, 1.0, self.sensor).max(axis=1)[:, None] * depth)
 
     def _clear(self, cams: Array, reach: Array) -> NDArray[np.bool_]:
-        """(K, L, N) whether nothing hides a point within reach; (0, 0, 0) where nothing can."""
-        if not self.hides:
-            return np.zeros((0, 0, 0), bool)
+        """As `_lines`, or (0, 0, 0) where candidates take all lines of sight for clear."""
+        return self._lines(cams, reach) if self.hides else np.zeros((0, 0, 0), bool)
+
+    def _lines(self, cams: Array, reach: Array) -> NDArray[np.bool_]:
+        """(K, L, N) whether nothing hides a point that counts and lies within reach (K, L)."""
         away = np.linalg.norm(self.points[:, :2] - cams[:, :, None, :2], axis=-1)
         k, image, i = np.nonzero((away <= reach[..., None]) & (self.weights > 0))
         clear = np.zeros(away.shape, bool)

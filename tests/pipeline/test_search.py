@@ -1,0 +1,97 @@
+"""The loop of planner and camera: what is found when, and what planners are told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.search import SearchByChance, SearchInRows, World, found_in, grid_over, search
+from wildlab.planning.information import SearchSensor
+from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
+
+SENSOR = SearchSensor(0.3, 0.2, sd=0.2, reach=100.0, nearest=5.0)
+FLYING = Flying(5.0, 50.0)
+FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
+AREAS = (
+    np.array([[0.0, 0.0], [60.0, 0.0], [60.0, 60.0], [0.0, 60.0]]),
+    np.array([[0.0, 100.0], [60.0, 100.0], [60.0, 160.0], [0.0, 160.0]]),
+)
+START = Platform(np.zeros(2), 0.0, look_attitude(0.0, 0.0, 0.0))
+
+
+def world(spots, chance=0.0, images=300, terrain=FLAT) -> World:
+    at = np.column_stack([np.array(spots, float), np.full(len(spots), -0.5)])
+    area_of = np.array([0 if east < 80 else 1 for _, east in spots])
+    return World(terrain, AREAS, np.tile(at, (images, 1, 1)), area_of, np.full((images, len(spots)), chance))
+
+
+def test_an_animal_is_found_by_its_probability_and_in_the_field_of_view():
+    leg = Leg(
+        np.array([[0.0, 0.0, -50.0]] * 3),
+        look_attitude(0.0, 0.0, 0.0)[None],
+        np.array([True, False, True]),
+        0.0,
+    )
+    here, beside = [5.0, 5.0], [30.0, 0.0]
+    rows = np.arange(3)
+    assert found_in(world([here, beside]), leg, rows, SENSOR).tolist() == [
+        [True, False], [False, False], [True, False],
+    ]  # fmt: skip
+    away = 49.5**2 + 50
+    luck = np.exp(-away / 100.0**2)
+    assert found_in(world([here], luck - 1e-6), leg, rows, SENSOR).any()
+    assert not found_in(world([here], luck + 1e-6), leg, rows, SENSOR).any()
+
+
+def test_what_the_ground_hides_is_not_found():
+    height = np.zeros((101, 101), np.float32)
+    height[:, 52] = 45.0
+    walled = Terrain(height, north=-500.0, east=-500.0, step=10.0)
+    leg = Leg(np.array([[0.0, 0.0, -50.0]]), look_attitude(0.0, 0.7, 0.0)[None], np.array([True]), 0.0)
+    assert found_in(world([[0.0, 45.0]]), leg, np.arange(1), SENSOR).all()
+    assert not found_in(world([[0.0, 45.0]], terrain=walled), leg, np.arange(1), SENSOR).any()
+
+
+def test_a_search_ends_when_all_are_found_and_leaves_an_area_that_is_done():
+    rows = SearchInRows(world([[5.0, 5.0], [30.0, 130.0]]), FLYING, 15.0, (0, 1))
+    grid, _ = grid_over(AREAS, FLAT, 10.0)
+    found = search(world([[5.0, 5.0], [30.0, 130.0]]), rows, START, SENSOR, FLYING, grid)
+    assert found.found[0] <= 3 and np.isfinite(found.found).all()
+    assert len(found.p_nc) == 3 * found.decisions and found.asked == 0
+    # The first area is left at once: its far corner was never flown to.
+    first = found.p_nc[found.p_nc[:, 1] < 75]
+    assert not ((first[:, 0] > 40) & (first[:, 1] < 40)).any()
+    assert (np.diff(found.covered) >= 0).all() and 0 < found.covered[-1] < 1
+
+
+def test_rows_are_flown_again_while_animals_are_missing():
+    lucky = world([[30.0, 30.0]], images=600)
+    lucky.chance[:150] = 1.0  # not found on the first round
+    rows = SearchInRows(lucky, FLYING, 15.0, (0, 1))
+    grid, _ = grid_over(AREAS[:1], FLAT, 10.0)
+    found = search(lucky, rows, START, SENSOR, FLYING, grid)
+    assert 150 < found.found[0] < 600 and (found.p_nc[:, 1] < 80).all()
+
+
+def test_a_search_without_luck_ends_with_the_time():
+    dark = world([[30.0, 30.0]], chance=1.0, images=50)
+    walk = SearchByChance(dark, FLYING, np.random.default_rng(1))
+    found = search(dark, walk, START, SENSOR, FLYING, grid_over(AREAS, FLAT, 10.0)[0])
+    assert np.isinf(found.found).all() and len(found.p_nc) == 48
+
+
+def test_a_grid_lies_in_its_areas_and_on_the_ground():
+    slope = Terrain(
+        np.tile(np.arange(101, dtype=np.float32)[:, None], 101), north=-500.0, east=-500.0, step=10.0
+    )
+    points, area_of = grid_over(AREAS, slope, 10.0)
+    assert len(points) == 72 and (area_of == np.repeat([0, 1], 36)).all()
+    assert points[:, 2] == pytest.approx(-(points[:, 0] + 500) / 10)
+
+
+@pytest.mark.parametrize("area", [AREAS[0] + 1000, AREAS[0] / 100])
+def test_an_area_off_the_map_or_without_a_point_is_refused(area):
+    with pytest.raises(WildlabError, match="area 1 has"):
+        grid_over([area], FLAT, 10.0)

@@ -1,0 +1,179 @@
+"""What the study of planning by information computes, and that its words turn with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.evaluation.shares import FAILS, HOLDS, decide, decide_check
+from wildlab.planning.areas import contains
+from wildlab.reporting.published import load_claims
+from wildlab.studies.information_planning import STUDY, charts, text
+from wildlab.studies.information_planning.trial import (
+    AHEAD,
+    BUDGET_S,
+    CHANCE,
+    FIXED,
+    GREEDY,
+    INFORMATION,
+    RECORDED,
+    ROWS,
+    SEARCHERS,
+    STATIONS,
+    SWING,
+    check_claims,
+    draw_scene,
+    draw_situation,
+    numbers_of,
+    search_all,
+)
+
+
+@pytest.fixture(scope="module")
+def one():
+    return search_all(2, "uav-search", (INFORMATION, ROWS))
+
+
+def row(**changed: float) -> dict[tuple[str, str], float]:
+    base = {
+        (who, name): value
+        for who in SEARCHERS
+        for name, value in {
+            "first_found": 10.0, "half_found": 100.0, "all_found": 300.0, "mean_found": 150.0,
+            "share_found": 1.0, "covered": 0.9, "weighed": 200.0,
+        }.items()
+    }  # fmt: skip
+    base |= {(who, f"share_{n + 1}"): min(1.0, n / 10) for who in SEARCHERS for n in range(STATIONS)}
+    base |= {(who, "tour_time"): 100.0 for who in (GREEDY, AHEAD)}
+    base |= {(who, "broken_off"): 0.0 for who in (GREEDY, AHEAD)}
+    for key, value in changed.items():
+        who, _, name = key.partition("__")
+        base[who.replace("_", "-"), name] = value
+    return base
+
+
+GOOD = {
+    "information__all_found": 200.0, "information__half_found": 60.0, "information_down__all_found": 250.0,
+    "greedy__tour_time": 120.0, "greedy__broken_off": 2.0,
+}  # fmt: skip
+BAD = {
+    "information__all_found": 400.0, "information__half_found": 160.0, "information_down__all_found": 350.0,
+    "information__weighed": 1.0,
+}  # fmt: skip
+
+
+def table(worlds: int = 40, **changed: float) -> pd.DataFrame:
+    return pd.DataFrame([row(**changed)] * worlds)
+
+
+def test_a_world_is_the_twins_kind_and_the_same_for_its_seed():
+    scene, again = draw_scene(5, "uav-search"), draw_scene(5, "uav-search")
+    assert (scene.world.animals == again.world.animals).all() and (scene.grid == again.grid).all()
+    assert scene.flying.height == 60 and scene.flying.speed == 5
+    assert scene.sensor.half_width == pytest.approx(360 / 1267)
+    for number, area in enumerate(scene.world.areas):
+        inside = scene.world.animals[:, scene.world.area_of == number, :2]
+        low, high = area.min(axis=0) - 1e-6, area.max(axis=0) + 1e-6
+        assert ((inside >= low) & (inside <= high)).all()
+        assert contains(area, inside[0]).all()
+    steps = np.diff(scene.world.animals[..., :2], axis=0)
+    assert steps.std() == pytest.approx(0.5, rel=0.05)
+    assert not (draw_scene(6, "uav-search").grid[:3] == scene.grid[:3]).all()
+
+
+def test_planners_find_animals_where_they_are(one):
+    scene, found = one
+    for searched in found.values():
+        assert np.isfinite(searched.found).all()
+        for animal, time in enumerate(searched.found):
+            image = round(time) - 1
+            away = scene.world.animals[image, animal] - searched.p_nc[image]
+            assert scene.world.chance[image, animal] < np.exp(-(away @ away) / 100.0**2)
+            assert searched.counts[image]
+    assert found[INFORMATION].asked > 100 * found[INFORMATION].decisions and found[ROWS].asked == 0
+    # Nobody is faster than the platform, and all keep its height above the ground.
+    for searched in found.values():
+        steps = np.linalg.norm(np.diff(searched.p_nc[:, :2], axis=0), axis=1)
+        assert steps.max() <= 5 + 1e-9
+        above = -searched.p_nc[:, 2] - scene.world.terrain.heights_at(searched.p_nc[:, :2])
+        assert above == pytest.approx(60, abs=1e-6)
+
+
+def test_the_numbers_of_a_search(one):
+    _, found = one
+    numbers = numbers_of(found[ROWS])
+    times = np.sort(found[ROWS].found)
+    assert numbers["first_found"] == times[0] and numbers["all_found"] == times[-1]
+    assert numbers["half_found"] == times[4] and numbers["mean_found"] == pytest.approx(times.mean())
+    shares = [numbers[f"share_{n + 1}"] for n in range(STATIONS)]
+    assert shares == sorted(shares) and shares[-1] == 1
+    late = found[ROWS]._replace(found=np.append(times[:-1], np.inf))
+    assert numbers_of(late)["all_found"] == BUDGET_S and numbers_of(late)["share_found"] == 0.9
+    assert set(RECORDED) - {"tour_time", "broken_off"} <= set(numbers)
+
+
+def test_a_greedy_choice_is_never_quicker_than_the_shortest_order():
+    for seed in range(3):
+        situation = draw_situation(seed, draw_scene(seed, "uav-search"))
+        assert situation.ahead.time <= situation.greedy.time < 3600
+        assert len(situation.ahead.order) == len(situation.positions) + 1
+        assert (
+            f"{situation.greedy.broken_off} times"
+            in charts.greedy_shown(situation)[0].axes[0].get_title(loc="left")
+            or not situation.greedy.broken_off
+        )
+
+
+def test_claims_turn_with_the_numbers():
+    claims = {one["id"]: one for one in load_claims("information-planning")}
+    good, bad = (check_claims(table(**kind), seconds_each=0.01) for kind in (GOOD, BAD))
+    assert set(good) == set(claims)
+    for name, claim in claims.items():
+        assert good[name].holds(claim.get("threshold")).all(), name
+        assert not bad[name].holds(claim.get("threshold")).any(), name
+    assert decide_check(good["computationally-expensive"], 0.1).verdict == HOLDS
+    cheap = check_claims(table(), seconds_each=1e-6)["computationally-expensive"]
+    assert decide_check(cheap, 0.1).verdict == FAILS
+    assert decide(good["lower-search-time"].holds()).met == 40
+
+
+def test_words_turn_with_the_numbers():
+    good, bad = table(**GOOD), table(**BAD)
+    assert "at least the 70 % asked for" in text.summary(good)[0]
+    assert "below the 70 % asked for" in text.summary(bad)[0]
+    assert "do not settle it" in text.summary(table(3, **GOOD))[0]
+    assert "3.3 minutes, in rows after 5.0" in text.summary(good)[1]
+    assert "it still is sooner than these rows" in text.summary(good)[2]
+    assert "sooner than these rows only in" in text.summary(bad)[2]
+    mixed = pd.concat([good, bad], ignore_index=True)
+    assert text.summary(mixed)[2].count("settled") == 2
+    assert "rows, camera down: 1.7 min" in text.differences(good)
+    assert "rows, camera down: −1.7 min" in text.differences(bad)
+    assert text.differences(table(1)) == "Of one world there is no mean difference."
+    assert "20 % longer" in text.greedy_words(good) and "0 % longer" in text.greedy_words(bad)
+    assert "In 40 it did not come to an end" in text.greedy_words(table(greedy__tour_time=np.inf))
+    assert "200 candidate steps, 10 µs" in text.cost_words(good, 1e-5)
+
+
+def test_the_table_has_each_planner():
+    shown = text.table(pd.concat([table(30), table(10, chance__share_found=0.8)], ignore_index=True))
+    assert shown["planner"].tolist() == [text.NAMES[who] for who in SEARCHERS]
+    assert shown["missed"].tolist() == ["0 of 40"] * 4 + ["10 of 40"]
+    assert set(text.COLUMNS) == set(shown.columns)
+
+
+def test_charts_say_what_they_show(one):
+    scene, found = one
+    title = charts.way_shown(scene, found[ROWS], ROWS)[2]
+    assert f"all found after {text.minutes(found[ROWS].found.max())} min" in title
+    lost = found[ROWS]._replace(found=np.append(found[ROWS].found[:-1], np.inf))
+    assert "1 of 10 not found" in charts.way_shown(scene, lost, ROWS)[2]
+    assert "by information 3.3 min" in charts.times_shown(table(**GOOD))[2]
+    assert "random walk" in charts.share_shown(table())[2]
+
+
+def test_every_subject_has_a_name_and_every_number_a_unit():
+    assert set(text.NAMES) == set(SEARCHERS) == {INFORMATION, FIXED, ROWS, SWING, CHANCE}
+    assert STUDY.metric_of is not None
+    assert STUDY.metric_of(ROWS, "all_found").unit == "s" and STUDY.metric_of(ROWS, "share_3") is None
