@@ -151,7 +151,7 @@ def test_words_turn_with_the_numbers():
     assert "rows, camera down: 1.7 min" in text.differences(good)
     assert "rows, camera down: −1.7 min" in text.differences(bad)
     assert text.differences(table(1)) == "Of one world there is no mean difference."
-    assert "20 % longer" in text.greedy_words(good) and "0 % longer" in text.greedy_words(bad)
+    assert "takes 20.0 % longer" in text.greedy_words(good) and "takes 0 % longer" in text.greedy_words(bad)
     assert "In 40 it did not come to an end" in text.greedy_words(table(greedy__tour_time=np.inf))
     assert "200 candidate steps, 10 µs" in text.cost_words(good, 1e-5)
 

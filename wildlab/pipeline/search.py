@@ -133,9 +133,8 @@ def search(
         asked, decisions = asked + weighed, decisions + 1
         rows = np.arange(taken, taken + flying.images)
         shown = found_in(world, leg, rows, sensor) & still
-        for image, hits in zip(rows, shown, strict=True):
-            found[hits & np.isinf(found)] = flying.interval * (image + 1)
         for image in range(flying.images):
+            found[shown[image] & np.isinf(found)] = flying.interval * (taken + image + 1)
             if leg.counts[image]:
                 seen |= shown_points(world.terrain, grid, leg, image, sensor, ~seen)
             covered.append(seen.mean())

@@ -244,7 +244,8 @@ class InformationPlanner:
         """(B, S) what is left to know in each block of each state."""
         count = len(self._middles)
         whole = self._block + count * np.arange(len(left))[:, None]
-        return np.bincount(whole.ravel(), (left * self.weights).ravel(), len(left) * count).reshape(-1, count)
+        sums = np.bincount(whole.ravel(), (left * self.weights).ravel(), len(left) * count)
+        return np.asarray(sums.reshape(-1, count), float)
 
     def _headings(self, states: list[Platform], blocks: Array) -> tuple[NDArray[np.intp], Array]:
         """Candidates (K,): which state each begins in, and its heading."""

@@ -41,7 +41,8 @@ COLUMNS = {
 }
 DIGITS = {"half": 1, "all": 1}
 
-METHOD = r"""Each world is drawn from its seed: rolling land like that of F's map, two enclosures of the sizes of
+METHOD = r"""Each world is drawn from its seed: rolling
+land like that of F's map, two enclosures of the sizes of
 the twin's, and the animals in them, which walk at random and turn at the fence. All planners fly
 the same multicopter with the same camera from the same corner, at the same speed and height above
 the ground, and take an image every second. An animal in an image is found with the probability of F

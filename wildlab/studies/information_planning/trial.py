@@ -148,7 +148,7 @@ def draw_scene(seed: int, twin: str) -> Scene:
         length, width = size.length.si, size.width.si
         middle = np.array([rng.uniform(-60.0, 60.0), side * rng.uniform(160.0, 240.0)])
         course = np.pi / 2 + rng.uniform(-0.35, 0.35)
-        areas.append(rectangle(*middle, length, width, course))
+        areas.append(rectangle(float(middle[0]), float(middle[1]), length, width, course))
         count = int(size.animals.number)
         flat = _walks(middle, length, width, course, (images, count), _step_sd(given, flying), rng)
         up = terrain.heights_at(flat.reshape(-1, 2)).reshape(images, count) + given_height(given)
