@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.studies.printed_numbers import text
+from wildlab.studies.printed_numbers import planning_formulas, text
 from wildlab.studies.printed_numbers.arithmetic import (
     images_in,
     off_nadir,
@@ -168,3 +168,29 @@ def test_formulas_are_judged_by_what_they_give():
     assert not same.differs and formulas_table([same])["verdict"].tolist() == ["does the same"]
     assert "1 of 2" in formulas_words([same, added])
     assert not added._replace(letter=0.0, sense=0.0).differs
+
+
+def test_formulas_of_planning_differ_from_what_they_should_follow_from():
+    shown = planning_formulas.all_formulas()
+    assert [one.apart for one in shown] == [True] * 7
+    assert {one.verdict for one in shown} == {"differ"}
+    table = planning_formulas.table_of_formulas(shown)
+    assert list(table.columns) == list(planning_formulas.COLUMNS) and len(table) == 7
+    assert planning_formulas.formula_words(shown).startswith("7 of 7 printed formulas")
+    # sin(theta) where cos(theta)^2 belongs, for 80 m above and 67.1 m beside.
+    r2 = 80.0**2 + 60.0**2 + 30.0**2
+    assert f"−{80 / r2**0.5:.2f} as printed, {(60.0**2 + 30.0**2) / r2:.2f} derived" in shown[0].shown
+    assert "just found is worth inf" in shown[-1].shown
+
+
+def test_a_formula_that_follows_is_not_called_different(monkeypatch):
+    """Were the print the derivative, the page would say that they agree."""
+    sensor = planning_formulas.SearchSensor(1.0, 1.0, sd=1.0, reach=1.0, nearest=1e-9)
+
+    def right(points, p_nc, sd):
+        turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+        return turn @ planning_formulas.bearing_information(points, p_nc, sensor) @ turn.T
+
+    monkeypatch.setattr(planning_formulas, "as_printed", right)
+    assert [one.verdict for one in planning_formulas.information_formulas()[:3]] == ["agree"] * 3
+    assert planning_formulas.formula_words(planning_formulas.information_formulas()).startswith("1 of 4")
