@@ -12,6 +12,7 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import make_plan
+from wildlab.pipeline.plan_coverage import cover
 from wildlab.pipeline.plan_files import missions
 from wildlab.pipeline.plan_heights import TOLERANCE, follow
 from wildlab.pipeline.plan_said import plan_result
@@ -35,6 +36,10 @@ def field(tmp_path_factory):
 
 def plan(area, **given):
     return make_plan(Wanted(area, CAMERA, **given))
+
+
+def result_of(made):
+    return plan_result(made, cover(made))
 
 
 # -- what is seen
@@ -152,7 +157,7 @@ def test_longer_plans_become_flights_that_each_last(field):
         more = [*before.rows, before.rows[-1] + 1]
         longer = fly_rows("longer", more, made.pattern, made.home, made.wanted, None, made.height)
         assert longer.duration > 8 * 60 * 0.75
-    assert plan_result(made)["sorties"][0]["of_battery"] <= 0.75
+    assert result_of(made)["sorties"][0]["of_battery"] <= 0.75
 
 
 def test_a_battery_too_small_for_one_row_is_said(field):
@@ -222,17 +227,17 @@ def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     cliff[100:] = 90.0
     terrain = Terrain(cliff, north=-1000.0, east=-1000.0, step=10.0)
     wanted = Wanted(field, CAMERA, height_m=60.0, direction_deg=0.0, climb_m_s=2.0)
-    flat, steep = make_plan(wanted), make_plan(wanted, lambda areas: terrain)
+    flat, steep = make_plan(wanted), make_plan(wanted, terrain)
     assert steep.duration > flat.duration + 2 * 90 / 2.0
-    said = plan_result(steep)["warnings"]
+    said = result_of(steep)["warnings"]
     assert any("would have to climb or sink" in one and "it can do 2:" in one for one in said)
-    assert not plan_result(flat)["warnings"]
+    assert not result_of(flat)["warnings"]
 
 
 def test_heights_above_take_off_are_differences_of_ground(field):
     terrain = hills()
     wanted = Wanted(field, CAMERA, height_m=60.0)
-    made = make_plan(wanted, lambda areas: terrain)
+    made = make_plan(wanted, terrain)
     flight = missions(made)[0]
     way = made.sorties[0].way
     assert np.allclose(flight.above_ground, 60.0)

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from wildlab.commands.shared import FILE, FOLDER, terminal_console
+from wildlab.commands.terrain import says_of, terrain_options
 from wildlab.errors import WildlabError
 from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
     from wildlab.geometry.camera import Camera
+    from wildlab.pipeline.plan_wanted import Gimbal
 
 
 class Pair(click.ParamType[tuple[float, float]]):
@@ -41,6 +43,9 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.option("--image", type=Pair("xX×", "640x512"), help="Without --camera: columns x rows of the image.")
 @click.option("--focal", type=float, help="With --image: focal length, px.")
 @click.option("--view", type=float, help="With --image, in place of --focal: field of view across, deg.")
+@click.option("--terrain", type=FILE, help="Map of heights (GeoTIFF): heights follow it, and it hides.")
+@terrain_options("--terrain-", "crs", "unit", "nodata", "cell", "corner")
+@click.option("--trees", type=float, default=0.0, help="Height of the tallest trees, m: fly above them.")
 @click.option("--into", type=FOLDER, required=True, help="Folder for way points, maps and the page.")
 @click.option("--height", type=float, help="Above the ground, m.  [default: from --animal and --pixels]")
 @click.option("--animal", type=float, default=1.5, show_default=True, help="Length of what is looked for, m.")
@@ -50,6 +55,16 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.option(
     "--tilt", type=float, default=90.0, show_default=True, help="Camera below the horizon, deg; 90 is down."
 )
+@click.option(
+    "--gimbal",
+    type=click.Choice(["fixed", "yaw", "roll", "adaptive"]),
+    default="fixed",
+    show_default=True,
+    help="How the camera swings to either side; adaptive keeps to the areas (F 5.4).",
+)
+@click.option("--swing", type=float, default=0.0, help="How far to either side, deg.")
+@click.option("--rate", type=float, help="How fast, deg/s.  [default: no faster than leaves nothing out]")
+@click.option("--exposure", type=float, default=10.0, show_default=True, help="Of an image, ms.")
 @click.option("--direction", type=float, help="Of the rows, deg clockwise from north.  [default: quickest]")
 @click.option("--wind", type=float, default=0.0, help="Its speed, m/s.")
 @click.option("--wind-from", type=float, help="From where, deg clockwise from north.")
@@ -68,6 +83,11 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.option(
     "--home", type=Pair(",; ", "58.66,16.46"), help="Take-off: latitude,longitude.  [default: row 1]"
 )
+@click.option("--animals", type=float, help="How many live in each area that does not say itself.")
+@click.option("--density", type=float, help="Or how many on a square kilometre.")
+@click.option(
+    "--detection", type=float, default=1.0, show_default=True, help="Share of animals in view that are found."
+)
 @click.option("--photo-every", type=float, default=0.0, help="Trigger the camera each so many metres.")
 @click.option(
     "--above",
@@ -85,6 +105,8 @@ def plan(
     image: tuple[float, float] | None,
     focal: float | None,
     view: float | None,
+    terrain: Path | None,
+    trees: float,
     into: Path,
     height: float | None,
     animal: float,
@@ -92,6 +114,10 @@ def plan(
     speed: float,
     overlap: float,
     tilt: float,
+    gimbal: Gimbal,
+    swing: float,
+    rate: float | None,
+    exposure: float,
     direction: float | None,
     wind: float,
     wind_from: float | None,
@@ -101,12 +127,16 @@ def plan(
     battery: float | None,
     reserve: float,
     max_height: float,
+    animals: float | None,
+    density: float | None,
+    detection: float,
     home: tuple[float, float] | None,
     photo_every: float,
     above: Literal["take-off", "ground"],
     exact: bool,
     overwrite: bool,
     as_json: bool,
+    **stated: Any,
 ) -> None:
     """Plan a flight that searches AREA, a GeoJSON or KML file of polygons, in rows.
 
@@ -117,6 +147,7 @@ def plan(
     Examples:
       wildlab plan fence.geojson --camera camera.toml --into flight
       wildlab plan fence.geojson --image 640x512 --view 32 --height 60 --battery 25 --into flight
+      wildlab plan fence.geojson --camera camera.toml --terrain dem.tif --animals 5 --into flight
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --into flight
     """
     from wildlab.files import write_atomic
@@ -128,12 +159,18 @@ def plan(
     wanted = Wanted(
         area,
         lens(camera, image, focal, view),
+        says_of(terrain, stated, "--terrain-"),
+        trees,
         height_m=height,
         animal_m=animal,
         pixels=pixels,
         speed_m_s=speed,
         overlap=overlap,
         tilt_deg=tilt,
+        gimbal=gimbal,
+        swing_deg=swing,
+        rate_deg_s=rate,
+        exposure_s=exposure / 1000,
         wind_m_s=wind,
         wind_from_deg=wind_from,
         turn_radius_m=turn_radius,
@@ -144,11 +181,14 @@ def plan(
         max_height_m=max_height,
         direction_deg=direction,
         home=home,
+        animals=animals,
+        density_km2=density,
+        detection=detection,
         heights=above,
         photo_m=photo_every,
     )
-    made, result = plan_flight(wanted, into, terminal_console(), overwrite=overwrite)
-    write_atomic(into / PAGE, plan_page(made, result, exact=exact))
+    made, covered, result = plan_flight(wanted, into, terminal_console(), overwrite=overwrite)
+    write_atomic(into / PAGE, plan_page(made, covered, result, exact=exact))
     if as_json:
         print_json(result)
         return

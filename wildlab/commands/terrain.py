@@ -33,11 +33,13 @@ _OPTIONS: dict[str, tuple[Any, str]] = {
 _METRES = {"sd": "sd_m", "step": "step_m", "margin": "margin_m", "cell": "cell_m"}
 
 
-def terrain_options(prefix: str) -> Callable[[Command], Command]:
-    """Options for what a map does not say of itself, each with a prefix."""
+def terrain_options(prefix: str, *names: str) -> Callable[[Command], Command]:
+    """Options for what a map does not say of itself, each with a prefix: those named, or all."""
 
     def decorate(command: Command) -> Command:
         for name, (kind, text) in reversed(_OPTIONS.items()):
+            if names and name not in names:
+                continue
             command = click.option(f"{prefix}{name}", f"terrain_{name}", type=kind, help=text)(command)
         return command
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.area import Area, Areas, read_areas
+from wildlab.flight.terrain.laying import CutOut, terrain_about
+from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan_sorties import Sortie, split_rows
-from wildlab.pipeline.plan_view import View, look
+from wildlab.pipeline.plan_view import FURTHEST, View, look
 from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.planning.areas import contains
 from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 
 #: A height that is not stated stays this far below the greatest one allowed, metres: way points between
@@ -22,6 +25,12 @@ from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 BELOW_RULE = 5.0
 #: The least height that is chosen without being asked for, metres.
 LEAST_HEIGHT = 10.0
+#: A map reaches at least so far beyond the areas, metres.
+LEAST_MARGIN = 200.0
+#: Share of an area of which the map may know nothing.
+MOST_UNKNOWN = 0.05
+#: Metres between treetops and the aircraft at least.
+CLEARANCE = 10.0
 #: Metres from the take-off point to the areas' middle beyond which it is a slip of a key.
 FURTHEST_HOME = 50_000.0
 
@@ -50,6 +59,8 @@ class Plan:
         (2,) the take-off point in n, metres.
     sorties
         The flights.
+    cut
+        Where the terrain comes from; None where it was given, or there is none.
     """
 
     wanted: Wanted
@@ -61,6 +72,7 @@ class Plan:
     pattern: Pattern
     home: Array
     sorties: tuple[Sortie, ...]
+    cut: CutOut | None = None
 
     @property
     def duration(self) -> float:
@@ -83,15 +95,15 @@ class Plan:
         return seconds
 
 
-def make_plan(wanted: Wanted, read_terrain: Callable[[Areas], Terrain] | None = None) -> Plan:
+def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
     """Plan a flight.
 
     Parameters
     ----------
     wanted
         What is asked for.
-    read_terrain
-        Gives the terrain under areas, where ``wanted`` names a map.
+    terrain
+        Under the areas, in n about their middle, in place of the map that ``wanted`` names.
 
     Returns
     -------
@@ -103,12 +115,17 @@ def make_plan(wanted: Wanted, read_terrain: Callable[[Areas], Terrain] | None = 
         Where nothing can be flown as it is wanted; the message says what and why.
     """
     areas = read_areas(wanted.area)
-    view = look(wanted.camera, wanted.tilt_deg)
+    view = look(wanted.camera, wanted.tilt_deg, wanted.gimbal, wanted.swing_deg)
     height = _height(wanted, view)
     strip = view.width * height
     distance = row_distance(strip, wanted.overlap)
-    terrain = None if read_terrain is None else read_terrain(areas)
     home = None if wanted.home is None else _home(wanted.home, areas)
+    cut = None
+    if terrain is None and wanted.terrain is not None:
+        cut = _cut_out(wanted.terrain, wanted, areas, home, view.middle * height + FURTHEST * height)
+        terrain = cut.terrain
+    if terrain is not None:
+        _check_under(areas, terrain, strip)
     direction = None if wanted.direction_deg is None else math.radians(wanted.direction_deg)
     pattern = lawn_mowers(
         [area.outline for area in areas.areas],
@@ -118,15 +135,18 @@ def make_plan(wanted: Wanted, read_terrain: Callable[[Areas], Terrain] | None = 
         start=home,
         back=home is not None,
     )
+    # What a tilted camera sees lies ahead: rows begin, and end, as much before the ground that is theirs.
+    along = np.stack([np.cos(pattern.directions), np.sin(pattern.directions)], axis=-1)
+    pattern = pattern._replace(rows=pattern.rows - view.middle * height * along[:, None])
     if home is None:
         home = pattern.rows[0, 0]
     sorties = split_rows(pattern, home, wanted, terrain, height)
-    return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties)
+    return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties, cut)
 
 
 def _height(wanted: Wanted, view: View) -> float:
     """The height that was asked for, or the one from which the animal has the pixels it shall have."""
-    most = wanted.max_height_m
+    most, least = wanted.max_height_m, wanted.trees_m + CLEARANCE if wanted.trees_m > 0 else 0.0
     if wanted.height_m is not None:
         if wanted.height_m > most:
             raise WildlabError(
@@ -134,16 +154,51 @@ def _height(wanted: Wanted, view: View) -> float:
                 "fly lower, or state with --max-height what you have permission for",
                 field="--height",
             )
+        if wanted.height_m < least:
+            raise WildlabError(
+                f"a height of {wanted.height_m:g} m above the ground, and trees of {wanted.trees_m:g} m",
+                f"fly {least:g} m above the ground at least, {CLEARANCE:g} m above the treetops",
+                field="--height",
+            )
         return wanted.height_m
     sharp = wanted.animal_m / wanted.pixels * math.sqrt(wanted.camera.fx * wanted.camera.fy) / view.slant
-    if sharp < LEAST_HEIGHT:
+    least = max(least, LEAST_HEIGHT)
+    if sharp < least:
+        over = f"trees of {wanted.trees_m:g} m" if wanted.trees_m > 0 else "the ground"
         raise WildlabError(
             f"{wanted.animal_m:g} m are {wanted.pixels:g} pixels in this camera from {sharp:.1f} m above the "
-            f"ground only, and nothing below {LEAST_HEIGHT:g} m is planned unasked",
+            f"ground only, and over {over} nothing below {least:g} m is planned unasked",
             "ask for fewer pixels with --pixels, or state --height",
             field="--pixels",
         )
-    return float(math.floor(min(sharp, max(most - BELOW_RULE, min(most, LEAST_HEIGHT)))))
+    return float(math.floor(min(sharp, max(most - BELOW_RULE, min(most, least)))))
+
+
+def _cut_out(says: TerrainSays, wanted: Wanted, areas: Areas, home: Array | None, beyond: float) -> CutOut:
+    """The map under the areas and as far about them as a flight comes or looks."""
+    points = np.concatenate([area.outline for area in areas.areas])
+    if home is not None:
+        points = np.concatenate([points, home[None]])
+    margin = max(LEAST_MARGIN, beyond + 6 * wanted.turn_radius_m)
+    return terrain_about(Path(says.file), says, areas.origin, points, margin)
+
+
+def _check_under(areas: Areas, terrain: Terrain, strip: float) -> None:
+    """Refuse areas below which the map knows too little."""
+    for area in areas.areas:
+        low, high = area.outline.min(axis=0), area.outline.max(axis=0)
+        sides = [
+            np.linspace(low[k], high[k], max(20, min(200, int((high - low)[k] / strip * 8)))) for k in (0, 1)
+        ]
+        points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+        points = np.concatenate([points[contains(area.outline, points)], area.outline])
+        unknown = float((~np.isfinite(terrain.heights_at(points))).mean())
+        if unknown > MOST_UNKNOWN:
+            raise WildlabError(
+                f"{100 * unknown:.0f} % of {area.name} lie outside the map of heights, or where it has none",
+                "give a map that holds the whole area, or plan the part that it holds",
+                field="--terrain",
+            )
 
 
 def _home(home: tuple[float, float], areas: Areas) -> Array:

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from wildlab.files import write_json
 from wildlab.pipeline.plan import Plan, make_plan
+from wildlab.pipeline.plan_coverage import Covered, cover
 from wildlab.pipeline.plan_files import RESULT, clear_folder, refuse_folder, write_plan
 from wildlab.pipeline.plan_said import plan_result
 from wildlab.pipeline.plan_wanted import Wanted
@@ -16,7 +17,7 @@ from wildlab.pipeline.plan_wanted import Wanted
 
 def plan_flight(
     wanted: Wanted, into: Path, console: Console, *, overwrite: bool = False
-) -> tuple[Plan, dict[str, Any]]:
+) -> tuple[Plan, list[Covered], dict[str, Any]]:
     """Plan, and write what a pilot takes along.
 
     Parameters
@@ -32,7 +33,7 @@ def plan_flight(
 
     Returns
     -------
-    plan
+    plan, covered
         For its page.
     result
         For JSON, also in ``result.json``: numbers, sentences, and ``places``, the files that hold positions.
@@ -43,11 +44,17 @@ def plan_flight(
         Where nothing can be flown as it is wanted, or the folder is not free.
     """
     refuse_folder(into, overwrite)
-    with console.status("planning"):
+    with console.status("planning") as status:
         plan = make_plan(wanted)
-        result = plan_result(plan)
+
+        def tell(done: int, of: int) -> None:
+            status.update(f"looking what will be seen: {done} of {of} areas")
+
+        tell(0, len(plan.areas.areas))
+        covered = cover(plan, tell)
+        result = plan_result(plan, covered)
     into.mkdir(parents=True, exist_ok=True)
     clear_folder(into)
     result["places"] = write_plan(plan, into)
     write_json(into / RESULT, result)
-    return plan, result
+    return plan, covered, result

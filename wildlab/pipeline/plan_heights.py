@@ -48,7 +48,13 @@ class Followed(NamedTuple):
     unknown: float
 
 
-def follow(way: Array, terrain: Terrain | None, above: float, most_above: float = math.inf) -> Followed:
+def follow(
+    way: Array,
+    terrain: Terrain | None,
+    above: float,
+    most_above: float = math.inf,
+    steepest: float = math.inf,
+) -> Followed:
     """Way points that follow the ground.
 
     Parameters
@@ -61,12 +67,15 @@ def follow(way: Array, terrain: Terrain | None, above: float, most_above: float 
         Height above the ground, metres.
     most_above
         What may not be passed, by the rules; between way points, too.
+    steepest
+        Metres up or down for each metre of way, where an aircraft cannot slow down: it begins to climb before
+        a hill, and is then higher above the ground than was asked for.
 
     Returns
     -------
     Followed
-        Between way points the height runs straight and stays within `TOLERANCE` of what was asked for, and
-        below ``most_above``, at every place that was looked at.
+        Between way points the height runs straight and, at every place that was looked at, stays within
+        `TOLERANCE` of what was asked for and below ``most_above``, but where ``steepest`` asks for more.
     """
     if terrain is None:
         zero, high = np.zeros(len(way)), np.full(len(way), above)
@@ -85,6 +94,11 @@ def follow(way: Array, terrain: Terrain | None, above: float, most_above: float 
         ground = ground.copy()
         ground[~known] = ground[known][nearest]
     wanted = ground + above
+    if math.isfinite(steepest):
+        # The greatest of what every other place asks for, less what can be climbed or sunk on the way there.
+        before = np.maximum.accumulate(wanted + steepest * along) - steepest * along
+        after = np.maximum.accumulate((wanted - steepest * along)[::-1])[::-1] + steepest * along
+        wanted = np.maximum(before, after)
     up = min(TOLERANCE, max(most_above - above, 0.0))
     kept = _thinned(along, wanted - TOLERANCE, wanted, wanted + up, corner >= 0)
     flown = np.interp(along, along[kept], wanted[kept])

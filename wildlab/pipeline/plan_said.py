@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wildlab.flight.files import printable
+from wildlab.flight.readers.area import Area
 from wildlab.pipeline.plan import Plan
+from wildlab.pipeline.plan_coverage import EDGE, SHARP, Covered, gimbal_rate
 from wildlab.pipeline.plan_sorties import Sortie
+from wildlab.pipeline.plan_view import FURTHEST
 
 #: Pixels along an animal below which F 3.2's chain and people alike miss many.
 FEW_PIXELS = 5.0
+#: Share of an area that may be missed before it is told of.
+UNSEEN = 0.02
 
 
-def plan_result(plan: Plan) -> dict[str, Any]:
+def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
     """A plan as plain values for JSON; metres of n, and no position on the Earth.
 
     Parameters
     ----------
     plan
         From `wildlab.pipeline.plan.make_plan`.
+    covered
+        Of each area, from `wildlab.pipeline.plan_coverage.cover`.
 
     Returns
     -------
@@ -29,15 +39,25 @@ def plan_result(plan: Plan) -> dict[str, Any]:
     """
     wanted, view = plan.wanted, plan.view
     seconds = plan.area_seconds()
+    living = [animals_in(plan, area) for area in plan.areas.areas]
+    found = [n * one.seen * wanted.detection for n, one in zip(living, covered, strict=True)]
     return {
         "height_m": plan.height,
         "strip_m": round(plan.strip, 2),
         "animal_pixels": round(view.pixels(wanted.camera, wanted.animal_m, plan.height), 2),
         "duration_s": round(plan.duration, 1),
         "furthest_m": round(_furthest(plan), 1),
+        "seen": round(seen_share(plan, covered), 4),
+        "animals": _number(sum(living)),
+        "expected_finds": _number(sum(found)),
         "areas": [
             {
                 "name": area.name,
+                "seen": round(covered[k].seen, 4),
+                "hidden": round(covered[k].share(covered[k].hidden), 4),
+                "blurred": round(covered[k].share(covered[k].blurred), 4),
+                "animals": _number(living[k]),
+                "expected_finds": _number(found[k]),
                 "size_m2": round(area.size, 1),
                 "rows": int((plan.pattern.area == k).sum()),
                 "row_distance_m": round(float(plan.pattern.distance[k]), 2),
@@ -47,8 +67,8 @@ def plan_result(plan: Plan) -> dict[str, Any]:
         ],
         "sorties": [_sortie(plan, one) for one in plan.sorties],
         "assumed": assumed(plan),
-        "warnings": warnings(plan),
-        "sentences": summary(plan),
+        "warnings": [*warnings(plan), *unseen(plan, covered)],
+        "sentences": summary(plan, covered, sum(found)),
     }
 
 
@@ -69,29 +89,83 @@ def _sortie(plan: Plan, one: Sortie) -> dict[str, Any]:
     }
 
 
-def summary(plan: Plan) -> list[str]:
+def summary(plan: Plan, covered: Sequence[Covered], finds: float) -> list[str]:
     """What a pilot wants to know first."""
     n, rows = len(plan.sorties), len(plan.pattern.rows)
     areas = plan.areas.areas
     size = sum(area.size for area in areas)
     where = areas[0].name if len(areas) == 1 else f"{len(areas)} areas"
-    flights = "one flight" if n == 1 else f"{n} flights"
+    flights = (
+        f"one flight of {minutes(plan.duration)}"
+        if n == 1
+        else f"{n} flights of {minutes(plan.duration)} in all"
+    )
     pixels = plan.view.pixels(plan.wanted.camera, plan.wanted.animal_m, plan.height)
     least, most = f"{plan.pattern.distance.min():.0f}", f"{plan.pattern.distance.max():.0f}"
     apart = least if least == most else f"{least} to {most}"
     return [
-        f"{where}, {hectares(size)}: {flights} of {minutes(plan.duration)} in all, over {count(rows, 'row')} "
-        f"{apart} m apart.",
+        f"{where}, {hectares(size)}: {flights}, over {count(rows, 'row')} {apart} m apart.",
         f"The camera is {plan.height:.0f} m above the ground and sees a strip of {plan.strip:.0f} m; "
         f"{plan.wanted.animal_m:g} m on the ground are {pixels:.0f} pixels.",
+        f"Of the ground {percent(seen_share(plan, covered))} will be seen.{_finds(plan, finds)}",
     ]
+
+
+def _finds(plan: Plan, finds: float) -> str:
+    if math.isnan(finds):
+        return ""
+    living = sum(animals_in(plan, area) for area in plan.areas.areas)
+    return f" Of {living:.4g} animals {finds:.3g} should be found, if they keep still."
+
+
+def seen_share(plan: Plan, covered: Sequence[Covered]) -> float:
+    """Share of all areas together that is seen."""
+    sizes = [area.size for area in plan.areas.areas]
+    return sum(size * one.seen for size, one in zip(sizes, covered, strict=True)) / sum(sizes)
+
+
+def animals_in(plan: Plan, area: Area) -> float:
+    """How many animals live in an area: what its file says, else what was asked for; NaN if nobody said."""
+    wanted = plan.wanted
+    if not math.isnan(area.animals):
+        return area.animals
+    if wanted.animals is not None:
+        return wanted.animals
+    return math.nan if wanted.density_km2 is None else wanted.density_km2 * area.size / 1e6
+
+
+def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
+    """Where more than `UNSEEN` of an area is not seen, why, and what helps; a sentence for each area."""
+    said = []
+    for area, one in zip(plan.areas.areas, covered, strict=True):
+        missed = 1 - one.seen
+        if missed <= UNSEEN:
+            continue
+        hidden, blurred = one.share(one.hidden), one.share(one.blurred)
+        causes = {
+            "hidden by the ground": (hidden, "rows in another direction, or a camera that looks more down"),
+            "in blurred images alone": (blurred, "a slower flight or swing, or a shorter exposure"),
+            "in no image": (missed - hidden - blurred, "a larger overlap, or a lower speed"),
+        }
+        parts = [f"{percent(share)} {what}" for what, (share, _) in causes.items() if share > 0.005]
+        helps = max(causes.values())[1]
+        said.append(
+            f"{percent(missed)} of {area.name} will not be seen: {', '.join(parts)}. What helps: {helps}."
+        )
+    return said
 
 
 def assumed(plan: Plan) -> list[str]:
     """What the plan rests on, each a sentence."""
     wanted = plan.wanted
     said = []
-    if plan.terrain is None:
+    if plan.cut is not None and plan.wanted.terrain is not None:
+        said.append(
+            f"The ground is that of {printable(Path(plan.wanted.terrain.file).name)}, every "
+            f"{plan.cut.terrain.step:.3g} m, {plan.cut.rms:.2g} m (rms) from the map's own heights. Trees, "
+            "masts and lines are not in it, unless it is a map of surfaces."
+        )
+    elif plan.terrain is None:
         said.append("The ground is flat and as high as the take-off point: no map of heights was given.")
     if wanted.home is None:
         said.append("Take-off is where the first row begins: no other place was given (--home).")
@@ -115,10 +189,30 @@ def assumed(plan: Plan) -> list[str]:
     else:
         said.append(f"It stops at the end of each row, and turns in {wanted.turn_s:g} s.")
     said.append(f"It climbs and sinks at {wanted.climb_m_s:g} m/s at most.")
+    if wanted.trees_m > 0:
+        said.append(f"Trees are {wanted.trees_m:g} m at most; what they hide counts as seen.")
     looks = (
         "straight down" if wanted.tilt_deg == 90 else f"ahead, {wanted.tilt_deg:g} degrees below the horizon"
     )
     said.append(f"The camera looks {looks}, level however the aircraft leans, its picture's top in flight.")
+    if wanted.gimbal != "fixed":
+        keeping = ", turning back where it would look beyond the areas" if wanted.gimbal == "adaptive" else ""
+        about = "yaw" if wanted.gimbal == "yaw" else "roll"
+        said.append(
+            f"It swings {wanted.swing_deg:g} degrees to either side about {about}, at "
+            f"{math.degrees(gimbal_rate(plan)):.0f} degrees a second{keeping}."
+        )
+    said.append(
+        f"Ground counts as seen where an image of the rows shows it, not nearer to its edge than "
+        f"{100 * EDGE:.0f} % of its shorter side, no further than {FURTHEST:g} heights away, with nothing "
+        f"before it, and blurred in {1000 * wanted.exposure_s:g} ms by {100 * SHARP:.0f} % of "
+        f"{wanted.animal_m:g} m at most."
+    )
+    if not math.isnan(sum(animals_in(plan, area) for area in plan.areas.areas)):
+        said.append(
+            f"Of animals on ground that is seen, {percent(wanted.detection)} are found (--detection); they "
+            "are spread evenly, and keep still."
+        )
     if wanted.battery_min is None:
         said.append("How long a battery lasts was not said (--battery), so nothing is held against it.")
     else:
@@ -171,6 +265,18 @@ def minutes(seconds: float) -> str:
     """ "12 min", "1 h 05 min": rounded up, as whoever waits counts."""
     whole = math.ceil(seconds / 60 - 1e-9)
     return f"{whole} min" if whole < 60 else f"{whole // 60} h {whole % 60:02d} min"
+
+
+def percent(share: float) -> str:
+    """A share as a person says it; nearly all is not all."""
+    if 0 < share < 0.01 or 0.99 < share < 1:
+        near = "< 0.1 %" if share < 0.5 else "> 99.9 %"
+        return f"{100 * share:.1f} %" if 0.0005 < share < 0.9995 else near
+    return f"{100 * share:.0f} %"
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 3)
 
 
 def hectares(size: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -155,7 +156,10 @@ def fly_rows(
         spacing=max(wanted.turn_radius_m / 20, 1.0),
     )
     corners = _corners(course, wanted.turn_radius_m)
-    way = follow(course.points[corners], terrain, above, wanted.max_height_m)
+    # What can stop slows down where the ground is steep; what cannot has to begin to climb before.
+    slope = wanted.climb_m_s / (wanted.speed_m_s + wanted.wind_m_s)
+    steepest = slope if wanted.vehicle == "fixed-wing" else math.inf
+    way = follow(course.points[corners], terrain, above, wanted.max_height_m, steepest)
     duration, steepest = _times(course, corners, way, wanted)
     return Sortie(name, chosen, course, _row_of(course, flown, of), way, duration, steepest)
 

@@ -5,22 +5,29 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.flight.terrain_model import TerrainSays
 from wildlab.flight.writers.mission import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
 
+Gimbal = Literal["fixed", "yaw", "roll", "adaptive"]
 #: By field: the option, least and greatest value, unit. What lies outside is a slip of a unit or a key.
 LIMITS: dict[str, tuple[str, float, float, str]] = {
     "height_m": ("--height", 2.0, 5000.0, "m"),
+    "trees_m": ("--trees", 0.0, 120.0, "m"),
     "animal_m": ("--animal", 0.05, 30.0, "m"),
     "pixels": ("--pixels", 1.0, 500.0, "px"),
     "speed_m_s": ("--speed", 0.5, 80.0, "m/s"),
     "overlap": ("--overlap", 0.0, 0.9, ""),
     "tilt_deg": ("--tilt", -30.0, 90.0, "deg"),
+    "swing_deg": ("--swing", 0.0, 80.0, "deg"),
+    "rate_deg_s": ("--rate", 0.1, 720.0, "deg/s"),
+    "exposure_s": ("--exposure", 0.0, 1.0, "s"),
     "wind_m_s": ("--wind", 0.0, 60.0, "m/s"),
     "wind_from_deg": ("--wind-from", 0.0, 360.0, "deg"),
     "turn_radius_m": ("--turn-radius", 0.0, 2000.0, "m"),
@@ -48,7 +55,9 @@ class Wanted:
     camera
         Its intrinsic parameters.
     terrain
-        Elevation map; None plans over flat ground.
+        Which elevation map, and what it does not say of itself; None plans over flat ground.
+    trees_m
+        Height of the tallest trees.
     height_m
         Of the lens above the ground; None takes it from ``animal_m`` and ``pixels``.
     animal_m, pixels
@@ -59,6 +68,11 @@ class Wanted:
         Share of a row's strip that the next row sees again.
     tilt_deg
         Of the camera below the horizon, ahead; 90 is straight down.
+    gimbal, swing_deg, rate_deg_s
+        ``"fixed"``, or how the camera swings to either side of its tilt (F 5.4), how far, and how fast; no
+        rate takes the slowest one that leaves nothing out.
+    exposure_s
+        For which an image is exposed; of a microbolometer, its thermal time constant.
     wind_m_s, wind_from_deg
         From where the wind blows, clockwise from north; None where there is no wind.
     turn_radius_m, turn_s
@@ -85,13 +99,18 @@ class Wanted:
 
     area: Path
     camera: Camera
-    terrain: Path | None = None
+    terrain: TerrainSays | None = None
+    trees_m: float = 0.0
     height_m: float | None = None
     animal_m: float = 1.5
     pixels: float = 10.0
     speed_m_s: float = 10.0
     overlap: float = 0.2
     tilt_deg: float = 90.0
+    gimbal: Gimbal = "fixed"
+    swing_deg: float = 0.0
+    rate_deg_s: float | None = None
+    exposure_s: float = 0.010
     wind_m_s: float = 0.0
     wind_from_deg: float | None = None
     turn_radius_m: float = 0.0
@@ -114,6 +133,12 @@ class Wanted:
             if value is not None and not low <= value <= high:
                 span = f"from {low:g} to {high:g} {unit}".rstrip()
                 raise WildlabError(f"a value of {value:g}", f"give a number {span}", field=option)
+        if (self.gimbal == "fixed") is not (self.swing_deg == 0):
+            raise WildlabError(
+                f"a gimbal that is {self.gimbal} with a swing of {self.swing_deg:g} degrees",
+                "give --gimbal and --swing together, or neither",
+                field="--swing",
+            )
         if self.wind_m_s > 0 and self.wind_from_deg is None:
             raise WildlabError(
                 f"a wind of {self.wind_m_s:g} m/s from nowhere",

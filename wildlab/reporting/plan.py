@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import Plan
+from wildlab.pipeline.plan_coverage import Covered
 from wildlab.pipeline.plan_files import origin_text
-from wildlab.pipeline.plan_said import count, hectares, minutes
+from wildlab.pipeline.plan_said import count, hectares, minutes, percent
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
 from wildlab.reporting.html import examine
@@ -25,17 +28,25 @@ from wildlab.reporting.text import NOTHING, escape
 
 #: Colours of flights, over and over.
 FLIGHTS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+#: Ground of an area by what becomes of it.
+GROUND = {"seen": "#D6EBDF", "hidden": "#D55E00", "only blurred": "#CC79A7", "in no image": "#F0C24B"}
+#: Places along a flight at which its ground is drawn.
+PLACES = 800
 #: Flights that a key names one by one.
 NAMED = 6
 
 
-def plan_page(plan: Plan, result: Mapping[str, Any], *, exact: bool = False) -> str:
+def plan_page(
+    plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any], *, exact: bool = False
+) -> str:
     """The whole page, without anything that has to be fetched.
 
     Parameters
     ----------
     plan
         From `wildlab.pipeline.plan.make_plan`.
+    covered
+        Of each area, from `wildlab.pipeline.plan_coverage.cover`.
     result
         From `wildlab.pipeline.plan_said.plan_result`.
     exact
@@ -52,7 +63,7 @@ def plan_page(plan: Plan, result: Mapping[str, Any], *, exact: bool = False) -> 
         If the page would break a promise of `wildlab.reporting.html.examine`.
     """
     n = len(result["sorties"])
-    title = f"{count(n, 'flight')} of {minutes(result['duration_s'])} in all"
+    title = f"{count(n, 'flight')} of {minutes(result['duration_s'])}{' in all' if n > 1 else ''}"
     names = ", ".join(one["name"] for one in result["areas"][:4])
     more = len(result["areas"]) - 4
     names += f" and {count(more, 'more area')}" if more > 0 else ""
@@ -61,13 +72,15 @@ def plan_page(plan: Plan, result: Mapping[str, Any], *, exact: bool = False) -> 
         f'<header><h1>{escape(title)}</h1><p class="sub">{escape(names)}; {escape(place)}</p></header>',
         _summary(result),
         _tiles(result),
-        "<h2>Where it flies</h2>",
-        _figure(*_map(plan)),
-        "<h2>Flights</h2>",
-        _flights(result),
+        "<h2>Where it flies, and what it sees</h2>",
+        _figure(*_map(plan, covered, result)),
         "<h2>Areas</h2>",
         _areas(result),
+        "<h2>Flights</h2>",
+        _flights(result),
     ]
+    if plan.terrain is not None:
+        parts += ["<h2>Heights</h2>", _figure(*_heights(plan, plan.terrain))]
     parts += ["<h2>What this rests on</h2>", _points(result["assumed"])]
     whole = page(title=title, body="\n".join(parts), kicker="wildlab › plan")
     examine(whole, "plan")
@@ -88,6 +101,13 @@ def _tiles(result: Mapping[str, Any]) -> str:
     longest = max(one["duration_s"] for one in result["sorties"])
     tiles = [
         (minutes(longest), "the longest flight, from take-off to landing"),
+        (percent(result["seen"]), "of the ground is seen"),
+    ]
+    if result["expected_finds"] is not None:
+        tiles.append(
+            (f"{result['expected_finds']:.3g}", f"finds expected, of {result['animals']:.4g} animals")
+        )
+    tiles += [
         (f"{result['height_m']:.0f} m", "above the ground"),
         (f"{result['animal_pixels']:.0f} px", "across what is looked for"),
         (f"{result['furthest_m']:.0f} m", "from take-off at the most"),
@@ -99,8 +119,9 @@ def _tiles(result: Mapping[str, Any]) -> str:
     )
 
 
-def _map(plan: Plan) -> tuple[Figure, str, str]:
+def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> tuple[Figure, str, str]:
     fig, ax = new_figure(5.8, 5.2)
+    there = [_draw_covered(ax, one) for one in covered]
     for area in plan.areas.areas:
         _draw_area(ax, area)
     many = len(plan.sorties) > NAMED
@@ -114,15 +135,75 @@ def _map(plan: Plan) -> tuple[Figure, str, str]:
     ax.margins(0.06)
     map_axes(ax)
     rows = len(plan.pattern.rows)
-    ax.set_title(f"{count(rows, 'row')} in {count(len(plan.sorties), 'flight')}")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
+    ax.set_title(f"{percent(result['seen'])} is seen, in {count(len(plan.sorties), 'flight')}")
+    handles, _ = ax.get_legend_handles_labels()
+    shown = np.any(there, axis=0)
+    handles += [
+        Patch(color=c, label=what) for (what, c), some in zip(GROUND.items(), shown, strict=True) if some
+    ]
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     spread = _extent(plan)
     alt = (
         f"Map, north up, of {count(len(plan.areas.areas), 'area')} over {spread[0]:.0f} m by "
         f"{spread[1]:.0f} m with {count(rows, 'row')} of "
         f"{count(len(plan.sorties), 'flight')} and the take-off point."
     )
+    alt += " " + " ".join(
+        f"{one['name']}: {percent(one['seen'])} seen, {percent(one['hidden'])} hidden, "
+        f"{percent(one['blurred'])} blurred."
+        for one in result["areas"][:NAMED]
+    )
     return fig, alt, "North is up. Arrows show which way a row is flown; the triangle is the take-off point."
+
+
+def _draw_covered(ax: Axes, one: Covered) -> list[bool]:
+    """The ground of an area, by what becomes of it; whether there is any of each kind."""
+    seen = one.looks > 0
+    kinds = [seen, one.hidden, one.blurred, ~(seen | one.hidden | one.blurred)]
+    colours = np.ones((*one.inside.shape, 4))
+    colours[~one.inside] = 0
+    for which, colour in zip(kinds, GROUND.values(), strict=True):
+        colours[which & one.inside] = to_rgba(colour)
+    half = one.step / 2
+    rows, columns = one.inside.shape
+    ax.imshow(
+        colours,
+        origin="lower",
+        extent=(
+            one.east - half,
+            one.east + columns * one.step - half,
+            one.north - half,
+            one.north + rows * one.step - half,
+        ),
+        interpolation="nearest",
+        zorder=1,
+    )
+    return [bool((which & one.inside).any()) for which in kinds]
+
+
+def _heights(plan: Plan, terrain: Terrain) -> tuple[Figure, str, str]:
+    """The ground below each flight, and the way above it, from the take-off point's height."""
+    fig, ax = new_figure(6.0, 3.0)
+    base = float(plan.sorties[0].way.ground[0])
+    begin, low, high, top = 0.0, np.inf, -np.inf, -np.inf
+    for k, one in enumerate(plan.sorties):
+        way = one.way
+        along = begin + np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(way.points, axis=0), axis=1))])
+        places = np.linspace(along[0], along[-1], PLACES)
+        where = np.stack([np.interp(places, along, way.points[:, axis]) for axis in (0, 1)], axis=1)
+        ground = terrain.heights_at(where) - base
+        ax.fill_between(places / 1000, ground, y2=-1e5, color="#CFC7B8", lw=0)
+        ax.plot(along / 1000, way.height - base, color=FLIGHTS[k % len(FLIGHTS)], lw=1.2)
+        low, high = min(low, float(np.nanmin(ground))), max(high, float(way.height.max()) - base)
+        top, begin = max(top, float(np.nanmax(ground))), float(along[-1])
+    ax.set(xlabel="way (km)", ylabel="above take-off (m)", ylim=(low - 5, high + 10), xlim=(0, begin / 1000))
+    least, most = min(one.way.least for one in plan.sorties), max(one.way.most for one in plan.sorties)
+    ax.set_title(f"{least:.0f} to {most:.0f} m above the ground")
+    alt = (
+        f"The way and the ground below it over {begin / 1000:.1f} km. From the take-off point, the ground "
+        f"lies between {low:.0f} and {top:.0f} m; the way is {least:.0f} to {most:.0f} m above it."
+    )
+    return fig, alt, "The flights one after the other, each in its colour of the map."
 
 
 def _draw_area(ax: Axes, area: Area) -> None:
@@ -187,17 +268,24 @@ def _flights(result: Mapping[str, Any]) -> str:
 
 
 def _areas(result: Mapping[str, Any]) -> str:
-    heads = ["area", "size", "rows", "row distance, m", "time"]
+    heads = ["area", "size", "seen", "hidden", "finds", "rows", "row distance, m", "time"]
     rows = [
         [
             one["name"],
             hectares(one["size_m2"]),
+            percent(one["seen"]),
+            percent(one["hidden"]),
+            NOTHING
+            if one["expected_finds"] is None
+            else f"{one['expected_finds']:.3g} of {one['animals']:.3g}",
             str(one["rows"]),
             f"{one['row_distance_m']:.1f}",
             minutes(one["seconds"]),
         ]
         for one in result["areas"]
     ]
+    if all(one["expected_finds"] is None for one in result["areas"]):
+        heads, rows = _without(4, heads, rows)
     note = (
         '<p class="note">Times are of rows and the turns between them, without the ways there and back.</p>'
     )

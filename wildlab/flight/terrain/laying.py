@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from wildlab.flight.terrain.resampling import (
 )
 from wildlab.flight.terrain_file import MOST_NODES
 from wildlab.flight.terrain_model import TerrainPart, TerrainSays
+from wildlab.geometry.frames import Origin
 from wildlab.geometry.terrain import Terrain
 
 Array = NDArray[np.float64]
@@ -84,6 +85,85 @@ def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
     margin = says.margin_m
     if margin is None:
         margin = float(np.clip(HEIGHTS_ABOVE * max(above, default=0.0), LEAST, MOST))
+    cut = _cut_out(places, positions, margin, says)
+    record = TerrainPart(
+        source=path.name,
+        sha256=elevation.digest,
+        crs=_named(elevation),
+        heights=heights,
+        added_m=added,
+        unit=elevation.unit,
+        cell_m=cut.cell,
+        averaged=cut.every,
+        step_m=cut.terrain.step,
+        rows=cut.terrain.height.shape[0],
+        columns=cut.terrain.height.shape[1],
+        holes=int(np.isnan(cut.terrain.height).sum()),
+        error_rms_m=cut.rms,
+        error_max_m=cut.largest,
+        sd_m=says.sd_m,
+    )
+    manifest = replace_in_manifest(flight.manifest, {"terrain": record.model_dump(exclude_none=True)})
+    return Flight(manifest, flight.nav, flight.tables, flight.folder, cut.terrain)
+
+
+def terrain_about(path: Path, says: TerrainSays, origin: Origin, points: Array, margin: float) -> CutOut:
+    """The part of an elevation map about places that no flight has been to yet.
+
+    Parameters
+    ----------
+    path
+        Of the map.
+    says
+        What the user says of it. What its heights count from is not asked: they are taken as they are, and
+        differences between them are what matters.
+    origin
+        Of n.
+    points
+        (N, 2) north and east, metres.
+    margin
+        How far it reaches beyond them, metres.
+
+    Returns
+    -------
+    CutOut
+
+    Raises
+    ------
+    WildlabError
+        Where the map cannot be used, or none of the places lies over it.
+    """
+    places = places_of(open_elevation(path, says), origin, 0.0)
+    positions = np.column_stack([points, np.zeros(len(points))])
+    _refuse_elsewhere(places, positions, "the areas do not lie", "the order of their coordinates")
+    return _cut_out(places, positions, margin if says.margin_m is None else says.margin_m, says)
+
+
+class CutOut(NamedTuple):
+    """A part of an elevation map in n.
+
+    Attributes
+    ----------
+    terrain
+        On its grid.
+    cell
+        Sides of the map's cell, metres.
+    every
+        How many cells a side were averaged.
+    rms, largest
+        How far the grid lies from the map's own nodes, metres.
+    """
+
+    terrain: Terrain
+    cell: tuple[float, float]
+    every: int
+    rms: float
+    largest: float
+
+
+def _cut_out(places: Places, positions: Array, margin: float, says: TerrainSays) -> CutOut:
+    """The part of a map that is near positions (N, 3), resampled into n."""
+    elevation, path = places.map, places.map.path
     low, high = positions[:, :2].min(axis=0) - margin, positions[:, :2].max(axis=0) + margin
     cell = _cell_sides(places, positions)
     about = _within(places, Extent(*(float(side) for side in (low[0], high[0], low[1], high[1]))))
@@ -104,25 +184,7 @@ def lay_terrain(flight: Flight, path: Path, says: TerrainSays) -> Flight:
     # What is known of a height at a node is known no better between nodes.
     sd = math.hypot(says.sd_m, rms) if says.sd_m is not None else math.nan
     terrain = Terrain(terrain.height, terrain.north, terrain.east, terrain.step, sd)
-    record = TerrainPart(
-        source=path.name,
-        sha256=elevation.digest,
-        crs=_named(elevation),
-        heights=heights,
-        added_m=added,
-        unit=elevation.unit,
-        cell_m=cell,
-        averaged=every,
-        step_m=step,
-        rows=terrain.height.shape[0],
-        columns=terrain.height.shape[1],
-        holes=int(np.isnan(terrain.height).sum()),
-        error_rms_m=rms,
-        error_max_m=largest,
-        sd_m=says.sd_m,
-    )
-    manifest = replace_in_manifest(flight.manifest, {"terrain": record.model_dump(exclude_none=True)})
-    return Flight(manifest, flight.nav, flight.tables, flight.folder, terrain)
+    return CutOut(terrain, cell, every, rms, largest)
 
 
 def _positions(flight: Flight) -> tuple[Array, NDArray[np.bool_]]:
@@ -304,7 +366,9 @@ def _window(places: Places, extent: Extent, every: int, path: Path) -> tuple[int
     return row, column, rows, columns
 
 
-def _refuse_elsewhere(places: Places, positions: Array) -> None:
+def _refuse_elsewhere(
+    places: Places, positions: Array, what: str = "the flight does not lie", also: str = "the flight's origin"
+) -> None:
     """Refuse a map that no position of the flight lies over, and say how far off it is."""
     rows, columns = places.map.shape
 
@@ -330,8 +394,8 @@ def _refuse_elsewhere(places: Places, positions: Array) -> None:
     far = f"{distance / 1000:,.1f} km away" if distance >= 1000 else f"{distance:.0f} m away"
     far = far if math.isfinite(distance) else "beyond the reach of its own CRS"
     raise WildlabError(
-        f"the flight does not lie over this map, whose nearest cell is {far}{_mirrored(places)}",
-        "give a map of the place, or check its CRS and the flight's origin",
+        f"{what} over this map, whose nearest cell is {far}{_mirrored(places)}",
+        f"give a map of the place, or check its CRS and {also}",
         file=places.map.path,
         field="terrain",
     )
@@ -350,6 +414,8 @@ def _mirrored(places: Places) -> str:
         x, y = places.to_map(np.array([signs[1] * longitude]), np.array([signs[0] * latitude]))
         if over(x, y):
             return f"; with the other sign of {what} it would"
+    if abs(longitude) <= 90 and over(*places.to_map(np.array([latitude]), np.array([longitude]))):
+        return "; with latitude and longitude swapped it would"
     x, y = places.to_map(np.array([longitude]), np.array([latitude]))
     for shift in (-1e7, 1e7):
         if over(x, y + shift):
