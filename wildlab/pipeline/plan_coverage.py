@@ -34,7 +34,7 @@ from wildlab.planning.gimbal import (
     swing_yaw,
     view_inside,
 )
-from wildlab.planning.sightings import Sightings, see
+from wildlab.planning.sightings import see
 
 #: Share of an image's shorter side that its edge is: what lies in it is not counted.
 EDGE = 0.05
@@ -50,8 +50,6 @@ ABOVE = 0.1
 AGAIN, ROLLS = 0.1, 17
 #: Sightings whose lines are looked along at once.
 TOGETHER = 500_000
-#: A surface so far below everything that no line of sight meets it.
-NOTHING_HIDES = Terrain(np.full((2, 2), -1e6, np.float32), 0.0, 0.0, 1.0)
 
 
 class Covered(NamedTuple):
@@ -250,10 +248,6 @@ def _within_edge(camera: Camera) -> Camera:
     )
 
 
-def _some(found: Sightings, which: NDArray[np.bool_]) -> Sightings:
-    return Sightings(*(part[which] for part in found))
-
-
 def _covered(plan: Plan, nodes: Terrain, inside: NDArray[np.bool_], images: list[Images]) -> Covered:
     shape, size = nodes.height.shape, nodes.height.size
     looks, shown, soft = (np.zeros(size, np.intp) for _ in range(3))
@@ -264,8 +258,8 @@ def _covered(plan: Plan, nodes: Terrain, inside: NDArray[np.bool_], images: list
     for one in images:
         if not one.poses.rows[0]:
             continue
-        found = see(nodes, one.poses, FURTHEST * plan.height, surface=NOTHING_HIDES)
-        found = _some(found, mask[found.node])
+        found = see(nodes, one.poses, FURTHEST * plan.height, hidden=False)
+        found = found.take(mask[found.node])
         shown += np.bincount(found.node, minlength=size)
         if plan.terrain is not None:
             clear = np.ones(len(found.node), bool)
@@ -280,7 +274,7 @@ def _covered(plan: Plan, nodes: Terrain, inside: NDArray[np.bool_], images: list
                     ]
                 )
                 clear[part] = lines_clear(plan.terrain, points, one.poses.p_nc[found.image[part]])
-            found = _some(found, clear)
+            found = found.take(clear)
         sharp = one.sharp[found.image]
         looks += np.bincount(found.node[sharp], minlength=size)
         soft += np.bincount(found.node[~sharp], minlength=size)
