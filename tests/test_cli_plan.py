@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 from tests.flight.test_area import LAT, LON, collection, feature, polygon
@@ -121,3 +122,107 @@ def test_a_calibrated_camera_is_taken(capsys, area, tmp_path):
     )
     assert code == 0, err
     assert json.loads(out)["strip_m"] == pytest.approx(60 * 639 / 800, abs=0.01)
+
+
+# -- over a map of heights
+
+
+def write_map(path, heights, north_west, crs="EPSG:32633", cell=5.0):
+    import rasterio
+
+    with rasterio.open(
+        path,
+        "w",
+        driver="GTiff",
+        height=heights.shape[0],
+        width=heights.shape[1],
+        count=1,
+        dtype="float32",
+        crs=crs,
+        transform=rasterio.Affine(cell, 0, north_west[0], 0, -cell, north_west[1]),
+    ) as out:
+        out.write(heights, 1)
+    return path
+
+
+@pytest.fixture(scope="module")
+def over_map(tmp_path_factory):
+    """An area of 200 m by 400 m in the middle of a map of 1 km by 1 km, in UTM zone 33, with a ridge."""
+    from pyproj import Transformer
+
+    folder = tmp_path_factory.mktemp("map")
+    east, north = Transformer.from_crs(4326, 32633, always_xy=True).transform(LON, LAT)
+    x = np.arange(200) * 5.0
+    ridge = 40 * np.exp(-(((x - 500) / 60) ** 2)) + 300
+    heights = np.tile(ridge.astype(np.float32), (200, 1))
+    dem = write_map(folder / "dem.tif", heights, (east - 400, north + 700))
+    area = folder / "fence.geojson"
+    area.write_text(json.dumps(collection(feature(polygon(FIELD), name="Wolf", animals=6))), encoding="utf-8")
+    return folder, area, dem, heights, (east - 400, north + 700)
+
+
+def test_heights_follow_a_map_and_finds_are_told(capsys, over_map, tmp_path):
+    _, area, dem, _, _ = over_map
+    into = tmp_path / "out"
+    code, out, err = call(
+        capsys, area, *SHEET, "--terrain", dem, "--height", 60, "--direction", 90, "--into", into
+    )
+    assert code == 0, err
+    assert "Of 6 animals 6 should be found" in out
+    rows = read_wpl((into / "sortie-1.waypoints").read_text())
+    points = rows[rows[:, 3] == 16][1:]
+    # Over the ridge and back down, row after row: 60 m above the ground, counted from the take-off's.
+    assert np.ptp(points[:, 10]) == pytest.approx(40, abs=6)
+    assert rows[0, 10] == pytest.approx(300, abs=12)  # what the map says of the take-off point
+    said = json.loads((into / "result.json").read_text())
+    one = said["sorties"][0]
+    assert 54.9 <= one["least_above_ground_m"] <= 60 <= one["most_above_ground_m"] <= 65.1
+    page = (into / "report.html").read_text()
+    assert (
+        page.count("data:image/png") == 2 and "that of dem.tif, every" in page and str(dem.parent) not in page
+    )
+    assert "58.6" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
+
+
+def test_maps_that_do_not_fit_are_sentences(capsys, over_map, tmp_path):
+    folder, area, dem, heights, corner = over_map
+    into = ("--into", tmp_path / "out")
+
+    def refused(path, *given, area=area):
+        code, _, err = call(capsys, area, *SHEET, "--height", 60, "--terrain", path, *given, *into)
+        assert code == 2 and "Traceback" not in err and not (tmp_path / "out").exists(), err
+        return err
+
+    no_crs = write_map(folder / "no_crs.tif", heights, corner, crs=None)
+    assert "states no CRS" in refused(no_crs)
+    assert "there is no such file" in refused(folder / "none.tif")
+    # The same map, 300 m further north: it holds a part of the area.
+    part = write_map(folder / "part.tif", heights, (corner[0], corner[1] + 500))
+    assert re.search(r"\d\d % of Wolf lie outside the map of heights", refused(part))
+    away = write_map(folder / "away.tif", heights, (corner[0], corner[1] + 5000))
+    assert "the areas do not lie over this map, whose nearest cell is 4." in refused(away)
+    south = write_map(folder / "south.tif", heights, (corner[0], 10_000_800 - corner[1]), "EPSG:32733")
+    assert "with the other sign of latitude it would" in refused(south)
+    turned = folder / "turned.geojson"
+    ring = [[b, a] for a, b in polygon(FIELD)["coordinates"][0]]
+    turned.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    assert "with latitude and longitude swapped it would" in refused(dem, area=turned)
+    holes = heights.copy()
+    holes[:, 80:] = np.nan
+    assert "lie outside the map of heights, or where it has none" in refused(
+        write_map(folder / "holes.tif", holes, corner)
+    )
+    code, _, err = call(capsys, area, *SHEET, "--terrain-crs", "EPSG:32633", *into)
+    assert code == 2 and "something is said of a map, and no map is named" in err
+
+
+def test_trees_and_rules_forbid(capsys, over_map, tmp_path):
+    _, area, dem, _, _ = over_map
+    code, _, err = call(capsys, area, *SHEET, "--height", 25, "--trees", 20, "--into", tmp_path / "a")
+    assert code == 2 and "a height of 25 m above the ground, and trees of 20 m. Fly 30 m" in err
+    code, _, err = call(capsys, area, *SHEET, "--pixels", 60, "--trees", 20, "--into", tmp_path / "a")
+    assert code == 2 and "over trees of 20 m nothing below 30 m is planned unasked" in err
+    # An aircraft that cannot slow down begins to climb before the ridge, and is too high above the valley.
+    given = ("--terrain", dem, "--height", 110, "--direction", 90, "--climb", 1, "--turn-radius", 30)
+    code, _, err = call(capsys, area, *SHEET, *given, "--into", tmp_path / "b")
+    assert code == 0 and re.search(r"the way is 1[2-9]\d m above the ground, and 120 m are allowed", err)

@@ -14,6 +14,7 @@ from wildlab.flight.terrain.laying import CutOut, terrain_about
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan_outlines import simplified
 from wildlab.pipeline.plan_sorties import Sortie, split_rows
 from wildlab.pipeline.plan_view import FURTHEST, View, look
 from wildlab.pipeline.plan_wanted import Wanted
@@ -25,6 +26,8 @@ from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 BELOW_RULE = 5.0
 #: The least height that is chosen without being asked for, metres.
 LEAST_HEIGHT = 10.0
+#: Turns of a fence smaller than this share of a strip are left to the overlap.
+FOLLOWED = 0.02
 #: A map reaches at least so far beyond the areas, metres.
 LEAST_MARGIN = 200.0
 #: Share of an area of which the map may know nothing.
@@ -128,7 +131,7 @@ def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
         _check_under(areas, terrain, strip)
     direction = None if wanted.direction_deg is None else math.radians(wanted.direction_deg)
     pattern = lawn_mowers(
-        [area.outline for area in areas.areas],
+        [simplified(area.outline, FOLLOWED * strip) for area in areas.areas],
         distance,
         directions=None if direction is None else [direction] * len(areas.areas),
         turn=_turn_length(wanted),

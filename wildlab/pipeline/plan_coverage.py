@@ -21,6 +21,7 @@ from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
 from wildlab.pipeline.plan import Plan
+from wildlab.pipeline.plan_outlines import simplified
 from wildlab.pipeline.plan_sorties import Sortie
 from wildlab.pipeline.plan_view import FURTHEST
 from wildlab.planning.areas import contains
@@ -44,6 +45,8 @@ SHARP = 0.25
 NEXT = 0.25
 #: Nodes across a strip, and in all areas at most.
 ACROSS, MOST_NODES = 40, 400_000
+#: Share of their distance that nodes tell a fence by.
+TOLD = 0.1
 #: Metres above the ground that is looked at: an animal is not flat, and a grid is not exact.
 ABOVE = 0.1
 #: Share of its length that a swing sees again, and rolls at which an adaptive one looks ahead.
@@ -145,6 +148,8 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     points, headings = course.at(times)
     piece = np.clip(np.searchsorted(course.times, times, side="right") - 1, 0, len(course.times) - 1)
     on_row = sortie.row_of[piece] >= 0
+    # On a row the way is straight; between pieces of a turn, headings run from one to the next.
+    headings = np.where(on_row, course.headings[piece], headings)
     if wanted.vehicle == "fixed-wing":
         headings = _nose(headings, wanted.speed_m_s, wanted.wind)
     ground = np.zeros(len(points)) if plan.terrain is None else _known(plan.terrain, points)
@@ -225,9 +230,10 @@ def _nodes(
     count = np.maximum(np.ceil((high - low) / step).astype(int), 2)
     north, east = (low[k] + step * (np.arange(count[k]) + 0.5) for k in (0, 1))
     points = np.stack(np.meshgrid(north, east, indexing="ij"), axis=-1).reshape(-1, 2)
-    inside = contains(outline, points)
+    # Corners that differ from a straight fence by less than nodes can tell cost time and nothing else.
+    inside = contains(simplified(outline, TOLD * step), points)
     for hole in holes:
-        inside &= ~contains(hole, points)
+        inside &= ~contains(simplified(hole, TOLD * step), points)
     shape = (len(north), len(east))
     ground = np.zeros(len(points)) if terrain is None else terrain.heights_at(points)
     if not np.isfinite(ground).any():

@@ -1,0 +1,230 @@
+"""What a plan says will be seen, beside what is known otherwise: shares by hand, hiding by brute force."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from tests.flight.test_area import collection, feature, polygon
+from tests.pipeline.test_plan import CAMERA, hills, plan
+from wildlab.geometry.camera import project
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan import make_plan
+from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
+from wildlab.pipeline.plan_flown import ExecutionErrors, with_errors
+from wildlab.pipeline.plan_outlines import simplified
+from wildlab.pipeline.plan_said import animals_in, percent, plan_result, unseen
+from wildlab.pipeline.plan_wanted import Wanted
+
+HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
+FIELD = [[0, 0], [0, 160], [200, 160], [200, 0], [0, 0]]
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    path = tmp_path_factory.mktemp("areas") / "field.geojson"
+    path.write_text(json.dumps(collection(feature(polygon(FIELD, HOLE), name="field", animals=12))))
+    return path
+
+
+def over(area, terrain, **given):
+    return make_plan(Wanted(area, CAMERA, **given), terrain)
+
+
+def test_with_overlap_all_of_a_flat_field_is_seen_and_its_hole_is_not_asked(field):
+    made = plan(field, height_m=50.0)
+    (found,) = cover(made)
+    assert found.seen == 1.0
+    area = float(found.inside.sum()) * found.step**2
+    assert area == pytest.approx(160 * 200 - 40 * 40, rel=0.02)
+    rows, columns = np.indices(found.inside.shape)
+    north, east = found.north + found.step * rows, found.east + found.step * columns
+    in_hole = (abs(north - (70 - 100)) < 19) & (abs(east - (70 - 80)) < 19)
+    assert in_hole.any() and not found.inside[in_hole].any()
+
+
+def test_without_overlap_what_lies_at_the_edges_of_images_is_missed(field):
+    # Rows to the north; of 640 columns, 25 on either side do not count.
+    made = plan(field, height_m=50.2, overlap=0.0, direction_deg=0.0)
+    (found,) = cover(made)
+    distance = float(made.pattern.distance[0])
+    width = made.strip * (640 - 50) / 639
+    assert width < distance
+    assert found.seen == pytest.approx(width / distance, abs=0.02)
+    assert found.share(found.hidden) == 0 and found.share(found.blurred) == 0
+
+
+@pytest.mark.parametrize("tilt", [90.0, 30.0])
+def test_what_is_hidden_is_hidden_by_brute_force(field, tilt):
+    terrain = hills(step=8.0)
+    steep = Terrain(5.0 * terrain.height, terrain.north, terrain.east, terrain.step)
+    made = over(field, steep, height_m=40.0, tilt_deg=tilt)
+    (found,) = cover(made)
+    images = images_of(made, made.sorties[0])
+    p, R = images.poses.p_nc, images.poses.R_nc
+    rng = np.random.default_rng(1)
+    rows, columns = np.nonzero(found.inside)
+    some = rng.choice(len(rows), 60, replace=False)
+    t = np.linspace(0.0, 1.0, 2001)[1:-1, None]
+    agreed = 0
+    for i, j in zip(rows[some], columns[some], strict=True):
+        ne = np.array([found.north + found.step * i, found.east + found.step * j])
+        point = np.array([*ne, -steep.heights_at(ne[None])[0] - 0.1])
+        camera = images.poses.camera
+        offset = np.einsum("nij,ni->nj", R, point - p)
+        u, v = project(camera, offset).T
+        with np.errstate(invalid="ignore"):
+            inside = (u >= 0) & (v >= 0) & (u <= camera.width) & (v <= camera.height)
+        inside &= np.linalg.norm(point - p, axis=1) <= FURTHEST * 40.0
+        shown = False
+        for k in np.flatnonzero(inside):
+            line = p[k] + t * (point - p[k])
+            if images.sharp[k] and (-line[:, 2] > steep.heights_at(line[:, :2])).all():
+                shown = True
+                break
+        agreed += shown == (found.looks[i, j] > 0)
+    assert agreed >= 59  # a line that grazes the ground may fall either way between its steps
+    assert found.seen < 1.0 or tilt == 90.0
+
+
+def test_a_trench_hides_from_a_camera_that_looks_ahead(field):
+    height = np.zeros((300, 300), np.float32)
+    height[145:149] = -30.0  # 4 m wide, across rows to the north
+    terrain = Terrain(height, north=-150.0, east=-150.0, step=1.0)
+    made = over(field, terrain, height_m=40.0, tilt_deg=45.0, direction_deg=0.0)
+    (found,) = cover(made)
+    north = found.north + found.step * np.arange(len(found.inside))
+    bottom = (north > -6.2) & (north < -0.8)
+    assert found.hidden[bottom].any() and not found.hidden[~bottom].any()
+    down = over(field, terrain, height_m=40.0, tilt_deg=90.0, direction_deg=0.0)
+    assert cover(down)[0].share(cover(down)[0].hidden) < found.share(found.hidden)
+
+
+def test_what_is_planned_as_seen_is_seen_with_errors_of_the_pose(field):
+    made = over(field, hills(), height_m=60.0)
+    images = images_of(made, made.sorties[0])
+    errors = ExecutionErrors(2.0, 1.5, 60.0, *np.radians([0.7, 0.7, 1.5]), 5.0)
+    R = images.poses.R_nc
+    headings = np.arctan2(-R[:, 1, 1], -R[:, 0, 1])
+    (planned,) = cover(made)
+    for seed in (1, 2):
+        flown = with_errors(images.poses, headings, errors, 0.5, np.random.default_rng(seed))
+        # The whole image, which the plan did not count on.
+        edge = (CAMERA.width - images.poses.camera.width) / 2
+        kept, total = 0, 0
+        rows, columns = np.nonzero(planned.looks > 0)
+        for i, j in list(zip(rows, columns, strict=True))[::37]:
+            ne = np.array([planned.north + planned.step * i, planned.east + planned.step * j])
+            point = np.array([*ne, -made.terrain.heights_at(ne[None])[0]])
+            u, v = project(flown.camera, np.einsum("nij,ni->nj", flown.R_nc, point - flown.p_nc)).T
+            with np.errstate(invalid="ignore"):
+                seen = (abs(u - flown.camera.width / 2) <= flown.camera.width / 2 + edge) & (
+                    abs(v - flown.camera.height / 2) <= flown.camera.height / 2 + edge
+                )
+            kept, total = kept + bool((seen & images.sharp).any()), total + 1
+        assert kept >= 0.95 * total > 50
+
+
+def test_images_are_near_enough_that_none_is_needed_between(field):
+    made = plan(field, height_m=50.0, tilt_deg=60.0)
+    images = images_of(made, made.sorties[0])
+    steps = np.linalg.norm(np.diff(images.poses.p_nc, axis=0), axis=1)
+    assert np.median(steps) <= 0.26 * made.view.length * made.height
+    # The camera looks 60 degrees below the horizon, along the row.
+    lens = images.poses.R_nc[:, :, 2]
+    assert np.allclose(lens[:, 2], math.sin(math.radians(60)), atol=1e-9)
+    row = made.pattern.rows[made.sorties[0].rows[0]]
+    ahead = (row[1] - row[0]) / np.linalg.norm(row[1] - row[0])
+    assert np.allclose(lens[0, :2], ahead * math.cos(math.radians(60)), atol=1e-6)
+
+
+def test_a_fixed_wing_points_its_camera_where_its_nose_is(field):
+    made = plan(
+        field, height_m=60.0, turn_radius_m=30.0, direction_deg=0.0, wind_m_s=6.0, wind_from_deg=270.0
+    )
+    images = images_of(made, made.sorties[0])
+    top = -images.poses.R_nc[:, :, 1]  # up in the image, ahead of the nose
+    heading = np.degrees(np.arctan2(top[:, 1], top[:, 0]))
+    # On rows to the north, a wind from the west turns the nose to the west by asin(6 / 10).
+    north = np.abs(heading) < 60
+    assert north.any() and np.allclose(heading[north], -math.degrees(math.asin(0.6)), atol=1e-6)
+
+
+@pytest.mark.parametrize("gimbal", ["yaw", "roll", "adaptive"])
+def test_a_camera_that_swings_sees_a_wider_strip(field, gimbal):
+    given = dict(height_m=50.0, tilt_deg=60.0, gimbal=gimbal, swing_deg=30.0, exposure_s=0.001, speed_m_s=5.0)
+    made, still = plan(field, **given), plan(field, height_m=50.0, tilt_deg=60.0)
+    assert made.strip > 1.3 * still.strip and len(made.pattern.rows) < len(still.pattern.rows)
+    assert gimbal_rate(still) == 0 < gimbal_rate(made)
+    (found,) = cover(made)
+    assert found.seen > 0.9
+    (blurred,) = cover(plan(field, **{**given, "exposure_s": 0.5}))
+    assert blurred.seen < 0.1 and blurred.share(blurred.blurred) > 0.8
+
+
+# -- what is said
+
+
+def covered(seen=0, hidden=0, blurred=0, missed=0):
+    """An area of a hundred nodes."""
+    kinds = np.repeat([0, 1, 2, 3], [seen, hidden, blurred, missed]).reshape(10, 10)
+    return Covered(0.0, 0.0, 1.0, np.ones((10, 10), bool), (kinds == 0).astype(int), kinds == 1, kinds == 2)
+
+
+def test_why_ground_is_not_seen_and_what_helps_follows_from_the_shares(field):
+    made = plan(field, height_m=50.0)
+    assert unseen(made, [covered(seen=99, hidden=1)]) == []
+    (said,) = unseen(made, [covered(seen=70, hidden=20, blurred=3, missed=7)])
+    assert said == (
+        "30 % of field will not be seen: 20 % hidden by the ground, 3 % in blurred images alone, 7 % in no "
+        "image. What helps: rows in another direction, or a camera that looks more down."
+    )
+    (said,) = unseen(made, [covered(seen=70, hidden=3, blurred=20, missed=7)])
+    assert said.endswith("What helps: a slower flight or swing, or a shorter exposure.")
+    (said,) = unseen(made, [covered(seen=70, blurred=3, missed=27)])
+    assert "hidden" not in said and said.endswith("What helps: a larger overlap, or a lower speed.")
+
+
+def test_finds_are_animals_times_what_is_seen(field):
+    made = plan(field, height_m=50.0, detection=0.8, animals=99)
+    result = plan_result(made, [covered(seen=50, missed=50)])
+    # What the file says of an area goes before what is said of all.
+    assert result["animals"] == 12 and result["expected_finds"] == pytest.approx(12 * 0.5 * 0.8)
+    assert result["seen"] == 0.5 and result["areas"][0]["expected_finds"] == pytest.approx(4.8)
+    assert any("4.8 should be found" in one for one in result["sentences"])
+
+
+def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps(collection(feature(polygon(FIELD)))))
+    for given, number in (({}, math.nan), ({"animals": 5}, 5), ({"density_km2": 250}, 8.0)):
+        made = plan(path, height_m=50.0, **given)
+        assert animals_in(made, made.areas.areas[0]) == pytest.approx(number, rel=1e-3, nan_ok=True)
+    result = plan_result(plan(path, height_m=50.0), [covered(seen=100)])
+    assert result["expected_finds"] is None and not any(
+        "should be found" in one for one in result["sentences"]
+    )
+
+
+def test_nearly_all_is_not_all():
+    assert [percent(x) for x in (0, 0.0001, 0.004, 0.5, 0.996, 0.9996, 1)] == [
+        "0 %", "< 0.1 %", "0.4 %", "50 %", "99.6 %", "> 99.9 %", "100 %",
+    ]  # fmt: skip
+
+
+# -- outlines
+
+
+def test_simpler_outlines_stay_within_the_tolerance():
+    angle = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
+    radius = 300 * (1 + 0.15 * np.sin(3 * angle))
+    ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    simple = simplified(ring, 1.5)
+    assert 10 < len(simple) < 100
+    a, b = simple, np.roll(simple, -1, axis=0)
+    for point in ring[::13]:
+        t = np.clip(((point - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0, 1)
+        assert np.linalg.norm(a + t[:, None] * (b - a) - point, axis=1).min() <= 1.5 + 1e-9
+    square = np.array([[0.0, 0], [0, 9], [9, 9], [9, 0]])
+    assert simplified(square, 5.0) is square
