@@ -40,7 +40,8 @@ def touches(height: Array, i: int, j: int, u: float, v: float, z: float, ray: Ar
     if not above + end * (slope + end * bend) > 0:
         return True
     # Between both ends it dips where the height above the ground is bent upwards and falls at first.
-    return bend > 0 and slope < 0 and -slope < 2 * bend * end and slope * slope >= 4 * bend * above
+    dips: bool = bend > 0 and slope < 0 and -slope < 2 * bend * end and slope * slope >= 4 * bend * above
+    return dips
 
 
 @compiled

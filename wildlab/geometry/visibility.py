@@ -80,9 +80,10 @@ def lines_clear(terrain: Terrain, points: ArrayLike, p_nc: ArrayLike) -> NDArray
     from wildlab.geometry.compilation import announced
     from wildlab.geometry.sight_kernels import clear_all
 
-    ends = [_to_grid(terrain, each, whole=True) for each in (starts, targets)]
+    blocks, shapes = terrain._blocks
+    lenses, ends = (_to_grid(terrain, each, whole=True) for each in (starts, targets))
     with announced("lines of sight"):
-        return np.asarray(clear_all(terrain.height, *terrain._blocks, *ends, SHORT_OF, terrain._top))
+        return np.asarray(clear_all(terrain.height, blocks, shapes, lenses, ends, SHORT_OF, terrain._top))
 
 
 def visible_nodes(terrain: Terrain, poses: CameraPoses, above: float = 0.0, furthest: float = np.inf) -> Seen:
