@@ -66,8 +66,8 @@ chosen. Points are drawn all over the land, each with a bearing, and the camera 
 point as far off as the incidence angle asks for.
 
 Intervals are of the mean over lands (Student, 95 %). Times are those of this machine and this code:
-compiled loops for all ways, angles by the arc tangent as (2.24) has it. They are taken in turn, the
-quickest of five calls counts, and they are not the same twice; the steps are."""
+compiled loops for all ways, angles by the arc tangent as (2.24) has it. They are times of the processor,
+taken in turn, of five calls the quickest; they are not the same twice, and the steps are."""
 
 #: What stands before the claims.
 LANDS = (
@@ -123,7 +123,7 @@ def alike_words(times: pd.DataFrame, way: str) -> str:
     low, high = float(found.min()), float(found.max())
     name = "rays from the highest ground in view" if way == RAYS else "rays from the camera"
     said = f"take {number(low, 2)} to {number(high, 2)} times Bresenham's time, by altitude"
-    return f"{name} {said}, which is {'' if max(high, 1 / low) <= ALIKE else 'not '}alike"
+    return f"{name} {said}, which is {'' if max(high, 1 / low) <= ALIKE else 'not '}alike at every one"
 
 
 def agreement_words(spread: pd.DataFrame) -> str:

@@ -43,15 +43,15 @@ MOST_POINTS, PART = 2000, 10
 
 
 def best_times(calls: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Fewest seconds of each call, all in turn: what else the machine does only ever adds."""
+    """Fewest seconds of the processor for each call, all in turn: what else a machine does only adds."""
     for call in calls.values():
         call()  # the first one compiles, and fills the caches
     times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(repeats):
         for name, call in calls.items():
-            begun = time.perf_counter()
+            begun = time.process_time()
             call()
-            times[name].append(time.perf_counter() - begun)
+            times[name].append(time.process_time() - begun)
     return {name: min(each) for name, each in times.items()}
 
 
