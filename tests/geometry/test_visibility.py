@@ -73,7 +73,7 @@ def test_what_is_unknown_hides_and_so_does_a_camera_below_the_ground():
     assert not lines_clear(terrain, [[0.0, 2.0, -1.0]], [0.0, 1.0, 1.0]).any()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(st.integers(0, 10**6), st.sampled_from([0.4, 3.0, 30.0]), st.booleans())
 def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high, one):
     """The walk of rays goes the other way, works out crossings, and does not know what hid lines before."""
@@ -93,7 +93,8 @@ def test_a_line_is_clear_where_the_walk_from_the_camera_meets_nothing(seed, high
     ground = terrain.heights_at(points[:40, :2])
     points[:40, 2] = np.where(np.isnan(ground), points[:40, 2], -ground)
     lens = np.column_stack([rng.uniform(*corners, (count, 2)), -rng.uniform(0, 3 * high, count)])
-    lens[::7, :2] = points[::7, :2]  # straight above or below
+    # Straight above or below; not at a node, where the walk begins in a patch that the line may not cross.
+    lens[21::7, :2] = points[21::7, :2]
     lens = lens[0] if one else lens
     met = intersect_terrain(terrain, points - lens, lens, furthest=1 - SHORT_OF)
     np.testing.assert_array_equal(lines_clear(terrain, points, lens), met.became == MISSED)
