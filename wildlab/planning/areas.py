@@ -250,7 +250,10 @@ def way_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> Array:
     held = contains(fence, ends) | (distance_to_border(fence, ends) <= 10 * SAME)
     if not held.all() or stays_inside(fence, a, b):
         return ends
-    nodes = np.concatenate([ends, fence])
+    # A shortest way bends at corners that stick into the area alone.
+    after = np.roll(fence, -1, axis=0) - fence
+    before_it = np.roll(after, 1, axis=0)
+    nodes = np.concatenate([ends, fence[before_it[:, 0] * after[:, 1] - before_it[:, 1] * after[:, 0] < 0]])
     far = np.full(len(nodes), np.inf)
     far[0], before, todo = 0.0, np.zeros(len(nodes), int), set(range(len(nodes)))
     while todo:
@@ -280,33 +283,43 @@ def _signed_area(points: Array) -> float:
 def _crossing_edges(points: Array) -> tuple[int, int] | None:
     """Two edges that meet elsewhere than at the corner they share, or None."""
     count = len(points)
-    ends = np.roll(points, -1, axis=0)
-    for i in range(count):
-        for j in range(i + 1, count):
-            if j == i + 1 or (i == 0 and j == count - 1):
-                # Neighbours share a corner; they overlap where one turns straight back.
-                first, second = (i, j) if j == i + 1 else (j, i)
-                u, v = ends[first] - points[first], ends[second] - points[second]
-                cross = u[0] * v[1] - u[1] * v[0]
-                if abs(cross) <= 1e-12 * np.linalg.norm(u) * np.linalg.norm(v) and u @ v < 0 and count > 3:
-                    return first, second
-            elif _meet(points[i], ends[i], points[j], ends[j]):
-                return i, j
+    edges = np.roll(points, -1, axis=0) - points
+    if count > 3:
+        # Neighbours share a corner; they overlap where one turns straight back.
+        after = np.roll(edges, -1, axis=0)
+        cross = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+        lengths = np.linalg.norm(edges, axis=1) * np.linalg.norm(after, axis=1)
+        back = (np.abs(cross) <= 1e-12 * lengths) & (np.einsum("ij,ij->i", edges, after) < 0)
+        if back.any():
+            first = int(back.argmax())
+            return first, (first + 1) % count
+    for i in range(count - 2):
+        # The last edge is a neighbour of the first.
+        last = count - 1 if i == 0 else count
+        meet = _meet(points[i], edges[i], points[i + 2 : last], edges[i + 2 : last])
+        if meet.any():
+            return i, i + 2 + int(meet.argmax())
     return None
 
 
-def _meet(a: Array, b: Array, c: Array, d: Array) -> bool:
-    """Whether two closed segments have a point in common."""
+def _meet(a: Array, along: Array, b: Array, edges: Array) -> NDArray[np.bool_]:
+    """Which closed segments, from b (N, 2) along edges (N, 2), have a point in common with one."""
+    length, lengths = np.linalg.norm(along), np.linalg.norm(edges, axis=1)
 
-    def side(p: Array, q: Array, r: Array) -> float:
-        u, v = q - p, r - p
-        value = u[0] * v[1] - u[1] * v[0]
-        return 0.0 if abs(value) <= SAME * float(np.linalg.norm(u)) else float(value)
+    def sides(u: Array, v: Array, scale: Array) -> Array:
+        value = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+        return np.where(np.abs(value) <= SAME * scale, 0.0, np.sign(value))
 
-    sides = side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)
-    if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
-        return True
-    for value, p, q, r in zip(sides, (a, a, c, c), (b, b, d, d), (c, d, a, b), strict=True):
-        if value == 0 and (r >= np.minimum(p, q) - SAME).all() and (r <= np.maximum(p, q) + SAME).all():
-            return True
-    return False
+    start, end = sides(along, b - a, length), sides(along, b + edges - a, length)
+    near, far = sides(edges, a - b, lengths), sides(edges, a + along - b, lengths)
+    meet = (start * end < 0) & (near * far < 0)
+
+    def within(points: Array, origins: Array, spans: Array) -> NDArray[np.bool_]:
+        low, high = np.minimum(origins, origins + spans), np.maximum(origins, origins + spans)
+        return np.asarray(((points >= low - SAME) & (points <= high + SAME)).all(axis=-1))
+
+    meet |= (start == 0) & within(b, a, along)
+    meet |= (end == 0) & within(b + edges, a, along)
+    meet |= (near == 0) & within(a, b, edges)
+    meet |= (far == 0) & within(a + along, b, edges)
+    return np.asarray(meet)

@@ -23,6 +23,8 @@ from wildlab.planning.areas import check_area, way_inside
 from wildlab.planning.visits import Way, visit_order
 
 Ends = Literal["cover", "inside"]
+#: Directions of rows that are tried at most.
+MOST_DIRECTIONS = 60
 #: More rows than this over one area are a slip of a unit.
 MOST_ROWS = 5000
 
@@ -351,7 +353,11 @@ def _best_direction(fence: Array, distance: float, ends: Ends, turn: float) -> f
     edges = edges[np.argsort(-np.linalg.norm(edges, axis=1), kind="stable")]
     angles = np.mod(np.arctan2(edges[:, 1], edges[:, 0]), np.pi)
     angles = np.where(np.pi - angles < 1e-9, 0.0, angles)
-    _, first = np.unique(np.round(angles, 2), return_index=True)
+    # Of a fence with very many corners the edges that differ, and of these the longest.
+    coarse = (
+        np.round(angles, 2) if len(edges) <= MOST_DIRECTIONS else np.round(MOST_DIRECTIONS * angles / np.pi)
+    )
+    _, first = np.unique(coarse, return_index=True)
 
     def cost(angle: float) -> float:
         pieces = [piece for row in rows_over(fence, distance, angle, ends)[0] for piece in row]

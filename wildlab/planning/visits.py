@@ -14,6 +14,9 @@ from wildlab.planning.areas import way_inside
 
 #: Up to how many areas every order is looked at.
 EXACT = 9
+#: Ways between areas, times corners of the fence, up to which ways that stay inside are measured; of more,
+#: which would take minutes, the order is by straight ways.
+MOST_WAYS = 20_000
 
 
 class Way(NamedTuple):
@@ -97,7 +100,7 @@ class _Costs:
         entrance = np.array([ways[k][w].points[0] for k, w in flat])
         leave = np.array([ways[k][w].points[-1] for k, w in flat])
         apart = np.linalg.norm(leave[:, None] - entrance[None], axis=-1)
-        if fence is not None:
+        if fence is not None and len(flat) ** 2 * len(fence) <= MOST_WAYS:
             for i, j in np.ndindex(*apart.shape):
                 if flat[i][0] != flat[j][0]:
                     path = way_inside(fence, leave[i], entrance[j])
