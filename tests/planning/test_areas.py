@@ -67,6 +67,15 @@ def test_what_lies_inside_is_what_winds_round() -> None:
     assert not contains(star, [[np.nan, 0.0]]).any()
 
 
+def test_many_points_are_looked_at_as_few_are() -> None:
+    fence = check_area(U_SHAPE)
+    points = np.random.default_rng(3).uniform(-20, 120, (3000, 2))
+    few = np.array_split(points, 100)
+    assert np.array_equal(contains(fence, points), np.concatenate([contains(fence, one) for one in few]))
+    apart = np.concatenate([distance_to_border(fence, one) for one in few])
+    assert np.allclose(distance_to_border(fence, points), apart)
+
+
 def test_convex_or_not() -> None:
     assert is_convex(check_area(SQUARE))
     assert is_convex(rectangle(5.0, 6.0, 20.0, 10.0, 0.7))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import shortest_path
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
 #: Corners nearer to one another than this are one corner, metres; and what counts as on a border.
 SAME = 1e-6
+#: Up to so many pairs of points and edges are looked at all at once.
+TOGETHER = 20_000
 #: Areas below this cannot be searched, square metres.
 LEAST = 1e-3
 
@@ -135,8 +140,15 @@ def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
     """
     fence = np.asarray(corners, float)
     asked = np.atleast_2d(np.asarray(points, float))
+    following = np.roll(fence, -1, axis=0)
+    if len(fence) * len(asked) <= TOGETHER:
+        spans = (fence[:, 1] > asked[:, 1:]) != (following[:, 1] > asked[:, 1:])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slope = (following[:, 0] - fence[:, 0]) / (following[:, 1] - fence[:, 1])
+            north = fence[:, 0] + (asked[:, 1:] - fence[:, 1]) * slope
+            return np.asarray((spans & (asked[:, :1] < north)).sum(axis=1) % 2 == 1)
     inside = np.zeros(len(asked), bool)
-    for a, b in zip(fence, np.roll(fence, -1, axis=0), strict=True):
+    for a, b in zip(fence, following, strict=True):
         spans = (a[1] > asked[:, 1]) != (b[1] > asked[:, 1])
         with np.errstate(invalid="ignore", divide="ignore"):
             at = a[0] + (asked[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
@@ -223,8 +235,14 @@ def distance_to_border(corners: ArrayLike, points: ArrayLike) -> Array:
     """
     fence = np.asarray(corners, float)
     asked = np.atleast_2d(np.asarray(points, float))
+    following = np.roll(fence, -1, axis=0)
+    if len(fence) * len(asked) <= TOGETHER:
+        edges, to = following - fence, asked[:, None] - fence
+        part = np.einsum("nki,ki->nk", to, edges) / np.maximum(np.einsum("ki,ki->k", edges, edges), 1e-300)
+        off = to - np.clip(part, 0, 1)[..., None] * edges
+        return np.asarray(np.sqrt(np.einsum("nki,nki->nk", off, off)).min(axis=1))
     nearest = np.full(len(asked), np.inf)
-    for a, b in zip(fence, np.roll(fence, -1, axis=0), strict=True):
+    for a, b in zip(fence, following, strict=True):
         edge = b - a
         t = np.clip((asked - a) @ edge / max(edge @ edge, 1e-300), 0, 1)
         nearest = np.minimum(nearest, np.linalg.norm(asked - a - t[:, None] * edge, axis=1))
@@ -250,27 +268,44 @@ def way_inside(corners: ArrayLike, start: ArrayLike, end: ArrayLike) -> Array:
     held = contains(fence, ends) | (distance_to_border(fence, ends) <= 10 * SAME)
     if not held.all() or stays_inside(fence, a, b):
         return ends
-    # A shortest way bends at corners that stick into the area alone.
-    after = np.roll(fence, -1, axis=0) - fence
-    before_it = np.roll(after, 1, axis=0)
-    nodes = np.concatenate([ends, fence[before_it[:, 0] * after[:, 1] - before_it[:, 1] * after[:, 0] < 0]])
-    far = np.full(len(nodes), np.inf)
-    far[0], before, todo = 0.0, np.zeros(len(nodes), int), set(range(len(nodes)))
-    while todo:
-        here = min(todo, key=lambda one: far[one])
-        todo.remove(here)
-        if here == 1 or not np.isfinite(far[here]):
-            break
-        for there in todo:
-            length = far[here] + float(np.linalg.norm(nodes[there] - nodes[here]))
-            if length < far[there] and stays_inside(fence, nodes[here], nodes[there]):
-                far[there], before[there] = length, here
-    if not np.isfinite(far[1]):
+    corners_in, lengths, before = _ways_between_corners(fence.tobytes())
+    far = [
+        np.array(
+            [np.linalg.norm(end - one) if stays_inside(fence, end, one) else np.inf for one in corners_in]
+        )
+        for end in ends
+    ]
+    if not len(corners_in):
+        return ends  # rounding alone: in a convex area the straight way is inside
+    total = far[0][:, None] + lengths + far[1]
+    first, last = np.unravel_index(int(total.argmin()), total.shape)
+    if not np.isfinite(total[first, last]):
         return ends  # rounding alone: a checked polygon is connected
-    path = [1]
-    while path[-1] != 0:
-        path.append(int(before[path[-1]]))
-    return np.asarray(nodes[path[::-1]])
+    path = [int(last)]
+    while path[-1] != first:
+        path.append(int(before[first, path[-1]]))
+    return np.concatenate([ends[:1], corners_in[path[::-1]], ends[1:]])
+
+
+@lru_cache(maxsize=16)
+def _ways_between_corners(data: bytes) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Corners that stick into an area, at which alone shortest ways bend, and the ways between all of them.
+
+    (M, 2) metres, their lengths (M, M), and from each row's corner the corner before each column's.
+    """
+    fence = np.frombuffer(data).reshape(-1, 2)
+    after = np.roll(fence, -1, axis=0) - fence
+    into = np.roll(after, 1, axis=0)
+    nodes = fence[into[:, 0] * after[:, 1] - into[:, 1] * after[:, 0] < 0]
+    direct = np.full((len(nodes), len(nodes)), np.inf)
+    for i in range(len(nodes)):
+        for j in range(i):
+            if stays_inside(fence, nodes[i], nodes[j]):
+                direct[i, j] = direct[j, i] = np.linalg.norm(nodes[i] - nodes[j])
+    if not len(nodes):
+        return nodes, direct, np.zeros((0, 0), np.intp)
+    lengths, before = shortest_path(direct, method="D", return_predecessors=True)
+    return nodes, lengths, before
 
 
 def _signed_area(points: Array) -> float:
