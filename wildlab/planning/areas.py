@@ -305,7 +305,7 @@ def _ways_between_corners(data: bytes) -> tuple[Array, Array, NDArray[np.intp]]:
     if not len(nodes):
         return nodes, direct, np.zeros((0, 0), np.intp)
     lengths, before = shortest_path(direct, method="D", return_predecessors=True)
-    return nodes, lengths, before
+    return nodes, np.asarray(lengths), np.asarray(before, np.intp)
 
 
 def _signed_area(points: Array) -> float:
@@ -339,7 +339,7 @@ def _crossing_edges(points: Array) -> tuple[int, int] | None:
 
 def _meet(a: Array, along: Array, b: Array, edges: Array) -> NDArray[np.bool_]:
     """Which closed segments, from b (N, 2) along edges (N, 2), have a point in common with one."""
-    length, lengths = np.linalg.norm(along), np.linalg.norm(edges, axis=1)
+    length, lengths = np.asarray(np.linalg.norm(along)), np.linalg.norm(edges, axis=1)
 
     def sides(u: Array, v: Array, scale: Array) -> Array:
         value = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
