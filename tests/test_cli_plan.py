@@ -226,3 +226,12 @@ def test_trees_and_rules_forbid(capsys, over_map, tmp_path):
     given = ("--terrain", dem, "--height", 110, "--direction", 90, "--climb", 1, "--turn-radius", 30)
     code, _, err = call(capsys, area, *SHEET, *given, "--into", tmp_path / "b")
     assert code == 0 and re.search(r"the way is 1[2-9]\d m above the ground, and 120 m are allowed", err)
+
+
+def test_a_flight_of_too_many_way_points_leaves_the_plan_that_is_there(capsys, area, tmp_path):
+    into = tmp_path / "out"
+    assert call(capsys, area, *SHEET, "--height", 60, "--into", into)[0] == 0
+    before = {one.name: one.read_bytes() for one in into.iterdir()}
+    code, _, err = call(capsys, area, *SHEET, "--height", 3, "--overlap", 0.9, "--into", into, "--overwrite")
+    assert code == 2 and "items, and autopilots take about 700" in err
+    assert {one.name: one.read_bytes() for one in into.iterdir()} == before

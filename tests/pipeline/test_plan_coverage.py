@@ -228,3 +228,12 @@ def test_simpler_outlines_stay_within_the_tolerance():
         assert np.linalg.norm(a + t[:, None] * (b - a) - point, axis=1).min() <= 1.5 + 1e-9
     square = np.array([[0.0, 0], [0, 9], [9, 9], [9, 0]])
     assert simplified(square, 5.0) is square
+
+
+def test_images_reach_both_ends_of_every_row_and_turns_blur_none_of_them(field):
+    made = plan(field, height_m=50.0, tilt_deg=60.0)
+    images = images_of(made, made.sorties[0])
+    assert images.sharp.all()
+    for row in made.pattern.rows:
+        for end in row:
+            assert np.linalg.norm(images.poses.p_nc[:, :2] - end, axis=1).min() < 0.1

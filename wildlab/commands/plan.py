@@ -154,7 +154,6 @@ def plan(
     from wildlab.pipeline.plan_command import plan_flight
     from wildlab.pipeline.plan_files import PAGE
     from wildlab.pipeline.plan_wanted import Wanted
-    from wildlab.reporting.plan import plan_page
 
     wanted = Wanted(
         area,
@@ -188,6 +187,9 @@ def plan(
         photo_m=photo_every,
     )
     made, covered, result = plan_flight(wanted, into, terminal_console(), overwrite=overwrite)
+    # What makes pages takes seconds to be imported: what is wrong has been said by now.
+    from wildlab.reporting.plan import plan_page
+
     write_atomic(into / PAGE, plan_page(made, covered, result, exact=exact))
     if as_json:
         print_json(result)

@@ -7,10 +7,10 @@ from typing import Any
 
 from rich.console import Console
 
-from wildlab.files import write_json
+from wildlab.files import write_atomic, write_json
 from wildlab.pipeline.plan import Plan, make_plan
 from wildlab.pipeline.plan_coverage import Covered, cover
-from wildlab.pipeline.plan_files import RESULT, clear_folder, refuse_folder, write_plan
+from wildlab.pipeline.plan_files import RESULT, clear_folder, plan_texts, refuse_folder
 from wildlab.pipeline.plan_said import plan_result
 from wildlab.pipeline.plan_wanted import Wanted
 
@@ -46,6 +46,7 @@ def plan_flight(
     refuse_folder(into, overwrite)
     with console.status("planning") as status:
         plan = make_plan(wanted)
+        texts = plan_texts(plan)
 
         def tell(done: int, of: int) -> None:
             status.update(f"looking what will be seen: {done} of {of} areas")
@@ -55,6 +56,8 @@ def plan_flight(
         result = plan_result(plan, covered)
     into.mkdir(parents=True, exist_ok=True)
     clear_folder(into)
-    result["places"] = write_plan(plan, into)
+    for name, text in texts.items():
+        write_atomic(into / name, text)
+    result["places"] = list(texts)
     write_json(into / RESULT, result)
     return plan, covered, result

@@ -141,13 +141,14 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     wanted, course = plan.wanted, sortie.course
     rate = gimbal_rate(plan)
     fastest = wanted.speed_m_s + wanted.wind_m_s
-    step = NEXT * plan.view.length * plan.height / fastest
+    step = NEXT * min(plan.view.length, 1.0) * plan.height / fastest
     if rate > 0:
         step = min(step, NEXT * 2 * math.atan(plan.wanted.camera.width / 2 / wanted.camera.fx) / rate)
-    times = np.arange(0.0, course.duration + step, step)
+    times = _instants(course.times, sortie.row_of, step)
     points, headings = course.at(times)
     piece = np.clip(np.searchsorted(course.times, times, side="right") - 1, 0, len(course.times) - 1)
-    on_row = sortie.row_of[piece] >= 0
+    row_of = sortie.row_of[piece]
+    on_row = row_of >= 0
     # On a row the way is straight; between pieces of a turn, headings run from one to the next.
     headings = np.where(on_row, course.headings[piece], headings)
     if wanted.vehicle == "fixed-wing":
@@ -156,10 +157,25 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     positions = np.column_stack([points, -(ground + _above(sortie, points, times))])
     angles = _angles(plan, times, positions, headings, rate)
     poses = camera_on_course(_within_edge(wanted.camera), positions, headings, angles)
-    blurred = blur(wanted.camera, poses, times, wanted.exposure_s, plan.view.slant * plan.height)
     rows = np.flatnonzero(on_row)
+    blurred = np.zeros(len(times))
+    # Row by row: the turn before a row blurs none of its images.
+    for run in np.split(rows, np.flatnonzero(np.diff(row_of[rows]) != 0) + 1):
+        if len(run) > 1:
+            slant = plan.view.slant * plan.height
+            blurred[run] = blur(wanted.camera, poses.take(run), times[run], wanted.exposure_s, slant)
     most = SHARP * plan.view.pixels(wanted.camera, wanted.animal_m, plan.height)
     return Images(poses.take(rows), (blurred <= most)[rows])
+
+
+def _instants(times: Array, row_of: NDArray[np.intp], step: float) -> Array:
+    """When images are taken: every ``step`` seconds, and at both ends of each row."""
+    begins = np.flatnonzero(row_of[:-1] >= 0)
+    # Just before a row ends: at its end, the next piece begins.
+    ends = times[begins + 1] - 1e-3 * step
+    every = np.unique(np.concatenate([np.arange(0.0, times[-1], step), times[begins], ends]))
+    apart = np.diff(every, prepend=-np.inf) > 1e-2 * step
+    return np.asarray(every[apart | np.isin(every, times[begins])])
 
 
 def gimbal_rate(plan: Plan) -> float:

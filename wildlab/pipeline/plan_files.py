@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic, write_json
 from wildlab.flight.writers.maps import plan_geojson, plan_kml
 from wildlab.flight.writers.mission import Mission
 from wildlab.flight.writers.qgc_plan import qgc_plan
@@ -60,20 +61,18 @@ def missions(plan: Plan) -> list[Mission]:
     return found
 
 
-def write_plan(plan: Plan, into: Path) -> list[str]:
-    """Write the way points of each flight and the maps.
+def plan_texts(plan: Plan) -> dict[str, str]:
+    """What the files of a plan hold.
 
     Parameters
     ----------
     plan
         From `wildlab.pipeline.plan.make_plan`.
-    into
-        A folder that is there.
 
     Returns
     -------
-    list of str
-        Names of the files; all of them hold positions on the Earth.
+    dict
+        By name; all of them hold positions on the Earth.
 
     Raises
     ------
@@ -81,16 +80,19 @@ def write_plan(plan: Plan, into: Path) -> list[str]:
         Where a flight has more way points than autopilots take.
     """
     flights = missions(plan)
-    texts = {one.name.replace(" ", "-"): (waypoints_text(one), qgc_plan(one)) for one in flights}
     outlines = [(area.name, rings_on_earth(area, plan.areas)) for area in plan.areas.areas]
-    written = []
-    for name, (text, content) in texts.items():
-        write_atomic(into / f"{name}.waypoints", text)
-        write_json(into / f"{name}.plan", content)
-        written += [f"{name}.waypoints", f"{name}.plan"]
-    write_json(into / MAPS[0], plan_geojson(outlines, flights))
-    write_atomic(into / MAPS[1], plan_kml("wildlab plan", outlines, flights))
-    return [*written, *MAPS]
+    texts = {}
+    for one in flights:
+        name = one.name.replace(" ", "-")
+        texts[f"{name}.waypoints"] = waypoints_text(one)
+        texts[f"{name}.plan"] = _json(qgc_plan(one))
+    texts[MAPS[0]] = _json(plan_geojson(outlines, flights))
+    texts[MAPS[1]] = plan_kml("wildlab plan", outlines, flights)
+    return texts
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def refuse_folder(into: Path, overwrite: bool) -> None:

@@ -173,7 +173,8 @@ def _blocks(
         reach[1, sinks] = np.minimum(reach[1, sinks], ends[sinks].max(axis=1))
         furthest_corner = np.abs(reach - p[:, :2]).max(axis=(0, 2))
         # A few sizes of window are enough.
-        window = np.minimum(furthest, furthest * 2.0 ** np.ceil(np.log2(furthest_corner / furthest)))
+        with np.errstate(divide="ignore"):
+            window = np.minimum(furthest, furthest * 2.0 ** np.ceil(np.log2(furthest_corner / furthest)))
     corner = np.array([terrain.north, terrain.east])
     shape = np.array(terrain.height.shape)
     reach = np.nan_to_num(reach, nan=-1e9)
