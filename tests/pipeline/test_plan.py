@@ -245,6 +245,8 @@ def test_heights_above_take_off_are_differences_of_ground(field):
     assert np.allclose(flight.above_home, 60 + way.ground - way.ground[0], atol=0.05)
     assert np.ptp(flight.above_home) > 20
     assert flight.above_home[0] == pytest.approx(60.0, abs=1e-3)
+    (said,) = [one for one in result_of(made)["assumed"] if "begins itself" in one]
+    assert f"set that to {math.ceil((way.height - way.ground[0]).max())} m above the take-off" in said
 
 
 # -- numbers that are none

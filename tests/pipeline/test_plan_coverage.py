@@ -8,7 +8,7 @@ import pytest
 
 from tests.flight.test_area import collection, feature, polygon
 from tests.pipeline.test_plan import CAMERA, hills, plan
-from wildlab.geometry.camera import project
+from wildlab.geometry.camera import normalise, project
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import make_plan
 from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
@@ -42,6 +42,20 @@ def test_with_overlap_all_of_a_flat_field_is_seen_and_its_hole_is_not_asked(fiel
     north, east = found.north + found.step * rows, found.east + found.step * columns
     in_hole = (abs(north - (70 - 100)) < 19) & (abs(east - (70 - 80)) < 19)
     assert in_hole.any() and not found.inside[in_hole].any()
+
+
+def test_the_edge_of_an_image_is_left_out_and_nothing_else_changes(field):
+    made = plan(field, height_m=50.0)
+    inner = images_of(made, made.sorties[0]).poses.camera
+    assert (inner.width, inner.height) == (640 - 50, 512 - 50)
+    corners = np.array([[0.0, 0.0], [590.0, 462.0]])
+    assert np.allclose(normalise(inner, corners), normalise(CAMERA, corners + 25.0))
+
+
+def test_a_tilted_camera_flies_its_rows_so_that_their_ends_are_seen(field):
+    for direction in (0.0, 90.0, 215.0):
+        made = plan(field, height_m=50.0, tilt_deg=50.0, direction_deg=direction)
+        assert cover(made)[0].seen > 0.998
 
 
 def test_without_overlap_what_lies_at_the_edges_of_images_is_missed(field):

@@ -178,6 +178,11 @@ def assumed(plan: Plan) -> list[str]:
         said.append(
             "Heights in the files are above the autopilot's own map of the ground, which has to have one."
         )
+    highest = max(float((one.way.height - one.way.ground[0]).max()) for one in plan.sorties)
+    said.append(
+        "A return home that the autopilot begins itself (lost link, low battery) is at its own height: set "
+        f"that to {math.ceil(highest - 1e-6)} m above the take-off point or more."
+    )
     air = f"{wanted.speed_m_s:g} m/s through the air"
     if wanted.wind_m_s > 0:
         said.append(f"The aircraft flies {air}, in a steady wind of {wanted.wind_m_s:g} m/s from "
