@@ -14,7 +14,7 @@ from wildlab.pipeline.plan import make_plan
 from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
 from wildlab.pipeline.plan_flown import ExecutionErrors, with_errors
 from wildlab.pipeline.plan_outlines import simplified
-from wildlab.pipeline.plan_said import animals_in, percent, plan_result, unseen
+from wildlab.pipeline.plan_said import animals_in, head_count, percent, plan_result, unseen
 from wildlab.pipeline.plan_wanted import Wanted
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -222,6 +222,7 @@ def test_animals_may_be_said_for_each_area_or_by_density(tmp_path):
 
 
 def test_nearly_all_is_not_all():
+    assert [head_count(x) for x in (0.034, 4.8, 15.26, 1234.5)] == ["0.034", "4.8", "15.3", "1234"]
     assert [percent(x) for x in (0, 0.0001, 0.004, 0.5, 0.996, 0.9996, 1)] == [
         "0 %", "< 0.1 %", "0.4 %", "50 %", "99.6 %", "> 99.9 %", "100 %",
     ]  # fmt: skip

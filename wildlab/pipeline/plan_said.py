@@ -115,7 +115,7 @@ def _finds(plan: Plan, finds: float) -> str:
     if math.isnan(finds):
         return ""
     living = sum(animals_in(plan, area) for area in plan.areas.areas)
-    return f" Of {living:.4g} animals {finds:.3g} should be found, if they keep still."
+    return f" Of {head_count(living)} animals {head_count(finds)} should be found, if they keep still."
 
 
 def seen_share(plan: Plan, covered: Sequence[Covered]) -> float:
@@ -278,6 +278,11 @@ def percent(share: float) -> str:
         near = "< 0.1 %" if share < 0.5 else "> 99.9 %"
         return f"{100 * share:.1f} %" if 0.0005 < share < 0.9995 else near
     return f"{100 * share:.0f} %"
+
+
+def head_count(value: float) -> str:
+    """A number of animals that may be expected: three figures, and never half an animal of hundreds."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _number(value: float) -> float | None:

@@ -19,7 +19,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import Plan
 from wildlab.pipeline.plan_coverage import Covered
 from wildlab.pipeline.plan_files import origin_text
-from wildlab.pipeline.plan_said import count, hectares, minutes, percent
+from wildlab.pipeline.plan_said import count, head_count, hectares, minutes, percent
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
 from wildlab.reporting.html import examine
@@ -104,9 +104,8 @@ def _tiles(result: Mapping[str, Any]) -> str:
         (percent(result["seen"]), "of the ground is seen"),
     ]
     if result["expected_finds"] is not None:
-        tiles.append(
-            (f"{result['expected_finds']:.3g}", f"finds expected, of {result['animals']:.4g} animals")
-        )
+        living = head_count(result["animals"])
+        tiles.append((head_count(result["expected_finds"]), f"finds expected, of {living} animals"))
     tiles += [
         (f"{result['height_m']:.0f} m", "above the ground"),
         (f"{result['animal_pixels']:.0f} px", "across what is looked for"),
@@ -277,7 +276,7 @@ def _areas(result: Mapping[str, Any]) -> str:
             percent(one["hidden"]),
             NOTHING
             if one["expected_finds"] is None
-            else f"{one['expected_finds']:.3g} of {one['animals']:.3g}",
+            else f"{head_count(one['expected_finds'])} of {head_count(one['animals'])}",
             str(one["rows"]),
             f"{one['row_distance_m']:.1f}",
             minutes(one["seconds"]),
