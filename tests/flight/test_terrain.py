@@ -25,7 +25,7 @@ from wildlab.geometry.frames import geodetic_to_ned
 LATITUDE, LONGITUDE, HEIGHT = 46.8, 14.6, 700.0
 UTM = 32633
 #: Places in n to compare terrains at, metres.
-AT = np.random.default_rng(0).uniform(-150, 150, (100, 2))
+AT = np.random.default_rng(0).uniform(-100, 100, (100, 2))
 
 
 def hills(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -60,6 +60,7 @@ def write_map(
     given = {"crs": crs, "transform": transform, "dtype": "float32", "count": 1} | more
     given = {key: value for key, value in given.items() if value is not None}
     units = given.pop("units", None)
+    given["crs"] = given.pop("local", given["crs"])
     with rasterio.open(path, "w", driver="GTiff", width=side, height=side, **given) as data:
         for band in range(given["count"]):
             data.write(values.astype(given["dtype"]), band + 1)
@@ -84,7 +85,8 @@ def flown() -> Callable[..., Flight]:
 
 
 def lay(flight: Flight, path: Path, **says: Any) -> Flight:
-    return lay_terrain(flight, path, TerrainSays(**({"file": "map", "heights": "ellipsoid"} | says)))
+    given = {"file": "map", "heights": "ellipsoid", "margin_m": 150.0} | says
+    return lay_terrain(flight, path, TerrainSays(**given))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +100,7 @@ def test_the_surface_in_n_is_the_surface_on_the_earth(
     flight = lay(flown(), write_map(tmp_path / "dem.tif", crs=crs, cell=cell, turn=turn))
     assert flight.terrain is not None
     rng = np.random.default_rng(0)
-    longitude, latitude = LONGITUDE + rng.uniform(-4e-3, 4e-3, 500), LATITUDE + rng.uniform(-3e-3, 3e-3, 500)
+    longitude, latitude = LONGITUDE + rng.uniform(-1e-3, 1e-3, 500), LATITUDE + rng.uniform(-3e-3, 3e-3, 500)
     p = geodetic_to_ned(
         np.radians(latitude), np.radians(longitude), hills(longitude, latitude),
         flight.manifest.origin_tuple(),
@@ -216,8 +218,7 @@ def test_a_fine_map_of_a_wide_place_is_averaged(tmp_path: Path, flown: Callable[
     fine, coarse = lay(flown(), path), lay(flown(), path, step_m=11.0)
     assert fine.terrain is not None and coarse.terrain is not None and coarse.manifest.terrain is not None
     assert coarse.manifest.terrain.averaged == 5
-    at = np.random.default_rng(0).uniform(-200, 200, (300, 2))
-    np.testing.assert_allclose(coarse.terrain.heights_at(at), fine.terrain.heights_at(at), atol=0.7)
+    np.testing.assert_allclose(coarse.terrain.heights_at(AT), fine.terrain.heights_at(AT), atol=0.7)
     assert coarse.manifest.terrain.error_rms_m > fine.manifest.terrain.error_rms_m  # type: ignore[union-attr]
 
 
@@ -285,8 +286,10 @@ def test_what_is_no_file_or_damaged_is_refused(tmp_path: Path, flown: Callable[.
         lay(flown(), tmp_path / "cut.tif")
     with pytest.raises(WildlabError, match="CRS nonsense is not known to PROJ"):
         lay(flown(), path, crs="nonsense")
+    with pytest.raises(WildlabError, match=r"states the CRS .*zone 33N, and .*zone 34N is said of it"):
+        lay(flown(), path, crs="EPSG:32634")
     with pytest.raises(WildlabError, match=r"CRS \(.*\) is not one of places on Earth"):
-        lay(flown(), path, crs='LOCAL_CS["site",UNIT["metre",1]]')
+        lay(flown(), write_map(tmp_path / "site.tif", local='LOCAL_CS["site",UNIT["metre",1]]'))
 
 
 def test_a_claim_beyond_belief_is_refused(tmp_path: Path, flown: Callable[..., Flight]) -> None:

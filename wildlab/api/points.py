@@ -41,14 +41,18 @@ class Points(Brief):
         if known.any():
             half = np.sqrt(np.linalg.eigvalsh(P[known])[:, 1] * chi2.ppf(0.9, 2))
             rows.append(("longer half axis of the 90 % ellipse", f"{np.median(half):.2f} m (median)"))
+        if "ray" in self.table:
+            counts = self.table["ray"].value_counts()
+            rows.append(("rays over terrain", "; ".join(f"{n} {what}" for what, n in counts.items())))
         return Summary(f"Points of {self.flight.name}", rows)
 
 
 def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Points:
     """Put a flight's pixel detections on the ground, each with its covariance.
 
-    Poses and ground come from the flight; standard deviations from the log where it has them, else from the
-    manifest, else usual ones (`wildlab.pipeline.georeference.USUAL`).
+    Poses and ground come from the flight, the ground being its terrain where it has one; standard deviations
+    from the log where it has them, else from the manifest, else usual ones
+    (`wildlab.pipeline.georeference.USUAL`).
 
     Parameters
     ----------

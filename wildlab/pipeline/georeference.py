@@ -16,6 +16,7 @@ from wildlab.geometry.calibration import Calibration, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.ray_ends import BECAME
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_covariance
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
@@ -290,11 +291,13 @@ def georeference(
     -------
     DataFrame
         The table of the observations with ``north_m``, ``east_m``, ``down_m``, the covariance ``cov_nn``,
-        ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found).
+        ``cov_ne``, ``cov_ee`` (m2) and ``ellipse`` (how the covariance was found). Over terrain also ``ray``:
+        what became of it, in the words of `wildlab.geometry.ray_ends.BECAME`.
     """
     o = observations
     if errors is None:
         errors = pose_errors(flight, o)
+    met = None
     if o.terrain is not None:
         met = pixels_to_terrain(o.poses, o.uv, o.terrain)
         ground = met.points
@@ -302,6 +305,7 @@ def georeference(
     else:
         ground = georeference_pixels(o.poses, o.uv, o.plane_down)
         covariance, method = ground_covariance(o.poses, o.uv, o.plane_down, errors, rng)
+    more = {} if met is None else {"ray": [BECAME[int(one)] for one in met.became]}
     return o.table.assign(
         north_m=ground[:, 0],
         east_m=ground[:, 1],
@@ -310,6 +314,7 @@ def georeference(
         cov_ne=covariance[:, 0, 1],
         cov_ee=covariance[:, 1, 1],
         ellipse=method,
+        **more,
     )
 
 

@@ -111,7 +111,7 @@ def ground_sentences(observations: Observations, points: pd.DataFrame) -> list[s
             f"{placed} of {len(points)} points lie on level ground, at the height of each target: "
             "there is no terrain"
         ]
-    became = "; ".join(f"{n} {words}" for words, n in rays_of(observations).counts().items())
+    became = "; ".join(f"{n} {words}" for words, n in points["ray"].value_counts().items())
     said = [f"Of {len(points)} rays, over terrain: {became or 'none'}"]
     shift = shift_from_level(observations, points)
     if shift.n:

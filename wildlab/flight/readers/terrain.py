@@ -30,7 +30,7 @@ LOWEST, HIGHEST = -500.0, 9000.0
 #: Of one block of the file (a tile, a strip) in memory, bytes: GDAL reads no less than that at once.
 LARGEST_BLOCK = 256_000_000
 #: Cells a side that are believed.
-LARGEST_SIDE = 2_000_000
+LARGEST_SIDE = 500_000
 #: Of cells that are read at once.
 STRIP = 4_000_000
 #: F (6.1): a grey level is 0.2 m, black is 71 m.
@@ -239,6 +239,8 @@ def open_elevation(path: Path, says: TerrainSays) -> ElevationMap:
                 file=path,
                 field="terrain.crs",
             ) from None
+        if says.crs is not None and data.crs:
+            _refuse_other_crs(CRS.from_wkt(data.crs.to_wkt()), whole, path)
         transform = _placed(data, says, path, picture)
         factor, unit = _unit(data, whole, says, path)
         scale, offset = (float(data.scales[0]), float(data.offsets[0]))
@@ -330,6 +332,18 @@ def _refuse_layout(data: Any, path: Path) -> None:
     if min(rows, columns) < 2:
         raise WildlabError(
             f"has {columns} x {rows} cells, and a surface takes two each way", "give another", file=path
+        )
+
+
+def _refuse_other_crs(states: CRS, said: CRS, path: Path) -> None:
+    """Refuse a CRS that is not the file's own; one that adds what its heights count from is welcome."""
+    one, other = _split(states, path)[0], _split(said, path)[0]
+    if not one.equals(other, ignore_axis_order=True):
+        raise WildlabError(
+            f"states the CRS {printable(states.name)[:60]}, and {printable(said.name)[:60]} is said of it",
+            "leave crs out, or write the right one into the file (gdal_edit -a_srs)",
+            file=path,
+            field="terrain.crs",
         )
 
 
