@@ -15,13 +15,14 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checksums import accept_changes, checksums_of, manifest_changed, with_checksums
 from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.geometry.terrain import Terrain
 
 
 @pytest.fixture
 def folder(make_flight: Callable[..., Flight], tmp_path: Path) -> Path:
-    save_flight(make_flight(), tmp_path / "flight")
-    (tmp_path / "flight" / "terrain.tif").write_bytes(b"II*\x00 a terrain")
-    accept_changes(tmp_path / "flight")
+    flight = make_flight()
+    flight.terrain = Terrain(np.full((4, 4), -9.0, np.float32), -300.0, -300.0, 200.0)
+    save_flight(flight, tmp_path / "flight")
     return tmp_path / "flight"
 
 
