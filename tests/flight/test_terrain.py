@@ -147,6 +147,16 @@ def test_holes_stay_holes_and_are_counted(tmp_path: Path, flown: Callable[..., F
     np.testing.assert_array_equal(again.terrain.height, flight.terrain.height)
 
 
+def test_a_hole_may_be_any_number(tmp_path: Path, flown: Callable[..., Flight]) -> None:
+    """As a file of its kind rounds it, or none at all where its kind cannot hold it."""
+    holed = write_map(tmp_path / "f.tif", height=lambda x, y: np.where(x > LONGITUDE, -9999.1, 650.0))
+    flight = lay(flown(), holed, nodata=-9999.1)
+    assert flight.terrain is not None and np.isnan(flight.terrain.heights_at([[0.0, 60.0]])[0])
+    whole = write_map(tmp_path / "u.tif", height=lambda x, y: np.full(x.shape, 650.0), dtype="uint16")
+    flight = lay(flown(), whole, nodata=-9999.0)
+    assert flight.terrain is not None and np.isfinite(flight.terrain.heights_at(AT)).all()
+
+
 @pytest.mark.parametrize(
     ("written", "said"),
     [({"units": "ft"}, {}), ({}, {"unit": "ft"}), ({"crs": "EPSG:32633+6360"}, {"heights": 0.0})],

@@ -116,7 +116,8 @@ class ElevationMap:
         values = np.ma.getdata(found)
         hole = np.ma.getmaskarray(found).copy()
         if self.nodata is not None:
-            hole |= values == np.asarray(self.nodata, values.dtype)
+            # A value as the file would round it; one that its whole numbers cannot hold is in none of them.
+            hole |= values == (np.float32(self.nodata) if values.dtype == np.float32 else self.nodata)
         heights: Heights = (values.astype(float) * self.scale + self.offset).astype(np.float32)
         heights *= np.float32(self.factor)
         hole |= ~np.isfinite(heights)
@@ -269,7 +270,7 @@ def _gdal() -> Iterator[None]:
     """GDAL with a small cache, and without a look at neighbouring files or the network."""
     import rasterio
 
-    with rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR", CPL_LOG="/dev/null"):
+    with rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR"):
         yield
 
 
