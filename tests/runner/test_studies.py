@@ -184,7 +184,7 @@ def test_two_worlds_are_searched_by_every_planner(reports: Path, faults: Faults)
         assert 0 < metric["low"] <= metric["value"] <= metric["high"] <= 1200
     assert found["tour_time", "look-ahead"]["value"] <= found["tour_time", "greedy"]["value"]
     content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 8)
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 9)
     for figure in ("share-found", "times", "way-information", "way-rows", "way-chance", "greedy"):
         assert (folder / "figures" / f"{figure}.png").is_file()
     assert faults(folder / "report.html") == []

@@ -21,12 +21,14 @@ from wildlab.studies.information_planning.trial import (
     ROWS,
     SEARCHERS,
     STATIONS,
+    SURVEY,
     SWING,
     check_claims,
     draw_scene,
     draw_situation,
     numbers_of,
     search_all,
+    survey_rows,
 )
 
 
@@ -46,6 +48,13 @@ def row(**changed: float) -> dict[tuple[str, str], float]:
     }  # fmt: skip
     base |= {(who, f"share_{n + 1}"): min(1.0, n / 10) for who in SEARCHERS for n in range(STATIONS)}
     base |= {(who, "tour_time"): 100.0 for who in (GREEDY, AHEAD)}
+    base |= {
+        (SURVEY, name): value
+        for name, value in {
+            "positioned": 900.0, "all_positioned": 1.0, "most_known": 1.0, "revisits": 3.0,
+            "lost_by_covariance": 0.5, "lost_by_search": 0.25,
+        }.items()
+    }  # fmt: skip
     base |= {(who, "broken_off"): 0.0 for who in (GREEDY, AHEAD)}
     for key, value in changed.items():
         who, _, name = key.partition("__")
@@ -59,7 +68,7 @@ GOOD = {
 }  # fmt: skip
 BAD = {
     "information__all_found": 400.0, "information__half_found": 160.0, "information_down__all_found": 350.0,
-    "information__weighed": 1.0,
+    "information__weighed": 1.0, "search_and_revisit__lost_by_covariance": 0.0,
 }  # fmt: skip
 
 
@@ -110,7 +119,7 @@ def test_the_numbers_of_a_search(one):
     assert shares == sorted(shares) and shares[-1] == 1
     late = found[ROWS]._replace(found=np.append(times[:-1], np.inf))
     assert numbers_of(late)["all_found"] == BUDGET_S and numbers_of(late)["share_found"] == 0.9
-    assert set(RECORDED) - {"tour_time", "broken_off"} <= set(numbers)
+    assert {"all_found", "covered", "weighed"} <= set(numbers) & set(RECORDED)
 
 
 def test_a_greedy_choice_is_never_quicker_than_the_shortest_order():
@@ -123,6 +132,16 @@ def test_a_greedy_choice_is_never_quicker_than_the_shortest_order():
             in charts.greedy_shown(situation)[0].axes[0].get_title(loc="left")
             or not situation.greedy.broken_off
         )
+
+
+def test_a_survey_knows_as_many_as_it_says(one):
+    scene, _ = one
+    found = survey_rows(2, scene)
+    assert found.known.max() <= 10 and (np.isfinite(found.positioned) == (found.known[-1] == 10))
+    assert np.nanmedian(found.error) < 15
+    said = text.survey_words(table(search_and_revisit__all_positioned=0.0))
+    assert "in 0 % (0 % to 8.8 %) of 40 worlds" in said and "goes back 3.0 times" in said
+    assert "in 100 %" in text.survey_words(table())
 
 
 def test_claims_turn_with_the_numbers():

@@ -236,6 +236,15 @@ class SearchInRows:
 
     def next_leg(self, platform: Platform, open_areas: NDArray[np.bool_]) -> tuple[Leg, int]:
         """As `Searcher` has it."""
+        return self._rows(platform, open_areas).choose(platform), 0
+
+    def way_point(self, platform: Platform, open_areas: NDArray[np.bool_]) -> Array:
+        """(2,) m, the first that was not visited: where the search would go on."""
+        rows = self._rows(platform, open_areas)
+        return np.asarray(rows.way_points[rows.visited])
+
+    def _rows(self, platform: Platform, open_areas: NDArray[np.bool_]) -> PatternPlanner:
+        """What is left of the rows that are being flown, or the rows over the next area."""
         if self._now is None or self._now.done or not open_areas[self._area]:
             self._queue = [one for one in self._queue if open_areas[one]]
             if not self._queue:
@@ -243,7 +252,7 @@ class SearchInRows:
             self._area = self._queue.pop(0)
             rows = rows_from(self.areas[self._area], self.distance, platform.north_east)
             self._now = PatternPlanner(rows.waypoints, self.terrain, self.flying, self.sides)
-        return self._now.choose(platform), 0
+        return self._now
 
     def flown(self, leg: Leg) -> None:
         """As `Searcher` has it; rows do not ask what was seen."""

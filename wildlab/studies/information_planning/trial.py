@@ -21,6 +21,7 @@ from wildlab.pipeline.search import (
     grid_over,
     search,
 )
+from wildlab.pipeline.survey import Rules, Surveyed, survey
 from wildlab.planning.areas import rectangle
 from wildlab.planning.high_level import Tour, greedy_tour, shortest_tour
 from wildlab.planning.information import SearchSensor, initial_information
@@ -44,15 +45,23 @@ RECORDED = {
     "share_found": "1",
     "covered": "1",
     "weighed": "1",
+    "positioned": "s",
+    "revisits": "1",
+    "lost_by_covariance": "1",
+    "lost_by_search": "1",
     "tour_time": "s",
     "broken_off": "1",
 }
 #: The high-level planner's choice (5.3), and the shortest order of the same goals.
 GREEDY, AHEAD = "greedy", "look-ahead"
-SUBJECTS = (*SEARCHERS, GREEDY, AHEAD)
+#: Rows with going back to animals that are known (F 5.3.3, 5.3.4).
+SURVEY = "search-and-revisit"
+SUBJECTS = (*SEARCHERS, SURVEY, GREEDY, AHEAD)
 #: Its parameters, F (5.2): the exponent, and what the search is worth; an animal that is known to 10 m each
 #: way is worth as much. Not printed.
 ALPHA, SEARCH_WORTH = 1.0, 200.0
+#: Trace of a covariance beyond which an animal is lost, m^2: not known to 10 m each way. Not printed.
+LOST_M2 = 200.0
 #: For how long animals were not seen at most when the high-level planner is asked, s.
 OLDEST_S = 900.0
 #: At which shares of the time budget the share found is kept.
@@ -294,10 +303,26 @@ def draw_situation(seed: int, scene: Scene) -> Situation:
     return Situation(positions, covariances, platform, way_point, greedy, ahead)
 
 
+def survey_rows(seed: int, scene: Scene) -> Surveyed:
+    """Rows over the world of a seed, and going back to animals by F (5.2)-(5.3), until all are positioned."""
+    order = (scene.first, 1 - scene.first)
+    rows = SearchInRows(scene.world, scene.flying, Tuned().rows, order)
+    rules = Rules(ALPHA, SEARCH_WORTH, scene.walk / scene.flying.interval, LOST_M2)
+    rng = stream(seed, "errors of positions")
+    return survey(scene.world, rows, scene.start, scene.sensor, scene.flying, rules, rng)
+
+
 def trial(seed: int, *, twin: str) -> dict[tuple[str, str], float]:
     """One drawn world, searched by every planner, and one choice of the high-level planner in it."""
     scene, found = search_all(seed, twin)
     numbers = {(who, name): value for who, one in found.items() for name, value in numbers_of(one).items()}
+    surveyed = survey_rows(seed, scene)
+    numbers[SURVEY, "positioned"] = min(surveyed.positioned, BUDGET_S)
+    numbers[SURVEY, "all_positioned"] = float(np.isfinite(surveyed.positioned))
+    numbers[SURVEY, "most_known"] = float(surveyed.known.max() / scene.world.chance.shape[1])
+    numbers[SURVEY, "revisits"] = float(surveyed.revisits)
+    numbers[SURVEY, "lost_by_covariance"] = float(surveyed.lost_by_covariance)
+    numbers[SURVEY, "lost_by_search"] = float(surveyed.lost_by_search)
     situation = draw_situation(seed, scene)
     for who, tour in ((GREEDY, situation.greedy), (AHEAD, situation.ahead)):
         numbers[who, "tour_time"] = tour.time
@@ -333,5 +358,6 @@ def check_claims(spread: pd.DataFrame, *, seconds_each: float) -> dict[str, Chec
         "sooner-than-chance": sooner("all_found", CHANCE),
         "computationally-expensive": Check(measured=load, above=True, unit="of one core"),
         "greedy": Check(measured=greedy / ahead - 1, above=True, first=greedy, second=ahead, unit="s"),
+        "lost-in-large-area": Check(true=of(SURVEY, "lost_by_covariance") > 0),
         "zigzag": Check(true=of(GREEDY, "broken_off") > 0),
     }
