@@ -242,3 +242,14 @@ def test_a_random_walk_stays_in_its_areas_and_repeats_with_its_generator():
     assert (ways[0] == ways[1]).all() and not (ways[0] == ways[2]).all()
     assert (ways[0] > -15.1).all() and (ways[0] < [115.1, 95.1]).all()
     assert np.ptp(ways[0], axis=0).min() > 50
+
+
+def test_a_random_walk_comes_through_to_an_area_that_is_far():
+    far = np.array([[0.0, 200.0], [80.0, 200.0], [80.0, 280.0], [0.0, 280.0]])
+    near = far - [0.0, 200.0]
+    walk, at = RandomWalk([near, far], FLAT, FLYING, np.random.default_rng(1)), DOWN
+    east = np.array([(at := walk.choose(at).end).north_east[1] for _ in range(400)])
+    between = (east > 100) & (east < 180)
+    assert (east < 80).sum() > 50 and (east > 200).sum() > 50
+    # A crossing takes some 8 legs; who turns round all the time stays between.
+    assert between.mean() < 0.25

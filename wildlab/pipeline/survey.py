@@ -147,7 +147,7 @@ def survey(
     images, animals = world.chance.shape
     filters = _Filters(animals, rules)
     lives = np.bincount(world.area_of, minlength=len(world.areas))
-    platform, taken, lost = start, 0, [0, 0]
+    platform, taken, lost = start, 0, np.zeros(2, int)
     p_nc, goals, known, errors = [], list[int](), list[int](), list[float]()
     positioned, done = np.inf, np.zeros(len(world.areas), bool)
     while taken + flying.images <= images:
@@ -168,7 +168,7 @@ def survey(
             filters.see(seen, at + rng.normal(0.0, rules.position_sd, at.shape))
         by_covariance = filters.live & wanted & lost_by_covariance(filters.P, rules.limit)
         by_search = filters.live & wanted & lost_by_search(filters.missed, rules.doubt) & ~by_covariance
-        lost = [lost[0] + int(by_covariance.sum()), lost[1] + int(by_search.sum())]
+        lost += (by_covariance.sum(), by_search.sum())
         filters.live &= ~(by_covariance | by_search)
         filters.missed[~filters.live] = 1.0
         platform, taken = leg.end, taken + flying.images
@@ -182,7 +182,8 @@ def survey(
         np.concatenate([*p_nc, np.zeros((0, 3))]),
         np.array(goals, np.intp),
         np.array(known, np.intp),
-        *lost,
+        int(lost[0]),
+        int(lost[1]),
         np.array(errors),
     )
 

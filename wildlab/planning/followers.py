@@ -112,6 +112,7 @@ class RandomWalk:
         turn_sd: float = np.radians(45.0),
     ) -> None:
         self.areas, self.terrain, self.flying, self.rng, self.turn_sd = areas, terrain, flying, rng, turn_sd
+        self._aim: Array | None = None
 
     def choose(self, platform: Platform) -> Leg:
         """The next leg, the camera straight down.
@@ -125,14 +126,22 @@ class RandomWalk:
         -------
         Leg
         """
+        here = platform.north_east
         heading = platform.heading + self.rng.normal(0.0, self.turn_sd)
-        p = leg_positions(self.terrain, self.flying, platform.north_east[None], [heading])[0]
-        if not any(contains(area, p[-1:, :2])[0] for area in self.areas):
-            aim = self._spot() - platform.north_east
-            heading = float(np.arctan2(aim[1], aim[0]))
-            p = leg_positions(self.terrain, self.flying, platform.north_east[None], [heading])[0]
+        p = leg_positions(self.terrain, self.flying, here[None], [heading])[0]
+        if self._inside(p[-1, :2]):
+            self._aim = None
+        else:
+            # One spot until it is inside again: new ones all the time would keep it between two areas.
+            if self._aim is None or not self._inside(self._aim):
+                self._aim = self._spot()
+            heading = float(np.arctan2(*(self._aim - here)[::-1]))
+            p = leg_positions(self.terrain, self.flying, here[None], [heading])[0]
         R = look_attitude(heading, 0.0, 0.0)[None]
         return Leg(p, R, self.flying.ready(turn_between(R[0], platform.R_nc)), float(heading))
+
+    def _inside(self, spot: Array) -> bool:
+        return any(contains(area, spot[None])[0] for area in self.areas)
 
     def _spot(self) -> Array:
         """(2,) anywhere in one of the areas."""

@@ -174,8 +174,9 @@ def cost_words(spread: pd.DataFrame, seconds_each: float) -> str:
     load = weighed * seconds_each / DECISION_S
     return (
         f"A decision weighs {weighed:.0f} candidate steps, {1e6 * seconds_each:.0f} µs of processor time "
-        f"each, with the loop about it, on the machine that made this report: {1e3 * weighed * seconds_each:.1f} ms every "
-        f"{DECISION_S:.0f} s, or {percent(load, 2)} of one core. Rows weigh none."
+        f"each, with the loop about it, on the machine that made this report. That is "
+        f"{1e3 * weighed * seconds_each:.1f} ms every {DECISION_S:.0f} s, or {percent(load, 2)} of one core. "
+        "Rows weigh none."
     )
 
 
@@ -201,13 +202,13 @@ def survey_words(spread: pd.DataFrame) -> str:
         name: float(spread[SURVEY, name].mean())
         for name in ("revisits", "lost_by_covariance", "lost_by_search")
     }
+    most = percent(float(spread[SURVEY, "most_known"].mean()))
     return (
-        f"In rows with F's high-level planner every enclosure has had all its animals known at once "
-        f"within {BUDGET_S / 60:.0f} minutes in {with_interval(whole)} of {count} worlds; at best "
-        f"{percent(float(spread[SURVEY, 'most_known'].mean()))} of the animals are known, on the mean. "
-        f"A search goes back {means['revisits']:.1f} times; {means['lost_by_covariance']:.1f} times an animal is lost "
-        f"because its covariance is beyond the limit, {means['lost_by_search']:.1f} times because it was not "
-        "found where it should be."
+        f"In rows with F's high-level planner every enclosure has had all its animals known at once within "
+        f"{BUDGET_S / 60:.0f} minutes in {with_interval(whole)} of {count} worlds; at best {most} of the "
+        f"animals are known, on the mean. A search goes back {means['revisits']:.1f} times; "
+        f"{means['lost_by_covariance']:.1f} times an animal is lost because its covariance is beyond the "
+        f"limit, {means['lost_by_search']:.1f} times because it was not found where it should be."
     )
 
 
