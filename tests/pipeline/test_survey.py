@@ -52,7 +52,8 @@ def test_an_enclosure_that_is_done_stays_done():
     chance[20:, 0], chance[:300, 1] = 1.0, 1.0
     given = World(LAND, areas, np.tile(at, (900, 1, 1)), np.array([0, 1]), chance)
     rows = SearchInRows(given, FLYING, 20.0, (0, 1))
-    found = survey(given, rows, START, SENSOR, FLYING, RULES, np.random.default_rng(1))
+    soon_lost = RULES._replace(walk=1.0)
+    found = survey(given, rows, START, SENSOR, FLYING, soon_lost, np.random.default_rng(1))
     assert 300 < found.positioned < 900 and found.lost_by_covariance == found.lost_by_search == 0
     assert 0 not in found.goal[1:]
 

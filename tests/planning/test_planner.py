@@ -148,6 +148,24 @@ def test_looking_further_ahead_finds_what_one_step_cannot_see():
     assert four.gain > one.gain and four.asked > one.asked
 
 
+def test_what_is_learnt_later_counts_less():
+    """A little at hand to the west, much in the east that only the second step shows."""
+    points = np.concatenate([grid((-5, 15), (-90, -70)), grid((-60, 60), (120, 240))])
+    given = {"turns": (-np.pi / 2, np.pi / 2), "looks": ((0.0, 0.0), (0.0, 0.9)), "steps": 3, "beam": 50}
+    patient = planner(points, beyond=0.0, fades=1.0, **given).choose(DOWN)
+    hasty = planner(points, beyond=0.0, fades=1e-3, **given).choose(DOWN)
+    assert patient.leg.p_nc[-1, 1] > 10 and hasty.leg.p_nc[-1, 1] < -10
+
+
+def test_what_a_step_learns_is_not_counted_again_beyond_it():
+    """Where what is left counts twice, it would rather leave it, and looks where there is nothing."""
+    points = grid((-80, 80), (20, 120))
+    given = {"turns": (0.0, np.pi / 2), "looks": ((0.0, 0.0), (0.6, 0.0)), "steps": 1, "fades": 1.0}
+    calm = planner(points, beyond=2.0, **given).choose(DOWN)
+    keen = planner(points, beyond=0.0, **given).choose(DOWN)
+    assert calm.gain == 0 and keen.gain > 1000
+
+
 def test_a_wall_hides_what_is_behind_it():
     height = np.zeros((101, 101), np.float32)
     height[:, 53] = 45.0  # a wall 30 m to the east
