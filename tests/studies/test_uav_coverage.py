@@ -17,6 +17,8 @@ from wildlab.studies.uav_coverage.trial import (
     DOWN,
     LOW,
     LOW_CLOSE,
+    LOW_FASTER,
+    MORE,
     SPACINGS,
     YAW,
     Case,
@@ -46,7 +48,7 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
         "seen": 0.9, "only_blurred": 0.0, "in_sight": 5.0, "ground": 1e5, "outside": 2e4, "detected": 0.9,
         "time": 1000.0, "held": 0.99, "sure": 0.8, "flown": 0.9, "margin": 80.0, "kept": 0.9, "sharp": 1.0,
     }  # fmt: skip
-    row = {(name, key): value for name in CASES for key, value in usual.items()}
+    row = {(name, key): value for name in CASES | MORE for key, value in usual.items()}
     row |= {(YAW, "seen"): 0.98, (YAW, "ground"): 1.5e5, (YAW, "in_sight"): 4.0, (LOW, "seen"): 0.8}
     row |= {(LOW_CLOSE, "seen"): 0.97, (DOWN, "in_view"): 1.0}
     for k, spacing in enumerate(SPACINGS):
@@ -60,7 +62,7 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
 
 def test_what_is_surely_planned_is_seen_with_errors_of_the_pose(draws: pd.DataFrame) -> None:
     """What has to be shown: 95 % of it at least, in every draw of every case."""
-    for name in CASES:
+    for name in CASES | MORE:
         assert (draws[name, "held"] >= 0.95).all(), name
         assert (draws[name, "sure"] > 0.3).all(), name
 
@@ -73,7 +75,7 @@ def test_a_plan_without_a_margin_promises_more_than_flights_show(draws: pd.DataF
 def test_numbers_agree_with_one_another(draws: pd.DataFrame) -> None:
     fence = nodes_in(land_of(1), fences_of(load_twin("uav-search"), 1)) >= 0
     area = fence.sum() * 4.0
-    for name in CASES:
+    for name in CASES | MORE:
         inside = draws[name, "ground"] - draws[name, "outside"]
         assert np.allclose(inside, draws[name, "seen"] * area)
         assert (draws[name, "detected"] <= draws[name, "seen"]).all()
@@ -101,6 +103,7 @@ def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
         "yaw-covers-more-inside": {f"{YAW}/seen": 0.905},
         "moving-more-less-redundant": {f"{YAW}/in_sight": 6.0},
         "lower-needs-closer": {f"{LOW}/seen": 0.97},
+        "lower-needs-closer-or-faster": {f"{LOW_FASTER}/seen": 0.97},
         "convex-covered": {f"{DOWN}/in_view": 0.99},
         "distance-time-missed": {f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0},
     }
@@ -136,9 +139,13 @@ def test_other_words_turn_too() -> None:
     assert "which is no more" not in text.moving_words(made_up())
     same = made_up(**{f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0})
     assert "which is no more" in text.moving_words(same)
-    assert "is enough" in text.rate_words(2, {DOWN: 0.001, YAW: -0.004})
-    assert "leaves some out" in text.rate_words(2, {DOWN: 0.001, YAW: 0.02})
-    assert len(text.rows_table(made_up())) == len(text.held_table(made_up(1))) == len(CASES)
+    assert "half as many would do" in text.rate_words(2, {DOWN: 0.001, YAW: -0.004})
+    assert "half as many would leave some out" in text.rate_words(2, {DOWN: 0.001, YAW: 0.02})
+    assert "swings twice as fast bring 10.0 % back" in text.summary(made_up())[1]
+    assert (
+        "swings twice as fast bring nothing back" in text.summary(made_up(**{f"{LOW_FASTER}/seen": 0.7}))[1]
+    )
+    assert len(text.rows_table(made_up())) == len(text.held_table(made_up(1))) == len(CASES | MORE)
 
 
 def test_a_twin_without_a_survey_is_refused() -> None:
