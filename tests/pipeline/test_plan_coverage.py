@@ -14,7 +14,7 @@ from wildlab.pipeline.plan import make_plan
 from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
 from wildlab.pipeline.plan_flown import ExecutionErrors, with_errors
 from wildlab.pipeline.plan_outlines import simplified
-from wildlab.pipeline.plan_said import animals_in, head_count, percent, plan_result, unseen
+from wildlab.pipeline.plan_said import animals_in, assumed, head_count, percent, plan_result, unseen
 from wildlab.pipeline.plan_wanted import Wanted
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
@@ -42,6 +42,19 @@ def test_with_overlap_all_of_a_flat_field_is_seen_and_its_hole_is_not_asked(fiel
     north, east = found.north + found.step * rows, found.east + found.step * columns
     in_hole = (abs(north - (70 - 100)) < 19) & (abs(east - (70 - 80)) < 19)
     assert in_hole.any() and not found.inside[in_hole].any()
+
+
+def test_photos_that_are_far_apart_leave_ground_out(field):
+    """Straight down from 50 m an image is 25.6 m long, less its edges: 23 m of each 100 m are seen."""
+    made = plan(field, height_m=50.0, photo_m=100.0)
+    found = cover(made)
+    length = made.view.length * made.height
+    assert 0.1 < found[0].seen < 1.6 * length / 100.0
+    assert "photos nearer to one another" in unseen(made, found)[0]
+    assert "Photos are taken 100 m apart." in assumed(made)
+    near = plan(field, height_m=50.0, photo_m=5.0)
+    assert cover(near)[0].seen > 0.9
+    assert any("films" in one for one in assumed(plan(field, height_m=50.0)))
 
 
 def test_the_edge_of_an_image_is_left_out_and_nothing_else_changes(field):
@@ -195,7 +208,10 @@ def test_why_ground_is_not_seen_and_what_helps_follows_from_the_shares(field):
         "image. What helps: rows in another direction, or a camera that looks more down."
     )
     (said,) = unseen(made, [covered(seen=70, hidden=3, blurred=20, missed=7)])
-    assert said.endswith("What helps: a slower flight or swing, or a shorter exposure.")
+    assert said.endswith("What helps: a slower flight or a shorter exposure.")
+    for given, helps in (({}, "a smaller swing"), ({"rate_deg_s": 30.0}, "a slower flight or swing")):
+        swings = plan(field, height_m=50.0, gimbal="roll", **given)
+        assert helps in unseen(swings, [covered(seen=70, hidden=3, blurred=20, missed=7)])[0]
     (said,) = unseen(made, [covered(seen=70, blurred=3, missed=27)])
     assert "hidden" not in said and said.endswith("What helps: a larger overlap, or a lower speed.")
 

@@ -45,7 +45,7 @@ def test_words_follow_the_numbers(found):
     heading, said = heights_words(found)
     per_metre = np.mean(found[0].off["level"])
     assert f"costs {per_metre:.1f} m at 15 degrees" in heading
-    assert "rays leave the land" in said
+    assert f"{found[0].drawn - found[0].used} of the 240 rays at 15 degrees leave the land" in said
 
     def made(pitch, level, plane, coarse):
         off = {"level": level, "plane": plane, "coarse": coarse}
@@ -56,4 +56,4 @@ def test_words_follow_the_numbers(found):
     assert "at most" in heights_words(alike)[0] and "not told from a plane" in heights_words(alike)[1]
     assert "takes most of that away" in heights_words([made(15.0, 4, 9.0, 1.0), made(90.0, 0, 0, 0)])[1]
     assert "node every 30 m helps" in heights_words([made(15.0, 4, 9.0, 6.0), made(90.0, 0, 0, 0)])[1]
-    assert "4 of 24 rays" in heights_words(alike)[1]
+    assert "2 of the 12 rays at 15 degrees" in heights_words(alike)[1]

@@ -144,7 +144,12 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     step = NEXT * min(plan.view.length, 1.0) * plan.height / fastest
     if rate > 0:
         step = min(step, NEXT * 2 * math.atan(plan.wanted.camera.width / 2 / wanted.camera.fx) / rate)
-    times = _instants(course.times, sortie.row_of, step)
+    if wanted.photo_m > 0:
+        # Over the ground so far apart at most, as in the slowest row; the trigger knows no ends of rows.
+        step = wanted.photo_m / max(wanted.speed_m_s - wanted.wind_m_s, 0.5)
+        times = np.arange(0.0, course.times[-1], step)
+    else:
+        times = _instants(course.times, sortie.row_of, step)
     points, headings = course.at(times)
     piece = np.clip(np.searchsorted(course.times, times, side="right") - 1, 0, len(course.times) - 1)
     row_of = sortie.row_of[piece]

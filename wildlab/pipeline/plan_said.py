@@ -137,6 +137,20 @@ def animals_in(plan: Plan, area: Area) -> float:
 def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
     """Where more than `UNSEEN` of an area is not seen, why, and what helps; a sentence for each area."""
     said = []
+    # By itself a swing is as slow as it may be without leaving ground out.
+    slower = plan.wanted.gimbal != "fixed" and plan.wanted.rate_deg_s is not None
+    sharper = (
+        "a slower flight or swing, or a shorter exposure"
+        if slower
+        else "a slower flight or a shorter exposure"
+        if plan.wanted.gimbal == "fixed"
+        else "a slower flight, a smaller swing, or a shorter exposure"
+    )
+    more = (
+        "photos nearer to one another (--photo-every), or a larger overlap"
+        if plan.wanted.photo_m > 0
+        else "a larger overlap, or a lower speed"
+    )
     for area, one in zip(plan.areas.areas, covered, strict=True):
         missed = 1 - one.seen
         if missed <= UNSEEN:
@@ -144,8 +158,8 @@ def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
         hidden, blurred = one.share(one.hidden), one.share(one.blurred)
         causes = {
             "hidden by the ground": (hidden, "rows in another direction, or a camera that looks more down"),
-            "in blurred images alone": (blurred, "a slower flight or swing, or a shorter exposure"),
-            "in no image": (missed - hidden - blurred, "a larger overlap, or a lower speed"),
+            "in blurred images alone": (blurred, sharper),
+            "in no image": (missed - hidden - blurred, more),
         }
         parts = [f"{percent(share)} {what}" for what, (share, _) in causes.items() if share > 0.005]
         helps = max(causes.values())[1]
@@ -200,6 +214,11 @@ def assumed(plan: Plan) -> list[str]:
         "straight down" if wanted.tilt_deg == 90 else f"ahead, {wanted.tilt_deg:g} degrees below the horizon"
     )
     said.append(f"The camera looks {looks}, level however the aircraft leans, its picture's top in flight.")
+    said.append(
+        f"Photos are taken {wanted.photo_m:g} m apart."
+        if wanted.photo_m > 0
+        else "The camera films, or takes photos so quickly that they overlap."
+    )
     if wanted.gimbal != "fixed":
         keeping = ", turning back where it would look beyond the areas" if wanted.gimbal == "adaptive" else ""
         about = "yaw" if wanted.gimbal == "yaw" else "roll"

@@ -188,13 +188,12 @@ def heights_words(found: list[Shift]) -> tuple[str, str]:
         if unlike
         else f"a map with a node every {COARSE_M:.0f} m is not told from a plane"
     )
-    drawn = sum(one.drawn for one in found)
-    used = sum(one.used for one in found)
     return heading, (
         f"From {ABOVE_M:.0f} m above rolling land a ray {flat.pitch:.0f} degrees below the horizon "
         f"lands {plane[flat.pitch].estimate:.0f} m off ({plane[flat.pitch].low:.0f} to "
         f"{plane[flat.pitch].high:.0f}) on a plane at the height below the camera, and one straight down "
         f"{plane[steep.pitch].estimate:.1f} m; {beside}: {coarse[flat.pitch].estimate:.1f} m "
-        f"({coarse[flat.pitch].low:.1f} to {coarse[flat.pitch].high:.1f}). {drawn - used} of {drawn} rays "
-        "leave the land without meeting it, and count nowhere."
+        f"({coarse[flat.pitch].low:.1f} to {coarse[flat.pitch].high:.1f}). {flat.drawn - flat.used} "
+        f"of the {flat.drawn} rays at {flat.pitch:.0f} degrees leave the land without meeting it and count "
+        f"nowhere; straight down {steep.drawn - steep.used} do."
     )
