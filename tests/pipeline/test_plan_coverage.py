@@ -210,7 +210,7 @@ def test_why_ground_is_not_seen_and_what_helps_follows_from_the_shares(field):
     (said,) = unseen(made, [covered(seen=70, hidden=3, blurred=20, missed=7)])
     assert said.endswith("What helps: a slower flight or a shorter exposure.")
     for given, helps in (({}, "a smaller swing"), ({"rate_deg_s": 30.0}, "a slower flight or swing")):
-        swings = plan(field, height_m=50.0, gimbal="roll", **given)
+        swings = plan(field, height_m=50.0, gimbal="roll", swing_deg=20.0, **given)
         assert helps in unseen(swings, [covered(seen=70, hidden=3, blurred=20, missed=7)])[0]
     (said,) = unseen(made, [covered(seen=70, blurred=3, missed=27)])
     assert "hidden" not in said and said.endswith("What helps: a larger overlap, or a lower speed.")
