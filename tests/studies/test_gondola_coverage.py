@@ -111,17 +111,18 @@ def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
 def test_the_words_turn_with_the_numbers() -> None:
     first, second, third = text.summary(made_up())
     assert "adaptive, 45 deg: 35.0 %, against 10.0 %" in first
-    assert "adaptive, 45 deg, 20.0 % of what it sees" in second and "is yaw" in second
+    assert "adaptive, 45 deg, 20.0 % of what it sees" in second and "most is seen with yaw" in second
     assert "held" in third and "99.0 %" in third
     first, second, third = text.summary(
         made_up(**{"roll-75/seen": 0.6, "roll-75/near": 0.9, f"{DOWN}/held": 0.5})
     )
-    assert "roll, 75 deg: 60.0 %" in first and "near the cable is the same" in second
+    assert "roll, 75 deg: 60.0 %" in first and "most is seen with roll, 75 deg, 90.0 %" in second
     assert "did not always hold" in third
     assert "3 of 3 limits" in text.strategies_words(made_up())
     assert "2 of 3 limits" in text.strategies_words(made_up(**{"adaptive-45/outside": 9e4}))
     assert "Of those that turn about yaw" not in text.near_words(made_up())
     assert "Of those that turn about yaw" in text.near_words(made_up(**{"roll-75/near": 0.9}))
-    assert "is enough" in text.rate_words(5, 7.5, {"roll-60": 0.004})
-    assert "leaves some out" in text.rate_words(5, 7.5, {"roll-60": 0.03, "adaptive-60": 0.001})
+    assert "that hardly matters" in text.rate_words(5, {"roll-60": 0.004})
+    said = text.rate_words(5, {"roll-60": -0.03, "adaptive-60": 0.001})
+    assert "3.00 % more of the enclosures" in said and "hang on it" in said
     assert len(text.table(made_up())) == len(text.held_table(made_up(1))) == len(STRATEGIES)

@@ -163,7 +163,7 @@ def test_words_turn_with_the_numbers():
     assert "below the 70 % asked for" in text.summary(bad)[0]
     assert "do not settle it" in text.summary(table(3, **GOOD))[0]
     assert "3.3 minutes, in rows after 5.0" in text.summary(good)[1]
-    assert "it still is sooner than these rows" in text.summary(good)[2]
+    assert "such planning still is sooner than these rows" in text.summary(good)[2]
     assert "sooner than these rows only in" in text.summary(bad)[2]
     mixed = pd.concat([good, bad], ignore_index=True)
     assert text.summary(mixed)[2].count("settled") == 2

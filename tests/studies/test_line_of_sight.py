@@ -141,7 +141,7 @@ def test_words_follow_their_numbers(spread):
     assert len(first) == 3 and "sees nothing at all" in first[2] and f"{TILT} degrees" in first[0]
     turned = spread.copy()
     turned[LETTER, "seen_20m"] = 0.25
-    assert "sees up to 25.0 %" in text.summary(turned, times_of())[2]
+    assert "sees 25.0 % of the points at most" in text.summary(turned, times_of())[2]
     assert "at most 25.0 %" in text.letter_words(turned)
     for more, less, said in ((0.3, 0.1, "sees too much"), (0.1, 0.3, "too little"), (0.2, 0.2, "errs both")):
         for height in HEIGHTS:

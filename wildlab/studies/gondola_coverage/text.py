@@ -82,13 +82,12 @@ def summary(spread: pd.DataFrame) -> list[str]:
     most, near = best(spread, "seen"), best(spread, "near")
     least = min(STRATEGIES, key=lambda one: outside(spread, one))
     worst = min(float(spread[one, "held"].min()) for one in STRATEGIES)
-    same = "is the same" if near == most else f"is {name_of(near)}"
     kept = "held" if worst >= HELD else "did not always hold"
     return [
         f"Most of the enclosures is seen with {name_of(most)}: {percent(mean(spread, most, 'seen'))}, "
         f"against {percent(mean(spread, DOWN, 'seen'))} with the camera straight down.",
         f"Least beside the enclosures is seen with {name_of(least)}, {percent(outside(spread, least))} of "
-        f"what it sees; the best strategy near the cable {same}, with "
+        f"what it sees; within {NEAR:.0f} m of the cable most is seen with {name_of(near)}, "
         f"{percent(mean(spread, near, 'near'))} of that ground.",
         f"What a plan says is surely seen {kept} with errors of the pose: in the worst of "
         f"{len(spread) * len(STRATEGIES)} rides {percent(worst)} of it was seen.",
@@ -166,14 +165,18 @@ def near_words(spread: pd.DataFrame) -> str:
     )
 
 
-def rate_words(rate: float, frames: float, differences: dict[str, float]) -> str:
-    """How much less is seen with the images that are looked at than with all that the camera takes."""
+def rate_words(rate: float, differences: dict[str, float]) -> str:
+    """How much of what is seen hangs on how many images are looked at: less half as many."""
     worst = max(differences, key=lambda one: abs(differences[one]))
     much = abs(differences[worst])
-    verdict = "is enough" if much <= 0.01 else "leaves some out"
-    sense = "larger" if differences[worst] > 0 else "smaller"
+    sense = "less" if differences[worst] > 0 else "more"
+    verdict = (
+        "that hardly matters"
+        if much <= 0.01
+        else "differences between strategies that are no larger hang on it"
+    )
     return (
-        f"Looking at {rate:g} images a second {verdict}: with all {frames:g} that the camera takes, the "
-        f"share of the enclosures that is seen is {percent(much, 2)} {sense} for {name_of(worst)}, and "
-        "differs by less for the others that were tried."
+        f"{rate:g} images a second were looked at, and the adaptive gimbal decides as often. With half as "
+        f"many, {percent(much, 2)} {sense} of the enclosures is seen with {name_of(worst)}, which differs "
+        f"most of {len(differences)} that were tried: {verdict}."
     )

@@ -40,7 +40,6 @@ COLUMNS = {
     "covered": "ground seen by then",
     "sooner": "by information is sooner",
 }
-DIGITS = {"half": 1, "all": 1}
 
 METHOD = r"""Each world is drawn from its seed: rolling
 land like that of F's map, two enclosures of the sizes of
@@ -104,24 +103,37 @@ def wanted_words(share: Interval) -> str:
 def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what the worlds gave."""
     share, half = sooner_share(spread, ROWS), sooner_share(spread, ROWS, "half_found")
-    middle = {who: float(spread[who, "all_found"].median()) for who in (INFORMATION, ROWS)}
     return [
         f"Planning by information finds all animals sooner than rows with the camera straight down in "
         f"{with_interval(share)} of {len(spread)} worlds, {wanted_words(share)}; half of them in "
         f"{with_interval(half)}.",
-        f"On the median world all are found after {minutes(middle[INFORMATION])} minutes, in rows after "
-        f"{minutes(middle[ROWS])}.",
+        f"On the median world all are found {when_words(spread, INFORMATION)}, in rows "
+        f"{when_words(spread, ROWS)}.",
         why_words(spread),
     ]
+
+
+def when_words(spread: pd.DataFrame, who: str) -> str:
+    """When all are found on the median world; a search that ends before that has no such time."""
+    middle = float(spread[who, "all_found"].median())
+    if middle >= BUDGET_S - 1e-6:
+        return f"not within the {BUDGET_S / 60:.0f} minutes"
+    return f"after {minutes(middle)} minutes"
+
+
+def median_words(seconds: pd.Series) -> str:
+    """A median in minutes; of searches that ended before it only that."""
+    middle = float(seconds.median())
+    return f"over {BUDGET_S / 60:.0f}" if middle >= BUDGET_S - 1e-6 else minutes(middle)
 
 
 def why_words(spread: pd.DataFrame) -> str:
     """What the gain is due to: the gimbal that may look anywhere, or the choice of the way."""
     fixed, swing = sooner_share(spread, ROWS, one=FIXED), sooner_share(spread, SWING)
     gimbal = {
-        "sooner": "With its camera fixed straight down it still is sooner than these rows in",
-        "later": "With its camera fixed straight down it is sooner than these rows only in",
-        "open": "Whether it is sooner with its camera fixed straight down is not settled: it is in",
+        "sooner": "With its camera fixed straight down, such planning still is sooner than these rows in",
+        "later": "With its camera fixed straight down, such planning is sooner than these rows only in",
+        "open": "Whether such planning is sooner with its camera fixed down is not settled: it is in",
     }[_side(fixed)]
     beside = {
         "sooner": "where the rows' camera looks from side to side it is sooner in",
@@ -143,8 +155,8 @@ def table(spread: pd.DataFrame) -> pd.DataFrame:
         rows.append(
             {
                 "planner": NAMES[who],
-                "half": float(spread[who, "half_found"].median()) / 60,
-                "all": float(spread[who, "all_found"].median()) / 60,
+                "half": median_words(spread[who, "half_found"]),
+                "all": median_words(spread[who, "all_found"]),
                 "missed": f"{missed} of {len(spread)}",
                 "covered": percent(float(spread[who, "covered"].median())),
                 "sooner": "" if who == INFORMATION else with_interval(sooner_share(spread, who)),

@@ -76,8 +76,8 @@ LANDS = (
 LIMITS = [
     "F timed Matlab on another machine and another map; figure 7.1 is not in the text of the thesis, and "
     "no number of it is used.",
-    "The land is drawn: rolling ground without cliffs, walls or houses. Rougher ground hides more, and "
-    "both ways of F then differ more from the exact one.",
+    "The land is drawn: rolling ground without cliffs, walls or houses. On other ground "
+    "both ways of F may differ from the exact one by more or less.",
     "How trees stand, how high and on how much of the ground is chosen, and the shares that they hide "
     "follow from it.",
     "Of points at a height above the ground, such as animals, nothing is said here.",
@@ -106,7 +106,7 @@ def summary(spread: pd.DataFrame, times: pd.DataFrame) -> list[str]:
     off = {way: with_interval(disagreement(spread, way)) for way in (RAYS, ANGLES)}
     trees = hidden(spread)
     letter = float(np.nanmax([spread[LETTER, f"seen_{name}"].max() for name, *_ in settings()]))
-    nothing = "sees nothing at all" if letter == 0 else f"sees up to {percent(letter)} of the points"
+    nothing = "sees nothing at all" if letter == 0 else f"sees {percent(letter)} of the points at most"
     return [
         f"Whether a camera that looks {TILT} degrees off straight down sees a point is answered wrongly for "
         f"{off[ANGLES]} of the points by the thesis's Bresenham, and for {off[RAYS]} by its ray casting.",

@@ -89,7 +89,8 @@ def summary(spread: pd.DataFrame) -> list[str]:
         f"At half the height the same rows and swings leave {percent(1 - mean(spread, LOW, 'seen'))} of the "
         f"enclosures unseen; rows 10 m apart {_back(back)}, swings twice as fast {_back(faster)}."
         if lost > 0.005
-        else "At half the height the same rows see as much of the enclosures."
+        else "At half the height the same rows see "
+        + ("as much of the enclosures." if lost > -0.005 else f"{percent(-lost)} more of the enclosures.")
     )
     worst = min(float(spread[name, "held"].min()) for name in NAMES)
     kept = "held" if worst >= HELD else "did not always hold"
