@@ -9,6 +9,7 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.simulation.land import ground_heights
 from wildlab.simulation.parameters import TwinParameters, load_twin, twin_names
 from wildlab.simulation.twin_trajectory import twin_trajectory
 from wildlab.simulation.twins import OPTIONAL_TABLES, simulate
@@ -51,7 +52,13 @@ def test_no_twin_breaks_in_another_wind_or_at_another_speed(
     detections, truth = flight.table("detections"), flight.nav["truth"]
     assert np.isfinite(detections[["u_px", "v_px"]].to_numpy()).all()
     lowest, highest = altitudes(twin)
-    height, off = -truth["down_m"].to_numpy(), 5 * twin.flight.altitude_sd.si + 0.5
+    place = truth[["north_m", "east_m"]].to_numpy()
+    height, off = (
+        -truth["down_m"].to_numpy() - ground_heights(twin, place),
+        5 * twin.flight.altitude_sd.si + 0.5,
+    )
+    if twin.land is not None:
+        off += 0.15 * twin.land.follow.si + 0.5  # what is shorter than that is flown over
     assert lowest - off < height.min() and height.max() < highest + off
     R = quaternion_to_matrix(truth[["q_w", "q_x", "q_y", "q_z"]].to_numpy())
     roll, pitch, _ = np.degrees(matrix_to_euler(R)).T
