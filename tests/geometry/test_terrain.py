@@ -134,6 +134,24 @@ def test_a_ray_passes_over_a_hole_that_nothing_known_reaches():
     np.testing.assert_allclose(over.points[0], [40.0, 75.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("way", [(0.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (1.0, 0.0)])
+def test_a_ray_from_a_border_has_nothing_to_do_with_the_cell_behind_it(way):
+    """The hole lies behind a start on a border: whichever way it looks, the ground is met before."""
+    north, east = way
+    height = np.zeros((5, 5), np.float32)
+    height[[0, 0, 4, 4], [0, 4, 0, 4]] = 5.0  # there is higher ground: over a hole nothing is known
+    start = np.array([2.0 + 0.4 * abs(east), 2.0 + 0.4 * abs(north), -0.5])
+    if north:
+        height[int(2 - 2 * north)] = np.nan
+        height[int(2 - north)] = np.nan
+    else:
+        height[:, int(2 - 2 * east)] = np.nan
+        height[:, int(2 - east)] = np.nan
+    met = intersect_terrain(Terrain(height, 0.0, 0.0, 1.0), [[north, east, 0.5]], start)
+    assert met.became.tolist() == [HIT]
+    assert met.points[0] == pytest.approx([start[0] + north, start[1] + east, 0.0])
+
+
 def test_heights_and_slopes_are_those_of_the_surface():
     rng = np.random.default_rng(5)
     terrain = Terrain(rng.normal(0, 5, (8, 11)).astype(np.float32), 3.0, -4.0, 2.5)

@@ -150,6 +150,11 @@ def walk(
     level = min(levels, 2)
     j = min(max(int(x + t * dx), 0), columns - 2)
     i = min(max(int(y + t * dy), 0), rows - 2)
+    # From a border towards less it goes into the cell before, and has nothing to do with this one.
+    if dx < 0 and 0 < j == x + t * dx:
+        j -= 1
+    if dy < 0 and 0 < i == y + t * dy:
+        i -= 1
     # Every step crosses a border or goes down a level, and every border takes it up by one level at most.
     for _ in range(4 * (rows + columns) + 100):
         size = 0 if level == 0 else FIRST + level - 1
