@@ -225,7 +225,32 @@ def test_trees_and_rules_forbid(capsys, over_map, tmp_path):
     # An aircraft that cannot slow down begins to climb before the ridge, and is too high above the valley.
     given = ("--terrain", dem, "--height", 110, "--direction", 90, "--climb", 1, "--turn-radius", 30)
     code, _, err = call(capsys, area, *SHEET, *given, "--into", tmp_path / "b")
-    assert code == 0 and re.search(r"the way is 1[2-9]\d m above the ground, and 120 m are allowed", err)
+    assert code == 2 and re.search(r"--max-height: sortie 1 is 1[2-9]\d m above the ground \d+ m", err)
+    assert "climbs and sinks at 1 m/s at most" in err and not (tmp_path / "b").exists()
+    lower = int(re.search(r"plan (\d+) m above the ground or lower", err, re.IGNORECASE).group(1))
+    given = [lower - 1 if one == 110 else one for one in given]
+    assert call(capsys, area, *SHEET, *given, "--into", tmp_path / "b")[0] == 0
+
+
+def test_a_take_off_point_of_unknown_height_is_refused(capsys, over_map, tmp_path):
+    folder, area, dem, heights, corner = over_map
+    given = ("--height", 60, "--into", tmp_path / "out")
+    outside = ("--home", f"{LAT + 0.012},{LON}")
+    code, _, err = call(capsys, area, *SHEET, "--terrain", dem, *given, *outside)
+    assert code == 2 and "the take-off point lies outside the map of heights" in err
+    assert "--above ground" in err and not (tmp_path / "out").exists()
+    code, _, err = call(capsys, area, *SHEET, "--terrain", dem, *given, *outside, "--above", "ground")
+    assert code == 0, err
+    assert "take-off point, whose height the map does not know" in (tmp_path / "out/report.html").read_text()
+    assert call(capsys, area, *SHEET, "--terrain", dem, "--height", 60, "--home", f"{LAT + 0.005},{LON}",
+                "--into", tmp_path / "known")[0] == 0  # fmt: skip
+    holed = heights.copy()
+    row, column = int((700 - 0.005 * 111_300) / 5), 400 // 5
+    holed[row - 8 : row + 8, column - 8 : column + 8] = np.nan
+    path = write_map(folder / "take_off_hole.tif", holed, corner)
+    code, _, err = call(capsys, area, *SHEET, "--terrain", path, "--height", 60, "--home",
+                        f"{LAT + 0.005},{LON}", "--into", tmp_path / "hole")  # fmt: skip
+    assert code == 2 and "where it has a hole" in err
 
 
 def test_a_flight_of_too_many_way_points_leaves_the_plan_that_is_there(capsys, area, tmp_path):

@@ -14,6 +14,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import make_plan
 from wildlab.pipeline.plan_coverage import cover
 from wildlab.pipeline.plan_files import missions
+from wildlab.pipeline.plan_forbidden import nearest_ground, refuse_near
 from wildlab.pipeline.plan_heights import TOLERANCE, follow
 from wildlab.pipeline.plan_said import plan_result
 from wildlab.pipeline.plan_sorties import fly_rows
@@ -232,6 +233,48 @@ def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     said = result_of(steep)["warnings"]
     assert any("would have to climb or sink" in one and "it can do 2:" in one for one in said)
     assert not result_of(flat)["warnings"]
+
+
+def wall(rise, step=4.0):
+    """Ground that rises between two nodes."""
+    height = np.zeros((300, 300), np.float32)
+    height[150:] = rise
+    return Terrain(height, north=-600.0, east=-600.0, step=step)
+
+
+def test_a_way_keeps_off_a_wall_on_all_sides():
+    across = follow(np.array([[-200.0, 0.0], [200.0, 0.0]]), wall(90.0), 60.0)
+    # Straight up before the wall, whose foot is at -4 and whose top is at 0; between places looked at it runs straight.
+    near = nearest_ground(across, wall(90.0))
+    assert 7.0 < near < 11.0
+    beside = follow(np.array([[-8.0, -200.0], [-8.0, 200.0]]), wall(90.0), 60.0)
+    assert nearest_ground(beside, wall(90.0)) > 7.0 and beside.most > 85.0
+    far = follow(np.array([[-20.0, -200.0], [-20.0, 200.0]]), wall(90.0), 60.0)
+    assert far.most == pytest.approx(60.0)
+    assert nearest_ground(far, wall(90.0)) == pytest.approx(16 + 4 * 60 / 90, abs=0.6)
+
+
+def test_the_nearest_ground_of_a_slope_is_that_of_a_plane():
+    steep = Terrain((np.arange(300)[:, None] * 4.0 * np.ones(300)).astype(np.float32), -600.0, -600.0, 4.0)
+    way = follow(np.array([[0.0, -100.0], [0.0, 100.0]]), steep, 60.0)
+    assert way.most == pytest.approx(60.0)
+    assert nearest_ground(way, steep) == pytest.approx(60 / math.sqrt(2), rel=0.02)
+    assert nearest_ground(way, steep, 20.0) == pytest.approx(40 / math.sqrt(2), rel=0.02)
+
+
+def test_a_way_that_comes_too_near_is_refused(field):
+    terrain = wall(90.0)
+    made = make_plan(Wanted(field, CAMERA, height_m=60.0), terrain)
+    assert made.nearest > 5.0
+    assert any(
+        f"no nearer than {made.nearest:.0f} m to the ground" in one for one in result_of(made)["assumed"]
+    )
+    one = made.sorties[0]
+    low = one._replace(way=one.way._replace(height=np.minimum(one.way.height, 92.0)))
+    with pytest.raises(WildlabError, match=r"comes within [0-4]\.\d m of ground .* and 5\.0 m are the least"):
+        refuse_near([low], terrain, made.wanted, 60.0)
+    with pytest.raises(WildlabError, match=r"sortie 1 is 1\d\d m above the ground .* as steep as a wall"):
+        make_plan(Wanted(field, CAMERA, height_m=60.0), wall(150.0))
 
 
 def test_heights_above_take_off_are_differences_of_ground(field):

@@ -14,26 +14,23 @@ from wildlab.flight.terrain.laying import CutOut, terrain_about
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan_forbidden import refuse_heights, refuse_near, refuse_take_off
 from wildlab.pipeline.plan_outlines import simplified
 from wildlab.pipeline.plan_sorties import Sortie, split_rows
 from wildlab.pipeline.plan_view import FURTHEST, View, look
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plan_wanted import CLEARANCE, Wanted
 from wildlab.planning.areas import contains
 from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 
 #: A height that is not stated stays this far below the greatest one allowed, metres: way points between
 #: which the ground falls away are higher above it.
 BELOW_RULE = 5.0
-#: The least height that is chosen without being asked for, metres.
-LEAST_HEIGHT = 10.0
 #: Turns of a fence smaller than this share of a strip are left to the overlap.
 FOLLOWED = 0.02
 #: A map reaches at least so far beyond the areas, metres.
 LEAST_MARGIN = 200.0
 #: Share of an area of which the map may know nothing.
 MOST_UNKNOWN = 0.05
-#: Metres between treetops and the aircraft at least.
-CLEARANCE = 10.0
 #: Metres from the take-off point to the areas' middle beyond which it is a slip of a key.
 FURTHEST_HOME = 50_000.0
 
@@ -62,6 +59,8 @@ class Plan:
         (2,) the take-off point in n, metres.
     sorties
         The flights.
+    nearest
+        Least distance in space between the ways and the ground, or the treetops on it, metres.
     cut
         Where the terrain comes from; None where it was given, or there is none.
     """
@@ -75,6 +74,7 @@ class Plan:
     pattern: Pattern
     home: Array
     sorties: tuple[Sortie, ...]
+    nearest: float
     cut: CutOut | None = None
 
     @property
@@ -143,8 +143,11 @@ def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
     pattern = pattern._replace(rows=pattern.rows - view.middle * height * along[:, None])
     if home is None:
         home = pattern.rows[0, 0]
+    refuse_take_off(home, terrain, wanted)
     sorties = split_rows(pattern, home, wanted, terrain, height)
-    return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties, cut)
+    refuse_heights(sorties, home, wanted, height)
+    nearest = refuse_near(sorties, terrain, wanted, height)
+    return Plan(wanted, areas, terrain, view, height, strip, pattern, home, sorties, nearest, cut)
 
 
 def _height(wanted: Wanted, view: View) -> float:
@@ -165,7 +168,7 @@ def _height(wanted: Wanted, view: View) -> float:
             )
         return wanted.height_m
     sharp = wanted.animal_m / wanted.pixels * math.sqrt(wanted.camera.fx * wanted.camera.fy) / view.slant
-    least = max(least, LEAST_HEIGHT)
+    least = wanted.least_m
     if sharp < least:
         over = f"trees of {wanted.trees_m:g} m" if wanted.trees_m > 0 else "the ground"
         raise WildlabError(

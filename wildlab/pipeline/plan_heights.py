@@ -15,6 +15,10 @@ from wildlab.geometry.terrain import Terrain
 TOLERANCE = 5.0
 #: Metres between places at which the ground below a way is looked at, where the map is no coarser.
 SPACING = 5.0
+#: Metres that a way keeps from ground and treetops on all sides, where it is high enough for that.
+CLEARANCE = 10.0
+#: Rings, as shares of that distance, and directions in which ground is looked for.
+RINGS, DIRECTIONS = (0.25, 0.5, 0.75, 0.97), 16
 #: Places along a way at most; a longer one is looked at more coarsely.
 MOST_PLACES = 100_000
 
@@ -34,6 +38,8 @@ class Followed(NamedTuple):
         (N,) which point of the given way each is; -1 for those put between them.
     least, most
         Heights above the ground anywhere on the way, metres.
+    highest
+        (2,) where it is that high above the ground, metres.
     unknown
         Metres of the way below which the ground is not known; there it is taken to be as at the nearest place
         of the way where it is.
@@ -45,7 +51,31 @@ class Followed(NamedTuple):
     corner: NDArray[np.intp]
     least: float
     most: float
+    highest: Array
     unknown: float
+
+
+def clear_of(above: float, trees: float = 0.0) -> float:
+    """How far a way keeps from ground and treetops on all sides, metres.
+
+    Parameters
+    ----------
+    above
+        Height above the ground, metres.
+    trees
+        That stand on it, metres.
+
+    Returns
+    -------
+    float
+        `CLEARANCE`; of low ways half the height above the treetops, or every slope would be a wall.
+
+    Examples
+    --------
+    >>> clear_of(60.0), clear_of(12.0)
+    (10.0, 6.0)
+    """
+    return min(CLEARANCE, (above - trees) / 2)
 
 
 def follow(
@@ -54,6 +84,7 @@ def follow(
     above: float,
     most_above: float = math.inf,
     steepest: float = math.inf,
+    trees: float = 0.0,
 ) -> Followed:
     """Way points that follow the ground.
 
@@ -70,16 +101,19 @@ def follow(
     steepest
         Metres up or down for each metre of way, where an aircraft cannot slow down: it begins to climb before
         a hill, and is then higher above the ground than was asked for.
+    trees
+        That stand on the ground, metres.
 
     Returns
     -------
     Followed
         Between way points the height runs straight and, at every place that was looked at, stays within
-        `TOLERANCE` of what was asked for and below ``most_above``, but where ``steepest`` asks for more.
+        `TOLERANCE` of what was asked for and below ``most_above``, but where ``steepest`` asks for more, or
+        ground beside or before it would be nearer than `clear_of`.
     """
     if terrain is None:
         zero, high = np.zeros(len(way)), np.full(len(way), above)
-        return Followed(way, zero, high, np.arange(len(way)), above, above, 0.0)
+        return Followed(way, zero, high, np.arange(len(way)), above, above, way[0], 0.0)
     places, corner, along = _places(way, max(SPACING, terrain.step / 2))
     ground = terrain.heights_at(places)
     known = np.isfinite(ground)
@@ -93,19 +127,33 @@ def follow(
         )
         ground = ground.copy()
         ground[~known] = ground[known][nearest]
-    wanted = ground + above
+    clear = _clear(places, terrain, clear_of(above, trees)) + trees
+    wanted = np.fmax(ground + above, clear)
     if math.isfinite(steepest):
         # The greatest of what every other place asks for, less what can be climbed or sunk on the way there.
         before = np.maximum.accumulate(wanted + steepest * along) - steepest * along
         after = np.maximum.accumulate((wanted - steepest * along)[::-1])[::-1] + steepest * along
         wanted = np.maximum(before, after)
     up = min(TOLERANCE, max(most_above - above, 0.0))
-    kept = _thinned(along, wanted - TOLERANCE, wanted, wanted + up, corner >= 0)
+    kept = _thinned(
+        along, np.fmin(np.fmax(wanted - TOLERANCE, clear), wanted), wanted, wanted + up, corner >= 0
+    )
     flown = np.interp(along, along[kept], wanted[kept])
     over = flown - ground
-    return Followed(
-        places[kept], ground[kept], wanted[kept], corner[kept], float(over.min()), float(over.max()), unknown
-    )
+    least, most, highest = float(over.min()), float(over.max()), places[int(over.argmax())]
+    return Followed(places[kept], ground[kept], wanted[kept], corner[kept], least, most, highest, unknown)
+
+
+def _clear(places: Array, terrain: Terrain, distance: float) -> Array:
+    """The least height at each place that is so far from all ground about it; NaN where none is known."""
+    bearings = np.linspace(0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    found = np.full(len(places), np.nan)
+    for share in RINGS:
+        rise = distance * math.sqrt(1 - share**2)
+        for north, east in zip(np.cos(bearings), np.sin(bearings), strict=True):
+            beside = terrain.heights_at(places + share * distance * np.array([north, east]))
+            found = np.fmax(found, beside + rise)
+    return found
 
 
 def _places(way: Array, spacing: float) -> tuple[Array, NDArray[np.intp], Array]:

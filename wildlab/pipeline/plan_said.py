@@ -46,6 +46,7 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
         "strip_m": round(plan.strip, 2),
         "animal_pixels": round(view.pixels(wanted.camera, wanted.animal_m, plan.height), 2),
         "duration_s": round(plan.duration, 1),
+        "nearest_ground_m": round(plan.nearest, 1),
         "furthest_m": round(_furthest(plan), 1),
         "seen": round(seen_share(plan, covered), 4),
         "animals": _number(sum(living)),
@@ -192,11 +193,10 @@ def assumed(plan: Plan) -> list[str]:
         said.append(
             "Heights in the files are above the autopilot's own map of the ground, which has to have one."
         )
-    highest = max(float((one.way.height - one.way.ground[0]).max()) for one in plan.sorties)
-    said.append(
-        "A return home that the autopilot begins itself (lost link, low battery) is at its own height: set "
-        f"that to {math.ceil(highest - 1e-6)} m above the take-off point or more."
-    )
+    if plan.terrain is not None:
+        trees = " or a treetop" if wanted.trees_m > 0 else ""
+        said.append(f"The way comes no nearer than {plan.nearest:.0f} m to the ground{trees}, on any side.")
+    said.append(_return_height(plan))
     air = f"{wanted.speed_m_s:g} m/s through the air"
     if wanted.wind_m_s > 0:
         said.append(f"The aircraft flies {air}, in a steady wind of {wanted.wind_m_s:g} m/s from "
@@ -248,15 +248,23 @@ def assumed(plan: Plan) -> list[str]:
     return said
 
 
+def _return_height(plan: Plan) -> str:
+    """What a return home that the autopilot begins itself needs."""
+    begins = "A return home that the autopilot begins itself (lost link, low battery)"
+    if plan.terrain is not None and not np.isfinite(plan.terrain.heights_at(plan.home[None])).all():
+        return (
+            f"{begins} is above the take-off point, whose height the map does not know: look it up yourself."
+        )
+    highest = max(float((one.way.height - one.way.ground[0]).max()) for one in plan.sorties)
+    return (
+        f"{begins} is at its own height: set that to {math.ceil(highest - 1e-6)} m above the take-off point or "
+        "more."
+    )
+
+
 def warnings(plan: Plan) -> list[str]:
     """What speaks against flying it as it is, each a sentence."""
     wanted, found = plan.wanted, []
-    most = max(one.way.most for one in plan.sorties)
-    if most > wanted.max_height_m + 0.05:
-        found.append(
-            f"Somewhere the way is {most:.0f} m above the ground, and {wanted.max_height_m:g} m are allowed: "
-            "plan lower."
-        )
     steepest = max(one.steepest for one in plan.sorties)
     if steepest > wanted.climb_m_s:
         found.append(

@@ -159,7 +159,7 @@ def fly_rows(
     # What can stop slows down where the ground is steep; what cannot has to begin to climb before.
     slope = wanted.climb_m_s / (wanted.speed_m_s + wanted.wind_m_s)
     steepest = slope if wanted.vehicle == "fixed-wing" else math.inf
-    way = follow(course.points[corners], terrain, above, wanted.max_height_m, steepest)
+    way = follow(course.points[corners], terrain, above, wanted.max_height_m, steepest, wanted.trees_m)
     duration, steepest = _times(course, corners, way, wanted)
     return Sortie(name, chosen, course, _row_of(course, flown, of), way, duration, steepest)
 

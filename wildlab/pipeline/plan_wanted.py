@@ -15,6 +15,8 @@ from wildlab.flight.writers.mission import Heights, Vehicle
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array
 
+#: The least height that is chosen without being asked for, and above treetops, metres.
+LEAST_HEIGHT, CLEARANCE = 10.0, 10.0
 Gimbal = Literal["fixed", "yaw", "roll", "adaptive"]
 #: By field: the option, least and greatest value, unit. What lies outside is a slip of a unit or a key.
 LIMITS: dict[str, tuple[str, float, float, str]] = {
@@ -173,6 +175,11 @@ class Wanted:
     def vehicle(self) -> Vehicle:
         """What has a turn radius cannot stop."""
         return "fixed-wing" if self.turn_radius_m > 0 else "multicopter"
+
+    @property
+    def least_m(self) -> float:
+        """Metres above the ground below which nothing is planned unasked."""
+        return max(self.trees_m + CLEARANCE if self.trees_m > 0 else 0.0, LEAST_HEIGHT)
 
     @property
     def usable_s(self) -> float:
