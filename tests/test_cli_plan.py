@@ -10,6 +10,11 @@ from tests.flight.test_area import LAT, LON, collection, feature, polygon
 from tests.flight.test_mission_writers import check_plan, read_wpl
 from tests.pipeline.test_plan import FIELD
 from wildlab import cli
+from wildlab.geometry.camera import Camera
+from wildlab.pipeline.plan import make_plan
+from wildlab.pipeline.plan_coverage import cover
+from wildlab.pipeline.plan_said import plan_result
+from wildlab.pipeline.plan_wanted import Wanted
 
 SHEET = ("--image", "640x512", "--view", "45")
 
@@ -50,13 +55,18 @@ def test_a_plan_leaves_files_and_a_page_that_tells_no_place(capsys, area, tmp_pa
     for hidden in (page, (into / "result.json").read_text(), out):
         text = re.sub(r"data:image/png;base64,[^\"]+", "", hidden)
         assert "58.6" not in text and "16.4" not in text and str(tmp_path) not in text.replace(str(into), "")
-    assert "Wolf &lt;script&gt;" in page and "withheld" in page
+    assert "Wolf" not in page + out + (into / "result.json").read_text() and "withheld" in page
+    assert "area 1" in page and "Wolf" in (into / "plan.kml").read_text()
+    code, _, err = call(capsys, area, *SHEET, "--height", 60, "--names", "--into", tmp_path / "named")
+    named = (tmp_path / "named" / "report.html").read_text()
+    assert code == 0 and "Wolf &lt;script&gt;" in named and "withheld" in named and "the names that" in err
     assert "Exact positions are in " in err and all(one in err for one in flights)
     assert out.splitlines()[-1].endswith("report.html")
 
 
 def test_the_page_tells_the_place_where_it_may(capsys, area, tmp_path):
     code, _, err = call(capsys, area, *SHEET, "--into", tmp_path / "out", "--exact")
+    assert "Wolf &lt;script&gt;" in (tmp_path / "out" / "report.html").read_text()
     assert code == 0 and "report.html: keep these to the pilot" in err
     assert "n begins at 58.66" in (tmp_path / "out" / "report.html").read_text()
 
@@ -75,6 +85,25 @@ def test_a_folder_is_replaced_only_when_asked(capsys, area, tmp_path):
     (other / "photo.jpg").write_text("x")
     code, _, err = call(capsys, area, *SHEET, "--into", other, "--overwrite")
     assert code == 2 and "holds other things (photo.jpg)" in err
+
+
+def test_the_map_holds_all_that_is_on_it(tmp_path):
+    from wildlab.reporting.plan import _map
+
+    path = tmp_path / "two.geojson"
+    far = [[a, b + 900] for a, b in FIELD]
+    path.write_text(json.dumps(collection(feature(polygon(FIELD)), feature(polygon(far)))))
+    camera = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)
+    for given in ({}, {"turn_radius_m": 60.0}):
+        made = make_plan(Wanted(path, camera, height_m=100.0, **given))
+        found = cover(made)
+        figure, _, _ = _map(made, found, plan_result(made, found))
+        figure.canvas.draw()
+        (west, east), (south, north) = figure.axes[0].get_xlim(), figure.axes[0].get_ylim()
+        points = np.concatenate([one.outline for one in made.areas.areas] + [made.sorties[0].course.points])
+        assert south < points[:, 0].min() and points[:, 0].max() < north
+        # The arrow to the north stands to the right of everything.
+        assert west < points[:, 1].min() and points[:, 1].max() < west + 0.93 * (east - west)
 
 
 def test_json_is_what_is_in_the_file(capsys, area, tmp_path):
@@ -96,7 +125,11 @@ def test_json_is_what_is_in_the_file(capsys, area, tmp_path):
         ((*SHEET, "--height", "-5"), "--height: a value of -5"),
         ((*SHEET, "--speed", "nan"), "--speed: a value of nan"),
         ((*SHEET, "--tilt", "-20"), "sees no ground near enough"),
-        ((*SHEET, "--wind", "11", "--wind-from", "0"), "against an airspeed of 10 m/s"),
+        (
+            (*SHEET, "--wind", "11", "--wind-from", "0", "--turn-radius", "30"),
+            "against an airspeed of 10 m/s",
+        ),
+        ((*SHEET, "--wind", "11", "--wind-from", "0", "--max-airspeed", "20"), "are 21 m/s through the air"),
         ((*SHEET, "--battery", "1"), "one row with the way there and back"),
         ((*SHEET, "--home", "0,0"), "km from the areas"),
     ],
@@ -179,7 +212,9 @@ def test_heights_follow_a_map_and_finds_are_told(capsys, over_map, tmp_path):
     assert 54.9 <= one["least_above_ground_m"] <= 60 <= one["most_above_ground_m"] <= 65.1
     page = (into / "report.html").read_text()
     assert (
-        page.count("data:image/png") == 2 and "that of dem.tif, every" in page and str(dem.parent) not in page
+        page.count("data:image/png") == 2
+        and "that of the map that was given, every" in page
+        and "dem.tif" not in page
     )
     assert "58.6" not in re.sub(r"data:image/png;base64,[^\"]+", "", page)
 

@@ -192,8 +192,16 @@ def test_a_check_holds_the_survey_against_the_map(flown: Callable[..., Flight]) 
     problems = [one.sentence for one in check_flight(flight) if one.level == "problem"]
     assert any("100 % of the poses are more than 5 m below the ground" in one for one in problems)
     flight.terrain = Terrain(ground.height[:60], ground.north, ground.east, ground.step)
-    warned = [one for one in check_flight(flight) if "are not over the terrain" in one.sentence]
-    assert [one.level for one in warned] == ["warning"]
+    warned = [one for one in check_flight(flight) if "beyond the border of the terrain" in one.sentence]
+    assert [one.level for one in warned] == ["warning"] and "reaches further" in warned[0].fix
+    assert not any("a hole" in one.sentence for one in check_flight(flight) if one.level == "warning")
+    # A hole is no border: the map reaches, and knows nothing there.
+    holed = ground.height.copy()
+    holed[60:] = np.nan
+    flight.terrain = Terrain(holed, ground.north, ground.east, ground.step)
+    warned = [one for one in check_flight(flight) if "over a hole of the terrain" in one.sentence]
+    assert [one.level for one in warned] == ["warning"] and "reaches further" not in warned[0].fix
+    assert not any("beyond the border" in one.sentence for one in check_flight(flight))
 
 
 def test_without_terrain_it_is_said(flown: Callable[..., Flight]) -> None:

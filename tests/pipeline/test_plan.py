@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from tests.flight.test_area import collection, feature, polygon
 from wildlab.errors import WildlabError
+from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import make_plan
@@ -16,7 +18,7 @@ from wildlab.pipeline.plan_coverage import cover
 from wildlab.pipeline.plan_files import missions
 from wildlab.pipeline.plan_forbidden import nearest_ground, refuse_near
 from wildlab.pipeline.plan_heights import TOLERANCE, follow
-from wildlab.pipeline.plan_said import plan_result
+from wildlab.pipeline.plan_said import plan_result, warnings
 from wildlab.pipeline.plan_sorties import fly_rows
 from wildlab.pipeline.plan_view import look
 from wildlab.pipeline.plan_wanted import LIMITS, Wanted
@@ -36,7 +38,7 @@ def field(tmp_path_factory):
 
 
 def plan(area, **given):
-    return make_plan(Wanted(area, CAMERA, **given))
+    return make_plan(Wanted(area, CAMERA, **{"names": True} | given))
 
 
 def result_of(made):
@@ -109,9 +111,11 @@ def test_times_are_those_of_the_way(field):
 
 
 def test_wind_along_the_rows_costs_what_the_triangle_says(field):
-    still = plan(field, height_m=60.0, direction_deg=0.0)
-    windy = plan(field, height_m=60.0, direction_deg=0.0, wind_m_s=6.0, wind_from_deg=0.0)
+    wing = {"height_m": 60.0, "direction_deg": 0.0, "turn_radius_m": 30.0}
+    still, hover = plan(field, **wing), plan(field, height_m=60.0, direction_deg=0.0)
+    windy = plan(field, **wing, wind_m_s=6.0, wind_from_deg=0.0)
     rows = np.linalg.norm(np.diff(still.pattern.rows, axis=1)[:, 0], axis=1)
+    assert np.allclose(windy.pattern.rows, still.pattern.rows)
     up = np.cos(still.pattern.directions) > 0
 
     def on_rows(made):
@@ -122,6 +126,20 @@ def test_wind_along_the_rows_costs_what_the_triangle_says(field):
     assert np.allclose(on_rows(still), rows / 10.0)
     # From the north: against it on rows to the north, with it on those to the south.
     assert np.allclose(on_rows(windy), np.where(up, rows / 4.0, rows / 16.0))
+    # The autopilot of a multicopter is told a speed over the ground, and holds it.
+    gusty = plan(field, height_m=60.0, direction_deg=0.0, wind_m_s=6.0, wind_from_deg=0.0)
+    assert gusty.duration == hover.duration
+    for made, kind, speeds in (
+        (windy, 0, "4 to 16 m/s over the ground"),
+        (gusty, 1, "16 m/s through the air"),
+    ):
+        commanded = [one for one in mission_items(missions(made)[0]) if one.command == CHANGE_SPEED]
+        assert [one.parameters[:2] for one in commanded] == [(kind, 10.0)]
+        assert any(speeds in one for one in result_of(made)["assumed"])
+    (said,) = [one for one in result_of(gusty)["warnings"] if "Against the wind" in one]
+    assert "16 m/s through the air to hold 10 m/s" in said
+    able = plan(field, height_m=60.0, wind_m_s=6.0, wind_from_deg=0.0, max_air_m_s=16.0)
+    assert not any("Against the wind" in one for one in result_of(able)["warnings"])
 
 
 def test_an_aircraft_that_cannot_stop_turns_no_tighter_than_it_can(field):
@@ -141,6 +159,18 @@ def test_an_aircraft_that_cannot_stop_turns_no_tighter_than_it_can(field):
         for end in row:
             assert np.linalg.norm(way - end, axis=1).min() < 1e-6
     assert len(way) < len(points) / 2
+
+
+def test_a_wing_flies_the_direction_that_is_quickest_with_its_turns_and_the_wind(tmp_path):
+    path = tmp_path / "a.geojson"
+    ring = [[0, 0], [0, 390], [400, 390], [400, 0], [0, 0]]
+    path.write_text(json.dumps(collection(feature(polygon(ring)))))
+    for wind_from in (0.0, 90.0):
+        given = {"height_m": 60.0, "turn_radius_m": 40.0, "wind_m_s": 7.0, "wind_from_deg": wind_from}
+        made = plan(path, **given)
+        each = [plan(path, direction_deg=one, **given).duration for one in (0.0, 90.0)]
+        assert made.duration == pytest.approx(min(each), rel=0.001)
+        assert abs(each[0] - each[1]) > 0.05 * each[0]
 
 
 # -- batteries
@@ -166,6 +196,40 @@ def test_a_battery_too_small_for_one_row_is_said(field):
         WildlabError, match=r"one row with the way there and back takes \d+\.\d minutes, and of a"
     ):
         plan(field, height_m=60.0, battery_min=1.5)
+
+
+def test_splitting_the_area_is_named_where_a_battery_is_too_small(field):
+    with pytest.raises(WildlabError, match="or split the area into smaller ones"):
+        plan(field, height_m=60.0, battery_min=1.5)
+
+
+def test_one_row_has_no_distance_and_few_pixels_are_said(tmp_path):
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps(collection(feature(polygon([[0, 0], [0, 20], [400, 20], [400, 0], [0, 0]])))))
+    said = result_of(plan(path, height_m=60.0))
+    assert said["sentences"][0].endswith("over 1 row.")
+    assert not any("were asked for" in one for one in said["warnings"])
+    few = result_of(plan(path, height_m=60.0, pixels=25.0))["warnings"]  # 800 * 1.5 / 60 = 20
+    assert any("are 20.0 pixels, and 25 were asked for" in one for one in few)
+
+
+def test_what_lies_in_two_areas_counts_once(tmp_path, field):
+    path = tmp_path / "a.geojson"
+    # 8 ha each; the second is the first, 150 m further east: 50 m by 400 m are in both.
+    other = [[a, b + 150] for a, b in FIELD]
+    content = collection(feature(polygon(FIELD), name="a"), feature(polygon(other), name="b"))
+    path.write_text(json.dumps(content))
+    made = plan(path, height_m=60.0, density_km2=100.0)
+    assert sum(made.alone.values()) == pytest.approx(14e4, rel=0.01)
+    said = result_of(made)
+    assert said["animals"] == pytest.approx(14, rel=0.01)
+    assert said["sentences"][0].startswith("2 areas, 14.0 ha")
+    (told,) = [one for one in said["warnings"] if "in more than one area" in one]
+    assert told.startswith("2.0 ha lie") and "Animals" not in told
+    each = result_of(plan(path, height_m=60.0, animals=4.0))
+    assert any("Animals are counted for each area" in one for one in each["warnings"])
+    # Apart, or side by side, is no overlap.
+    assert not any("more than one" in one for one in result_of(plan(field, height_m=60.0))["warnings"])
 
 
 def test_where_one_takes_off(field):
@@ -229,6 +293,11 @@ def test_climbing_that_is_too_steep_takes_longer_and_is_said(field):
     terrain = Terrain(cliff, north=-1000.0, east=-1000.0, step=10.0)
     wanted = Wanted(field, CAMERA, height_m=60.0, direction_deg=0.0, climb_m_s=2.0)
     flat, steep = make_plan(wanted), make_plan(wanted, terrain)
+    wing = make_plan(replace(wanted, turn_radius_m=30.0, max_height_m=500.0), terrain)
+    assert wing.sorties[0].steepest == pytest.approx(2.0, rel=0.01) and not result_of(wing)["warnings"]
+    one = replace(wing, sorties=(wing.sorties[0]._replace(steepest=3.0),))
+    (said,) = warnings(one)
+    assert "it cannot slow down" in said and "slow down there" not in said
     assert steep.duration > flat.duration + 2 * 90 / 2.0
     said = result_of(steep)["warnings"]
     assert any("would have to climb or sink" in one and "it can do 2:" in one for one in said)
@@ -244,7 +313,7 @@ def wall(rise, step=4.0):
 
 def test_a_way_keeps_off_a_wall_on_all_sides():
     across = follow(np.array([[-200.0, 0.0], [200.0, 0.0]]), wall(90.0), 60.0)
-    # Straight up before the wall, whose foot is at -4 and whose top is at 0; between places looked at it runs straight.
+    # Up before the wall, whose foot is at -4 and top at 0; between places looked at, the way is straight.
     near = nearest_ground(across, wall(90.0))
     assert 7.0 < near < 11.0
     beside = follow(np.array([[-8.0, -200.0], [-8.0, 200.0]]), wall(90.0), 60.0)
@@ -305,7 +374,9 @@ def test_absurd_numbers_are_refused_by_name(name, value):
 
 def test_winds_that_forbid():
     with pytest.raises(WildlabError, match="a wind of 12 m/s against an airspeed of 10 m/s"):
-        Wanted(Path("x"), CAMERA, wind_m_s=12.0, wind_from_deg=90.0)
+        Wanted(Path("x"), CAMERA, wind_m_s=12.0, wind_from_deg=90.0, turn_radius_m=30.0)
+    with pytest.raises(WildlabError, match="are 16 m/s through the air, and the aircraft can do 15"):
+        Wanted(Path("x"), CAMERA, wind_m_s=6.0, wind_from_deg=90.0, max_air_m_s=15.0)
     with pytest.raises(WildlabError, match="Say with --wind-from whence"):
         Wanted(Path("x"), CAMERA, wind_m_s=3.0)
     with pytest.raises(WildlabError, match="is said twice"):

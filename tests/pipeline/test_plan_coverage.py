@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tests.pipeline.test_plan import CAMERA, hills, plan
 from wildlab.geometry.camera import normalise, project
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.plan import make_plan
+from wildlab.pipeline.plan_advice import swing_advice
 from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
 from wildlab.pipeline.plan_flown import ExecutionErrors, with_errors
 from wildlab.pipeline.plan_outlines import simplified
@@ -213,6 +215,8 @@ def test_why_ground_is_not_seen_and_what_helps_follows_from_the_shares(field):
         swings = plan(field, height_m=50.0, gimbal="roll", swing_deg=20.0, **given)
         assert helps in unseen(swings, [covered(seen=70, hidden=3, blurred=20, missed=7)])[0]
     (said,) = unseen(made, [covered(seen=70, blurred=3, missed=27)])
+    (small,) = unseen(made, [covered(seen=96, hidden=3, missed=1)._replace(blurred=np.zeros((10, 10), bool))])
+    assert "3 % hidden by the ground, 1 % in no image." in small
     assert "hidden" not in said and said.endswith("What helps: a larger overlap, or a lower speed.")
 
 
@@ -268,3 +272,23 @@ def test_images_reach_both_ends_of_every_row_and_turns_blur_none_of_them(field):
     for row in made.pattern.rows:
         for end in row:
             assert np.linalg.norm(images.poses.p_nc[:, :2] - end, axis=1).min() < 0.1
+
+
+def test_a_swing_that_blurs_everything_names_a_speed_that_does_not(field):
+    """Checked by flying that speed, and one step faster."""
+    given = {"height_m": 100.0, "gimbal": "roll", "swing_deg": 30.0}
+    made = plan(field, **given)
+    found = cover(made)
+    result = plan_result(made, found)
+    assert result["sentences"][0].startswith("Hardly anything will be seen as it is planned: ")
+    (said,) = [one for one in result["warnings"] if "nearly all of them would be sharp" in one]
+    speed = float(re.search(r"--speed ([\d.]+)\)", said).group(1))
+    assert 1.0 < speed < 10.0
+    slow = plan(field, speed_m_s=speed, **given)
+    slower = plan_result(slow, cover(slow))
+    assert slower["seen"] > 0.9 and not any("would be sharp" in one for one in slower["warnings"])
+    assert not slower["sentences"][0].startswith(("Hardly", "Less"))
+    faster = plan(field, speed_m_s=speed + 0.5, **given)
+    assert images_of(faster, faster.sorties[0]).sharp.mean() < 0.95
+    still = plan(field, exposure_s=1.0, **given)
+    assert any("slower flights blur them, too" in one for one in swing_advice(still, cover(still)))

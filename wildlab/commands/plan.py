@@ -50,7 +50,14 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.option("--height", type=float, help="Above the ground, m.  [default: from --animal and --pixels]")
 @click.option("--animal", type=float, default=1.5, show_default=True, help="Length of what is looked for, m.")
 @click.option("--pixels", type=float, default=10.0, show_default=True, help="Across how many it shall be.")
-@click.option("--speed", type=float, default=10.0, show_default=True, help="Through the air, m/s.")
+@click.option(
+    "--speed",
+    type=float,
+    default=10.0,
+    show_default=True,
+    help="Over ground; with --turn-radius through air, m/s.",
+)
+@click.option("--max-airspeed", type=float, help="What a multicopter can do through the air, m/s.")
 @click.option("--overlap", type=float, default=0.2, show_default=True, help="Of neighbouring rows, a share.")
 @click.option(
     "--tilt", type=float, default=90.0, show_default=True, help="Camera below the horizon, deg; 90 is down."
@@ -65,7 +72,9 @@ class Pair(click.ParamType[tuple[float, float]]):
 @click.option("--swing", type=float, default=0.0, help="How far to either side, deg.")
 @click.option("--rate", type=float, help="How fast, deg/s.  [default: no faster than leaves nothing out]")
 @click.option("--exposure", type=float, default=10.0, show_default=True, help="Of an image, ms.")
-@click.option("--direction", type=float, help="Of the rows, deg clockwise from north.  [default: quickest]")
+@click.option(
+    "--direction", type=float, help="Of the rows, deg clockwise from north.  [default: quickest edge]"
+)
 @click.option("--wind", type=float, default=0.0, help="Its speed, m/s.")
 @click.option("--wind-from", type=float, help="From where, deg clockwise from north.")
 @click.option(
@@ -96,6 +105,7 @@ class Pair(click.ParamType[tuple[float, float]]):
     show_default=True,
     help="Above what the autopilot keeps its heights; ground needs its own map.",
 )
+@click.option("--names", is_flag=True, help="Let the page tell the names of areas and of the map.")
 @click.option("--exact", is_flag=True, help="Let the page tell where on the Earth this is.")
 @click.option("--overwrite", is_flag=True, help="Replace the plan that is there.")
 @click.option("--json", "as_json", is_flag=True, help="What came out, as JSON.")
@@ -112,6 +122,7 @@ def plan(
     animal: float,
     pixels: float,
     speed: float,
+    max_airspeed: float | None,
     overlap: float,
     tilt: float,
     gimbal: Gimbal,
@@ -133,6 +144,7 @@ def plan(
     home: tuple[float, float] | None,
     photo_every: float,
     above: Literal["take-off", "ground"],
+    names: bool,
     exact: bool,
     overwrite: bool,
     as_json: bool,
@@ -164,6 +176,7 @@ def plan(
         animal_m=animal,
         pixels=pixels,
         speed_m_s=speed,
+        max_air_m_s=max_airspeed,
         overlap=overlap,
         tilt_deg=tilt,
         gimbal=gimbal,
@@ -185,6 +198,7 @@ def plan(
         detection=detection,
         heights=above,
         photo_m=photo_every,
+        names=names or exact,
     )
     made, covered, result = plan_flight(wanted, into, terminal_console(), overwrite=overwrite)
     # What makes pages takes seconds to be imported: what is wrong has been said by now.
@@ -201,7 +215,8 @@ def plan(
     places = [*result["places"], *([PAGE] if exact else [])]
     click.echo(f"Exact positions are in {', '.join(places)}: keep these to the pilot.", err=True)
     if not exact:
-        click.echo(f"{PAGE} has metres only, and does not say where.", err=True)
+        told = "metres, and the names that you let it tell" if names else "metres only"
+        click.echo(f"{PAGE} has {told}, and no position.", err=True)
     click.echo(shown(into / PAGE))
 
 

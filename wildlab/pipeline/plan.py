@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ from wildlab.flight.terrain.laying import CutOut, terrain_about
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.plan_directions import directions
 from wildlab.pipeline.plan_forbidden import refuse_heights, refuse_near, refuse_take_off
-from wildlab.pipeline.plan_outlines import simplified
+from wildlab.pipeline.plan_outlines import simplified, sizes_alone
 from wildlab.pipeline.plan_sorties import Sortie, split_rows
 from wildlab.pipeline.plan_view import FURTHEST, View, look
 from wildlab.pipeline.plan_wanted import CLEARANCE, Wanted
@@ -77,6 +79,18 @@ class Plan:
     nearest: float
     cut: CutOut | None = None
 
+    @cached_property
+    def alone(self) -> dict[str, float]:
+        """Square metres of each area that lie in none before it, by name."""
+        return sizes_alone(self.areas.areas)
+
+    @property
+    def names(self) -> list[str]:
+        """Of the areas, as what may be passed on calls them: by number, unless their names may be told."""
+        return [
+            area.name if self.wanted.names else f"area {k + 1}" for k, area in enumerate(self.areas.areas)
+        ]
+
     @property
     def duration(self) -> float:
         """Of all flights, seconds, without changes of batteries."""
@@ -129,11 +143,11 @@ def make_plan(wanted: Wanted, terrain: Terrain | None = None) -> Plan:
         terrain = cut.terrain
     if terrain is not None:
         _check_under(areas, terrain, strip)
-    direction = None if wanted.direction_deg is None else math.radians(wanted.direction_deg)
+    outlines = [simplified(area.outline, FOLLOWED * strip) for area in areas.areas]
     pattern = lawn_mowers(
-        [simplified(area.outline, FOLLOWED * strip) for area in areas.areas],
+        outlines,
         distance,
-        directions=None if direction is None else [direction] * len(areas.areas),
+        directions=directions(outlines, distance, wanted),
         turn=_turn_length(wanted),
         start=home,
         back=home is not None,

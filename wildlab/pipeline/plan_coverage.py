@@ -140,13 +140,12 @@ def images_of(plan: Plan, sortie: Sortie) -> Images:
     """
     wanted, course = plan.wanted, sortie.course
     rate = gimbal_rate(plan)
-    fastest = wanted.speed_m_s + wanted.wind_m_s
-    step = NEXT * min(plan.view.length, 1.0) * plan.height / fastest
+    step = NEXT * min(plan.view.length, 1.0) * plan.height / wanted.fastest_m_s
     if rate > 0:
         step = min(step, NEXT * 2 * math.atan(plan.wanted.camera.width / 2 / wanted.camera.fx) / rate)
     if wanted.photo_m > 0:
         # Over the ground so far apart at most, as in the slowest row; the trigger knows no ends of rows.
-        step = wanted.photo_m / max(wanted.speed_m_s - wanted.wind_m_s, 0.5)
+        step = wanted.photo_m / max(wanted.slowest_m_s, 0.5)
         times = np.arange(0.0, course.times[-1], step)
     else:
         times = _instants(course.times, sortie.row_of, step)
@@ -191,7 +190,7 @@ def gimbal_rate(plan: Plan) -> float:
     if wanted.rate_deg_s is not None:
         return math.radians(wanted.rate_deg_s)
     limit, length = math.radians(wanted.swing_deg), plan.view.length * plan.height
-    return swing_rate(limit, length, wanted.speed_m_s + wanted.wind_m_s, AGAIN)
+    return swing_rate(limit, length, wanted.fastest_m_s, AGAIN)
 
 
 def _nose(headings: Array, speed: float, wind: Array) -> Array:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.readers.area import Area
 from wildlab.flight.readers.rings import crossing, ring_area
 from wildlab.geometry.frames import Array
+from wildlab.planning.areas import contains
+
+#: Points to a side on which overlapping areas are counted.
+ACROSS = 200
 
 
 def simplified(ring: Array, tolerance: float) -> Array:
@@ -52,6 +60,48 @@ def simplified(ring: Array, tolerance: float) -> Array:
     if len(simpler) < 3 or ring_area(simpler) < ring_area(ring) / 2 or crossing(simpler) is not None:
         return ring
     return simpler
+
+
+def sizes_alone(areas: Sequence[Area]) -> dict[str, float]:
+    """How much of each area lies in no area before it: together, what all of them cover.
+
+    Parameters
+    ----------
+    areas
+        Outlines and holes in n.
+
+    Returns
+    -------
+    dict
+        Square metres, by name. Where areas overlap, counted on `ACROSS` points to a side.
+    """
+    found = {}
+    for k, area in enumerate(areas):
+        low, high = area.outline.min(axis=0), area.outline.max(axis=0)
+        near = [
+            one
+            for one in areas[:k]
+            if (one.outline.min(axis=0) < high).all() and (one.outline.max(axis=0) > low).all()
+        ]
+        share = 0.0
+        if near:
+            side = [low[axis] + (high - low)[axis] * (np.arange(ACROSS) + 0.5) / ACROSS for axis in (0, 1)]
+            points = np.stack(np.meshgrid(*side, indexing="ij"), axis=-1).reshape(-1, 2)
+            points = points[_within(area, points)]
+            before = np.zeros(len(points), bool)
+            for one in near:
+                before |= _within(one, points)
+            share = float(before.mean()) if len(points) else 0.0
+        found[area.name] = area.size * (1 - share)
+    return found
+
+
+def _within(area: Area, points: Array) -> NDArray[np.bool_]:
+    """Which points (N, 2) lie in an area, and not in its holes."""
+    inside = np.asarray(contains(area.outline, points))
+    for hole in area.holes:
+        inside &= ~contains(hole, points)
+    return inside
 
 
 def _distances(points: Array, a: Array, b: Array) -> Array:

@@ -12,12 +12,15 @@ import numpy as np
 from wildlab.flight.files import printable
 from wildlab.flight.readers.area import Area
 from wildlab.pipeline.plan import Plan
+from wildlab.pipeline.plan_advice import swing_advice
 from wildlab.pipeline.plan_coverage import EDGE, SHARP, Covered, gimbal_rate
 from wildlab.pipeline.plan_sorties import Sortie
 from wildlab.pipeline.plan_view import FURTHEST
 
 #: Pixels along an animal below which F 3.2's chain and people alike miss many.
 FEW_PIXELS = 5.0
+#: Share of the ground seen below which that is said before all else.
+LITTLE = 0.5
 #: Share of an area that may be missed before it is told of.
 UNSEEN = 0.02
 
@@ -53,7 +56,7 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
         "expected_finds": _number(sum(found)),
         "areas": [
             {
-                "name": area.name,
+                "name": plan.names[k],
                 "seen": round(covered[k].seen, 4),
                 "hidden": round(covered[k].share(covered[k].hidden), 4),
                 "blurred": round(covered[k].share(covered[k].blurred), 4),
@@ -68,13 +71,13 @@ def plan_result(plan: Plan, covered: Sequence[Covered]) -> dict[str, Any]:
         ],
         "sorties": [_sortie(plan, one) for one in plan.sorties],
         "assumed": assumed(plan),
-        "warnings": [*warnings(plan), *unseen(plan, covered)],
+        "warnings": [*warnings(plan), *unseen(plan, covered), *swing_advice(plan, covered)],
         "sentences": summary(plan, covered, sum(found)),
     }
 
 
 def _sortie(plan: Plan, one: Sortie) -> dict[str, Any]:
-    names = [plan.areas.areas[k].name for k in dict.fromkeys(plan.pattern.area[one.rows].tolist())]
+    names = [plan.names[k] for k in dict.fromkeys(plan.pattern.area[one.rows].tolist())]
     battery = plan.wanted.battery_min
     return {
         "name": one.name,
@@ -94,8 +97,8 @@ def summary(plan: Plan, covered: Sequence[Covered], finds: float) -> list[str]:
     """What a pilot wants to know first."""
     n, rows = len(plan.sorties), len(plan.pattern.rows)
     areas = plan.areas.areas
-    size = sum(area.size for area in areas)
-    where = areas[0].name if len(areas) == 1 else f"{len(areas)} areas"
+    size = sum(plan.alone.values())
+    where = plan.names[0] if len(areas) == 1 else f"{len(areas)} areas"
     flights = (
         f"one flight of {minutes(plan.duration)}"
         if n == 1
@@ -103,12 +106,18 @@ def summary(plan: Plan, covered: Sequence[Covered], finds: float) -> list[str]:
     )
     pixels = plan.view.pixels(plan.wanted.camera, plan.wanted.animal_m, plan.height)
     least, most = f"{plan.pattern.distance.min():.0f}", f"{plan.pattern.distance.max():.0f}"
-    apart = least if least == most else f"{least} to {most}"
+    apart = f" {least if least == most else f'{least} to {most}'} m apart" if rows > len(areas) else ""
+    seen = seen_share(plan, covered)
+    little = []
+    if seen < LITTLE:
+        what = "Hardly anything" if seen < LITTLE / 5 else "Less than half"
+        little = [f"{what} will be seen as it is planned: {percent(seen)} of the ground."]
     return [
-        f"{where}, {hectares(size)}: {flights}, over {count(rows, 'row')} {apart} m apart.",
+        *little,
+        f"{where}, {hectares(size)}: {flights}, over {count(rows, 'row')}{apart}.",
         f"The camera is {plan.height:.0f} m above the ground and sees a strip of {plan.strip:.0f} m; "
         f"{plan.wanted.animal_m:g} m on the ground are {pixels:.0f} pixels.",
-        f"Of the ground {percent(seen_share(plan, covered))} will be seen.{_finds(plan, finds)}",
+        f"Of the ground {percent(seen)} will be seen.{_finds(plan, finds)}",
     ]
 
 
@@ -120,8 +129,8 @@ def _finds(plan: Plan, finds: float) -> str:
 
 
 def seen_share(plan: Plan, covered: Sequence[Covered]) -> float:
-    """Share of all areas together that is seen."""
-    sizes = [area.size for area in plan.areas.areas]
+    """Share of all areas together that is seen; what lies in several of them counts once."""
+    sizes = list(plan.alone.values())
     return sum(size * one.seen for size, one in zip(sizes, covered, strict=True)) / sum(sizes)
 
 
@@ -132,7 +141,7 @@ def animals_in(plan: Plan, area: Area) -> float:
         return area.animals
     if wanted.animals is not None:
         return wanted.animals
-    return math.nan if wanted.density_km2 is None else wanted.density_km2 * area.size / 1e6
+    return math.nan if wanted.density_km2 is None else wanted.density_km2 * plan.alone[area.name] / 1e6
 
 
 def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
@@ -152,7 +161,7 @@ def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
         if plan.wanted.photo_m > 0
         else "a larger overlap, or a lower speed"
     )
-    for area, one in zip(plan.areas.areas, covered, strict=True):
+    for k, one in enumerate(covered):
         missed = 1 - one.seen
         if missed <= UNSEEN:
             continue
@@ -162,10 +171,10 @@ def unseen(plan: Plan, covered: Sequence[Covered]) -> list[str]:
             "in blurred images alone": (blurred, sharper),
             "in no image": (missed - hidden - blurred, more),
         }
-        parts = [f"{percent(share)} {what}" for what, (share, _) in causes.items() if share > 0.005]
+        parts = [f"{percent(share)} {what}" for what, (share, _) in causes.items() if share > 1e-9]
         helps = max(causes.values())[1]
         said.append(
-            f"{percent(missed)} of {area.name} will not be seen: {', '.join(parts)}. What helps: {helps}."
+            f"{percent(missed)} of {plan.names[k]} will not be seen: {', '.join(parts)}. What helps: {helps}."
         )
     return said
 
@@ -175,8 +184,9 @@ def assumed(plan: Plan) -> list[str]:
     wanted = plan.wanted
     said = []
     if plan.cut is not None and plan.wanted.terrain is not None:
+        name = printable(Path(plan.wanted.terrain.file).name) if wanted.names else "the map that was given"
         said.append(
-            f"The ground is that of {printable(Path(plan.wanted.terrain.file).name)}, every "
+            f"The ground is that of {name}, every "
             f"{plan.cut.terrain.step:.3g} m, {plan.cut.rms:.2g} m (rms) from the map's own heights. Trees, "
             "masts and lines are not in it, unless it is a map of surfaces."
         )
@@ -196,15 +206,17 @@ def assumed(plan: Plan) -> list[str]:
     if plan.terrain is not None:
         trees = " or a treetop" if wanted.trees_m > 0 else ""
         said.append(f"The way comes no nearer than {plan.nearest:.0f} m to the ground{trees}, on any side.")
+        said.append(
+            "The height of the take-off point in the files is the map's own number, whatever the map counts "
+            "heights from. The way does not rest on it: an autopilot measures where it takes off."
+        )
     said.append(_return_height(plan))
-    air = f"{wanted.speed_m_s:g} m/s through the air"
-    if wanted.wind_m_s > 0:
-        said.append(f"The aircraft flies {air}, in a steady wind of {wanted.wind_m_s:g} m/s from "
-                    f"{wanted.wind_from_deg:.0f} degrees.")  # fmt: skip
-    else:
-        said.append(f"The aircraft flies {air}, and there is no wind.")
+    said.append(_speed(plan))
     if wanted.turn_radius_m > 0:
-        said.append(f"It turns no tighter than {wanted.turn_radius_m:g} m.")
+        said.append(
+            f"It turns no tighter than {wanted.turn_radius_m:g} m. Its files end with a return, after which "
+            "it circles over home: the landing is the pilot's."
+        )
     else:
         said.append(f"It stops at the end of each row, and turns in {wanted.turn_s:g} s.")
     said.append(f"It climbs and sinks at {wanted.climb_m_s:g} m/s at most.")
@@ -248,6 +260,25 @@ def assumed(plan: Plan) -> list[str]:
     return said
 
 
+def _speed(plan: Plan) -> str:
+    """Which speed the files command, and so what the times are of."""
+    wanted = plan.wanted
+    wind = (
+        f"a steady wind of {wanted.wind_m_s:g} m/s from {wanted.wind_from_deg:.0f} degrees"
+        if wanted.wind_m_s > 0
+        else "no wind"
+    )
+    if wanted.vehicle == "fixed-wing":
+        return (
+            f"The autopilot holds {wanted.speed_m_s:g} m/s through the air; times are with {wind}, "
+            f"{wanted.slowest_m_s:g} to {wanted.fastest_m_s:g} m/s over the ground."
+        )
+    return (
+        f"The autopilot holds {wanted.speed_m_s:g} m/s over the ground, and times are of that; with {wind} "
+        f"these are up to {wanted.air_m_s:g} m/s through the air."
+    )
+
+
 def _return_height(plan: Plan) -> str:
     """What a return home that the autopilot begins itself needs."""
     begins = "A return home that the autopilot begins itself (lost link, low battery)"
@@ -257,8 +288,8 @@ def _return_height(plan: Plan) -> str:
         )
     highest = max(float((one.way.height - one.way.ground[0]).max()) for one in plan.sorties)
     return (
-        f"{begins} is at its own height: set that to {math.ceil(highest - 1e-6)} m above the take-off point or "
-        "more."
+        f"{begins} is at its own height: set that to {math.ceil(highest - 1e-6)} m above the take-off point "
+        "or more."
     )
 
 
@@ -266,11 +297,22 @@ def warnings(plan: Plan) -> list[str]:
     """What speaks against flying it as it is, each a sentence."""
     wanted, found = plan.wanted, []
     steepest = max(one.steepest for one in plan.sorties)
-    if steepest > wanted.climb_m_s:
+    # A hundredth is rounding: what cannot slow down is planned to climb at all that it can do.
+    if steepest > 1.01 * wanted.climb_m_s:
+        so = (
+            "it cannot slow down, so plan slower (--speed)"
+            if wanted.vehicle == "fixed-wing"
+            else "it has to slow down there, which the times allow for"
+        )
         found.append(
             f"The ground rises or falls so that at {wanted.speed_m_s:g} m/s the aircraft would have to climb "
-            f"or sink at {steepest:.1f} m/s, and it can do {wanted.climb_m_s:g}: it has to slow down there, "
-            "which the times allow for."
+            f"or sink at {steepest:.1f} m/s, and it can do {wanted.climb_m_s:g}: {so}."
+        )
+    if wanted.vehicle == "multicopter" and wanted.wind_m_s > 0 and wanted.max_air_m_s is None:
+        found.append(
+            f"Against the wind the aircraft has to fly {wanted.air_m_s:g} m/s through the air to hold "
+            f"{wanted.speed_m_s:g} m/s over the ground, and nobody said whether it can (--max-airspeed). "
+            "Wind costs battery that these times do not show."
         )
     unknown = sum(one.way.unknown for one in plan.sorties)
     if unknown > 0:
@@ -283,6 +325,18 @@ def warnings(plan: Plan) -> list[str]:
         found.append(
             f"{wanted.animal_m:g} m on the ground are {pixels:.1f} pixels only: fly lower, or do not expect "
             "to see it."
+        )
+    elif pixels < 0.99 * wanted.pixels:
+        found.append(
+            f"{wanted.animal_m:g} m on the ground are {pixels:.1f} pixels, and {wanted.pixels:g} were asked "
+            "for (--pixels): fly lower, or with a camera that looks more down."
+        )
+    twice = sum(area.size for area in plan.areas.areas) - sum(plan.alone.values())
+    if twice > 1e-3 * sum(plan.alone.values()):
+        told = wanted.animals is not None or any(not math.isnan(one.animals) for one in plan.areas.areas)
+        found.append(
+            f"{hectares(twice)} lie in more than one area, and are flown for each: join the areas, or cut "
+            f"one back.{' Animals are counted for each area as they were given.' if told else ''}"
         )
     if any(len(area.holes) for area in plan.areas.areas):
         found.append("Holes in areas are flown over, and not counted as searched.")

@@ -95,7 +95,8 @@ def split_rows(
                 raise WildlabError(
                     f"one row with the way there and back takes {best.duration / 60:.1f} minutes, and of a "
                     f"battery of {wanted.battery_min:g} minutes {wanted.usable_s / 60:.1f} may be used",
-                    "take off nearer to it (--home), fly faster, or turn the rows (--direction)",
+                    "take off nearer to it (--home), fly faster, turn the rows (--direction), or split the "
+                    "area into smaller ones",
                     field="--battery",
                 )
             # Longer flights take longer: the last row that a battery lasts for is found by halving.
@@ -152,12 +153,12 @@ def fly_rows(
         wanted.speed_m_s,
         turn_radius=wanted.turn_radius_m,
         turn_time=wanted.turn_s if wanted.turn_radius_m == 0 else 0.0,
-        wind=wanted.wind,
+        wind=wanted.drift,
         spacing=max(wanted.turn_radius_m / 20, 1.0),
     )
     corners = _corners(course, wanted.turn_radius_m)
     # What can stop slows down where the ground is steep; what cannot has to begin to climb before.
-    slope = wanted.climb_m_s / (wanted.speed_m_s + wanted.wind_m_s)
+    slope = wanted.climb_m_s / wanted.fastest_m_s
     steepest = slope if wanted.vehicle == "fixed-wing" else math.inf
     way = follow(course.points[corners], terrain, above, wanted.max_height_m, steepest, wanted.trees_m)
     duration, steepest = _times(course, corners, way, wanted)

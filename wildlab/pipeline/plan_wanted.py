@@ -25,6 +25,7 @@ LIMITS: dict[str, tuple[str, float, float, str]] = {
     "animal_m": ("--animal", 0.05, 30.0, "m"),
     "pixels": ("--pixels", 1.0, 500.0, "px"),
     "speed_m_s": ("--speed", 0.5, 80.0, "m/s"),
+    "max_air_m_s": ("--max-airspeed", 0.5, 80.0, "m/s"),
     "overlap": ("--overlap", 0.0, 0.9, ""),
     "tilt_deg": ("--tilt", -30.0, 90.0, "deg"),
     "swing_deg": ("--swing", 0.0, 80.0, "deg"),
@@ -65,7 +66,9 @@ class Wanted:
     animal_m, pixels
         Length of what is looked for, and across how many pixels it shall be seen.
     speed_m_s
-        Through the air.
+        Over the ground, which is what the autopilot of a multicopter holds; through the air of a fixed wing.
+    max_air_m_s
+        What a multicopter can fly through the air; None where nobody said.
     overlap
         Share of a row's strip that the next row sees again.
     tilt_deg
@@ -97,6 +100,8 @@ class Wanted:
         Above what an autopilot keeps its height.
     photo_m
         Metres between photos; 0 leaves the camera alone.
+    names
+        Whether page and numbers may tell the names of areas and of the map, which may tell where it is.
     """
 
     area: Path
@@ -107,6 +112,7 @@ class Wanted:
     animal_m: float = 1.5
     pixels: float = 10.0
     speed_m_s: float = 10.0
+    max_air_m_s: float | None = None
     overlap: float = 0.2
     tilt_deg: float = 90.0
     gimbal: Gimbal = "fixed"
@@ -128,6 +134,7 @@ class Wanted:
     detection: float = 1.0
     heights: Heights = "take-off"
     photo_m: float = 0.0
+    names: bool = False
 
     def __post_init__(self) -> None:
         for field, (option, low, high, unit) in LIMITS.items():
@@ -147,7 +154,14 @@ class Wanted:
                 "say with --wind-from whence it blows, degrees clockwise from north",
                 field="--wind",
             )
-        if self.wind_m_s >= self.speed_m_s:
+        if self.vehicle == "multicopter" and self.air_m_s > (self.max_air_m_s or math.inf):
+            raise WildlabError(
+                f"{self.speed_m_s:g} m/s over the ground against a wind of {self.wind_m_s:g} m/s are "
+                f"{self.air_m_s:g} m/s through the air, and the aircraft can do {self.max_air_m_s:g}",
+                "plan slower with --speed, or wait for less wind",
+                field="--max-airspeed",
+            )
+        if self.vehicle == "fixed-wing" and self.wind_m_s >= self.speed_m_s:
             raise WildlabError(
                 f"a wind of {self.wind_m_s:g} m/s against an airspeed of {self.speed_m_s:g} m/s: the "
                 "aircraft would not come home",
@@ -170,6 +184,26 @@ class Wanted:
         """(2,) where the air goes to, north and east, m/s."""
         towards = math.radians((self.wind_from_deg or 0.0) + 180.0)
         return np.asarray(self.wind_m_s * np.array([math.cos(towards), math.sin(towards)]))
+
+    @property
+    def drift(self) -> Array:
+        """(2,) what the wind adds to the way over ground, m/s: a multicopter's autopilot leaves nothing."""
+        return self.wind if self.vehicle == "fixed-wing" else np.zeros(2)
+
+    @property
+    def fastest_m_s(self) -> float:
+        """Over the ground at most."""
+        return self.speed_m_s + (self.wind_m_s if self.vehicle == "fixed-wing" else 0.0)
+
+    @property
+    def slowest_m_s(self) -> float:
+        """Over the ground at least."""
+        return self.speed_m_s - (self.wind_m_s if self.vehicle == "fixed-wing" else 0.0)
+
+    @property
+    def air_m_s(self) -> float:
+        """Through the air at most."""
+        return self.speed_m_s + (self.wind_m_s if self.vehicle == "multicopter" else 0.0)
 
     @property
     def vehicle(self) -> Vehicle:

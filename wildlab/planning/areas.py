@@ -17,6 +17,8 @@ SAME = 1e-6
 TOGETHER = 20_000
 #: Areas below this cannot be searched, square metres.
 LEAST = 1e-3
+#: Directions of rows that are tried at most.
+MOST_DIRECTIONS = 60
 
 
 def check_area(corners: ArrayLike, name: str = "area") -> Array:
@@ -358,3 +360,35 @@ def _meet(a: Array, along: Array, b: Array, edges: Array) -> NDArray[np.bool_]:
     meet |= (near == 0) & within(a, b, edges)
     meet |= (far == 0) & within(a + along, b, edges)
     return np.asarray(meet)
+
+
+def edge_directions(corners: ArrayLike, most: int = MOST_DIRECTIONS) -> Array:
+    """Directions of the edges of a fence, of those that differ the ones of the longest edges.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) north and east, metres.
+    most
+        How many at most.
+
+    Returns
+    -------
+    (D,) radians from 0 to below pi: a direction and its reverse are the same rows; the longest edge's first.
+
+    Examples
+    --------
+    >>> print(edge_directions([[0, 0], [0, 40], [100, 40], [100, 0]]))
+    [0.         1.57079633]
+    """
+    fence = np.asarray(corners, float)
+    edges = np.roll(fence, -1, axis=0) - fence
+    edges = edges[np.argsort(-np.linalg.norm(edges, axis=1), kind="stable")]
+    angles = np.mod(np.arctan2(edges[:, 1], edges[:, 0]), np.pi)
+    angles = np.where(np.pi - angles < 1e-9, 0.0, angles)
+    # Of a fence with very many corners the edges that differ, and of these the longest.
+    coarse = (
+        np.round(angles, 2) if len(edges) <= MOST_DIRECTIONS else np.round(MOST_DIRECTIONS * angles / np.pi)
+    )
+    _, first = np.unique(coarse, return_index=True)
+    return angles[np.sort(first)][:most]

@@ -19,12 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.frames import Array
-from wildlab.planning.areas import check_area, way_inside
+from wildlab.planning.areas import check_area, edge_directions, way_inside
 from wildlab.planning.visits import Way, visit_order
 
 Ends = Literal["cover", "inside"]
-#: Directions of rows that are tried at most.
-MOST_DIRECTIONS = 60
 #: More rows than this over one area are a slip of a unit.
 MOST_ROWS = 5000
 
@@ -348,23 +346,13 @@ def _block_ways(
 
 
 def _best_direction(fence: Array, distance: float, ends: Ends, turn: float) -> float:
-    edges = np.roll(fence, -1, axis=0) - fence
-    # A direction and its reverse are the same rows; the longest edge first, for ties.
-    edges = edges[np.argsort(-np.linalg.norm(edges, axis=1), kind="stable")]
-    angles = np.mod(np.arctan2(edges[:, 1], edges[:, 0]), np.pi)
-    angles = np.where(np.pi - angles < 1e-9, 0.0, angles)
-    # Of a fence with very many corners the edges that differ, and of these the longest.
-    coarse = (
-        np.round(angles, 2) if len(edges) <= MOST_DIRECTIONS else np.round(MOST_DIRECTIONS * angles / np.pi)
-    )
-    _, first = np.unique(coarse, return_index=True)
-
     def cost(angle: float) -> float:
         pieces = [piece for row in rows_over(fence, distance, angle, ends)[0] for piece in row]
         lengths = sum(float(np.linalg.norm(piece[1] - piece[0])) for piece in pieces)
         return lengths + len(pieces) * (turn + distance)
 
-    return min((float(angles[k]) for k in np.sort(first)), key=lambda angle: round(cost(angle), 6))
+    # Of equals the longest edge's.
+    return min((float(one) for one in edge_directions(fence)), key=lambda angle: round(cost(angle), 6))
 
 
 def _blocks(rows: list[list[Array]], direction: float) -> list[Array]:

@@ -71,7 +71,7 @@ def plan_page(
     parts = [
         f'<header><h1>{escape(title)}</h1><p class="sub">{escape(names)}; {escape(place)}</p></header>',
         _summary(result),
-        _tiles(result),
+        _tiles(plan, result),
         "<h2>Where it flies, and what it sees</h2>",
         _figure(*_map(plan, covered, result)),
         "<h2>Areas</h2>",
@@ -97,10 +97,10 @@ def _summary(result: Mapping[str, Any]) -> str:
     )
 
 
-def _tiles(result: Mapping[str, Any]) -> str:
+def _tiles(plan: Plan, result: Mapping[str, Any]) -> str:
     longest = max(one["duration_s"] for one in result["sorties"])
     tiles = [
-        (minutes(longest), "the longest flight, from take-off to landing"),
+        (minutes(longest), f"the longest flight, from take-off to {_ending(plan)}"),
         (percent(result["seen"]), "of the ground is seen"),
     ]
     if result["expected_finds"] is not None:
@@ -118,11 +118,16 @@ def _tiles(result: Mapping[str, Any]) -> str:
     )
 
 
+def _ending(plan: Plan) -> str:
+    """With what a flight ends: a return of a fixed wing circles over home until the pilot lands it."""
+    return "landing" if plan.wanted.vehicle == "multicopter" else "home and down"
+
+
 def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> tuple[Figure, str, str]:
     fig, ax = new_figure(5.8, 5.2)
     there = [_draw_covered(ax, one) for one in covered]
-    for area in plan.areas.areas:
-        _draw_area(ax, area)
+    for area, name in zip(plan.areas.areas, plan.names, strict=True):
+        _draw_area(ax, area, name)
     many = len(plan.sorties) > NAMED
     for k, one in enumerate(plan.sorties):
         points, colour = one.course.points, FLIGHTS[k % len(FLIGHTS)]
@@ -130,9 +135,13 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
         for row in one.rows:
             _arrow(ax, plan.pattern.rows[row], colour)
     ax.plot(plan.home[1], plan.home[0], "^", color=INK, ms=8, label="take-off", zorder=5)
-    ax.autoscale_view()
-    ax.margins(0.06)
+    low, high = _drawn(plan)
+    side = high - low
+    # Above and to the right there is room for the arrow to the north, below for the scale.
+    ax.set(xlim=(low[1] - 0.06 * side.max(), high[1] + 0.12 * side.max()))
+    ax.set(ylim=(low[0] - 0.10 * side.max(), high[0] + 0.06 * side.max()))
     map_axes(ax)
+    ax.set_aspect("equal", adjustable="box")
     rows = len(plan.pattern.rows)
     ax.set_title(f"{percent(result['seen'])} is seen, in {count(len(plan.sorties), 'flight')}")
     handles, _ = ax.get_legend_handles_labels()
@@ -153,6 +162,13 @@ def _map(plan: Plan, covered: Sequence[Covered], result: Mapping[str, Any]) -> t
         for one in result["areas"][:NAMED]
     )
     return fig, alt, "North is up. Arrows show which way a row is flown; the triangle is the take-off point."
+
+
+def _drawn(plan: Plan) -> tuple[Array, Array]:
+    """The least and the greatest north and east of areas, ways and take-off, metres."""
+    points = [area.outline for area in plan.areas.areas] + [one.course.points for one in plan.sorties]
+    every = np.concatenate([*points, plan.home[None]])
+    return every.min(axis=0), every.max(axis=0)
 
 
 def _draw_covered(ax: Axes, one: Covered) -> list[bool]:
@@ -205,7 +221,7 @@ def _heights(plan: Plan, terrain: Terrain) -> tuple[Figure, str, str]:
     return fig, alt, "The flights one after the other, each in its colour of the map."
 
 
-def _draw_area(ax: Axes, area: Area) -> None:
+def _draw_area(ax: Axes, area: Area, name: str) -> None:
     rings = [area.outline, *area.holes]
     corners = np.concatenate([np.concatenate([ring, ring[:1]])[:, ::-1] for ring in rings])
     codes = np.concatenate(
@@ -215,7 +231,7 @@ def _draw_area(ax: Axes, area: Area) -> None:
     ax.add_patch(PathPatch(Outline(corners, codes), facecolor="none", edgecolor=INK, lw=1.4, zorder=3))
     middle = area.outline.mean(axis=0)
     ax.annotate(
-        area.name,
+        name,
         xy=(float(middle[1]), float(middle[0])),
         ha="center",
         va="center",

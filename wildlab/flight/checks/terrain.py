@@ -61,13 +61,15 @@ def terrain_findings(flight: Flight) -> Iterator[Finding]:
         if not len(p):
             continue
         if not over.all():
-            yield Finding(
-                "warning",
-                f"nav/{name}",
-                "",
-                f"{100 * (1 - over.mean()):.3g} % of the poses are not over the terrain, or are over a hole",
-                "give a map that reaches further",
-            )
+            north, far_north, east, far_east = ground.extent
+            beyond = (p[:, 0] < north) | (p[:, 0] > far_north) | (p[:, 1] < east) | (p[:, 1] > far_east)
+            for which, where, help_ in (
+                (~over & beyond, "beyond the border of the terrain", "give a map that reaches further"),
+                (~over & ~beyond, "over a hole of the terrain", "fill it, or give another map"),
+            ):
+                if which.any():
+                    said = f"{100 * which.mean():.3g} % of the poses are {where}"
+                    yield Finding("warning", f"nav/{name}", "", said, help_)
         below = above[over] < -DEEP
         if below.mean() > FEW:
             yield Finding(
