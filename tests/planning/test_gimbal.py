@@ -120,6 +120,14 @@ def test_at_a_fence_on_one_side_it_turns_round_on_that_side_alone() -> None:
     assert roll.min() == pytest.approx(-0.9, abs=0.021)
 
 
+def test_an_adaptive_swing_begins_where_a_swing_between_the_least_limits_does() -> None:
+    t = np.arange(0.0, 20.0, 0.001)
+    never = np.zeros((len(t), 3), bool)
+    for start in (0.0, 0.1, 0.4, 0.7, 0.9):
+        roll = adapt_roll(t, never, [-1.0, 0.0, 1.0], (0.3, 0.9), 0.2, start=start).roll
+        assert roll[:6000] == pytest.approx(swing(t, 0.3, 0.2, start)[:6000], abs=2e-3)
+
+
 def test_the_rate_brings_the_swing_round_while_the_image_passes() -> None:
     rate = swing_rate(0.5, 12.0, 3.0, overlap=0.25)
     assert 4 * 0.5 / rate == pytest.approx(12.0 * 0.75 / 3.0)

@@ -147,8 +147,8 @@ def test_vessels_are_looked_for_on_two_flights(reports: Path, faults: Faults) ->
 @pytest.mark.parametrize(
     ("study", "claims", "figures"),
     [
-        ("uav-coverage", 7, ("fig-7-12a", "fig-7-12d", "age", "gap", "detected", "land")),
-        ("gondola-coverage", 5, ("fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18")),
+        ("uav-coverage", 9, ("fig-7-12a", "fig-7-12d", "age", "gap", "detected", "land")),
+        ("gondola-coverage", 6, ("fig-7-15", "fig-7-16", "fig-7-17", "fig-7-18")),
     ],
 )
 def test_what_plans_cover_is_seen_by_flights(

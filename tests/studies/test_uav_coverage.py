@@ -26,8 +26,11 @@ from wildlab.studies.uav_coverage.trial import (
     fences_of,
     land_of,
     plan,
+    planned_coverage,
     required,
+    run_case,
     trial,
+    with_larger_errors,
 )
 
 
@@ -55,6 +58,8 @@ def made_up(count: int = 40, **changes: float) -> pd.DataFrame:
         row |= {
             (f"rows-{spacing:.0f}m", "time"): 1000.0 - 100 * k,
             (f"rows-{spacing:.0f}m", "missed"): 0.1 * k,
+            (f"rows-{spacing:.0f}m", "missed_still"): 0.05 * k,
+            (f"rows-{spacing:.0f}m", "unseen"): 0.05 * k,
         }
     row |= {tuple(key.split("/", 1)): value for key, value in changes.items()}  # type: ignore[misc]
     return frame([row] * count)
@@ -106,6 +111,8 @@ def test_claims_are_those_published_and_turn_with_the_numbers() -> None:
         "lower-needs-closer-or-faster": {f"{LOW_FASTER}/seen": 0.97},
         "convex-covered": {f"{DOWN}/in_view": 0.99},
         "distance-time-missed": {f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0},
+        "distance-missed-by-moving": {f"rows-{SPACINGS[-1]:.0f}m/missed_still": 0.25},
+        "too-wide-not-whole": {f"rows-{SPACINGS[-1]:.0f}m/unseen": 0.005},
     }
     for claim, change in opposed.items():
         check = check_claims(made_up(**change))[claim]
@@ -139,6 +146,13 @@ def test_other_words_turn_too() -> None:
     assert "which is no more" not in text.moving_words(made_up())
     same = made_up(**{f"rows-{SPACINGS[-1]:.0f}m/missed": 0.0})
     assert "which is no more" in text.moving_words(same)
+    said = text.moving_words(made_up())
+    assert "as many are missed as if they stood still with the closer rows" in said
+    assert "10.0 % more are missed than if they stood still with the wider ones" in said
+    wide = f"rows-{SPACINGS[-1]:.0f}m"
+    said = text.moving_words(made_up(**{f"{wide}/missed_still": 0.3, f"{wide}/unseen": 0.4}))
+    assert "10.0 % fewer are missed" in said and "the wider ones 40.0 %" in said
+    assert len(text.rows_apart_table(made_up())) == len(SPACINGS)
     assert "half as many would do" in text.rate_words(2, {DOWN: 0.001, YAW: -0.004})
     assert "half as many would leave some out" in text.rate_words(2, {DOWN: 0.001, YAW: 0.02})
     assert "swings twice as fast bring 10.0 % back" in text.summary(made_up())[1]
@@ -146,6 +160,63 @@ def test_other_words_turn_too() -> None:
         "swings twice as fast bring nothing back" in text.summary(made_up(**{f"{LOW_FASTER}/seen": 0.7}))[1]
     )
     assert len(text.rows_table(made_up())) == len(text.held_table(made_up(1))) == len(CASES | MORE)
+
+
+def test_flights_of_which_nothing_is_surely_seen_are_counted_and_said() -> None:
+    spread = made_up(4)
+    spread.loc[:1, (LOW, "held")] = np.nan
+    said = text.summary(spread)[2]
+    assert f"in the worst of {4 * len(text.NAMES) - 2} flights 99.0 %" in said
+    assert "In 2 more nothing was surely to be seen" in said
+    assert f"{text.NAMES[LOW]}, in 2 of 4" in text.held_words(spread)
+    assert "In every draw of every case" not in text.held_words(spread)
+    table = text.held_table(spread).set_index("case")["least of all draws"]
+    assert (
+        table[text.NAMES[LOW]] == "99.0 %; nothing planned in 2 of 4" and table[text.NAMES[YAW]] == "99.0 %"
+    )
+    spread.loc[:, [(name, "held") for name in text.NAMES]] = np.nan
+    assert text.summary(spread)[2].startswith("Nothing was surely to be seen in any of")
+
+
+def test_what_a_map_says_of_half_is_true_of_half() -> None:
+    ages = np.array([60.0, 130.0, 250.0, 400.0, np.nan])
+    assert "in the last 4 min" in text.age_words(ages) and (ages <= 240).sum() >= 2
+    assert "for 3 min or longer" in text.gap_words(ages) and (ages >= 180).sum() >= 2
+    assert (
+        text.capital(text.age_words(ages[4:])) == "Nothing was seen" == text.capital(text.gap_words(ages[4:]))
+    )
+
+
+def test_animals_that_stand_are_missed_where_no_image_shows_the_ground(draws: pd.DataFrame) -> None:
+    for spacing in SPACINGS:
+        still, unseen = (draws[f"rows-{spacing:.0f}m", name] for name in ("missed_still", "unseen"))
+        # 60 animals: three standard deviations of their share.
+        assert (np.abs(still - unseen) < 3 * np.sqrt(unseen * (1 - unseen) / 60) + 0.02).all()
+    first, last = (f"rows-{one:.0f}m" for one in (SPACINGS[0], SPACINGS[-1]))
+    assert (draws[last, "unseen"] > draws[first, "unseen"]).all()
+    assert (draws[last, "missed"] != draws[last, "missed_still"]).any()
+
+
+def test_larger_errors_than_planned_for_are_said_by_what_they_give() -> None:
+    said = text.sensitivity_words({DOWN: (0.999, 0.97), LOW: (0.99, 0.8)}, 2.0)
+    assert "97.0 % for 99.9 %" in said and "less than 95 % in 1 of 2" in said and "2 times as large" in said
+    assert "cannot be tried" in text.sensitivity_words({DOWN: (np.nan, np.nan)}, 2.0)
+
+
+def test_larger_errors_show_less_of_what_is_surely_planned() -> None:
+    twin, land = load_twin("uav-search"), land_of(1)
+    run = run_case(twin, land, LOW, 1, 1, 1.0)
+    held = [with_larger_errors(twin, land, LOW, 1, run, factor) for factor in (0.0, 1.0, 4.0)]
+    assert held[0] == 1.0 and held[1] == pytest.approx(run[1].held) and held[2] < held[1]
+    assert planned_coverage(twin, land, LOW, 1, 1.0).seen.sum() == run[1].planned.seen.sum()
+
+
+def test_intervals_stand_where_draws_differ() -> None:
+    spread = made_up(3)
+    spread[YAW, "ground"] = [1.4e5, 1.5e5, 1.6e5]
+    assert "50 % more ground (25 to 75 %) than" in text.summary(spread)[0]
+    spread[DOWN, "sharp"] = [0.8, 0.9, 1.0]
+    assert text.rows_table(spread)["sharp images"][0] == "90.0 % (65.2 to 100 %)"
 
 
 def test_a_twin_without_a_survey_is_refused() -> None:

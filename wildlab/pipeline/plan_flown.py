@@ -65,6 +65,32 @@ class ExecutionErrors(NamedTuple):
     yaw: float
     attitude_time: float
 
+    def larger(self, factor: float) -> ExecutionErrors:
+        """Errors ``factor`` times as large, that last as long."""
+        sizes = ("horizontal", "vertical", "roll", "pitch", "yaw")
+        return self._replace(**{name: factor * getattr(self, name) for name in sizes})
+
+
+class Planned(NamedTuple):
+    """A plan alone.
+
+    Attributes
+    ----------
+    coverage
+        By its sharp images.
+    found
+        Its sightings.
+    sharp
+        (N,) bool of its images.
+    distance
+        (N,) metres to the ground in the middle of each image.
+    """
+
+    coverage: Coverage
+    found: Sightings
+    sharp: NDArray[np.bool_]
+    distance: Array
+
 
 class Executed(NamedTuple):
     """A plan, and one flight of it.
@@ -190,6 +216,36 @@ def execute(
     -------
     Executed
     """
+    t = np.asarray(times, float)
+    planned = as_planned(terrain, poses, t, looks)
+    found, sharp = planned.found, planned.sharp
+    margin = margin_px(poses.camera, errors, planned.distance, sigmas)
+    surely = found.take((found.edge >= margin[found.image]) & sharp[found.image])
+    sure = np.bincount(surely.node, minlength=terrain.height.size).reshape(terrain.height.shape) > 0
+    really = with_errors(poses, headings, errors, float(np.median(np.diff(t))), rng)
+    seen = see(terrain, really, looks.furthest)
+    return Executed(
+        planned.coverage,
+        from_sightings(seen, terrain, t, sharp, looks.range_scale),
+        np.asarray(sure),
+        found,
+        sharp,
+        float(np.median(margin)),
+    )
+
+
+def as_planned(terrain: Terrain, poses: CameraPoses, times: ArrayLike, looks: Looks) -> Planned:
+    """What a plan says will be seen, without any errors.
+
+    Parameters
+    ----------
+    terrain, poses, times, looks
+        As for `execute`.
+
+    Returns
+    -------
+    Planned
+    """
     t, camera = np.asarray(times, float), poses.camera
     middle = pixel_rays(camera, np.array([[camera.width / 2, camera.height / 2]]), poses.R_nc)
     met = intersect_terrain(terrain, middle.reshape(-1, 3), poses.p_nc).points
@@ -198,16 +254,41 @@ def execute(
     allowed = looks.blur_share * looks.size * min(camera.fx, camera.fy) / distance
     sharp = blur(camera, poses, t, looks.exposure, distance) <= allowed
     found = see(terrain, poses, looks.furthest)
-    margin = margin_px(camera, errors, distance, sigmas)
-    surely = found.take((found.edge >= margin[found.image]) & sharp[found.image])
-    sure = np.bincount(surely.node, minlength=terrain.height.size).reshape(terrain.height.shape) > 0
+    return Planned(from_sightings(found, terrain, t, sharp, looks.range_scale), found, sharp, distance)
+
+
+def held_with(
+    done: Executed,
+    terrain: Terrain,
+    poses: CameraPoses,
+    headings: ArrayLike,
+    times: ArrayLike,
+    furthest: float,
+    errors: ExecutionErrors,
+    rng: np.random.Generator,
+) -> float:
+    """Share of what a plan says is surely seen that a flight shows with other errors than those planned for.
+
+    Parameters
+    ----------
+    done
+        The plan, from `execute`.
+    terrain, poses, headings, times
+        As for `execute`.
+    furthest
+        Distance up to which anything is looked for, metres.
+    errors
+        Of this flight.
+    rng
+        Random numbers.
+
+    Returns
+    -------
+    float
+        NaN where nothing is surely seen. Images that are sharp in the plan are taken for sharp.
+    """
+    t = np.asarray(times, float)
     really = with_errors(poses, headings, errors, float(np.median(np.diff(t))), rng)
-    seen = see(terrain, really, looks.furthest)
-    return Executed(
-        from_sightings(found, terrain, t, sharp, looks.range_scale),
-        from_sightings(seen, terrain, t, sharp, looks.range_scale),
-        np.asarray(sure),
-        found,
-        sharp,
-        float(np.median(margin)),
-    )
+    seen = see(terrain, really, furthest)
+    shown = np.bincount(seen.node[done.sharp[seen.image]], minlength=terrain.height.size) > 0
+    return float(shown.reshape(done.sure.shape)[done.sure].mean()) if done.sure.any() else np.nan

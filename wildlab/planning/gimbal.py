@@ -314,6 +314,7 @@ def adapt_roll(
     limits: tuple[float, float],
     rate: float,
     pitch: float = NADIR,
+    start: float = 0.0,
 ) -> GimbalAngles:
     """The adaptive strategy (F 5.4.2, Algorithm 2, mended as said above), about roll.
 
@@ -332,11 +333,13 @@ def adapt_roll(
         Radians per second.
     pitch
         Radians.
+    start
+        Where in a swing between the least limits it begins, as for `swing`: 0 is straight below, turning to
+        positive roll.
 
     Returns
     -------
     GimbalAngles
-        It begins straight below, turning to positive roll.
 
     Raises
     ------
@@ -360,7 +363,9 @@ def adapt_roll(
         raise WildlabError(f"a rate of {rate} rad/s", "give radians per second above zero", field="rate")
     t, known = np.asarray(times, float), np.asarray(rolls, float)
     roll = np.zeros(len(t))
-    angle, sense = 0.0, 1
+    phase = float(np.mod(start + 0.25, 1.0))
+    angle, sense = least * (1 - abs(4 * phase - 2)), 1 if phase < 0.5 else -1
+    roll[:1] = angle
     for k in range(1, len(t)):
         reached = sense * angle
         nearest = int(np.abs(known - angle).argmin())

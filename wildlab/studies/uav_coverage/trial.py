@@ -18,9 +18,9 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, Looks, execute
+from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, Looks, as_planned, execute, held_with
 from wildlab.planning.courses import Course, fly
-from wildlab.planning.coverage import nodes_in, share_seen
+from wildlab.planning.coverage import Coverage, nodes_in, share_seen
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw
 from wildlab.planning.heights import follow_terrain
 from wildlab.planning.moving import first_seen, walks
@@ -67,7 +67,11 @@ RECORDED = {
     "time": "s",
     "held": "1",
     "missed": "1",
+    "missed_still": "1",
+    "unseen": "1",
 }
+#: How many times as large errors are tried as the plan allows for.
+LARGER = 2.0
 #: Chosen: an animal of 1.5 m; 10 ms is a usual time constant of a microbolometer; a quarter of an animal's
 #: length; animals down to a dozen pixels; r of (5.9) where these are few.
 LOOKS = Looks(size=1.5, exposure=0.01, blur_share=0.25, furthest=150.0, range_scale=150.0)
@@ -157,6 +161,21 @@ def run_case(
     return flown, execute(land, flown.poses, flown.headings, flown.times, LOOKS, errors, SIGMAS, rng)
 
 
+def planned_coverage(twin: TwinParameters, land: Terrain, name: str, fields: int, rate: float) -> Coverage:
+    """What one of `CASES` or `MORE` is planned to see."""
+    flown = plan(twin, land, (CASES | MORE)[name], fields, rate)
+    return as_planned(land, flown.poses, flown.times, LOOKS).coverage
+
+
+def with_larger_errors(
+    twin: TwinParameters, land: Terrain, name: str, seed: int, run: tuple[Flown, Executed], factor: float
+) -> float:
+    """Share of what is surely planned that a flight shows with errors ``factor`` times as large."""
+    flown, done = run
+    errors, rng = errors_of_execution(twin).larger(factor), stream(seed, f"execution of {name}")
+    return held_with(done, land, flown.poses, flown.headings, flown.times, LOOKS.furthest, errors, rng)
+
+
 def trial(seed: int, *, twin: str, fields: int, rate: float) -> dict[tuple[str, str], float]:
     """All cases over the land of one seed.
 
@@ -219,7 +238,11 @@ def numbers_of(flown: Flown, done: Executed, inside: NDArray[np.bool_]) -> dict[
 def _moving(
     twin: TwinParameters, land: Terrain, seed: int, fields: int, rate: float
 ) -> dict[tuple[str, str], float]:
-    """Time, and share of animals that walk and are never seen, with rows near and far apart."""
+    """Time, ground in no image, and animals that are never seen, with rows near and far apart.
+
+    The same animals once walk and once stand where they begin: what is missed of those that stand is ground
+    that no image shows, and the rest is by their moving.
+    """
     flights = [plan(twin, land, Case(60.0, spacing, False), fields, rate) for spacing in SPACINGS]
     longest = max((one.times for one in flights), key=len)
     animals = required(twin.animals, "animals")
@@ -227,14 +250,19 @@ def _moving(
         walks(fence, longest, WALKERS, animals.speed_sd.si, animals.step.si, stream(seed, f"herd {k}"))
         for k, fence in enumerate(fences_of(twin, fields))
     ]
+    inside = nodes_in(land, fences_of(twin, fields)) >= 0
     numbers = {}
     for spacing, flown in zip(SPACINGS, flights, strict=True):
         found = see(land, flown.poses, LOOKS.furthest)
         count = len(flown.times)
         sharp = np.ones(count, bool)
-        seen = [np.isfinite(first_seen(found, land, flown.times, sharp, herd[:, :count])) for herd in herds]
-        numbers[f"rows-{spacing:.0f}m", "time"] = flown.course.duration
-        numbers[f"rows-{spacing:.0f}m", "missed"] = float(1 - np.mean(seen))
+        shown = np.bincount(found.node, minlength=land.height.size).reshape(inside.shape) > 0
+        rows = f"rows-{spacing:.0f}m"
+        numbers[rows, "time"] = flown.course.duration
+        numbers[rows, "unseen"] = float(1 - shown[inside].mean())
+        for name, kept in (("missed", slice(count)), ("missed_still", np.zeros(count, np.intp))):
+            seen = [np.isfinite(first_seen(found, land, flown.times, sharp, one[:, kept])) for one in herds]
+            numbers[rows, name] = float(1 - np.mean(seen))
     return numbers
 
 
@@ -252,7 +280,11 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
 
     down, yaw, low, close, faster = (of(name, "seen") for name in (*CASES, LOW_FASTER))
     times = np.stack([of(f"rows-{one:.0f}m", "time") for one in SPACINGS])
-    missed = np.stack([of(f"rows-{one:.0f}m", "missed") for one in SPACINGS])
+    missed, still, unseen = (
+        np.stack([of(f"rows-{one:.0f}m", name) for one in SPACINGS])
+        for name in ("missed", "missed_still", "unseen")
+    )
+    moving = missed - still
     wider = of(YAW, "ground") / of(DOWN, "ground") - 1
     return {
         "yaw-covers-more": Check(measured=wider, above=True),
@@ -274,4 +306,8 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
             second=100 * missed[0],
             unit="%",
         ),
+        "distance-missed-by-moving": Check(
+            true=moving[-1] > moving[0], first=100 * moving[-1], second=100 * moving[0], unit="%"
+        ),
+        "too-wide-not-whole": Check(measured=unseen[-1] - unseen[0], above=True),
     }
