@@ -11,7 +11,7 @@ from wildlab.geometry.terrain import Terrain
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.landscape import grow_trees, synthetic_landscape
 from wildlab.studies.line_of_sight import STUDY, charts, claims, text
-from wildlab.studies.line_of_sight.timing import WAYS, furthest_ratio, timed
+from wildlab.studies.line_of_sight.timing import REPEATS, WAYS, furthest_ratio, timed
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -19,6 +19,7 @@ from wildlab.studies.line_of_sight.trial import (
     HEIGHTS,
     INCIDENCES,
     LETTER,
+    OTHERS,
     RAYS,
     TILT,
     TREES,
@@ -30,6 +31,7 @@ from wildlab.studies.line_of_sight.trial import (
     look,
     nodes_of,
     settings,
+    trees_on,
     trial,
     width_on_ground,
 )
@@ -151,6 +153,37 @@ def test_words_follow_their_numbers(spread):
     assert "a factor of" in text.steps_words(spread) and "75 degrees" in text.trees_words(spread)
 
 
+def test_every_setting_is_compared_once():
+    found = [(height, tilt) for _, height, tilt in settings()]
+    assert len(set(found)) == len(found) and (HEIGHT, TILT) in found
+
+
+def test_finer_steps_answer_nearer_to_the_exact_line_and_are_said(spread):
+    finer, coarser = (spread[RAYS, f"agreement_{name}"] for name in OTHERS)
+    usual = spread[RAYS, f"agreement_{HEIGHT}m"]
+    assert (finer >= usual).all() and (usual >= coarser).all() and (finer > coarser).any()
+    turned = spread.copy()
+    turned[RAYS, "agreement_coarser"] = 0.432
+    assert "43.2 % with 2 m within 4 m" in text.agreement_words(turned)
+
+
+def test_ground_below_the_surface_with_trees_is_what_they_hide_straight_down(spread):
+    land = Terrain(np.zeros((5, 5), np.float32), -4.0, -4.0, 2.0)
+    height = land.height.copy()
+    height[2, 2] = 9.0
+    assert trees_on(land, Terrain(height, -4.0, -4.0, 2.0)) == (1 / 25, 4 / 16)
+    planted, covered = spread[TREES, "planted"], spread[TREES, "covered"]
+    assert (covered > planted).all()
+    assert np.abs(spread[TREES, "hidden_0deg"] - covered).max() < 3 * np.sqrt(0.15 * 0.85 / 1000) + 0.01
+    turned = spread.copy()
+    turned[TREES, "covered"] = 0.321
+    assert "32.1 % of the ground" in text.trees_words(turned)
+
+
+def test_the_method_says_the_settings_it_ran_with():
+    assert f"of {REPEATS} calls" in text.METHOD and "1000 m by 500 m" in text.METHOD
+
+
 def test_one_land_has_no_intervals(spread):
     one = spread.iloc[:1]
     assert " to " not in text.with_interval(one[RAYS, "agreement_20m"])
@@ -158,12 +191,18 @@ def test_one_land_has_no_intervals(spread):
 
 
 def test_charts_name_who_is_nearer(spread):
-    better = charts.agreement_shown(spread)[0].axes[0].get_title(loc="left")
     turned = spread.copy()
-    for height in HEIGHTS:
-        turned[RAYS, f"agreement_{height}m"], turned[ANGLES, f"agreement_{height}m"] = 0.99, 0.9
-    assert better.startswith("Bresenham")
-    assert charts.agreement_shown(turned)[0].axes[0].get_title(loc="left").startswith("Ray casting")
+
+    def title(rays, angles):
+        for height in HEIGHTS:
+            turned[RAYS, f"agreement_{height}m"], turned[ANGLES, f"agreement_{height}m"] = rays, angles
+        return charts.agreement_shown(turned)[0].axes[0].get_title(loc="left")
+
+    assert title(0.99, 0.9).startswith("Ray casting")
+    assert title(0.9, 0.99).startswith("Bresenham")
+    # Of two lands one says so and one the contrary, though the means differ.
+    assert title([0.99, 0.90], [0.90, 0.92]) == "2 lands do not tell which way is nearer"
+    assert "do not tell" in charts.nearer_words(turned.iloc[:1])
     land = synthetic_landscape(1)
     view = look(land, camera_of(TWIN), stream(1, "test"), HEIGHT, 75.0)
     for shown in (charts.map_shown(land, view), charts.steps_shown(spread), charts.trees_shown(spread)):

@@ -13,6 +13,8 @@ _UNITS = {
     "seen": "1",
     "steps": "1",
     "hidden": "1",
+    "planted": "1",
+    "covered": "1",
     "width": "m",
     "exponent": "1",
 }

@@ -10,14 +10,14 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from wildlab.evaluation.runs import mean_interval
+from wildlab.evaluation.shares import paired_difference
 from wildlab.geometry.frames import Array
 from wildlab.geometry.line_of_sight import cast_rays, compare_angles
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
 from wildlab.reporting.figures import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.text import percent
-from wildlab.simulation.landscape import TREES_SHARE
-from wildlab.studies.line_of_sight.claims import at_heights, hidden
+from wildlab.studies.line_of_sight.claims import at_heights, disagreement, hidden
 from wildlab.studies.line_of_sight.text import NAMES, time_ratios
 from wildlab.studies.line_of_sight.timing import WAYS, seconds
 from wildlab.studies.line_of_sight.trial import (
@@ -29,6 +29,7 @@ from wildlab.studies.line_of_sight.trial import (
     STEP,
     TILT,
     TOLERANCE,
+    TREES,
     WHOLE_RAYS,
     View,
 )
@@ -55,6 +56,15 @@ def _heights(ax: Axes) -> None:
     ax.minorticks_off()
 
 
+def nearer_words(spread: pd.DataFrame) -> str:
+    """Which way is nearer to the exact answer: by the interval of the paired difference over lands."""
+    ahead = paired_difference(disagreement(spread, ANGLES), disagreement(spread, RAYS))
+    if ahead is None or ahead.low <= 0 <= ahead.high:
+        return f"{len(spread)} lands do not tell which way is nearer"
+    better = NAMES[RAYS if ahead.low > 0 else ANGLES]
+    return f"{better[0].upper()}{better[1:]} is nearer to the exact answer"
+
+
 def agreement_shown(spread: pd.DataFrame) -> Shown:
     """Agreement with the exact line of sight over height."""
     fig, ax = new_figure(5.6, 3.4)
@@ -64,8 +74,7 @@ def agreement_shown(spread: pd.DataFrame) -> Shown:
         found[way] = _band(ax, HEIGHTS, values, _COLOURS[way], _SHORT[way], 100.0)
     _heights(ax)
     ax.set_ylabel("points answered as exactly (%)")
-    better = max(found, key=lambda way: float(found[way].mean()))
-    ax.set_title(f"{NAMES[better][0].upper()}{NAMES[better][1:]} is nearer to the exact answer")
+    ax.set_title(nearer_words(spread))
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     ends = "; ".join(f"{_SHORT[way]} {each.min():.0f} to {each.max():.0f} %" for way, each in found.items())
     return (
@@ -110,7 +119,7 @@ def steps_shown(spread: pd.DataFrame) -> Shown:
     _heights(ax)
     ax.set(yscale="log", ylabel="steps, or grid points asked")
     most = max(found, key=lambda way: float(found[way][-1]))
-    ax.set_title(f"From {HEIGHTS[-1]} m a point takes up to {found[most][-1]:.0f} steps")
+    ax.set_title(f"From {HEIGHTS[-1]} m {_SHORT[most]}: {found[most][-1]:.0f} steps a point, the mean")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     said = "; ".join(f"{_SHORT[way]} {each[0]:.0f} and {each[-1]:.0f}" for way, each in found.items())
     return (
@@ -129,9 +138,9 @@ def trees_shown(spread: pd.DataFrame) -> Shown:
     return (
         fig, "trees", f"Share of the ground hidden by trees: {mean[0]:.0f} % straight down, "
                       f"{mean[-1]:.0f} % at {INCIDENCES[-1]} degrees.",
-        f"Of what is seen without trees; they stand on {percent(TREES_SHARE, 0)} of the ground. Mean over "
-        f"lands with its 95 % "
-        "interval.",
+        f"Of what is seen without trees; they are planted on {percent(spread[TREES, 'planted'].mean())} of "
+        f"the grid points, and the surface over them covers {percent(spread[TREES, 'covered'].mean())} of "
+        "the ground. Mean over lands with its 95 % interval.",
     )  # fmt: skip
 
 

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
 from wildlab.reporting.text import number, percent
-from wildlab.simulation.landscape import TREES_M, TREES_SHARE
+from wildlab.simulation.landscape import EAST_M, HIGHEST_M, LOWEST_M, NORTH_M, STEP_M, TREES_M, TREES_SHARE
 from wildlab.studies.line_of_sight.claims import at_heights, disagreement, hidden, saved
-from wildlab.studies.line_of_sight.timing import WAYS, seconds
+from wildlab.studies.line_of_sight.timing import REPEATS, WAYS, seconds
 from wildlab.studies.line_of_sight.trial import (
     ANGLES,
     EXACT,
@@ -19,10 +19,12 @@ from wildlab.studies.line_of_sight.trial import (
     HEIGHTS,
     INCIDENCES,
     LETTER,
+    OTHERS,
     RAYS,
     STEP,
     TILT,
     TOLERANCE,
+    TREES,
     VIEW,
     WHOLE_RAYS,
     settings,
@@ -48,26 +50,28 @@ COLUMNS = {
     "angles_off": "Bresenham: too many / too few",
 }
 
-METHOD = rf"""For each seed a land of 1000 m by 500 m is drawn with a grid point every 2 m and 51 m between
-its lowest and its highest point, as F's map has them (F 2.1, 6.1), and the thermal camera is set above it:
-at each of {len(HEIGHTS)} heights with the lens {TILT} degrees from straight down, and at {HEIGHT} m with
-other tilts. Places and headings are drawn; the middle of the image lies on the map. Nothing flies.
+METHOD = rf"""For each seed a land of {EAST_M:.0f} m by {NORTH_M:.0f} m is drawn with a grid point every
+{STEP_M:g} m and {HIGHEST_M - LOWEST_M:.0f} m between its lowest and its highest point, as F's map has them
+(F 2.1, 6.1), and the thermal camera is set above it: at each of {len(HEIGHTS)} heights with the lens {TILT}
+degrees from straight down, and at {HEIGHT} m with other tilts. Places and headings are drawn; the middle of
+the image lies on the map. Nothing flies.
 
 All ways are asked of the grid points in the field of view (2.22)-(2.23) of a camera that is centred and
 without distortion. The exact line of sight follows the line over bilinear patches between grid points; it
-is held against GRASS and GDAL on a real map (the tests want 99 % of the cells). Ray casting is algorithm 1
-with steps of {STEP:g} m that ends within {TOLERANCE:g} m of the point; F prints neither length. Rays begin
-at the height of the highest grid point in view (F 2.5.2), or where said at the camera. Bresenham compares
-the angles of (2.24) of the nearest grid points along the line, in the sense: the point itself is not among
-them, and the longer side is found without regard to signs.
+is held against GRASS and GDAL on a real map by the tests. Ray casting is algorithm 1
+with steps of {STEP:g} m that ends within {TOLERANCE:g} m of the point; F prints neither length, and half and
+twice of both are tried beside them. Rays begin at the height of the highest grid point in view (F 2.5.2), or
+where said at the camera. Bresenham compares the angles of (2.24) of the nearest grid points along the line,
+in the sense: the point itself is not among them, and the longer side is found without regard to signs.
 
 Trees stand in groups on {percent(TREES_SHARE, 0)} of the ground, {TREES_M:g} m high on average; both are
-chosen. Points are drawn all over the land, each with a bearing, and the camera stands {HEIGHT} m above the
-point as far off as the incidence angle asks for.
+chosen. The surface that hides slopes from a tree down to the grid points beside it, and so covers more of
+the ground than trees are planted on. Points are drawn all over the land, each with a bearing, and the camera
+stands {HEIGHT} m above the point as far off as the incidence angle asks for.
 
 Intervals are of the mean over lands (Student, 95 %). Times are those of this machine and this code:
 compiled loops for all ways, angles by the arc tangent as (2.24) has it. They are times of the processor,
-taken in turn, of five calls the quickest; they are not the same twice, and the steps are."""
+taken in turn, of {REPEATS} calls the quickest; they are not the same twice, and the steps are."""
 
 #: What stands before the claims.
 LANDS = (
@@ -146,6 +150,15 @@ def agreement_words(spread: pd.DataFrame) -> str:
         )
     below = [with_interval(spread[way, "agreement_0deg"]) for way in (RAYS, ANGLES)]
     parts.append(f"Straight down they agree on {below[0]} and {below[1]}.")
+    others = ", ".join(
+        f"{with_interval(spread[RAYS, f'agreement_{name}'])} with {step:g} m within {tolerance:g} m"
+        for name, (step, tolerance) in OTHERS.items()
+    )
+    parts.append(
+        f"F prints no step of the rays: from {HEIGHT} m ray casting agrees on "
+        f"{with_interval(spread[RAYS, f'agreement_{HEIGHT}m'])} with steps of {STEP:g} m that end within "
+        f"{TOLERANCE:g} m, and on {others}."
+    )
     return " ".join(parts)
 
 
@@ -195,8 +208,9 @@ def trees_words(spread: pd.DataFrame) -> str:
     said = [f"{with_interval(shares[:, k])} at {INCIDENCES[k]}" for k in (0, 2, 4, 5)]
     return (
         f"Of the ground that would be seen without trees they hide {', '.join(said[:-1])} and {said[-1]} "
-        f"degrees "
-        "from straight down."
+        f"degrees from straight down. What they hide straight down is put in, not found: they are planted on "
+        f"{with_interval(spread[TREES, 'planted'])} of the grid points, and the surface that is laid over "
+        f"them stands above {with_interval(spread[TREES, 'covered'])} of the ground."
     )
 
 

@@ -34,6 +34,8 @@ from wildlab.studies.line_of_sight.trial import (
     nodes_of,
 )
 
+#: How often each call is timed; the quickest counts.
+REPEATS = 5
 #: What is timed.
 WAYS = (RAYS, WHOLE_RAYS, ANGLES, EXACT)
 #: Over how many lands at most: more would tell no more of a ratio than this.
@@ -55,7 +57,7 @@ def best_times(calls: Mapping[str, Callable[[], object]], repeats: int) -> dict[
     return {name: min(each) for name, each in times.items()}
 
 
-def timed(seeds: Iterable[int], twin: str, repeats: int = 5) -> pd.DataFrame:
+def timed(seeds: Iterable[int], twin: str, repeats: int = REPEATS) -> pd.DataFrame:
     """Times of the three ways over views like those of the trials.
 
     Parameters
