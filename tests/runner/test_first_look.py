@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from rich.console import Console
 from rich.text import Text
 
@@ -68,6 +69,16 @@ def test_runs_of_a_slow_study_are_fewer_as_it_says(tmp_path: Path) -> None:
     (whole,), looks = jobs(tmp_path, "gating")
     assert looks["gating"].parameters["runs"] < whole.parameters["runs"] == 10_000
     assert set(looks["gating"].first_look) == {"runs", "varied_runs"}
+
+
+def test_a_first_look_may_take_less_of_what_is_no_whole_number(tmp_path: Path) -> None:
+    """The images that a camera takes each second, for one: 4 of 7.5."""
+    given = {"parameters": {"rate": 7.5}, "first_look": {"rate": 4}}
+    study = STUDIES["uav-coverage"].model_copy(update=given)
+    assert type(study)(**study.model_dump()).reductions()["rate"] == (4, 7.5)
+    assert look_words({"rate": (4, 7.5), "seeds": (5, 200)}) == "4 of 7.5 rate, 5 of 200 flights"
+    with pytest.raises(ValidationError, match="a first look takes 8 of 'rate'"):
+        type(study)(**study.model_dump() | {"first_look": {"rate": 8}})
 
 
 def test_a_quick_study_has_no_first_look_nor_has_one_whose_flights_are_given(tmp_path: Path) -> None:

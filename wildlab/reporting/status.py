@@ -125,11 +125,17 @@ class StudyStatus:
         return sum(number.verdict == verdict for number in self.counted)
 
 
+def _count(value: Any) -> str:
+    """A number as it is written, 200 or 7.5; no number at all raises a ValueError or TypeError."""
+    whole = int(value)
+    return str(whole) if whole == value or not isinstance(value, float) else f"{value:g}"
+
+
 def look_words(first_look: Any) -> str:
     """What is shown of what: "5 of 200 flights"; nothing for a full report, or what is none of ours."""
     try:
         parts = [
-            f"{int(few)} of {int(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
+            f"{int(few)} of {_count(whole)} {'flights' if name == 'seeds' else str(name).replace('_', ' ')}"
             for name, (few, whole) in first_look.items()
         ]
     except (AttributeError, TypeError, ValueError):

@@ -86,13 +86,13 @@ class StudyEntry(BaseModel):
         case = find_case(self.case)
         return None if case.trial is None else case
 
-    def reductions(self) -> dict[str, tuple[int, int]]:
+    def reductions(self) -> dict[str, tuple[int, float]]:
         """What a first look takes less of, by parameter: (how many, of how many). Empty for a study that is
         quick enough as it is."""
-        found = {}
+        found: dict[str, tuple[int, float]] = {}
         if self.seeds is not None and self.seeds > FIRST_LOOK_SEEDS:
             found["seeds"] = (FIRST_LOOK_SEEDS, self.seeds)
-        return found | {name: (few, int(self.parameters[name])) for name, few in self.first_look.items()}
+        return found | {name: (few, self.parameters[name]) for name, few in self.first_look.items()}
 
     @model_validator(mode="after")
     def _consistent(self) -> StudyEntry:
@@ -113,7 +113,7 @@ class StudyEntry(BaseModel):
             raise ValueError("flights beside the first need a recipe of the first")
         for name, few in self.first_look.items():
             whole = self.parameters.get(name)
-            if isinstance(whole, bool) or not isinstance(whole, int) or not 0 < few < whole:
+            if isinstance(whole, bool) or not isinstance(whole, int | float) or not 0 < few < whole:
                 raise ValueError(
                     f"a first look takes {few} of {name!r}, and the study's own is {whole!r}: "
                     "give a whole number above 0 and below the study's own"

@@ -36,7 +36,7 @@ class Job:
     cells: int = 0
     seeds: SeedWork | None = None
     #: What a first look takes less of, by parameter: (how many, of how many). Empty: the full numbers.
-    first_look: dict[str, tuple[int, int]] = field(default_factory=dict)
+    first_look: dict[str, tuple[int, float]] = field(default_factory=dict)
     #: What the page depends on, see `wildlab.runner.seeds.fingerprint.page_key`.
     fingerprint: str = ""
     #: Whether the notebook takes no parameters, leaves no numbers, and is shown with its code.
