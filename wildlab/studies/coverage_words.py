@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.runs import mean_interval
 from wildlab.reporting.text import percent
@@ -55,12 +55,17 @@ def difference_words(values: ArrayLike, more: str = "more", less: str = "less", 
     return f"{size} {more if sense > 0 else less}" + (f" ({ends}" if ends else "")
 
 
+def held_of(spread: pd.DataFrame, subjects: Iterable[str]) -> NDArray[np.float64]:
+    """Shares of what is surely planned that were seen, of all draws of all subjects; NaN where that is none."""
+    return np.concatenate([spread[one, "held"].to_numpy(float) for one in subjects])
+
+
 def worst_words(spread: pd.DataFrame, subjects: Iterable[str], flights: str) -> str:
     """Whether what was surely planned was seen in every flight: by the worst, and how many had none such.
 
     ``flights`` is what they are called: "flights" or "rides".
     """
-    held = np.concatenate([spread[one, "held"].to_numpy(float) for one in subjects])
+    held = held_of(spread, subjects)
     judged = held[np.isfinite(held)]
     none = len(held) - len(judged)
     if not len(judged):

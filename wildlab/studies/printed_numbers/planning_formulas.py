@@ -151,8 +151,8 @@ def formula_words(formulas: Sequence[Formula]) -> str:
     undefined = f" {len(empty)} more are not defined as printed, so that nothing differs." if empty else ""
     return (
         f"{len(apart)} of {len(names)} printed formulas of F's planning differ from what another place of F "
-        f"makes of them, in {parts} of {len(computed)} rows: of a matrix every row is a part.{undefined} What "
-        "is used here is derived from (5.7) and held against numerical derivatives; the print is computed "
+        f"makes of them, in {parts} of {len(computed)} rows: of a matrix every row is a part.{undefined} "
+        "What is used here is derived from (5.7) and held against numerical derivatives; the print is computed "
         "beside it for this table alone."
     )
 
