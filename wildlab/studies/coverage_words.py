@@ -56,7 +56,7 @@ def difference_words(values: ArrayLike, more: str = "more", less: str = "less", 
 
 
 def held_of(spread: pd.DataFrame, subjects: Iterable[str]) -> NDArray[np.float64]:
-    """Shares of what is surely planned that were seen, of all draws of all subjects; NaN where that is none."""
+    """Shares of what is surely planned that were seen, of all draws; NaN where nothing is surely planned."""
     return np.concatenate([spread[one, "held"].to_numpy(float) for one in subjects])
 
 

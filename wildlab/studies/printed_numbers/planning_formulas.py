@@ -152,8 +152,8 @@ def formula_words(formulas: Sequence[Formula]) -> str:
     return (
         f"{len(apart)} of {len(names)} printed formulas of F's planning differ from what another place of F "
         f"makes of them, in {parts} of {len(computed)} rows: of a matrix every row is a part.{undefined} "
-        "What is used here is derived from (5.7) and held against numerical derivatives; the print is computed "
-        "beside it for this table alone."
+        "What is used here is derived from (5.7) and held against numerical derivatives; the print is "
+        "computed beside it for this table alone."
     )
 
 
