@@ -36,8 +36,13 @@ def with_interval(values: ArrayLike, digits: int = 1, lowest: float = 0.0, highe
     if len(known) < 2:
         return said
     _, low, high = mean_interval(known)
-    ends = [percent(float(np.clip(one, lowest, highest)), digits) for one in (low, high)]
+    ends = [_signed(float(np.clip(one, lowest, highest)), digits) for one in (low, high)]
     return said if ends[0] == ends[1] else f"{said} ({ends[0].removesuffix(' %')} to {ends[1]})"
+
+
+def _signed(share: float, digits: int) -> str:
+    """In per cent, with a minus where there is one."""
+    return percent(share, digits) if share >= 0 else f"\N{MINUS SIGN}{100 * -share:.{digits}f} %"
 
 
 def difference_words(values: ArrayLike, more: str = "more", less: str = "less", digits: int = 1) -> str:
