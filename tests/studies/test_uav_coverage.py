@@ -11,7 +11,7 @@ from wildlab.evaluation.shares import FAILS, HOLDS, NO_PREMISE, decide_check
 from wildlab.planning.coverage import nodes_in
 from wildlab.reporting.published import load_claims
 from wildlab.simulation.parameters import load_twin
-from wildlab.studies.coverage_words import difference_words
+from wildlab.studies.coverage_words import difference_words, with_interval
 from wildlab.studies.uav_coverage import STUDY, text
 from wildlab.studies.uav_coverage.trial import (
     CASES,
@@ -223,6 +223,7 @@ def test_intervals_stand_where_draws_differ() -> None:
 def test_an_interval_of_a_difference_keeps_its_sign() -> None:
     said = difference_words([0.1, -0.02])
     assert said == "4.0 % more (\N{MINUS SIGN}72.2 to 80.2 %)"
+    assert with_interval([-0.024], lowest=-1.0) == "\N{MINUS SIGN}2.4 %"
 
 
 def test_a_twin_without_a_survey_is_refused() -> None:

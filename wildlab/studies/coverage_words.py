@@ -32,7 +32,7 @@ def with_interval(values: ArrayLike, digits: int = 1, lowest: float = 0.0, highe
     known = array[np.isfinite(array)]
     if not len(known):
         return "none"
-    said = percent(float(known.mean()), digits)
+    said = _signed(float(known.mean()), digits)
     if len(known) < 2:
         return said
     _, low, high = mean_interval(known)
