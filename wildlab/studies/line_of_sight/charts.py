@@ -119,7 +119,7 @@ def steps_shown(spread: pd.DataFrame) -> Shown:
     _heights(ax)
     ax.set(yscale="log", ylabel="steps, or grid points asked")
     most = max(found, key=lambda way: float(found[way][-1]))
-    ax.set_title(f"From {HEIGHTS[-1]} m {_SHORT[most]}: {found[most][-1]:.0f} steps a point, the mean")
+    ax.set_title(f"From {HEIGHTS[-1]} m on average {found[most][-1]:.0f} steps a point")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     said = "; ".join(f"{_SHORT[way]} {each[0]:.0f} and {each[-1]:.0f}" for way, each in found.items())
     return (
