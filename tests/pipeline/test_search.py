@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.search import SearchByChance, SearchInRows, World, found_in, grid_over, search
+from wildlab.pipeline.search import (
+    SearchByChance,
+    SearchInRows,
+    World,
+    found_in,
+    grid_over,
+    rows_at,
+    search,
+)
 from wildlab.planning.information import SearchSensor
 from wildlab.planning.legs import Flying, Leg, Platform, look_attitude
 
@@ -33,6 +43,7 @@ def test_an_animal_is_found_by_its_probability_and_in_the_field_of_view():
         look_attitude(0.0, 0.0, 0.0)[None],
         np.array([True, False, True]),
         0.0,
+        np.arange(1.0, 4.0),
     )
     here, beside = [5.0, 5.0], [30.0, 0.0]
     rows = np.arange(3)
@@ -49,7 +60,9 @@ def test_what_the_ground_hides_is_not_found():
     height = np.zeros((101, 101), np.float32)
     height[:, 52] = 45.0
     walled = Terrain(height, north=-500.0, east=-500.0, step=10.0)
-    leg = Leg(np.array([[0.0, 0.0, -50.0]]), look_attitude(0.0, 0.7, 0.0)[None], np.array([True]), 0.0)
+    leg = Leg(
+        np.array([[0.0, 0.0, -50.0]]), look_attitude(0.0, 0.7, 0.0)[None], np.array([True]), 0.0, np.ones(1)
+    )
     assert found_in(world([[0.0, 45.0]]), leg, np.arange(1), SENSOR).all()
     assert not found_in(world([[0.0, 45.0]], terrain=walled), leg, np.arange(1), SENSOR).any()
 
@@ -80,6 +93,34 @@ def test_a_search_without_luck_ends_with_the_time():
     walk = SearchByChance(dark, FLYING, np.random.default_rng(1))
     found = search(dark, walk, START, SENSOR, FLYING, grid_over(AREAS, FLAT, 10.0)[0])
     assert np.isinf(found.found).all() and len(found.p_nc) == 48
+
+
+def test_turns_take_time_from_a_search_and_animals_walk_on_meanwhile():
+    """One who turns round again and again finds what comes by later; the world goes on while it turns."""
+    spots = [[30.0, 30.0]]
+    still = world(spots, images=600)
+    grid = grid_over(AREAS, FLAT, 10.0)[0]
+    found = [
+        search(still, SearchInRows(still, flying, 15.0, (0,)), START, SENSOR, flying, grid)
+        for flying in (FLYING, replace(FLYING, turn_time=4.0))
+    ]
+    assert found[1].p_nc == pytest.approx(found[0].p_nc)
+    heading = np.unwrap(np.arctan2(*np.diff(found[0].p_nc[:, :2], axis=0, prepend=[[0.0, 0.0]]).T[::-1]))
+    turned = np.abs(np.diff(heading, prepend=0.0)).sum()
+    late = found[1].at[-1] - found[0].at[-1]
+    assert late > 1.5 and late == pytest.approx(4 * turned / np.pi, rel=0.35)
+    assert found[1].found[0] > found[0].found[0] and found[1].found[0] in found[1].at
+    # An animal that is there up to a time is missed by who comes 4 s late.
+    gone = world(spots, images=600)
+    gone.animals[int(found[0].found[0]) :, 0] += [0.0, 400.0, 0.0]
+    flying = replace(FLYING, turn_time=40.0)
+    ended = search(gone, SearchInRows(gone, flying, 15.0, (0,)), START, SENSOR, flying, grid)
+    assert np.isinf(ended.found).all() and ended.at[-1] <= 600
+
+
+def test_rows_of_a_world_are_those_that_hold():
+    assert rows_at(np.array([1.0, 2.0, 4.6, 5.6, 6.999999999999]), 1.0).tolist() == [0, 1, 3, 4, 6]
+    assert rows_at(np.array([0.5, 1.2]), 0.5).tolist() == [0, 1]
 
 
 def test_a_grid_lies_in_its_areas_and_on_the_ground():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,7 @@ from wildlab.planning.legs import (
     Flying,
     Leg,
     Platform,
+    heading_change,
     look_attitude,
     sideways_limit,
     turn_between,
@@ -54,7 +57,8 @@ def legs():
     for _ in range(6):
         heading, side, ahead = rng.uniform(-np.pi, np.pi), rng.uniform(-0.8, 0.8), rng.uniform(0, 0.8)
         p = np.column_stack([rng.uniform(-60, 60, (3, 2)), rng.uniform(-70, -40, 3)])
-        made.append(Leg(p, look_attitude(heading, side, ahead)[None], rng.random(3) < 0.7, heading))
+        rest = rng.random(3) < 0.7
+        made.append(Leg(p, look_attitude(heading, side, ahead)[None], rest, heading, np.arange(1.0, 4.0)))
     return made
 
 
@@ -211,6 +215,55 @@ def test_images_count_from_when_the_camera_is_at_rest():
     ]  # fmt: skip
     assert turn_between(look_attitude(0.3, 0.0, 0.0), look_attitude(1.5, 0.0, 0.0)) == pytest.approx(1.2)
     assert turn_between(look_attitude(0.3, -0.2, 0.0), look_attitude(0.3, 0.5, 0.0)) == pytest.approx(0.7)
+
+
+def test_turns_take_time_in_proportion_or_as_a_whole():
+    flying = Flying(5.0, 50.0, turn_time=4.0)
+    turns = np.radians([0, 20, 45, -90, 180])
+    assert flying.turning(turns) == pytest.approx([0, 4 / 9, 1, 2, 4])
+    stopping = replace(flying, stops_beyond=np.radians(30))
+    assert stopping.turning(turns).tolist() == [0, 0, 4, 4, 4]
+    assert flying.taken_at([2.0, 0.0, 1.0]).tolist() == [3, 4, 6]
+    # While the platform turns, the gimbal turns too: at 60 deg/s, 170 deg are done after three seconds.
+    assert flying.ready(np.radians(170), 2.0).all() and not flying.ready(np.radians(170)).all()
+    assert heading_change(np.radians([170, 0]), np.radians([-170, 270])) == pytest.approx(
+        np.radians([20, 90])
+    )
+    with pytest.raises(WildlabError, match=r"turn_time is -1\.0"):
+        Flying(5.0, 50.0, turn_time=-1.0)
+
+
+def test_all_who_turn_wait_as_long():
+    """East from a heading north, by each planner: 2 s of turning before the first image."""
+    flying = Flying(5.0, 50.0, turn_time=4.0)
+    points = grid((-50, 50), (150, 250))
+    Y = initial_information(len(points), [60.0, 60.0, 1.0])
+    horizon = Horizon(turns=(np.pi / 2,))
+    by_information = InformationPlanner(points, Y, FLAT, SENSOR, flying, horizon).choose(DOWN).leg
+    rows = PatternPlanner([[0.0, 100.0]], FLAT, flying).choose(DOWN)
+    far = np.array([[-5.0, 200.0], [5.0, 200.0], [5.0, 210.0], [-5.0, 210.0]])
+    by_chance = RandomWalk([far], FLAT, flying, np.random.default_rng(1)).choose(DOWN)
+    for leg in (by_information, rows, by_chance):
+        assert leg.heading == pytest.approx(np.pi / 2, abs=0.1)
+        assert leg.at == pytest.approx([3, 4, 5], abs=0.1)
+    # A corner on the way is waited at, not before.
+    corner = PatternPlanner([[7.0, 0.0], [7.0, 50.0]], FLAT, flying).choose(DOWN)
+    assert corner.at == pytest.approx([1, 4, 5])
+    round_trip = PatternPlanner([[1.0, 0.0], [1.0, 1.0], [-50.0, 1.0]], FLAT, flying).choose(DOWN)
+    assert round_trip.at == pytest.approx([5, 6, 7])
+
+
+def test_it_does_without_a_turn_that_costs_more_than_it_brings():
+    """Far more lies behind than ahead: a platform that turns in no time turns, a slow one flies on."""
+    points = np.concatenate([grid((20, 60), (-10, 10)), grid((-100, -10), (-40, 40))])
+    Y = initial_information(len(points), [60.0, 60.0, 1.0])
+    horizon = Horizon(turns=(0.0, np.pi), steps=2, fades=0.8)
+    norths = [
+        InformationPlanner(points, Y, FLAT, SENSOR, Flying(5.0, 50.0, turn_time=s), horizon)
+        .choose(DOWN).leg.p_nc[-1, 0]
+        for s in (0.0, 20.0)
+    ]  # fmt: skip
+    assert norths[0] < -14 and norths[1] > 14
 
 
 def test_how_far_sideways_an_image_reaches():

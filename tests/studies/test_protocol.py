@@ -29,7 +29,7 @@ TOLD = {
     },
     "static-point": {"bound": white_bound(551)},
     "navigation": {"tuned": next(iter(TUNINGS))},
-    "information-planning": {"seconds_each": 1e-5},
+    "information-planning": {"loads": np.full(3, 1e-3)},
 }
 
 

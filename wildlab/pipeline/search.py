@@ -2,7 +2,8 @@
 
 A planner knows the ground, the fences and how many animals each holds (F 5.1); where they are it learns when
 an image shows one. An animal in an image is found with the probability of F (5.8)-(5.9), and where the ground
-hides it, not at all. An enclosure whose animals are all found is done (F 5.3), whoever plans.
+hides it, not at all. An enclosure whose animals are all found is done (F 5.3), whoever plans. Turns take
+their time, whoever turns.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ class World(NamedTuple):
     areas
         Fences, (K, 2) north and east each, m.
     animals
-        (T, A, 3) the middle of each animal's body in n at each image, m.
+        (T, A, 3) the middle of each animal's body in n after each interval between images, m.
     area_of
         (A,) in which area each lives.
     chance
-        (T, A) from 0 to 1: an animal is found in an image where its probability is above this. The same for
-        all planners, so that luck does not tell them apart.
+        (T, A) from 0 to 1: an animal is found in an image where its probability is above this. At one time
+        the same for all planners, so that luck does not tell them apart.
     """
 
     terrain: Terrain
@@ -59,6 +60,8 @@ class Searched(NamedTuple):
         (A,) s, when each animal was first found; infinite where it was not.
     p_nc
         (L, 3) where images were taken, m.
+    at
+        (L,) s, when.
     counts
         (L,) images for which the camera was at rest.
     covered
@@ -71,6 +74,7 @@ class Searched(NamedTuple):
 
     found: Array
     p_nc: Array
+    at: Array
     counts: NDArray[np.bool_]
     covered: Array
     asked: int
@@ -105,7 +109,7 @@ def search(
     Parameters
     ----------
     world
-        What is searched; as many images as it has can be taken.
+        What is searched, for as long as it has rows.
     searcher
         The planner.
     start
@@ -124,27 +128,37 @@ def search(
     images, animals = world.chance.shape
     found = np.full(animals, np.inf)
     seen = np.zeros(len(grid), bool)
-    platform, taken, asked, decisions = start, 0, 0, 0
-    p_nc, counts, covered = [], [], []
-    while taken + flying.images <= images and np.isinf(found).any():
+    platform, clock, asked, decisions = start, 0.0, 0, 0
+    p_nc, at, counts, covered = [], [], [], []
+    while np.isinf(found).any():
         still = np.isinf(found)
         open_areas = np.array([still[world.area_of == k].any() for k in range(len(world.areas))])
         leg, weighed = searcher.next_leg(platform, open_areas)
+        times = clock + leg.at
+        rows = rows_at(times, flying.interval)
+        if rows[-1] >= images or times[-1] > images * flying.interval:
+            break
         asked, decisions = asked + weighed, decisions + 1
-        rows = np.arange(taken, taken + flying.images)
         shown = found_in(world, leg, rows, sensor) & still
         for image in range(flying.images):
-            found[shown[image] & np.isinf(found)] = flying.interval * (taken + image + 1)
+            found[shown[image] & np.isinf(found)] = times[image]
             if leg.counts[image]:
                 seen |= shown_points(world.terrain, grid, leg, image, sensor, ~seen)
             covered.append(seen.mean())
         searcher.flown(leg)
-        platform, taken = leg.end, taken + flying.images
+        platform, clock = leg.end, float(times[-1])
         p_nc.append(leg.p_nc)
+        at.append(times)
         counts.append(leg.counts)
     return Searched(
-        found, np.concatenate(p_nc), np.concatenate(counts), np.array(covered), asked, decisions
+        found, np.concatenate(p_nc), np.concatenate(at), np.concatenate(counts), np.array(covered), asked,
+        decisions,
     )  # fmt: skip
+
+
+def rows_at(times: Array, interval: float) -> NDArray[np.intp]:
+    """(L,) rows of a world that hold at times (L,) s: the last begun; turns put images between rows."""
+    return np.floor(np.asarray(times) / interval + 1e-9).astype(np.intp) - 1
 
 
 def found_in(world: World, leg: Leg, rows: NDArray[np.intp], sensor: SearchSensor) -> NDArray[np.bool_]:
@@ -185,7 +199,8 @@ class SearchByInformation:
     area_of
         (N,) of which area each point of its grid is.
     walk
-        Variance of the animals' walk over one step, each way, m^2, by which what is known wears off.
+        By how much the variance of where an animal is grows, each way, m^2/s, by which what is known wears
+        off.
     """
 
     def __init__(self, planner: InformationPlanner, area_of: NDArray[np.intp], walk: float) -> None:
@@ -200,7 +215,7 @@ class SearchByInformation:
     def flown(self, leg: Leg) -> None:
         """As `Searcher` has it."""
         self.planner.add(leg)
-        self.planner.wait(self.walk)
+        self.planner.wait(self.walk * float(leg.at[-1]))
 
 
 class SearchInRows:

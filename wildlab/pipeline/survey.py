@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.search import SearchInRows, World, found_in
+from wildlab.pipeline.search import SearchInRows, World, found_in, rows_at
 from wildlab.planning.followers import PatternPlanner
 from wildlab.planning.high_level import (
     SEARCH,
@@ -147,20 +147,23 @@ def survey(
     images, animals = world.chance.shape
     filters = _Filters(animals, rules)
     lives = np.bincount(world.area_of, minlength=len(world.areas))
-    platform, taken, lost = start, 0, np.zeros(2, int)
+    platform, clock, lost = start, 0.0, np.zeros(2, int)
     p_nc, goals, known, errors = [], list[int](), list[int](), list[float]()
     positioned, done = np.inf, np.zeros(len(world.areas), bool)
-    while taken + flying.images <= images:
+    while clock + flying.step <= images * flying.interval:
         count = np.bincount(world.area_of[filters.live], minlength=len(world.areas))
         # An enclosure whose animals were all known at once is scanned, and stays so (F 5.3).
         done |= all_positioned(count, lives)
         if done.all():
-            positioned = taken * flying.interval
+            positioned = clock
             break
         wanted = ~done[world.area_of]
         leg, goal = _next(rows, platform, filters, wanted, ~done)
-        window = np.arange(taken, taken + flying.images)
-        filters.p += rules.walk * flying.step
+        times = clock + leg.at
+        window = rows_at(times, flying.interval)
+        if times[-1] > images * flying.interval:
+            break
+        filters.p += rules.walk * float(leg.at[-1])
         _miss(filters, leg, sensor, world)
         for image, shown in enumerate(found_in(world, leg, window, sensor)):
             seen = np.flatnonzero(shown)
@@ -171,8 +174,8 @@ def survey(
         lost += (by_covariance.sum(), by_search.sum())
         filters.live &= ~(by_covariance | by_search)
         filters.missed[~filters.live] = 1.0
-        platform, taken = leg.end, taken + flying.images
-        off = np.hypot(*(filters.x - world.animals[taken - 1, :, :2])[filters.live].T)
+        platform, clock = leg.end, float(times[-1])
+        off = np.hypot(*(filters.x - world.animals[window[-1], :, :2])[filters.live].T)
         p_nc.append(leg.p_nc)
         goals.append(goal)
         known.append(int(filters.live.sum()))

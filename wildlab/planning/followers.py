@@ -9,7 +9,15 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.planning.areas import contains
-from wildlab.planning.legs import Flying, Leg, Platform, leg_positions, look_attitude, turn_between
+from wildlab.planning.legs import (
+    Flying,
+    Leg,
+    Platform,
+    heading_change,
+    leg_positions,
+    look_attitude,
+    turn_between,
+)
 
 
 class PatternPlanner:
@@ -72,18 +80,28 @@ class PatternPlanner:
         # An image on a way point is taken as one flies up to it.
         piece = np.clip(np.searchsorted(ends, at, side="left") - 1, 0, max(len(pieces) - 1, 0))
         self.visited += int((ends[1:] <= at[-1]).sum())
-        heading = np.full(len(at), platform.heading)
+        heading, waits = np.full(len(at), platform.heading), np.zeros(len(at))
         if len(pieces):
-            moving = ends[1:] > ends[:-1]
-            flown = np.arctan2(pieces[:, 1], pieces[:, 0])
-            heading = np.where(moving[piece], flown[piece], platform.heading)
+            headings = _headings(pieces, platform.heading)
+            heading = headings[piece + 1]
+            turns = flying.turning(heading_change(headings[:-1], headings[1:]))
+            waits = np.diff(np.cumsum(turns)[piece], prepend=0.0)
         sides = self.sides[(self._images + np.arange(len(at))) % len(self.sides)]
         self._images += len(at)
         R = look_attitude(heading, sides, 0.0)
         turned = turn_between(R, np.concatenate([platform.R_nc[None], R[:-1]]))
         up = self.terrain.heights_at(flat) + flying.height
         p = np.concatenate([flat, -up[:, None]], axis=-1)
-        return Leg(p, R, turned <= flying.slew * flying.interval, float(heading[-1]))
+        rest = turned <= flying.slew * (flying.interval + waits)
+        return Leg(p, R, rest, float(heading[-1]), flying.taken_at(waits))
+
+
+def _headings(pieces: Array, before: float) -> Array:
+    """(P + 1,) headings along pieces (P, 2) of a way, that before it first; no way keeps it."""
+    headings = [before]
+    for north, east in pieces:
+        headings.append(float(np.arctan2(east, north)) if north or east else headings[-1])
+    return np.array(headings)
 
 
 class RandomWalk:
@@ -138,7 +156,10 @@ class RandomWalk:
             heading = float(np.arctan2(*(self._aim - here)[::-1]))
             p = leg_positions(self.terrain, self.flying, here[None], [heading])[0]
         R = look_attitude(heading, 0.0, 0.0)[None]
-        return Leg(p, R, self.flying.ready(turn_between(R[0], platform.R_nc)), float(heading))
+        wait = float(self.flying.turning(heading_change(platform.heading, heading)))
+        waits = np.append(wait, np.zeros(self.flying.images - 1))
+        rest = self.flying.ready(turn_between(R[0], platform.R_nc), wait)
+        return Leg(p, R, rest, float(heading), self.flying.taken_at(waits))
 
     def _inside(self, spot: Array) -> bool:
         return any(contains(area, spot[None])[0] for area in self.areas)

@@ -33,11 +33,16 @@ class Flying:
     slew
         How fast the gimbal turns the camera, rad/s. Images count from when it is at rest: F (5.4) warns that
         those of a fast turn are blurred.
+    turn_time
+        How long the platform takes to turn round, through 180 degrees, s. It stands still meanwhile, and no
+        image is taken; smaller turns take less in proportion.
+    stops_beyond
+        None, or the angle beyond which any turn takes the whole ``turn_time``, and up to which none, rad.
 
     Raises
     ------
     WildlabError
-        Where one of them is not above zero.
+        Where ``turn_time`` is below zero, or one of those before it not above zero.
     """
 
     speed: float
@@ -45,30 +50,75 @@ class Flying:
     interval: float = 1.0
     images: int = 3
     slew: float = np.radians(60.0)
+    turn_time: float = 0.0
+    stops_beyond: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("speed", "height", "interval", "images", "slew"):
             if not getattr(self, name) > 0:
                 raise WildlabError(f"{name} is {getattr(self, name)}", "give a number above zero", field=name)
+        if not self.turn_time >= 0:
+            raise WildlabError(
+                f"turn_time is {self.turn_time}", "give seconds, or 0 for turns in no time", field="turn_time"
+            )
 
     @property
     def step(self) -> float:
-        """Seconds that a step takes."""
+        """Seconds that a step takes, without turns."""
         return self.images * self.interval
 
-    def ready(self, turned: ArrayLike) -> NDArray[np.bool_]:
+    def turning(self, turned: ArrayLike) -> Array:
+        """How long turns of the platform take.
+
+        Parameters
+        ----------
+        turned
+            (...) angles, either way, rad.
+
+        Returns
+        -------
+        (...) s.
+
+        Examples
+        --------
+        >>> print(Flying(5.0, 60.0, turn_time=4.0).turning(np.radians([0, 45, -180])))
+        [0. 1. 4.]
+        """
+        angle = np.abs(np.asarray(turned, float))
+        if self.stops_beyond is None:
+            return np.asarray(self.turn_time * angle / np.pi)
+        return np.where(angle > self.stops_beyond, self.turn_time, 0.0)
+
+    def taken_at(self, waits: ArrayLike) -> Array:
+        """When the images of a step are taken, counted from its beginning.
+
+        Parameters
+        ----------
+        waits
+            (..., images) s that the platform turns before each image.
+
+        Returns
+        -------
+        (..., images) s.
+        """
+        each = np.cumsum(np.asarray(waits, float), axis=-1)
+        return np.asarray(each + self.interval * np.arange(1, self.images + 1))
+
+    def ready(self, turned: ArrayLike, waits: ArrayLike = 0.0) -> NDArray[np.bool_]:
         """Which images of a step count where the camera has to turn first.
 
         Parameters
         ----------
         turned
             (...) by how much the camera turns as the step begins, rad.
+        waits
+            (...) how long the platform turns before it flies on, s; the gimbal turns meanwhile.
 
         Returns
         -------
         (..., images) bool.
         """
-        at = self.interval * np.arange(1, self.images + 1)
+        at = self.interval * np.arange(1, self.images + 1) + np.asarray(waits, float)[..., None]
         angle = np.asarray(turned, float)[..., None]
         return np.asarray((angle <= AT_REST) | (angle <= self.slew * at))
 
@@ -103,13 +153,16 @@ class Leg(NamedTuple):
     counts
         (L,) bool: images for which it is at rest.
     heading
-        Of the platform, rad.
+        Of the platform at the end, rad.
+    at
+        (L,) s from the beginning of the step to each image, with the turns before it.
     """
 
     p_nc: Array
     R_nc: Array
     counts: NDArray[np.bool_]
     heading: float
+    at: Array
 
     @property
     def end(self) -> Platform:
@@ -153,6 +206,27 @@ def turn_between(one: ArrayLike, other: ArrayLike) -> Array:
     """
     cos = (np.einsum("...ij,...ij->...", np.asarray(one, float), np.asarray(other, float)) - 1) / 2
     return np.asarray(np.arccos(np.clip(cos, -1.0, 1.0)))
+
+
+def heading_change(one: ArrayLike, other: ArrayLike) -> Array:
+    """By which angle a platform turns from one heading to another, the shorter way.
+
+    Parameters
+    ----------
+    one, other
+        (...) rad.
+
+    Returns
+    -------
+    (...) rad, 0 to pi.
+
+    Examples
+    --------
+    >>> print(np.degrees(heading_change(np.radians(170), np.radians(-170))).round(6))
+    20.0
+    """
+    apart = np.asarray(other, float) - np.asarray(one, float)
+    return np.asarray(np.abs((apart + np.pi) % (2 * np.pi) - np.pi))
 
 
 def sideways_limit(R_nc: ArrayLike, depth: ArrayLike, sensor: SearchSensor) -> Array:

@@ -22,6 +22,7 @@ from wildlab.planning.legs import (
     Flying,
     Leg,
     Platform,
+    heading_change,
     leg_positions,
     look_attitude,
     sideways_limit,
@@ -45,7 +46,8 @@ class Horizon:
     beam
         How many beginnings are followed up at each step.
     fades
-        What is learnt a step later counts so much of what is learnt now, from 0 to 1.
+        What is learnt a step later counts so much of what is learnt now, from 0 to 1. A turn delays all that
+        comes after it by the time it takes.
     beyond
         What is left to know beyond the horizon counts so much of what it would if it could all be seen on the
         way; F has 0, and then a planner whose horizon holds nothing new flies anywhere.
@@ -193,7 +195,7 @@ class InformationPlanner:
         h, s = self.horizon, self.sensor
         states = [platform]
         Y, left = self.Y[None], self.left[None]
-        worth, gained = np.zeros(1), np.zeros(1)
+        worth, gained, late = np.zeros(1), np.zeros(1), np.zeros(1)
         first: list[Leg] = []
         asked = 0
         length = self.flying.speed * self.flying.step / -np.log(h.fades) if h.fades < 1 else np.inf
@@ -203,7 +205,12 @@ class InformationPlanner:
             cams = self._positions(states, parents, headings)
             R = self._attitudes(headings)
             before = np.stack([one.R_nc for one in states])[parents]
-            counts = self.flying.ready(turn_between(R, before[:, None]))
+            was = np.array([one.heading for one in states])[parents]
+            waits = self.flying.turning(heading_change(was, headings))
+            counts = self.flying.ready(turn_between(R, before[:, None]), waits[:, None])
+            # In steps, as fading is: turns up to here delay what follows.
+            delay = late[parents] + waits / self.flying.step
+            fade = h.fades ** (ahead + delay)
             reach = self._reach(cams, R)
             clear = self._clear(cams, reach)
             limits = reach.max(axis=1) + self.flying.speed * self.flying.step
@@ -214,9 +221,9 @@ class InformationPlanner:
             asked += gains.size
             off = ~np.isfinite(cams).all(axis=(1, 2))
             tail = worth_beyond(blocks, self._middles, parents, cams[:, -1], length)
-            value = worth[parents][:, None] + h.fades**ahead * gains
+            value = worth[parents][:, None] + fade[:, None] * gains
             # What a step itself learns is no longer left beyond it; where it looks is near where it ends.
-            total = value + h.beyond * h.fades ** (ahead + 1) * (tail[:, None] - gains)
+            total = value + h.beyond * h.fades * fade[:, None] * (tail[:, None] - gains)
             total[off] = -np.inf
             best = np.argsort(-total, axis=None, kind="stable")[: h.beam if ahead + 1 < h.steps else 1]
             best = best[np.isfinite(total.ravel()[best])]
@@ -224,11 +231,11 @@ class InformationPlanner:
                 raise WildlabError("every step leads off the map", "give a map that reaches further")
             ks, gs = np.unravel_index(best, total.shape)
             legs = [
-                Leg(cams[k], R[k, g : g + 1], counts[k, g], float(headings[k]))
+                Leg(cams[k], R[k, g : g + 1], counts[k, g], float(headings[k]), self._at(waits[k]))
                 for k, g in zip(ks, gs, strict=True)
             ]
             first = [first[parents[k]] for k in ks] if ahead else legs
-            worth, gained = value[ks, gs], gained[parents[ks]] + gains[ks, gs]
+            worth, gained, late = value[ks, gs], gained[parents[ks]] + gains[ks, gs], delay[ks]
             if ahead + 1 < h.steps:
                 Y, left = Y[parents[ks]].copy(), left[parents[ks]].copy()
                 for n, (k, leg) in enumerate(zip(ks, legs, strict=True)):
@@ -239,6 +246,10 @@ class InformationPlanner:
                     )  # fmt: skip
                 states = [leg.end for leg in legs]
         return Chosen(first[0], float(gained[0]), asked)
+
+    def _at(self, wait: float) -> Array:
+        """(L,) s when images of a step are taken that begins with a turn."""
+        return self.flying.taken_at(np.append(wait, np.zeros(self.flying.images - 1)))
 
     def _in_blocks(self, left: Array) -> Array:
         """(B, S) what is left to know in each block of each state."""

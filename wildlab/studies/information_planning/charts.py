@@ -7,7 +7,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wildlab.pipeline.search import Searched
+from wildlab.evaluation.runs import mean_share_interval
+from wildlab.pipeline.search import Searched, rows_at
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,
@@ -20,7 +21,7 @@ from wildlab.reporting.figures import (
     new_figure,
 )
 from wildlab.reporting.text import percent
-from wildlab.studies.information_planning.text import NAMES, minutes
+from wildlab.studies.information_planning.text import NAMES, median_words, minutes
 from wildlab.studies.information_planning.trial import (
     BUDGET_S,
     CHANCE,
@@ -48,7 +49,8 @@ def way_shown(scene: Scene, found: Searched, who: str) -> Shown:
     ax.plot(path[:, 1], path[:, 0], color=COLOURS[who], lw=1.3)
     ax.plot(path[0, 1], path[0, 0], "s", color=INK, ms=6, label="start")
     for animal, time in enumerate(found.found):
-        row = len(found.p_nc) - 1 if np.isinf(time) else round(time / scene.flying.interval) - 1
+        seen_at = found.at[-1] if np.isinf(time) else time
+        row = int(rows_at(np.array([seen_at]), scene.flying.interval)[0])
         at = scene.world.animals[row, animal]
         late = np.isinf(time)
         ax.plot(at[1], at[0], "o", ms=6, mec=INK, mew=1.0, mfc="none" if late else VERMILLION)
@@ -103,20 +105,20 @@ def share_shown(spread: pd.DataFrame) -> Shown:
         shares = np.concatenate([np.zeros((len(shares), 1)), shares], axis=1)
         mean = shares.mean(axis=0)
         if len(shares) > 1:
-            half = 1.96 * shares.std(axis=0, ddof=1) / np.sqrt(len(shares))
-            low, high = np.clip([mean - half, mean + half], 0, 1)
+            low, high = np.transpose([mean_share_interval(column)[1:] for column in shares.T])
             ax.fill_between(at, low, high, color=COLOURS[who], alpha=0.16, lw=0)
         ax.plot(at, mean, _STYLES[who], color=COLOURS[who], label=NAMES[who])
         ends[who] = float(np.interp(5.0, at, mean))
     ax.set(xlabel="time (min)", ylabel="share of the animals found", xlim=(0, at[-1]), ylim=(0, 1.02))
     ax.set_title(
-        f"After 5 minutes: {100 * ends[INFORMATION]:.0f} % by information, {100 * ends[ROWS]:.0f} % in rows"
+        f"After 5 minutes: {100 * ends[INFORMATION]:.0f} % by information, "
+        f"{100 * ends[SWING]:.0f} % in rows from side to side"
     )
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     said = ", ".join(f"{NAMES[who]} {100 * ends[who]:.0f} %" for who in SEARCHERS)
     return (
         fig, "share-found", f"Share of the animals found against time; after 5 minutes: {said}.",
-        f"Mean over {len(spread)} worlds; bands: 95 % intervals of the mean.",
+        f"Mean over {len(spread)} worlds; bands: Student's 95 % intervals of the mean.",
     )  # fmt: skip
 
 
@@ -135,14 +137,10 @@ def times_shown(spread: pd.DataFrame) -> Shown:
         xlim=(0, BUDGET_S / 60),
         ylim=(0, 1.02),
     )
-    middle = {who: float(spread[who, "all_found"].median()) for who in (INFORMATION, ROWS)}
-    ax.set_title(
-        f"All found: {minutes(middle[INFORMATION])} min by information, {minutes(middle[ROWS])} in rows"
-    )
+    middle = {who: median_words(spread[who, "all_found"]) for who in SEARCHERS}
+    ax.set_title(f"All found: {middle[INFORMATION]} min by information, {middle[SWING]} in rows side to side")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    said = "; ".join(
-        f"{NAMES[who]} {minutes(float(spread[who, 'all_found'].median()))} min" for who in SEARCHERS
-    )
+    said = "; ".join(f"{NAMES[who]} {middle[who]} min" for who in SEARCHERS)
     return (
         fig, "times", f"Share of the worlds in which all animals were found by a time; medians: {said}.",
         f"Empirical distributions over {len(spread)} worlds; the title has the medians.",

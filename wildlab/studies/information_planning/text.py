@@ -7,19 +7,22 @@ import pandas as pd
 
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import paired_difference
+from wildlab.planning.planner import Horizon
 from wildlab.reporting.text import percent
 from wildlab.studies.information_planning.trial import (
     AHEAD,
     BUDGET_S,
     CHANCE,
-    DECISION_S,
     FIXED,
     GREEDY,
     INFORMATION,
     ROWS,
     SEARCHERS,
+    STOPPING,
+    STOPS_BEYOND,
     SURVEY,
     SWING,
+    Tuned,
 )
 
 #: What each planner is called.
@@ -30,7 +33,7 @@ NAMES = {
     SWING: "rows, camera from side to side",
     CHANCE: "random walk",
 }
-#: In how many worlds the planner by information has to be sooner.
+#: In how many worlds the planner by information has to be sooner: ours, F names no number.
 WANTED = 0.7
 COLUMNS = {
     "planner": "planner",
@@ -41,25 +44,30 @@ COLUMNS = {
     "sooner": "by information is sooner",
 }
 
-METHOD = r"""Each world is drawn from its seed: rolling
+_METHOD = r"""Each world is drawn from its seed: rolling
 land like that of F's map, two enclosures of the sizes of
 the twin's, and the animals in them, which walk at random and turn at the fence. All planners fly
 the same multicopter with the same camera from the same corner, at the same speed and height above
 the ground, and take an image every second. An animal in an image is found with the probability of F
 (5.8)-(5.9), if the ground does not hide it; the same luck for all planners. An image counts only
-where the camera has come to rest. An enclosure whose animals are all found is left, whoever plans:
+where the camera has come to rest. Through 180 degrees the platform turns for as long as the twin gives
+for a turn, through less in proportion; meanwhile it stands still and takes no image. That holds for all
+planners, and the one by information knows it: what comes after a turn counts less, as all that is learnt
+later does. The twin means that time for any turn at a pattern's corners; what comes of that, for turns
+beyond 30 degrees, stands beside it. An enclosure whose animals are all found is left, whoever plans:
 their number is known (F 5.1). A time of animals that were not all found counts as the whole budget.
 
 The planner by information keeps a matrix for each cell of 10 m, adds to it by F (5.10) what the two
 angles of (5.7) tell, from the Jacobian derived anew, and lets it wear off by (5.5) with the walk of the
-animals on the ground's two axes. At each decision it weighs headings and angles of the gimbal over two
+animals on the ground's two axes. At each decision it weighs headings and angles of the gimbal over some
 steps of three seconds (a beam search over F's horizon) and flies the first. Candidate looks take lines of
 sight for clear, what was looked at is added with the ground that hides. F's objective (5.6) sees nothing
 beyond its horizon; here what is left to know further away counts too, less the further it is.
 
-The planner whose camera is fixed has the settings of the one whose camera is free. Settings of rows and
-planner were chosen on the worlds of seeds 1001 to 1016 by the mean time until all are found; the worlds
-of the report were not looked at for that. F prints neither (5.9)'s reach nor the angles' standard
+Settings of both kinds of rows, of the planner whose camera is free and of the one whose camera is fixed
+were each chosen on the worlds of seeds 1001 to 1016, by the mean time until all are found; the worlds of
+the report were not looked at for that. SETTINGS
+F prints neither (5.9)'s reach nor the angles' standard
 deviation.
 
 Searching and going back (F 5.3.3, 5.3.4): before each leg F (5.2)-(5.3) chooses between the next way point
@@ -70,6 +78,23 @@ have shown it; the limit and what the search is worth are chosen.
 The greedy choice is asked for in each world: the animals of an enclosure were last seen at random times,
 and the search would go on at a random way point. Choosing by F (5.2)-(5.3) every second is compared with
 the shortest order of the same goals, which is found by trying all."""
+
+
+def _settings(horizon: Horizon, sd: float) -> str:
+    return (
+        f"{horizon.steps} steps ahead, of which the {horizon.beam} best are followed up, {sd:g} rad for the "
+        f"angles' standard deviation, and what is learnt a step later counts {horizon.fades:g} of what is "
+        "learnt now"
+    )
+
+
+def method(tuned: Tuned | None = None) -> str:
+    """How it was done, with the settings of both planners by information."""
+    t = tuned or Tuned()
+    free, down = _settings(t.horizon, t.sd), _settings(t.down_horizon, t.down_sd)
+    same = "the camera that is fixed: " + ("the same" if free == down else down)
+    rows = f"Rows are {t.rows:g} m apart with the camera down, {t.swing_rows:g} m from side to side"
+    return _METHOD.replace("SETTINGS", f"{rows}. The free camera: {free}; {same}.")
 
 
 def sooner_share(
@@ -93,22 +118,23 @@ def minutes(seconds: float) -> str:
 def wanted_words(share: Interval) -> str:
     """Whether a share reaches what was asked for."""
     if share.low >= WANTED:
-        return f"which is at least the {100 * WANTED:.0f} % asked for"
+        return f"at least the {100 * WANTED:.0f} % that we ask for"
     if share.high < WANTED:
-        return f"which is below the {100 * WANTED:.0f} % asked for"
+        return f"below the {100 * WANTED:.0f} % that we ask for"
     side = "above" if share.estimate >= WANTED else "below"
-    return f"{side} the {100 * WANTED:.0f} % asked for, but so few worlds do not settle it"
+    return f"{side} the {100 * WANTED:.0f} % that we ask for, but so few worlds do not settle it"
 
 
 def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what the worlds gave."""
-    share, half = sooner_share(spread, ROWS), sooner_share(spread, ROWS, "half_found")
+    swing, down = sooner_share(spread, SWING), sooner_share(spread, ROWS)
     return [
-        f"Planning by information finds all animals sooner than rows with the camera straight down in "
-        f"{with_interval(share)} of {len(spread)} worlds, {wanted_words(share)}; half of them in "
-        f"{with_interval(half)}.",
-        f"On the median world all are found {when_words(spread, INFORMATION)}, in rows "
-        f"{when_words(spread, ROWS)}.",
+        f"Planning by information, whose camera may look anywhere, finds all animals sooner than rows whose "
+        f"camera looks from side to side in {with_interval(swing)} of {len(spread)} worlds, "
+        f"{wanted_words(swing)}; than rows with the camera straight down in {with_interval(down)}, "
+        f"{wanted_words(down)}.",
+        f"On the median world all are found {when_words(spread, INFORMATION)}, in rows from side to side "
+        f"{when_words(spread, SWING)}, in rows with the camera down {when_words(spread, ROWS)}.",
         why_words(spread),
     ]
 
@@ -129,18 +155,27 @@ def median_words(seconds: pd.Series) -> str:
 
 def why_words(spread: pd.DataFrame) -> str:
     """What the gain is due to: the gimbal that may look anywhere, or the choice of the way."""
-    fixed, swing = sooner_share(spread, ROWS, one=FIXED), sooner_share(spread, SWING)
-    gimbal = {
-        "sooner": "With its camera fixed straight down, such planning still is sooner than these rows in",
-        "later": "With its camera fixed straight down, such planning is sooner than these rows only in",
-        "open": "Whether such planning is sooner with its camera fixed down is not settled: it is in",
+    fixed = sooner_share(spread, ROWS, one=FIXED)
+    said = {
+        "sooner": "With both cameras fixed straight down, such planning still is sooner than rows, in",
+        "later": "With both cameras fixed straight down, such planning is sooner than rows only in",
+        "open": "With both cameras fixed straight down, which is sooner is not settled: it is such planning in",
     }[_side(fixed)]
-    beside = {
-        "sooner": "where the rows' camera looks from side to side it is sooner in",
-        "later": "where the rows' camera looks from side to side it is sooner only in",
-        "open": "where the rows' camera looks from side to side it is not settled, with",
-    }[_side(swing)]
-    return f"{gimbal} {with_interval(fixed)}; {beside} {with_interval(swing)}."
+    return f"{said} {with_interval(fixed)}."
+
+
+def turns_words(spread: pd.DataFrame) -> str:
+    """What is left of the shares where a turn takes the whole time."""
+    one = STOPPING[INFORMATION]
+    shares = {who: sooner_share(spread, STOPPING[who], one=one) for who in (ROWS, SWING)}
+    said = "; ".join(f"than {NAMES[who]} in {with_interval(share)}" for who, share in shares.items())
+    missed = int((spread[one, "share_found"] < 1).sum())
+    return (
+        f"Where any turn beyond {np.degrees(STOPS_BEYOND):.0f} degrees takes as long as one round, by "
+        f"information is sooner {said}, of {len(spread)} worlds; all are found "
+        f"{when_words(spread, one)} on the median world, and not all in {missed}. The settings are those "
+        "chosen for turns in proportion."
+    )
 
 
 def _side(share: Interval) -> str:
@@ -166,29 +201,40 @@ def table(spread: pd.DataFrame) -> pd.DataFrame:
 
 
 def differences(spread: pd.DataFrame) -> str:
-    """By how much sooner all are found, world by world."""
+    """By how much sooner all are found, world by world; a search that ended before has no such time."""
     said = []
     for other in (ROWS, SWING, CHANCE):
+        ended = [int((spread[who, "share_found"] < 1).sum()) for who in (other, INFORMATION)]
         apart = paired_difference(spread[other, "all_found"], spread[INFORMATION, "all_found"])
         if apart is not None:
             said.append(
                 f"{NAMES[other]}: {minutes(apart.estimate)} min "
-                f"({minutes(apart.low)} to {minutes(apart.high)})"
+                f"({minutes(apart.low)} to {minutes(apart.high)}){_ended_words(*ended)}"
             )
     if not said:
         return "Of one world there is no mean difference."
     return "How much sooner all are found by information, mean over worlds: " + "; ".join(said) + "."
 
 
-def cost_words(spread: pd.DataFrame, seconds_each: float) -> str:
-    """What planning costs, by the measured time of a candidate step."""
+def _ended_words(other: int, own: int) -> str:
+    """What searches that ended with the budget do to a mean difference."""
+    if not other and not own:
+        return ""
+    if not own:
+        return f", at least, as {other} of the rows' or walks' searches ended before all were found"
+    return f", where {other} of its searches and {own} of those by information ended before all were found"
+
+
+def cost_words(spread: pd.DataFrame, cost: pd.DataFrame) -> str:
+    """What planning costs, as `timing.planning_cost` has measured it."""
     weighed = float(spread[INFORMATION, "weighed"].median())
-    load = weighed * seconds_each / DECISION_S
+    ms, load = 1e3 * cost["decision"], cost["load"]
     return (
-        f"A decision weighs {weighed:.0f} candidate steps, {1e6 * seconds_each:.0f} µs of processor time "
-        f"each, with the loop about it, on the machine that made this report. That is "
-        f"{1e3 * weighed * seconds_each:.1f} ms every {DECISION_S:.0f} s, or {percent(load, 2)} of one core. "
-        "Rows weigh none."
+        f"A decision weighs {weighed:.0f} candidate steps and takes {ms.median():.1f} ms of processor time "
+        f"({ms.min():.1f} to {ms.max():.1f} over {len(cost)} worlds) on the machine that made this report, "
+        f"with what it adds of the images, without the world and the camera. That is "
+        f"{percent(float(load.median()), 2)} of one core ({percent(float(load.min()), 2)} to "
+        f"{percent(float(load.max()), 2)}). Rows weigh none."
     )
 
 
@@ -226,8 +272,8 @@ def survey_words(spread: pd.DataFrame) -> str:
 
 LIMITS = [
     "F described this planner and did not build it: there are no numbers to agree with, only sentences.",
-    "Nobody flies in wind here, turns cost the platform no time, and the pose is known: what pose errors "
-    "cost is not in the times.",
+    "Nobody flies in wind here, the platform turns on the spot and loses no time by braking, and the pose is "
+    "known: what pose errors cost is not in the times.",
     "Detections are drawn by F (5.8)-(5.9), not found in images; there are no false alarms, and animals are "
     "told apart.",
     "Trees are not in the ground model, as in F.",
