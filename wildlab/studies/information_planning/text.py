@@ -159,7 +159,7 @@ def why_words(spread: pd.DataFrame) -> str:
     said = {
         "sooner": "With both cameras fixed straight down, such planning still is sooner than rows, in",
         "later": "With both cameras fixed straight down, such planning is sooner than rows only in",
-        "open": "With both cameras fixed straight down, which is sooner is not settled: it is such planning in",
+        "open": "With both cameras straight down it is not settled which is sooner: such planning is in",
     }[_side(fixed)]
     return f"{said} {with_interval(fixed)}."
 

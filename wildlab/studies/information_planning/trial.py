@@ -114,7 +114,7 @@ class Tuned(NamedTuple):
     )  # fmt: skip
     horizon: Horizon = Horizon(steps=2, fades=0.8)
     down_sd: float = 0.3
-    down_horizon: Horizon = Horizon(steps=2, fades=0.8)
+    down_horizon: Horizon = Horizon(steps=4, beam=8, fades=0.8)
     rows: float = 32.0
     swing_rows: float = 60.0
     swing: tuple[float, ...] = (15.0, -15.0)
