@@ -111,8 +111,8 @@ def share_shown(spread: pd.DataFrame) -> Shown:
         ends[who] = float(np.interp(5.0, at, mean))
     ax.set(xlabel="time (min)", ylabel="share of the animals found", xlim=(0, at[-1]), ylim=(0, 1.02))
     ax.set_title(
-        f"After 5 minutes: {100 * ends[INFORMATION]:.0f} % by information, "
-        f"{100 * ends[SWING]:.0f} % in rows from side to side"
+        f"After 5 min: {100 * ends[INFORMATION]:.0f} % by information, "
+        f"{100 * ends[SWING]:.0f} % swinging rows"
     )
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     said = ", ".join(f"{NAMES[who]} {100 * ends[who]:.0f} %" for who in SEARCHERS)
@@ -138,7 +138,7 @@ def times_shown(spread: pd.DataFrame) -> Shown:
         ylim=(0, 1.02),
     )
     middle = {who: median_words(spread[who, "all_found"]) for who in SEARCHERS}
-    ax.set_title(f"All found: {middle[INFORMATION]} min by information, {middle[SWING]} in rows side to side")
+    ax.set_title(f"All found: {middle[INFORMATION]} min by information, {middle[SWING]} swinging rows")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     said = "; ".join(f"{NAMES[who]} {middle[who]} min" for who in SEARCHERS)
     return (
