@@ -323,7 +323,7 @@ def test_same_seed_same_bytes(name, tmp_path):
     for folder in ("a", "b"):
         save_flight(simulate_twin(name, 4), tmp_path / folder)
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
-    assert len(files) == (6 if name == "large-ship" else 7)
+    assert len(files) == (6 if name == "large-ship" else 8)
     for file in files:
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
     assert sum((tmp_path / "a" / file).stat().st_size for file in files) < 40e6
