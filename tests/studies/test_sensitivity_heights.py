@@ -16,7 +16,7 @@ def found():
 
 
 def test_on_level_land_a_metre_costs_the_cotangent(monkeypatch):
-    flat = Terrain(np.zeros((251, 501), np.float32), -250.0, -500.0, 2.0)
+    flat = Terrain(np.full((251, 501), 20.0, np.float32), -250.0, -500.0, 2.0)
     monkeypatch.setattr(heights, "synthetic_landscape", lambda seed: flat)
     for one in shifts(lands=2, rays=40):
         assert np.allclose(one.off["level"], 1 / np.tan(np.radians(one.pitch)), atol=1e-6)

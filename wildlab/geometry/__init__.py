@@ -179,6 +179,7 @@ from wildlab.geometry.uncertainty import (
     inside_ellipse,
     ray_flatness,
     sample_ground,
+    sample_rays,
 )
 from wildlab.geometry.viewshed import (
     Footprint,
@@ -189,7 +190,7 @@ from wildlab.geometry.viewshed import (
     hidden_by,
     viewshed,
 )
-from wildlab.geometry.visibility import Seen, lines_clear, visible_nodes
+from wildlab.geometry.visibility import Seen, image_border, lines_clear, visible_nodes, widest_view
 
 __all__ = [
     "BECAME",
@@ -282,6 +283,7 @@ __all__ = [
     "helgesen_misalignment",
     "hidden_by",
     "homography",
+    "image_border",
     "image_raster",
     "in_field_of_view",
     "in_image",
@@ -315,6 +317,7 @@ __all__ = [
     "ray_flatness",
     "rotation_vector_to_matrix",
     "sample_ground",
+    "sample_rays",
     "sample_terrain",
     "skew",
     "split_images",
@@ -334,6 +337,7 @@ __all__ = [
     "view_errors",
     "viewshed",
     "visible_nodes",
+    "widest_view",
     "with_covariance",
     "wrap",
 ]

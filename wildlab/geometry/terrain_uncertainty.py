@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
-from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
+from wildlab.geometry.frames import Array, skew
 from wildlab.geometry.georeference import matching
 from wildlab.geometry.terrain import Met, Terrain, intersect_terrain, pixels_to_terrain
-from wildlab.geometry.uncertainty import FLAT, SAMPLES, UNBOUNDED, PoseErrors
+from wildlab.geometry.uncertainty import FLAT, SAMPLES, UNBOUNDED, PoseErrors, sample_rays
 
 #: Of the ellipse's own size, how far the terrain may lie from the touching plane.
 BENT = 0.2
@@ -270,15 +270,8 @@ def sample_terrain(
         Where there is more than one pose.
     """
     pixel, _ = matching(pose, uv)
-    off = rng.multivariate_normal(np.zeros(6), errors.pose, n)
-    R = pose.R_nb @ rotation_vector_to_matrix(off[:, 3:])
-    turn = rotation_vector_to_matrix(rng.multivariate_normal(np.zeros(3), errors.mount, n))
-    pixels = pixel + rng.multivariate_normal(np.zeros(2), errors.pixel, n)
+    rays, starts = sample_rays(pose, pixel, errors, rng, n)
     higher = np.sqrt(float(np.asarray(errors.plane))) * rng.standard_normal(n)
-    xy = normalise(pose.camera, pixels)
-    d_m = np.concatenate([xy, np.ones((n, 1))], axis=1) @ pose.R_mc.T
-    rays = np.einsum("nij,nj->ni", R @ pose.R_bm @ turn, d_m)
-    starts = pose.p_nb + off[:, :3] + R @ pose.lever_arm
     # Ground that is higher is the same as a camera that is lower, but for the height of the point.
     shift = np.column_stack([np.zeros((n, 2)), higher])
     return np.asarray(intersect_terrain(terrain, rays, starts + shift).points - shift)

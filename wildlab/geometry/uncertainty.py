@@ -283,17 +283,42 @@ def sample_ground(
         Where there is more than one pose.
     """
     pixel, plane = matching(pose, uv, plane_down)
+    rays, starts = sample_rays(pose, pixel, errors, rng, n)
+    planes = plane + np.sqrt(errors.plane) * rng.standard_normal(n)
+    return intersect_plane(rays, starts, planes)[:, :2]
+
+
+def sample_rays(
+    pose: CameraPoses, uv: ArrayLike, errors: PoseErrors, rng: np.random.Generator, n: int
+) -> tuple[Array, Array]:
+    """Rays of one pixel with errors of pixel, pose and mount drawn from their covariances.
+
+    Parameters
+    ----------
+    pose
+        The camera, with one pose.
+    uv
+        (2,) pixel.
+    errors
+        Covariances of the sources, each given once; that of the plane is left to who meets it.
+    rng
+        Drawn from.
+    n
+        How many draws.
+
+    Returns
+    -------
+    tuple of (n, 3) and (n, 3)
+        Directions in n, and where they start, metres.
+    """
     off = rng.multivariate_normal(np.zeros(6), errors.pose, n)
     R = pose.R_nb @ rotation_vector_to_matrix(off[:, 3:])
     turn = rotation_vector_to_matrix(rng.multivariate_normal(np.zeros(3), errors.mount, n))
-    pixels = pixel + rng.multivariate_normal(np.zeros(2), errors.pixel, n)
-    planes = plane + np.sqrt(errors.plane) * rng.standard_normal(n)
+    pixels = np.asarray(uv, float) + rng.multivariate_normal(np.zeros(2), errors.pixel, n)
     xy = normalise(pose.camera, pixels)
-    d_c = np.concatenate([xy, np.ones((n, 1))], axis=1)
-    d_m = d_c @ pose.R_mc.T
+    d_m = np.concatenate([xy, np.ones((n, 1))], axis=1) @ pose.R_mc.T
     rays = np.einsum("nij,nj->ni", R @ pose.R_bm @ turn, d_m)
-    p_nc = pose.p_nb + off[:, :3] + R @ pose.lever_arm
-    return intersect_plane(rays, p_nc, planes)[:, :2]
+    return rays, np.asarray(pose.p_nb + off[:, :3] + R @ pose.lever_arm)
 
 
 def _sampled(

@@ -148,7 +148,7 @@ def _in_view(camera: Camera, points: Array, p: Array, R: Array) -> NDArray[np.bo
     with np.errstate(invalid="ignore", divide="ignore"):
         ahead = offset[:, 2] > 0
         # Far outside the image a lens's polynomial may fold back into it.
-        outermost = _outermost(camera)
+        outermost = widest_view(camera)
         ahead &= np.hypot(offset[:, 0], offset[:, 1]) <= (1 + 1e-9) * outermost * offset[:, 2]
     found = np.zeros(len(points), bool)
     which = np.flatnonzero(ahead)
@@ -156,9 +156,20 @@ def _in_view(camera: Camera, points: Array, p: Array, R: Array) -> NDArray[np.bo
     return found
 
 
-def _outermost(camera: Camera) -> float:
-    """How far from the axis an image shows anything, as the tangent of an angle."""
-    border = np.hypot(*normalise(camera, _border(camera)).T)
+def widest_view(camera: Camera) -> float:
+    """How far from the axis an image shows anything.
+
+    Parameters
+    ----------
+    camera
+        Its lens may fold back: what lies further out than this is not shown, whatever its polynomial says.
+
+    Returns
+    -------
+    float
+        The tangent of the angle from the axis.
+    """
+    border = np.hypot(*normalise(camera, image_border(camera)).T)
     if np.isfinite(border).all():
         return float(border.max())
     # No ray comes to the corners: the image ends where a longer way from the axis comes no further out.
@@ -167,8 +178,18 @@ def _outermost(camera: Camera) -> float:
     return float(r[-1] if grows.all() else r[int(np.argmin(grows))])
 
 
-def _border(camera: Camera) -> Array:
-    """(4 K, 2) pixels along the border of the image."""
+def image_border(camera: Camera) -> Array:
+    """Pixels along the border of the image, its corners among them.
+
+    Parameters
+    ----------
+    camera
+        Of which the size counts.
+
+    Returns
+    -------
+    (4 K, 2) px
+    """
     along = np.linspace(0.0, 1.0, BORDER_RAYS)
     right, down = camera.width, camera.height
     zero, one = np.zeros(BORDER_RAYS), np.ones(BORDER_RAYS)
@@ -187,7 +208,7 @@ def _block(
     rows, columns = terrain.height.shape
     reach = np.array([p[:2] - furthest, p[:2] + furthest])
     low, high = float(np.nanmin(terrain.height)) + above, terrain._top + above
-    rays = pixel_rays(camera, _border(camera), R)
+    rays = pixel_rays(camera, image_border(camera), R)
     if (rays[:, 2] > 1e-6 * np.abs(rays).max()).all():
         there = max(-p[2] - high, 0.0), max(-p[2] - low, 0.0)
         ends = np.concatenate([p[:2] + (drop / rays[:, 2:]) * rays[:, :2] for drop in there])

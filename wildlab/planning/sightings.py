@@ -17,7 +17,7 @@ from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.geometry.visibility import lines_clear
+from wildlab.geometry.visibility import image_border, lines_clear, widest_view
 
 #: Lines of sight that are looked at together; what they take is some tens of megabytes.
 _TOGETHER = 250_000
@@ -110,7 +110,7 @@ def see(
     lens = np.array(
         [
             *(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.skew),
-            *(*camera.distortion, _outermost(camera)),
+            *(*camera.distortion, widest_view(camera) * (1 + 1e-9)),
         ],
         float,
     )
@@ -131,19 +131,6 @@ def see(
     return found.take(np.concatenate(clear))
 
 
-def _border(camera: Camera) -> Array:
-    along = np.linspace(0.0, 1.0, 9)
-    sides = [(along, 0 * along), (along, 0 * along + 1), (0 * along, along), (0 * along + 1, along)]
-    return np.concatenate([np.stack([u * camera.width, v * camera.height], axis=1) for u, v in sides])
-
-
-def _outermost(camera: Camera) -> float:
-    """How far from the axis the image shows anything, as the tangent of an angle."""
-    u, v = np.meshgrid(np.linspace(0, camera.width, 33), np.linspace(0, camera.height, 33))
-    seen = np.hypot(*normalise(camera, np.stack([u.ravel(), v.ravel()], axis=-1)).T)
-    return float(np.nanmax(seen)) * 1.001
-
-
 def _blocks(
     terrain: Terrain, camera: Camera, p: Array, R: Array, furthest: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -152,7 +139,7 @@ def _blocks(
     What it shows lies within the hull of where its border's rays come to the lowest and to the highest
     ground within the furthest distance; and within that distance, where a ray does not sink.
     """
-    directions = normalise(camera, _border(camera))
+    directions = normalise(camera, image_border(camera))
     directions = directions[np.isfinite(directions).all(axis=1)]
     # A little more than the border: between two rays a distorted border bulges.
     rays = np.concatenate([1.02 * directions, np.ones((len(directions), 1))], axis=1)
