@@ -1,0 +1,80 @@
+"""GPS time and UTC: how many leap seconds lie between them at each date."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+#: 1980-01-06, when both were alike, in s since 1970.
+GPS_START_S = 315964800.0
+WEEK_S = 604800.0
+#: First days on which UTC was one second further behind GPS time (IERS Bulletin C); none is announced since.
+LEAP_DAYS = (
+    *("1981-07-01", "1982-07-01", "1983-07-01", "1985-07-01", "1988-01-01", "1990-01-01", "1991-01-01"),
+    *("1992-07-01", "1993-07-01", "1994-07-01", "1996-01-01", "1997-07-01", "1999-01-01", "2006-01-01"),
+    *("2009-01-01", "2012-07-01", "2015-07-01", "2017-01-01"),
+)
+#: The same in s since 1970, UTC.
+_STARTS = np.array([datetime.fromisoformat(day).replace(tzinfo=UTC).timestamp() for day in LEAP_DAYS])
+
+
+def leap_seconds(utc_s: ArrayLike) -> Array:
+    """GPS time minus UTC, s, at UTC times (...) in s since 1970.
+
+    Parameters
+    ----------
+    utc_s
+        (...) s since 1970; NaN stays NaN.
+
+    Returns
+    -------
+    (...)
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> at = [datetime(year, 6, 1, tzinfo=UTC).timestamp() for year in (2014, 2025)]
+    >>> leap_seconds(at).tolist()
+    [16.0, 18.0]
+    """
+    at = np.asarray(utc_s, float)
+    return np.where(np.isnan(at), np.nan, np.searchsorted(_STARTS, at, side="right").astype(float))
+
+
+def gps_to_utc(gps_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of GPS time (...) in s since 6 January 1980.
+
+    Parameters
+    ----------
+    gps_s
+        (...) s: weeks times 604800, and the time of week.
+
+    Returns
+    -------
+    (...) s since 1970
+
+    Examples
+    --------
+    >>> from datetime import UTC, datetime
+    >>> datetime.fromtimestamp(float(gps_to_utc(1867 * 604800 + 16)), UTC).isoformat()
+    '2015-10-17T23:59:59+00:00'
+    """
+    counted = np.asarray(gps_s, float) + GPS_START_S
+    # A leap second begins where GPS time, too, is ahead by it.
+    behind = np.searchsorted(_STARTS + np.arange(1, len(_STARTS) + 1), counted, side="right")
+    return np.asarray(np.where(np.isnan(counted), np.nan, counted - behind))
+
+
+def week_to_utc(week: ArrayLike, time_of_week_s: ArrayLike) -> Array:
+    """UTC in s since 1970 of a GPS week (...) and the s since it began (...)."""
+    return gps_to_utc(np.asarray(week, float) * WEEK_S + np.asarray(time_of_week_s, float))
+
+
+def utc_to_gps(utc_s: ArrayLike) -> Array:
+    """GPS time (...) in s since 6 January 1980 of UTC (...) in s since 1970; the inverse of `gps_to_utc`."""
+    at = np.asarray(utc_s, float)
+    return np.asarray(at - GPS_START_S + leap_seconds(at))
