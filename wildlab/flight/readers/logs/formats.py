@@ -6,7 +6,8 @@ A reader's module has two functions::
     def read(path: Path, data: bytes, zone: str | None = None) -> RawLog
 
 ``head`` are the first `HEAD` bytes, and the name decides only where content is not enough; the path is
-only for messages; ``zone`` is that of wall clocks without one. A module is imported when a file may be of its format.
+only for messages; ``zone`` is that of wall clocks without one. A module is imported when a file may be of
+its format.
 """
 
 from __future__ import annotations
