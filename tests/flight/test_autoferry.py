@@ -256,8 +256,8 @@ RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
             '[tables.lidar]\nfile = "a.mat"\nfields = ["x"]\n\n[logs.lidar]',
             "'lidar' names a table and a log",
         ),
-        ('format = "autoferry"', 'format = "other"', "'other' does not fit"),
-        ('part = "lidar"', 'part = "sonar"', "'sonar' does not fit"),
+        ('format = "autoferry"', 'format = "other"', "'other' is no format of logs"),
+        ('part = "lidar"', 'part = "sonar"', "'sonar' is no part of a log"),
         ('sensor = "sensor"\n', "", "there are images, and no camera"),
         (
             'azimuth = { column = "bearing", unit = "rad" }',

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,10 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
-from wildlab.flight.readers.autoferry import read_part
+from wildlab.flight.readers.autoferry import Part, read_part
+from wildlab.flight.readers.logs.formats import FOLDERS, read_folder, read_log
+from wildlab.flight.readers.logs.log import RawLog
+from wildlab.flight.readers.logs.parts import stream_of
 from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
@@ -83,6 +86,7 @@ class RawFiles:
     hashes: dict[str, str] = field(default_factory=dict)
     _tables: dict[tuple[str, str], RawTable] = field(default_factory=dict)
     _variables: dict[str, dict[str, Any]] = field(default_factory=dict)
+    _logs: dict[tuple[str, str, str | None], RawLog] = field(default_factory=dict)
 
     def read(self, name: str, part: str, limit: int = RAW_LIMIT) -> bytes:
         """The bytes of a file, of at most so many.
@@ -140,9 +144,26 @@ class RawFiles:
         block = self.logs[name]
         if (name, "") not in self._tables:
             path = self.folder / block.file
-            cells, frames = read_part(path, self.read(block.file, f"logs.{name}"), block.part)
-            self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
+            if block.format == "autoferry":
+                data = self.read(block.file, f"logs.{name}")
+                cells, frames = read_part(path, data, cast(Part, block.part))
+                self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
+            else:
+                stream = stream_of(self._log(block, f"logs.{name}"), block, path)
+                cells = stream.columns
+                self._tables[name, ""] = RawTable(path, tuple(cells), cells, stream.rows, stream.counted_in)
         return self._tables[name, ""]
+
+    def _log(self, block: LogTable, part: str) -> RawLog:
+        key = (block.file, block.format, block.zone)
+        if key not in self._logs:
+            if block.format in FOLDERS:
+                path = inside(self.folder, block.file, file=self.recipe, field=f"{part}.file")
+                self._logs[key], self.hashes[block.file] = read_folder(path, block.format, block.zone)
+            else:
+                data = self.read(block.file, part)
+                self._logs[key] = read_log(self.folder / block.file, data, block.format, block.zone)
+        return self._logs[key]
 
     def series(self, block: Series, part: str) -> RawTable:
         """The rows of a table that count.

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from wildlab.flight.files import Strict, is_safe_name, leaves_folder
+from wildlab.flight.files import Strict, did_you_mean, is_safe_name, leaves_folder
 from wildlab.flight.manifest import GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.readers.autoferry import Part
+from wildlab.flight.readers.logs.formats import FOLDERS, FORMATS
+from wildlab.flight.readers.logs.log import PARTS
 from wildlab.flight.recipe.parts import (
     Acceleration,
     Angle,
@@ -20,6 +22,7 @@ from wildlab.flight.recipe.parts import (
     Speed,
     Stamp,
     Velocity,
+    Zone,
 )
 
 Separator = Annotated[str, Field(min_length=1, max_length=1)]
@@ -152,16 +155,38 @@ class MatlabTable(Strict):
 
 
 class LogTable(Strict):
-    """A table out of a log of a known format: one of the parts that its reader tells apart."""
+    """A table out of a log of a known format: one of the parts that its reader tells apart.
+
+    ``height`` makes a column ``height_m`` of the heights that count from there, with ``add_m`` added;
+    ``offset_s`` is added to ``time_s``, and makes it of ``time_log_s`` where the log does not know UTC;
+    ``zone`` is that of a wall clock without one.
+    """
 
     file: str
-    format: Literal["autoferry"]
-    part: Part
+    format: str
+    part: str
+    height: Literal["ellipsoid", "sea", "home"] | None = None
+    add_m: float = 0.0
+    offset_s: float = 0.0
+    zone: Zone | None = None
 
     @field_validator("file")
     @classmethod
     def _stays(cls, value: str) -> str:
         return _below(value)
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        formats = {**dict.fromkeys((*FORMATS, *FOLDERS), tuple(PARTS)), "autoferry": get_args(Part)}
+        if self.format not in formats:
+            raise ValueError(f"{self.format!r} is no format of logs; {did_you_mean(self.format, formats)}")
+        if self.part not in formats[self.format]:
+            raise ValueError(
+                f"{self.part!r} is no part of a log; {did_you_mean(self.part, formats[self.format])}"
+            )
+        if self.add_m and self.height is None:
+            raise ValueError("add_m is added to heights, and height does not say which; add height")
+        return self
 
 
 def _below(value: str) -> str:

@@ -12,6 +12,7 @@ its format.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -83,3 +84,47 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
         return read(path, data, zone)
     except RecursionError:
         raise WildlabError("is nested too deeply to be read", "copy the file again", file=path) from None
+
+
+#: Formats of whole folders: name in recipes -> (module, its reader, what it is called in sentences).
+FOLDERS: dict[str, tuple[str, str, str]] = {
+    "photos": ("wildlab.flight.readers.logs.photos", "read_photos", "folder of images"),
+    "clicks-yolo": ("wildlab.flight.readers.logs.clicks", "read_clicks_folder", "folder of YOLO's labels"),
+}
+#: So much of the beginning of each file goes into a folder's checksum: images are large and many.
+HASHED = 65536
+
+
+def read_folder(folder: Path, format_: str, zone: str | None = None) -> tuple[RawLog, str]:
+    """A folder as a log, and a SHA-256 of the names, sizes and beginnings of its files.
+
+    Parameters
+    ----------
+    folder
+        Only read.
+    format_
+        One of `FOLDERS`.
+    zone
+        Of wall clocks that carry none.
+
+    Returns
+    -------
+    RawLog and hexadecimal digits
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such folder, or nothing of it can be read.
+    """
+    if not folder.is_dir():
+        raise WildlabError("there is no such folder", "check the name, and the source folder", file=folder)
+    module, name, _ = FOLDERS[format_]
+    log: RawLog = getattr(import_module(module), name)(folder, zone)
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.is_symlink():
+            with path.open("rb") as stored:
+                head = stored.read(HASHED)
+            named = f"{path.relative_to(folder).as_posix()}\0{path.stat().st_size}\0"
+            digest.update(named.encode("utf-8", errors="surrogateescape") + hashlib.sha256(head).digest())
+    return log, digest.hexdigest()

@@ -1,0 +1,74 @@
+"""One part of a log as a recipe asks for it: heights from what it names, stamps moved by what it states."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs.log import RawLog, Stream
+
+
+class Wanted(Protocol):
+    """What a recipe says of a log's table."""
+
+    @property
+    def part(self) -> str: ...
+    @property
+    def height(self) -> str | None: ...
+    @property
+    def add_m(self) -> float: ...
+    @property
+    def offset_s(self) -> float: ...
+
+
+def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
+    """The part, with the columns ``height_m`` and ``stem`` (of ``file`` or ``image``) where they make sense.
+
+    Parameters
+    ----------
+    log
+        Read.
+    wanted
+        The part, what heights count from and what is added to them, what is added to stamps.
+    path
+        Only for messages.
+
+    Returns
+    -------
+    Stream
+        Rows without a stamp or a height that the recipe asked for are marked as not used.
+
+    Raises
+    ------
+    WildlabError
+        Where the log has no such part or no such heights.
+    """
+    if wanted.part not in log.parts:
+        there = ", ".join(log.parts) or "nothing that can be used"
+        raise WildlabError(
+            f"this log has no {wanted.part}", f"use what it has: {there}", file=path, field="part"
+        )
+    stream = log.parts[wanted.part]
+    columns = dict(stream.columns)
+    use, why = columns["use"].copy(), columns["why"].copy()
+    if "time_s" in columns or "time_log_s" in columns:
+        known = columns.get("time_s", np.full(len(stream), np.nan))
+        if not np.isfinite(known).any() and "time_log_s" in columns:
+            known = columns["time_log_s"]
+        columns["time_s"] = known + wanted.offset_s
+    if wanted.height is not None:
+        name = f"height_{wanted.height}_m"
+        if name not in columns:
+            there = ", ".join(one for one in columns if one.startswith("height_")) or "none"
+            problem = f"its {wanted.part} have no heights of the kind {wanted.height!r}"
+            raise WildlabError(problem, f"there are {there}", file=path, field="height")
+        columns["height_m"] = columns[name] + wanted.add_m
+        lost = (use == 1.0) & ~np.isfinite(columns["height_m"])
+        use[lost], why[lost] = 0.0, "no height"
+    for name in ("file", "image"):
+        if name in columns:
+            columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
+    return Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
