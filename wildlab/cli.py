@@ -22,9 +22,10 @@ from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
 from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
+from wildlab.commands.import_ import import_
 from wildlab.commands.plan import plan
-from wildlab.commands.shared import FILE, FOLDER
-from wildlab.commands.terrain import says_of, terrain, terrain_options
+from wildlab.commands.shared import FOLDER
+from wildlab.commands.terrain import terrain
 from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
@@ -66,7 +67,7 @@ def wildlab() -> None:
 
 for _command in (
     *(studies.list_, studies.run, studies.vary, studies.evaluate),
-    *(georeference, camera, detect, calibrate, terrain, plan),
+    *(import_, georeference, camera, detect, calibrate, terrain, plan),
 ):
     wildlab.add_command(_command)
 
@@ -115,47 +116,6 @@ def check(flight: Path, as_json: bool, accept: bool) -> None:
             click.echo(f"{use.purpose}: {yes if use.usable else 'no'}, {stopped(use.why)}")
     if problems:
         sys.exit(2)
-
-
-@wildlab.command("import")
-@click.argument("recipe", type=FILE)
-@click.option("--source", type=FOLDER, help="Folder of the raw files.  [default: the recipe's]")
-@click.option("--into", type=FOLDER, required=True, help="Folder of the flight to make.")
-@click.option("--calibration", type=FILE, help="What `wildlab calibrate` learnt, to be kept with the flight.")
-@click.option("--overwrite", is_flag=True, help="Replace the flight that is there.")
-@click.option(
-    "--terrain", "map_", type=FILE, help="An elevation map, GeoTIFF or PNG, to lay under the flight."
-)
-@terrain_options("--terrain-")
-def import_(
-    recipe: Path,
-    source: Path | None,
-    into: Path,
-    calibration: Path | None,
-    overwrite: bool,
-    map_: Path | None,
-    **stated: Any,
-) -> None:
-    """Make a flight folder from raw logs, as RECIPE says. The raw files are not changed.
-
-    How to write one is in data/recipes/README.md; `wildlab doctor` says where that data folder is. With
-    --calibration, what was learnt on another flight is kept with this one and applied when it is evaluated.
-    With --terrain, pixels are put on the ground of an elevation map; it must say what its heights count from,
-    or you do with --terrain-heights.
-
-    \b
-    Example:
-      wildlab import recipe.toml --source logs --into flights/mine
-      wildlab import recipe.toml --into flights/mine --terrain dem.tif --terrain-heights 46.2
-    """
-    from wildlab.flight.checks.sense.sense import sense_sentences
-    from wildlab.flight.recipe.importing import import_flight
-
-    flight = import_flight(recipe, source, into, overwrite, calibration, says_of(map_, stated, "--terrain-"))
-    click.echo(shown(into))
-    for line in sense_sentences(flight):
-        click.echo(line, err=True)
-    click.echo(f'Next: wildlab check "{shown(into)}"', err=True)
 
 
 @wildlab.command(short_help="Get a public data set, or list what there is.")

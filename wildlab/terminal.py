@@ -36,9 +36,9 @@ def print_json(content: Any) -> None:
     click.echo(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
-def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Columns of text under bold headings."""
+def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], *, err: bool = False) -> None:
+    """Columns of text under bold headings, on standard output, or standard error with `err`."""
     widths = [max(len(row[column]) for row in [headings, *rows]) for column in range(len(headings))]
     for index, row in enumerate([headings, *rows]):
         line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        click.echo(click.style(line, bold=True) if index == 0 else line)
+        click.echo(click.style(line, bold=True) if index == 0 else line, err=err)

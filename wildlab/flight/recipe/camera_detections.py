@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from wildlab.flight.files import Strict
 from wildlab.flight.recipe.parts import Angle, Length, Pixel, Position, Stamp
-from wildlab.flight.recipe.series import Block, Series
+from wildlab.flight.recipe.series import Series
 
 
 class Group(Strict):
@@ -35,7 +35,7 @@ class Group(Strict):
         return self
 
 
-class Frames(Block):
+class Frames(Series):
     """The images: one per row with its `id`, or one per `unique` combination of columns.
 
     `sensor` names the column that says which of several sensors looked; such frames need no camera.
@@ -87,7 +87,7 @@ class Ground(Strict):
         return self
 
 
-class Detections(Block):
+class Detections(Series):
     """Detections of one source. One of pixel, position, or azimuth says what was measured; with an elevation
     where the sensor has one, and with a range."""
 

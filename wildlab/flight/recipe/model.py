@@ -249,6 +249,21 @@ class Recipe(Strict):
         return self
 
     @model_validator(mode="after")
+    def _frames_whole(self) -> Self:
+        frames = self.frames
+        if frames is None or not (frames.where or frames.changed):
+            return self
+        others = {f"poses.{name}": one.frame is None and one.time is None for name, one in self.poses.items()}
+        others |= {f"detections[{i}]": one.frame is None for i, one in enumerate(self.detections)}
+        for name, by_row in others.items():
+            if by_row:
+                raise ValueError(
+                    f"some rows of [frames] do not count, and [{name}] belongs to them row by row; "
+                    "name the column of the frame there"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _poses_belong(self) -> Self:
         for name, poses in self.poses.items():
             if poses.time is not None and poses.frame is not None:
@@ -259,9 +274,10 @@ class Recipe(Strict):
                     f"[poses.{name}] has neither a time nor a frame; "
                     "add the time, or name the column of the frame"
                 )
-            if poses.time is None and (poses.where or poses.changed):
+            if poses.time is None and poses.frame is None and (poses.where or poses.changed):
                 raise ValueError(
-                    f"[poses.{name}] has no time, and where and changed are for logs over time; take them out"
+                    f"[poses.{name}] has no time and no frame, and where and changed would tear its rows "
+                    "from those of the frames; name the column of the frame, or take them out"
                 )
             bearing = poses.attitude.yaw_from_bearing is not None
             local = poses.position is None or poses.position.form != "wgs84"

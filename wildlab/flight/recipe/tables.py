@@ -46,7 +46,7 @@ def read_frames(recipe: Recipe, raw: RawFiles) -> FrameRows:
     block = recipe.frames
     if block is None:
         return FrameRows(pd.DataFrame({"frame_id": np.empty(0, object)}), None, np.empty(0, object))
-    rows = raw.table(block.file, block.separator, "frames")
+    rows = raw.series(block, "frames")
     if block.id is not None:
         of_row = texts(rows, block.id, "frames.id")
         first = np.arange(len(rows))
@@ -147,7 +147,7 @@ def read_detections(
     WildlabError
         Where a column is missing or a cell cannot be read, or pixels belong to no frame.
     """
-    rows = raw.table(block.file, block.separator, part)
+    rows = raw.series(block, part)
     frame = frames_of_rows(frames, recipe, block, block.frame, rows, part)
     if frame is None and block.kind == "pixel":
         raise rows.fail(

@@ -1,0 +1,163 @@
+"""The images of a card: which camera took them, and how their stamps meet the vehicle's log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.card.found import Found
+from wildlab.flight.card.roles import span_of
+from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.logs.photos import camera_of
+
+#: Time zones are whole quarters of an hour, s.
+QUARTER_S = 900.0
+#: The clock of a camera is set to within this of its zone's time, s.
+SET_WITHIN_S = 300.0
+
+
+@dataclass(frozen=True)
+class ImageClock:
+    """How the images' stamps become flight time.
+
+    Attributes
+    ----------
+    kind
+        ``"utc"``, or ``"sequence"`` for images without any time.
+    offset_s
+        What to add to the stamps.
+    said
+        A sentence on it.
+    block
+        What the recipe says of the images' table beside its file.
+    """
+
+    kind: Literal["utc", "sequence"]
+    offset_s: float
+    said: str
+    block: dict[str, Any] = field(default_factory=dict)
+
+
+def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPart | None, str]:
+    """The camera that took the images and how it is known; or None and why it is not.
+
+    Parameters
+    ----------
+    images
+        With the part ``photos``.
+    stated
+        By the user, which counts for more than the tags.
+
+    Returns
+    -------
+    camera, and a clause
+    """
+    if stated is not None:
+        return stated, "as you stated it"
+    if images.log is None:
+        return None, images.problem
+    found, how = camera_of(images.log)
+    return (None if found is None else CameraPart.model_validate(found)), how
+
+
+def clock_of_images(
+    images: Found, own: Found | None, stated_offset_s: float | None, triggers: str | None = None
+) -> ImageClock:
+    """How the images meet the vehicle's log.
+
+    By records of their triggers; by UTC where they have it; else by the only whole number of quarters of an
+    hour that brings their camera's wall clock into the flight.
+
+    Parameters
+    ----------
+    images
+        With the part ``photos``.
+    own
+        The vehicle's own log.
+    stated_offset_s
+        What to add to the stamps, where the user states it.
+    triggers
+        Name of the recipe's table of triggers, where there is one.
+
+    Returns
+    -------
+    ImageClock
+    """
+    photos = images.part("photos")
+    if photos is None:
+        return ImageClock("sequence", 0.0, "No image can be used.")
+    utc, wall = (_known(photos.columns.get(name), photos.used) for name in ("time_s", "time_log_s"))
+    offset = 0.0 if stated_offset_s is None else stated_offset_s
+    if triggers is not None:
+        return ImageClock(
+            "utc",
+            offset,
+            "The images have the times of the records of their triggers.",
+            {"triggers": triggers},
+        )
+    if len(utc):
+        return ImageClock("utc", offset, "The images' own stamps are in UTC." + _added(offset))
+    if not len(wall):
+        return ImageClock("sequence", 0.0, "The images have no time: they are numbered in order.")
+    if stated_offset_s is not None:
+        return ImageClock(
+            "utc", offset, f"The wall clock of the camera is corrected by {offset:g} s, as you said."
+        )
+    flown = None if own is None else span_of(own)
+    if flown is None:
+        return ImageClock(
+            "utc",
+            0.0,
+            "The camera's wall clock states no zone and is taken for UTC: times of day may be hours off.",
+        )
+    quarters = _quarters(wall, flown)
+    if quarters is None:
+        return ImageClock(
+            "utc",
+            0.0,
+            "The wall clock of the camera states no zone, and no zone brings the images into the flight: "
+            "give --zone or --camera-offset.",
+        )
+    offset = -quarters * QUARTER_S
+    return ImageClock(
+        "utc",
+        offset,
+        f"The camera's wall clock is taken to be {_hours(quarters)} UTC: only so do the images fall into the "
+        "flight. By seconds it is not known: wildlab clock estimates that.",
+    )
+
+
+def _known(column: NDArray[Any] | None, used: NDArray[np.bool_]) -> NDArray[np.float64]:
+    if column is None:
+        return np.empty(0)
+    values = np.asarray(column[used], float)
+    return values[np.isfinite(values)]
+
+
+def _added(offset: float) -> str:
+    return f" {offset:g} s are added to them, as you said." if offset else ""
+
+
+def _quarters(wall: NDArray[np.float64], flown: tuple[float, float]) -> int | None:
+    """How many quarters of an hour the wall clock is ahead of UTC, where one number alone fits the flight."""
+    shares = {}
+    for quarters in range(-14 * 4, 14 * 4 + 1):
+        at = wall - quarters * QUARTER_S
+        inside = (at >= flown[0] - SET_WITHIN_S) & (at <= flown[1] + SET_WITHIN_S)
+        shares[quarters] = float(inside.mean())
+    best = max(shares.values())
+    those = [quarters for quarters, share in shares.items() if share > best - 0.01]
+    whole = [quarters for quarters in those if quarters % 4 == 0]
+    chosen = those if len(those) == 1 else whole
+    return chosen[0] if best > 0.5 and len(chosen) == 1 else None
+
+
+def _hours(quarters: int) -> str:
+    if quarters == 0:
+        return "in"
+    hours, minutes = divmod(abs(quarters) * 15, 60)
+    length = f"{hours} h" + (f" {minutes} min" if minutes else "")
+    return f"{length} {'ahead of' if quarters > 0 else 'behind'}"

@@ -1,0 +1,270 @@
+"""Which role each thing on a card has in a flight, with the reason; whoever imports it may say otherwise."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.card.found import Found
+from wildlab.flight.files import did_you_mean
+from wildlab.geometry.frames import geodetic_to_ned
+
+Array = NDArray[np.float64]
+
+#: Role -> what it is of a flight.
+ROLES: dict[str, str] = {
+    "own": "the vehicle's own log",
+    "camera": "attitude and place of the camera, by a log that rides on it",
+    "receiver": "satellite positions of the vehicle, in place of its own log's",
+    "target": "where a target truly was",
+    "triggers": "when the camera was triggered",
+    "images": "the images",
+    "marks": "points that do not move, and where they truly are",
+    "clicks": "pixels of things in the images",
+    "nothing": "not used",
+}
+#: A receiver on board is within this of the vehicle's own log half of the time, m: five times the standard
+#: deviation of a single-frequency receiver. A target under the camera is not, but for one that is carried.
+ON_BOARD_M = 15.0
+#: Two logs meet where they share this time, s.
+SHARED_S = 1.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A thing on the card with its role. ``target`` is the target's name; ``why`` a clause."""
+
+    found: Found
+    role: str
+    why: str
+    target: str = ""
+
+
+class Path4(NamedTuple):
+    """Where a log says that it was: times (N,) s since 1970, and place (N, 3) in radians and m."""
+
+    times: Array
+    place: Array
+
+
+def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choice]:
+    """A role for everything that was found.
+
+    Parameters
+    ----------
+    found
+        From `found.search`.
+    stated
+        Name of a file or folder -> role, as `ROLES` names them; ``target:NAME`` names the target too. These
+        are not argued with.
+
+    Returns
+    -------
+    list of Choice
+        In the order of `found`.
+
+    Raises
+    ------
+    WildlabError
+        Where a role or a name that is stated is not known, or two are stated to be the vehicle's own log.
+    """
+    given = _stated(found, stated)
+    choices = {one.name + one.format: _first(one, given.get(one.name)) for one in found}
+    open_ = [one for one in found if one.name not in given and choices[one.name + one.format].role == ""]
+    own = next((one.found for one in choices.values() if one.role == "own"), None)
+    images = _images(found, choices)
+    if own is None and open_:
+        own, why = _own(open_, images)
+        if own is not None:
+            choices[own.name + own.format] = Choice(own, "own", why)
+    for one in open_:
+        if one is not own:
+            choices[one.name + one.format] = _other(one, own)
+    return _named([choices[one.name + one.format] for one in found])
+
+
+def _stated(found: Sequence[Found], stated: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    names = {one.name for one in found}
+    given: dict[str, tuple[str, str]] = {}
+    for name, role in stated.items():
+        kind, _, target = role.partition(":")
+        if name not in names:
+            raise WildlabError(
+                f"nothing called {name!r} was found", did_you_mean(name, names), field="--role"
+            )
+        if kind not in ROLES or (target and kind != "target"):
+            raise WildlabError(f"{role!r} is no role", did_you_mean(kind, ROLES), field="--role")
+        given[name] = (kind, target)
+    if sum(kind == "own" for kind, _ in given.values()) > 1:
+        raise WildlabError("two are stated to be the vehicle's own log", "name one", field="--role")
+    return given
+
+
+def _first(one: Found, stated: tuple[str, str] | None) -> Choice:
+    """What needs no comparison; an empty role where it does."""
+    if stated is not None:
+        return Choice(one, stated[0], "as you said", stated[1])
+    if one.log is None:
+        return Choice(one, "nothing", one.problem)
+    for part, role in (("photos", "images"), ("marks", "marks"), ("clicks", "clicks")):
+        if part in one.log.parts:
+            return Choice(one, role, f"it has {len(one.log.parts[part])} {_PARTS[part]}")
+    if one.part("poses") is None and one.part("gnss") is None:
+        if one.part("triggers") is not None:
+            return Choice(
+                one, "triggers", f"it has {len(one.log.parts['triggers'])} records of triggers alone"
+            )
+        return Choice(one, "nothing", _useless(one))
+    return Choice(one, "", "")
+
+
+_PARTS = {"photos": "images", "marks": "points", "clicks": "pixels"}
+
+
+def _useless(one: Found) -> str:
+    """Why a log without a usable place has no role."""
+    if one.log is None or not one.log.parts:
+        return "it holds nothing that a flight is made of"
+    reasons = [why for stream in one.log.parts.values() for why in stream.columns["why"] if why]
+    common = max(set(reasons), key=reasons.count) if reasons else "it has no positions"
+    return f"no row of it can be used: {common}"
+
+
+def _images(found: Sequence[Found], choices: Mapping[str, Choice]) -> Found | None:
+    """The folder with the most images."""
+    folders = [one for one in found if choices[one.name + one.format].role == "images"]
+    return max(folders, key=lambda one: len(one.log.parts["photos"]) if one.log else 0, default=None)
+
+
+def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, str]:
+    """The vehicle's own log, with the reason: one with an attitude rather than without, that covers the
+    images, and of those the longest."""
+    turned = [one for one in open_ if one.part("poses") is not None]
+    if not turned:
+        placed = images is not None and images.part("photos") is not None and _has_place(images)
+        if placed or not open_:
+            return None, ""
+        longest = max(open_, key=_duration)
+        only = "it is the only log" if len(open_) == 1 else "no log has an attitude, and it is the longest"
+        return longest, only
+    if len(turned) == 1:
+        return turned[0], "it is the only log with an attitude"
+    taken = span_of(images, "photos") if images is not None else None
+    during = [one for one in turned if taken is not None and _overlap(span_of(one), taken) > SHARED_S]
+    longest = max(during or turned, key=_duration)
+    if len(during) == 1:
+        return longest, "of the logs with an attitude it alone covers the images"
+    return longest, "of the logs with an attitude it is the longest"
+
+
+def _has_place(images: Found) -> bool:
+    photos = images.part("photos")
+    return photos is not None and "latitude_deg" in photos.columns
+
+
+def _other(one: Found, own: Found | None) -> Choice:
+    """A log that is not the vehicle's own."""
+    if own is None:
+        return Choice(one, "target", "the images say where the camera was, and this is another's track")
+    mine, theirs = path_of(own), path_of(one)
+    if theirs is None or not np.isfinite(theirs.times).any():
+        return Choice(one, "nothing", "its positions have no times")
+    if mine is None:
+        return Choice(one, "nothing", "the vehicle's own log has no times to compare with")
+    shared = _overlap((mine.times[0], mine.times[-1]), (theirs.times[0], theirs.times[-1]))
+    if shared < SHARED_S:
+        apart = max(mine.times[0] - theirs.times[-1], theirs.times[0] - mine.times[-1])
+        return Choice(
+            one, "nothing", f"it is of another time: {_lasting(apart)} lie between it and the flight"
+        )
+    distance = _distance(mine, theirs)
+    if distance < ON_BOARD_M:
+        near = f"half of the time it is within {distance:.1f} m of the vehicle's own log"
+        return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
+    return Choice(
+        one,
+        "target",
+        f"it is {distance:.0f} m (median) from the vehicle, for {_lasting(shared)} of its flight",
+    )
+
+
+def path_of(one: Found) -> Path4 | None:
+    """Where a log says that it was, rows that can be used; None where it does not say."""
+    for name in ("gnss", "poses"):
+        stream = one.part(name)
+        if stream is None or "latitude_deg" not in stream.columns or "time_s" not in stream.columns:
+            continue
+        c = stream.columns
+        heights = next((c[key] for key in c if key.startswith("height_")), np.zeros(len(stream)))
+        place = np.column_stack([np.radians(c["latitude_deg"]), np.radians(c["longitude_deg"]), heights])
+        good = stream.used & np.isfinite(place[:, :2]).all(axis=1) & np.isfinite(c["time_s"])
+        if good.any():
+            return Path4(c["time_s"][good], place[good])
+    return None
+
+
+def _distance(mine: Path4, theirs: Path4) -> float:
+    """Median level distance at their times, m."""
+    origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
+    a = geodetic_to_ned(mine.place[:, 0], mine.place[:, 1], np.zeros(len(mine.place)), origin)
+    b = geodetic_to_ned(theirs.place[:, 0], theirs.place[:, 1], np.zeros(len(theirs.place)), origin)
+    both = (theirs.times >= mine.times[0]) & (theirs.times <= mine.times[-1])
+    if not both.any():
+        return float("inf")
+    order = np.argsort(mine.times)
+    at = np.column_stack([np.interp(theirs.times[both], mine.times[order], a[order, i]) for i in (0, 1)])
+    return float(np.median(np.hypot(*(b[both, :2] - at).T)))
+
+
+def span_of(one: Found, part: str | None = None) -> tuple[float, float] | None:
+    names = (part,) if part else ("poses", "gnss")
+    for name in names:
+        stream = one.part(name)
+        if stream is not None and "time_s" in stream.columns:
+            times = stream.columns["time_s"][stream.used]
+            times = times[np.isfinite(times)]
+            if len(times):
+                return float(times.min()), float(times.max())
+    return None
+
+
+def _duration(one: Found) -> float:
+    span = span_of(one)
+    return span[1] - span[0] if span else 0.0
+
+
+def _overlap(a: tuple[float, float] | None, b: tuple[float, float] | None) -> float:
+    if a is None or b is None:
+        return 0.0
+    return min(a[1], b[1]) - max(a[0], b[0])
+
+
+def _lasting(seconds: float) -> str:
+    """``"12 s"``, ``"3 min"``, ``"5 h"``, ``"12 days"``."""
+    for length, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2 * length:
+            return f"{seconds / length:.0f} {unit}"
+    return f"{seconds:.0f} s"
+
+
+def _named(choices: list[Choice]) -> list[Choice]:
+    """Targets with names of their own, from the files'."""
+    taken: set[str] = {one.target for one in choices if one.target}
+    named = []
+    for one in choices:
+        if one.role == "target" and not one.target:
+            stem = re.sub(r"[^A-Za-z0-9_-]+", "-", one.found.name.rsplit("/", 1)[-1].rsplit(".", 1)[0])
+            name = base = stem.strip("-_")[:60] or "target"
+            number = 2
+            while name in taken:
+                name, number = f"{base}-{number}", number + 1
+            taken.add(name)
+            one = replace(one, target=name)
+        named.append(one)
+    return named

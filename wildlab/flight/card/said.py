@@ -1,0 +1,118 @@
+"""What was found on a card, as rows of a table and as sentences; no place is told."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.card.roles import Choice
+from wildlab.flight.files import printable
+from wildlab.flight.readers.logs.log import Stream
+
+#: Headings of `rows_of`.
+HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")
+_COUNTED = {"photos": "images", "marks": "points", "clicks": "pixels"}
+_REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "height_home_m": "take-off"}
+
+
+def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
+    """A row for each thing that was found, under `HEADINGS`."""
+    return [_row(one) for one in choices]
+
+
+def _row(choice: Choice) -> list[str]:
+    found, role = choice.found, choice.role + (f" {choice.target}" if choice.target else "")
+    if found.log is None:
+        return [printable(found.name), found.called, "", "", printable(found.problem), "", "", role]
+    parts = found.log.parts
+    times = np.concatenate([np.empty(0), *(_times(one) for one in parts.values())])
+    begins = lasts = ""
+    if len(times):
+        begins = datetime.fromtimestamp(float(times.min()), UTC).strftime("%Y-%m-%d %H:%M:%S")
+        lasts = f"{np.ptp(times):.0f} s"
+    references = [
+        text for name, text in _REFERENCES.items() if any(name in one.columns for one in parts.values())
+    ]
+    return [
+        printable(found.name),
+        found.called,
+        begins,
+        lasts,
+        ", ".join(_amount(name, stream) for name, stream in parts.items()) or "nothing that can be used",
+        found.log.clock.base if found.log.clock is not None else "",
+        ", ".join(references),
+        role,
+    ]
+
+
+def _amount(name: str, stream: Stream) -> str:
+    if name in _COUNTED:
+        return f"{len(stream)} {_COUNTED[name]}"
+    times = _times(stream)
+    steps = np.diff(times)
+    rate = f" at {1 / float(np.median(steps)):.3g} Hz" if len(steps) and np.median(steps) > 0 else ""
+    return f"{name} {len(stream)}{rate}"
+
+
+def _times(stream: Stream) -> NDArray[np.float64]:
+    values = stream.columns.get("time_s")
+    if values is None:
+        return np.empty(0)
+    used = np.asarray(values[stream.used], float)
+    return used[np.isfinite(used)]
+
+
+def sentences_of(choices: Sequence[Choice]) -> list[str]:
+    """What of each thing is not used and why, what was lost, and what its reader noted."""
+    said = []
+    for one in choices:
+        name = printable(one.found.name)
+        if one.found.log is None:
+            said.append(f"{name} is not used: {printable(one.why)}")
+            continue
+        _, _, _, _, holds, base, heights, _ = _row(one)
+        base, heights = (
+            base and f"; its time is from {base}",
+            heights and f"; its heights count from {heights}",
+        )
+        said.append(f"{name} holds {holds}{base}{heights}")
+        if one.role == "nothing":
+            said.append(f"{name} is not used: {printable(one.why)}")
+        elif one.why:
+            said.append(f"{name} is taken for {_article(one)}: {one.why}")
+        for part, stream in one.found.log.parts.items():
+            if not stream.used.all():
+                said.append(f"{name}: {_unused(part, stream)}")
+        said += [f"{name}: {printable(text)}" for text in (*one.found.log.lost, *one.found.log.notes)]
+        clock = one.found.log.clock
+        if clock is not None and clock.pairs > 2:
+            said.append(
+                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): it runs "
+                f"{1e6 * (clock.rate - 1):+.0f} ppm off, and {1000 * clock.spread_s:.0f} ms are left over "
+                f"(largest {1000 * clock.largest_s:.0f} ms)"
+            )
+    return said
+
+
+def _article(choice: Choice) -> str:
+    words = {
+        "own": "the vehicle's own log",
+        "camera": "a log that rides on the camera",
+        "receiver": "a receiver on board",
+        "target": f"the track of a target, {choice.target}",
+        "triggers": "records of the camera's triggers",
+        "images": "the images",
+        "marks": "surveyed points",
+        "clicks": "pixels of things in the images",
+    }
+    return words[choice.role]
+
+
+def _unused(part: str, stream: Stream) -> str:
+    reasons = Counter(str(why) for why in stream.columns["why"] if why)
+    told = ", ".join(f"{count} {why}" for why, count in reasons.most_common())
+    return f"{int((~stream.used).sum())} of {len(stream)} rows of {part} are not used ({told})"
