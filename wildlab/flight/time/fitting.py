@@ -8,8 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.time.envelope import lower_line
 
 Array = NDArray[np.float64]
+
+#: Stamps are numbers of this resolution at best: s since 1970 in 64 bits.
+RESOLUTION_S = 1e-6
+#: Tukey's biweight: residuals beyond so many standard deviations are outliers (95 % efficient for a normal).
+REACH = 4.685
+#: Fewer pairs than this are all believed.
+FEW = 6
+#: A rate further from 1 than this is none of a quartz, which keep 1e-4 and better.
+QUARTZ = 2e-4
+#: What is promised is promised at so many standard deviations.
+SURE = 3.0
 
 
 class ClockFit(NamedTuple):
@@ -18,7 +30,7 @@ class ClockFit(NamedTuple):
     Attributes
     ----------
     own_0, reference_0
-        s; the middle of the pairs, so that rate and offset hardly have to do with each other.
+        s; the middle of the pairs used, so that rate and offset hardly have to do with each other.
     rate
         Seconds of the reference for a second of the clock.
     residual
@@ -27,6 +39,10 @@ class ClockFit(NamedTuple):
         (N,) pairs that the fit rests on; the others are outliers.
     spread_s
         Robust standard deviation of the residuals used.
+    middle_sd_s, rate_sd
+        Standard deviations of ``reference_0`` and of ``rate``; infinite where the pairs do not tell.
+    first_s, last_s
+        Of the clock's stamps that the fit rests on, s.
     """
 
     own_0: float
@@ -35,10 +51,21 @@ class ClockFit(NamedTuple):
     residual: Array
     used: NDArray[np.bool_]
     spread_s: float
+    middle_sd_s: float = np.inf
+    rate_sd: float = np.inf
+    first_s: float = np.nan
+    last_s: float = np.nan
 
     def to_reference(self, own: ArrayLike) -> Array:
         """Stamps (...) of the clock, s, as the reference has them."""
         return np.asarray(self.reference_0 + self.rate * (np.asarray(own, float) - self.own_0))
+
+    def sd_at(self, own: ArrayLike) -> Array:
+        """Standard deviation of the fit at stamps (...) of the clock, s."""
+        away = np.asarray(own, float) - self.own_0
+        # At the middle nothing comes of a rate that is not known.
+        turned = np.where(away == 0, 0.0, self.rate_sd) * np.where(away == 0, 0.0, away)
+        return np.asarray(np.hypot(self.middle_sd_s, turned))
 
     @property
     def offset_s(self) -> float:
@@ -46,7 +73,38 @@ class ClockFit(NamedTuple):
         return float(self.to_reference(0.0))
 
 
-def fit_clock(own: ArrayLike, reference: ArrayLike) -> ClockFit:
+class WrongRate(NamedTuple):
+    """A clock that does not run as the reference does.
+
+    Attributes
+    ----------
+    rate, low, high
+        Seconds of the reference for a second of the clock, with its 99.7 % interval.
+    drift_s
+        What clocks that agreed at the first pair differ by at the last, s.
+    pairs, over_s
+        How many pairs say so, over how long a time of the reference, s.
+    """
+
+    rate: float
+    low: float
+    high: float
+    drift_s: float
+    pairs: int
+    over_s: float
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        way = "slow" if self.rate > 1 else "fast"
+        return (
+            f"the clock runs {way}: {self.rate:.6g} s of the reference go by in one of its seconds "
+            f"({self.low:.6g} to {self.high:.6g}), {abs(self.drift_s):.3g} s over the {self.over_s:.0f} s "
+            f"that {self.pairs} pairs of stamps cover"
+        )
+
+
+def fit_clock(own: ArrayLike, reference: ArrayLike, late: bool = False) -> ClockFit:
     """Rate and offset of a clock from pairs of stamps, robust against outliers.
 
     Parameters
@@ -55,15 +113,28 @@ def fit_clock(own: ArrayLike, reference: ArrayLike) -> ClockFit:
         (N,) s by the clock; NaN is left out.
     reference
         (N,) s by the reference, at the same instants.
+    late
+        Stamps of the reference can only be late, as times of receipt are: the line goes under them, not
+        through them. The least delay of all stays in the offset; nothing in the stamps tells it.
 
     Returns
     -------
     ClockFit
+        Robust start: median of slopes between pairs half the log apart (Siegel and Theil's idea: right with
+        up to 29 % of outliers), then Tukey's biweight. Standard deviations allow for residuals that go
+        together from one pair to the next.
 
     Raises
     ------
     WildlabError
         Where there is no pair.
+
+    Examples
+    --------
+    >>> own = np.arange(100.0)
+    >>> fit = fit_clock(own, 5.0 + 1.1 * own)
+    >>> round(fit.rate, 9), round(fit.offset_s, 9)
+    (1.1, 5.0)
     """
     x, y = np.asarray(own, float), np.asarray(reference, float)
     known = np.isfinite(x) & np.isfinite(y)
@@ -72,22 +143,142 @@ def fit_clock(own: ArrayLike, reference: ArrayLike) -> ClockFit:
         raise WildlabError(problem, "state the offset", field="time")
     x_0, y_0 = float(np.median(x[known])), float(np.median(y[known]))
     dx, dy = x[known] - x_0, y[known] - y_0
-    rate, offset = 1.0, float(np.median(dy - dx))
-    used = np.ones(len(dx), bool)
-    if np.ptp(dx) > 0 and len(dx) > 2:
-        for _ in range(20):
-            A = np.column_stack([np.ones(used.sum()), dx[used]])
-            (offset, rate), *_ = np.linalg.lstsq(A, dy[used], rcond=None)
-            left = dy - offset - rate * dx
-            spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-            kept = np.abs(left - np.median(left)) <= max(4 * spread, 1e-6)
-            if (kept == used).all() or kept.sum() < 3:
-                break
-            used = kept
+    at_0, rate = _start(dx, dy)
+    at_0, rate, used, sds = (_under if late else _through)(dx, dy, at_0, rate)
+    middle = float(dx[used].mean())
     residual = np.full(len(x), np.nan)
-    residual[known] = dy - offset - rate * dx
+    residual[known] = dy - at_0 - rate * dx
     every = np.zeros(len(x), bool)
     every[np.flatnonzero(known)[used]] = True
-    left = residual[every]
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    return ClockFit(x_0, y_0 + float(offset), float(rate), residual, every, spread)
+    return ClockFit(
+        x_0 + middle,
+        y_0 + at_0 + rate * middle,
+        rate,
+        residual,
+        every,
+        _scale(residual[every]),
+        *sds,
+        float(x[every].min()),
+        float(x[every].max()),
+    )
+
+
+def rate_is_off(fit: ClockFit, tolerance: float = QUARTZ) -> WrongRate | None:
+    """Whether a clock runs at a wrong rate, beyond what a quartz and the pairs' noise explain.
+
+    Parameters
+    ----------
+    fit
+        Of it.
+    tolerance
+        How far from 1 a rate may be.
+
+    Returns
+    -------
+    WrongRate, or None where nothing says so.
+    """
+    low, high = fit.rate - SURE * fit.rate_sd, fit.rate + SURE * fit.rate_sd
+    if not np.isfinite(fit.rate_sd) or (low <= 1 + tolerance and high >= 1 - tolerance):
+        return None
+    long = fit.last_s - fit.first_s
+    return WrongRate(fit.rate, low, high, (fit.rate - 1) * long, int(fit.used.sum()), fit.rate * long)
+
+
+def shortfall(fit: ClockFit, offset_s: float = 0.01, rate: float = 1e-4) -> str:
+    """Why a fit is not good to an offset (s) everywhere in its log and to a rate; empty where it is.
+
+    Parameters
+    ----------
+    fit
+        Of a clock.
+    offset_s, rate
+        What is wanted, at three standard deviations.
+
+    Returns
+    -------
+    A clause.
+    """
+    pairs = int(fit.used.sum())
+    if not np.isfinite(fit.middle_sd_s + fit.rate_sd):
+        return f"{pairs} pairs of stamps do not tell how good the fit of the clock is"
+    worst = SURE * float(fit.sd_at([fit.first_s, fit.last_s]).max())
+    said = []
+    if worst > offset_s:
+        said.append(f"the offset to {worst:.2g} s (wanted: {offset_s:g})")
+    if fit.rate_sd * SURE > rate:
+        said.append(f"the rate to {fit.rate_sd * SURE:.2g} (wanted: {rate:g})")
+    long = fit.last_s - fit.first_s
+    return f"{pairs} pairs of stamps over {long:.0f} s give " + " and ".join(said) if said else ""
+
+
+def _start(dx: Array, dy: Array) -> tuple[float, float]:
+    """Height at zero and slope, by medians."""
+    order = np.argsort(dx, kind="stable")
+    half = len(order) // 2
+    first, second = order[:half], order[len(order) - half :]
+    run = dx[second] - dx[first]
+    apart = run > 0
+    rate = float(np.median((dy[second] - dy[first])[apart] / run[apart])) if apart.sum() > 1 else 1.0
+    return float(np.median(dy - rate * dx)), rate
+
+
+def _through(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
+    """The line through the points, and what is known of it."""
+    turns = len(dx) > 2 and np.ptp(dx) > 0
+    A = np.column_stack([np.ones(len(dx)), dx]) if turns else np.ones((len(dx), 1))
+    solution = np.array([at_0, rate])[: A.shape[1]]
+    base = dy if turns else dy - rate * dx
+    scale = max(_scale(base - A @ solution), RESOLUTION_S)
+    weight = np.ones(len(dx))
+    for _ in range(50):
+        far = (base - A @ solution) / (REACH * scale)
+        # Of a handful none is in the minority, and half of all stamps are right where any are.
+        if len(dx) >= FEW:
+            weight = np.where(np.abs(far) < 1, (1 - far**2) ** 2, 0.0)
+        if (weight > 0.01).sum() < len(dx) / 2:
+            weight = (np.abs(far) <= np.median(np.abs(far))).astype(float)
+        root = np.sqrt(weight)[:, None]
+        found, *_ = np.linalg.lstsq(root * A, root[:, 0] * base, rcond=None)
+        step, solution = found - solution, found
+        scale = max(_scale((base - A @ solution)[weight > 0]), RESOLUTION_S)
+        if np.abs(step[0]) + np.abs(step[1:]).sum() * np.ptp(dx) < 1e-9:
+            break
+    used = weight > 0
+    left = (base - A @ solution)[used]
+    sds = _standard_deviations(dx[used], left, turns)
+    return float(solution[0]), float(solution[1]) if turns else rate, used, sds
+
+
+def _under(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
+    """The line under the points, and what is known of it."""
+    # Far outliers first: they would be the whole line.
+    left = dy - at_0 - rate * dx
+    low = float(np.quantile(left, 0.05)) if len(left) > 20 else -np.inf
+    kept = left >= 4 * low - 2 * RESOLUTION_S if low < 0 else np.ones(len(left), bool)
+    line = lower_line(dx[kept], left[kept])
+    used = np.zeros(len(dx), bool)
+    used[np.flatnonzero(kept)[line.used]] = True
+    sds = (max(line.middle_sd, RESOLUTION_S / 10), line.slope_sd)
+    return at_0 + line.at_0, rate + line.slope, used, sds
+
+
+_Line = tuple[float, float, NDArray[np.bool_], tuple[float, float]]
+
+
+def _scale(left: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(left - np.median(left)))) if len(left) else np.nan
+
+
+def _standard_deviations(dx: Array, left: Array, turns: bool) -> tuple[float, float]:
+    """Of the height at the middle and of the slope, from residuals (N,) in order of time."""
+    n, parameters = len(left), 1 + turns
+    if n < parameters + 2:
+        return np.inf, np.inf
+    spread = max(float(np.sqrt((left**2).sum() / (n - parameters))), RESOLUTION_S / np.sqrt(12))
+    in_order = left[np.argsort(dx, kind="stable")]
+    power = float((in_order**2).sum())
+    together = float((in_order[1:] * in_order[:-1]).sum()) / power if power > 0 and n > 10 else 0.0
+    # Residuals of a first-order Gauss-Markov process count for fewer than there are.
+    more = np.sqrt((1 + np.clip(together, 0, 0.98)) / (1 - np.clip(together, 0, 0.98)))
+    middle = float(spread * more / np.sqrt(n))
+    return middle, middle / float(np.std(dx)) if turns and np.ptp(dx) > 0 else np.inf

@@ -1,0 +1,162 @@
+"""One clock against another: simulated clocks, whose rate and offset are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.flight.time.fitting import ClockFit, fit_clock, rate_is_off, shortfall
+
+EPOCH = 1.7e9
+
+
+def clocks(
+    seed: int, pairs: int = 3000, long: float = 600.0
+) -> tuple[np.random.Generator, np.ndarray, np.ndarray, float]:
+    """A generator, stamps of a clock, the reference at these, and the rate."""
+    rng = np.random.default_rng(seed)
+    offset, rate = rng.choice([-1, 1]) * rng.uniform(0.05, 5.0), rng.uniform(0.9, 1.1)
+    own = np.sort(rng.uniform(0, long, pairs))
+    return rng, own, EPOCH + offset + rate * own, float(rate)
+
+
+def assert_as_promised(fit: ClockFit, own: np.ndarray, true: np.ndarray, rate: float) -> None:
+    at = np.array([0, len(own) // 2, -1])
+    assert np.abs(fit.to_reference(own[at]) - true[at]).max() < 0.010
+    assert abs(fit.rate - rate) < 1e-4
+
+
+@pytest.mark.parametrize("jitter", [0.01, 0.05])
+@pytest.mark.parametrize("outliers", [0.0, 0.2])
+def test_rate_and_offset_through_jitter_and_outliers(jitter: float, outliers: float) -> None:
+    for seed in range(60):
+        rng, own, true, rate = clocks(seed)
+        wrong = rng.random(len(own)) < outliers
+        fit = fit_clock(own, true + rng.normal(0, jitter, len(own)) + wrong * rng.normal(0, 100, len(own)))
+        assert_as_promised(fit, own, true, rate)
+        assert shortfall(fit) == ""
+        assert 0.8 * jitter < fit.spread_s < 1.2 * jitter
+
+
+@pytest.mark.parametrize("kind", ["uniform", "exponential", "steps of a stamp"])
+def test_under_stamps_that_are_only_late(kind: str) -> None:
+    for seed in range(40):
+        rng, own, true, rate = clocks(seed, 6000, 1200.0)
+        late = rng.uniform(0, 0.85, len(own)) if kind == "uniform" else rng.exponential(0.2, len(own))
+        stamps = true + late
+        if kind == "steps of a stamp":
+            stamps = np.ceil(stamps * 1000) / 1000
+        fit = fit_clock(own, stamps, late=True)
+        assert_as_promised(fit, own, true, rate)
+        assert shortfall(fit) == ""
+        # Through them, it would be off by the mean delay.
+        assert abs(fit_clock(own, stamps).to_reference(300.0) - fit.to_reference(300.0)) > 0.1
+
+
+def test_a_few_early_stamps_do_not_lift_the_line_off() -> None:
+    for seed in range(30):
+        rng, own, true, rate = clocks(seed, 6000, 1200.0)
+        stamps = true + rng.uniform(0, 0.85, len(own))
+        early = rng.choice(len(own), 6, replace=False)
+        stamps[early] -= rng.uniform(1.0, 500.0, 6)
+        fit = fit_clock(own, stamps, late=True)
+        assert_as_promised(fit, own, true, rate)
+        assert not fit.used[early].any()
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**31),
+    pairs=st.integers(3, 2000),
+    jitter=st.floats(0, 0.05),
+    late=st.booleans(),
+    long=st.floats(1.0, 5000.0),
+)
+def test_what_is_not_said_to_fall_short_is_as_promised(
+    seed: int, pairs: int, jitter: float, late: bool, long: float
+) -> None:
+    rng, own, true, rate = clocks(seed, pairs, long)
+    noise = rng.uniform(0, 10 * jitter, pairs) if late else rng.normal(0, jitter, pairs)
+    fit = fit_clock(own, true + noise, late)
+    said = shortfall(fit)
+    if not said:
+        # Three standard deviations are not certainty.
+        at = np.array([0, -1])
+        assert np.abs(fit.to_reference(own[at]) - true[at]).max() < 0.015
+        assert abs(fit.rate - rate) < 1.5e-4
+    else:
+        assert f"{fit.used.sum()} pairs" in said
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_standard_deviations_are_those_of_many_clocks(late: bool) -> None:
+    off = []
+    for seed in range(200):
+        rng, own, true, rate = clocks(seed, 500)
+        noise = rng.exponential(0.2, 500) if late else rng.normal(0, 0.03, 500)
+        fit = fit_clock(own, true + noise, late)
+        middle = float(np.interp(fit.own_0, own, true))
+        off.append([(fit.reference_0 - middle) / fit.middle_sd_s, (fit.rate - rate) / fit.rate_sd])
+    rms = np.sqrt(np.mean(np.square(off), axis=0))
+    assert (rms > 0.4).all() and (rms < 1.3).all()
+
+
+def test_residuals_that_go_together_count_for_fewer() -> None:
+    off = []
+    for seed in range(100):
+        rng, own, true, _ = clocks(seed, 1000)
+        noise = np.zeros(1000)
+        for i in range(1, 1000):
+            noise[i] = 0.9 * noise[i - 1] + rng.normal(0, 0.01)
+        fit = fit_clock(own, true + noise)
+        off.append((fit.reference_0 - float(np.interp(fit.own_0, own, true))) / fit.middle_sd_s)
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
+
+
+def test_a_wrong_rate_is_found_and_a_right_one_is_not() -> None:
+    for seed in range(40):
+        rng, own, true, rate = clocks(seed)
+        found = rate_is_off(fit_clock(own, true + rng.normal(0, 0.03, len(own))))
+        assert (found is not None) == (abs(rate - 1) > 2.5e-4) or abs(rate - 1) < 1e-3
+        if found is not None:
+            assert found.low < rate < found.high
+            assert found.drift_s == pytest.approx((rate - 1) * (own[-1] - own[0]), abs=0.05)
+            assert ("slow" if rate > 1 else "fast") in found.sentence
+            assert f"{found.pairs} pairs" in found.sentence
+        right = fit_clock(own, EPOCH + 2.0 + own * (1 + 5e-5) + rng.normal(0, 0.03, len(own)))
+        assert rate_is_off(right) is None
+
+
+def test_few_pairs_say_that_they_do_not_tell() -> None:
+    fit = fit_clock([1.0, 2.0], [11.0, 12.0])
+    assert fit.to_reference(3.0) == pytest.approx(13.0)
+    assert "2 pairs" in shortfall(fit)
+    assert rate_is_off(fit) is None
+    one = fit_clock([4.0], [9.0])
+    assert one.rate == 1.0 and one.offset_s == pytest.approx(5.0)
+    assert np.isinf(one.sd_at(4.0))
+    rng = np.random.default_rng(1)
+    own = np.linspace(0, 60, 30)
+    said = shortfall(fit_clock(own, 3 + own + rng.normal(0, 0.05, 30)))
+    assert "the offset to" in said and "the rate to" in said and "pairs of stamps over 60 s" in said
+
+
+def test_missing_stamps_are_left_out() -> None:
+    own = np.array([0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
+    fit = fit_clock(own, [10.0, 11.0, 12.0, np.nan, 14.0, 15.0])
+    assert np.isnan(fit.residual).tolist() == [False, False, True, True, False, False]
+    assert fit.used.tolist() == [True, True, False, False, True, True]
+    assert fit.rate == pytest.approx(1.0)
+    with pytest.raises(WildlabError, match="no stamp of one clock goes with one of the other"):
+        fit_clock([np.nan], [1.0])
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_stamps_that_are_all_alike_have_no_rate(late: bool) -> None:
+    fit = fit_clock([5.0] * 10, [7.0, 7.1] * 5, late)
+    assert fit.rate == 1.0
+    assert np.isinf(fit.rate_sd)
+    assert rate_is_off(fit) is None
