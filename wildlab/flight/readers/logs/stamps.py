@@ -1,0 +1,84 @@
+"""Which rows of a part have stamps that run: the others are marked, not dropped."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Flags = NDArray[np.bool_]
+
+#: Stamps further than this from the middle one are of no flight that the others are of.
+LONGEST_S = 86400.0
+
+
+def longest_increasing(stamps: ArrayLike) -> Flags:
+    """The largest choice of rows whose stamps strictly increase, so that one wrong stamp costs one row.
+
+    Parameters
+    ----------
+    stamps
+        (N,) finite numbers.
+
+    Returns
+    -------
+    (N,) bool
+
+    Examples
+    --------
+    >>> longest_increasing([1, 2, 90, 3, 3, 4]).tolist()
+    [True, True, False, True, False, True]
+    """
+    values = np.asarray(stamps)
+    if len(values) < 2 or (np.diff(values) > 0).all():
+        return np.ones(len(values), bool)
+    # Row that ends the best run of each length, and the row before each row in its run.
+    tails: list[float] = []
+    ends: list[int] = []
+    before: list[int] = []
+    for at, value in enumerate(values.tolist()):
+        place = bisect_left(tails, value)
+        before.append(ends[place - 1] if place else -1)
+        if place == len(tails):
+            tails.append(value)
+            ends.append(at)
+        elif value < tails[place]:
+            tails[place], ends[place] = value, at
+    chosen = np.zeros(len(values), bool)
+    at = ends[-1]
+    while at >= 0:
+        chosen[at] = True
+        at = before[at]
+    return chosen
+
+
+def stamps_that_fail(stamps: ArrayLike) -> dict[str, Flags]:
+    """Reason -> (N,) rows whose stamps (N,), s, cannot be used, as `make_stream` takes them.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s; NaN where there is none.
+
+    Returns
+    -------
+    dict
+        What is left has finite stamps that strictly increase.
+    """
+    values = np.asarray(stamps, float)
+    finite = np.isfinite(values)
+    far = np.zeros(len(values), bool)
+    if finite.any():
+        with np.errstate(over="ignore"):
+            far[finite] = np.abs(values[finite] - np.median(values[finite])) > LONGEST_S
+    near = finite & ~far
+    runs = np.zeros(len(values), bool)
+    runs[near] = longest_increasing(values[near])
+    repeated = near & ~runs & np.isin(values, values[runs])
+    return {
+        "no time": ~finite,
+        "a stamp more than a day from the others": far,
+        "a repeated stamp": repeated,
+        "a stamp out of order": near & ~runs & ~repeated,
+    }
