@@ -1,0 +1,162 @@
+"""GPX: values as gpxpy has them, damage, and what no parser may be asked to do."""
+
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import gpxpy
+import numpy as np
+import pytest
+
+from tests.flight.readers.tracks import check, survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import gpx
+
+START = datetime(2026, 6, 1, 10, tzinfo=UTC)
+SAMPLES = ("around-visnjan-with-car", "cerknicko-jezero", "Mojstrovka", "korita-zbevnica")
+
+
+def point(k: int, lat: object = None, inside: str | None = None, stamp: object = None) -> str:
+    at = (START + timedelta(seconds=k)).strftime("%Y-%m-%dT%H:%M:%SZ") if stamp is None else stamp
+    body = f"<ele>{100 + k}</ele><time>{at}</time>" if inside is None else inside
+    return f'<trkpt lat="{63 + k * 1e-4 if lat is None else lat}" lon="10.5">{body}</trkpt>'
+
+
+def document(*segments: str, head: str = "", version: str = "1.1") -> bytes:
+    body = "".join(f"<trkseg>{one}</trkseg>" for one in segments)
+    return f'{head}<gpx version="{version}" creator="x"><trk><name>n</name>{body}</trk></gpx>'.encode()
+
+
+def track(count: int = 10) -> str:
+    return "".join(map(point, range(count)))
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_equals_gpxpy(name, shared_data):
+    path = shared_data("logs", "target_gpx", f"{name}.gpx")
+    data = path.read_bytes()
+    assert gpx.recognise(data[:8192], path.name)
+    log = gpx.read(path, data)
+    check(log)
+    assert not log.lost
+    stream = log.parts["gnss"]
+    points = [p for t in gpxpy.parse(data.decode()).tracks for s in t.segments for p in s.points]
+    assert len(stream) == len(points)
+    for row, p in zip(np.argsort(stream.rows), points, strict=True):
+        assert stream.columns["latitude_deg"][row] == p.latitude
+        assert stream.columns["longitude_deg"][row] == p.longitude
+        height = stream.columns["height_sea_m"][row]
+        assert np.isnan(height) if p.elevation is None else height == p.elevation
+        at = stream.columns["time_s"][row]
+        assert np.isnan(at) if p.time is None else at == p.time.timestamp()
+
+
+def test_times_that_cannot_be_true(shared_data):
+    path = shared_data("logs", "target_gpx", "Mojstrovka.gpx")
+    log = gpx.read(path, path.read_bytes())
+    assert set(log.parts["gnss"].columns["why"]) == {"impossible time"}
+    assert "no point carries a time that can be true" in " ".join(log.notes)
+
+
+def test_no_times():
+    log = gpx.read(Path("x.gpx"), document("".join(point(k, inside="<ele>3</ele>") for k in range(5))))
+    assert log.parts["gnss"].used.all()
+    assert log.clock is None
+    assert "no point carries a time" in log.notes[0]
+
+
+def test_order_repetition_and_jumps():
+    body = [point(k) for k in range(20)]
+    body.insert(5, point(4, lat=63.001))
+    body.insert(9, point(0, stamp="2027-06-01T10:00:00Z"))
+    body.insert(15, point(12, lat=-30.0, stamp="2026-06-01T10:00:12.500Z"))
+    body.insert(16, point(12, lat=63.0013, inside="<ele>1</ele>"))
+    body.insert(17, point(0, lat=0.0).replace('lon="10.5"', 'lon="0.0"'))
+    log = gpx.read(Path("x.gpx"), document("".join(body)))
+    check(log)
+    why = log.parts["gnss"].columns["why"]
+    assert {k: one for k, one in enumerate(why) if one} == {
+        5: "repeated stamp",
+        9: "stamp out of order",
+        15: "impossible jump",
+        16: "no time",
+        17: "position is a placeholder",
+    }
+
+
+def test_segments_newest_first():
+    late, early = "".join(map(point, range(50, 60))), "".join(map(point, range(10)))
+    log = gpx.read(Path("x.gpx"), document(late, early))
+    assert log.parts["gnss"].used.all()
+    assert log.parts["gnss"].rows.tolist() == [*range(11, 21), *range(1, 11)]
+    assert any("put in order" in note for note in log.notes)
+    assert any(note.startswith("1 gap in it, the longest of 41 s") for note in log.notes)
+
+
+def test_speed_course_and_quality_of_gpx_1_0():
+    inside = "<time>2026-06-01T10:00:0{}Z</time><course>90</course><speed>5</speed>"
+    inside += "<geoidheight>40</geoidheight><fix>{}</fix><sat>7</sat><hdop>{}</hdop>"
+    cases = [("3d", 1.0), ("none", 1.0), ("dgps", 99.9), ("2d", 1.5)]
+    body = "".join(point(k, inside=inside.format(k, *case)) for k, case in enumerate(cases))
+    columns = gpx.read(Path("x.gpx"), document(body, version="1.0")).parts["gnss"].columns
+    np.testing.assert_allclose(columns["v_east_m_s"], 5.0)
+    np.testing.assert_allclose(columns["v_north_m_s"], 0.0, atol=1e-12)
+    assert columns["fix"].tolist() == [3.0, 0.0, 4.0, 2.0]
+    assert columns["why"].tolist() == ["", "no fix", "no dilution of precision", ""]
+    assert columns["undulation_m"].tolist() == [40.0] * 4
+
+
+@pytest.mark.parametrize("codec", ["utf-8-sig", "utf-16", "latin-1"])
+def test_encodings_and_line_ends(codec):
+    text = document(track()).decode().replace("<name>n</name>", "<name>Sæl =1+1</name>\r\n")
+    head = '<?xml version="1.0" encoding="ISO-8859-1"?>\r\n' if codec == "latin-1" else ""
+    data = (head + text).encode(codec)
+    assert gpx.recognise(data[:8192], "x")
+    log = gpx.read(Path("x.gpx"), data)
+    assert len(log.parts["gnss"]) == 10
+    assert not log.lost
+
+
+@pytest.mark.parametrize("codec", ["utf-8", "utf-16", "utf-16-le"])
+def test_entities_are_refused(codec):
+    lol = '<!DOCTYPE gpx [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]>'
+    data = (lol + document(track()).decode()).encode(codec)
+    if codec == "utf-16-le":
+        with pytest.raises(WildlabError):
+            gpx.read(Path("x.gpx"), data)
+        return
+    with pytest.raises(WildlabError, match="declares a document type or entities"):
+        gpx.read(Path("x.gpx"), data)
+
+
+def test_depth_is_bounded():
+    data = document(point(0, inside="<a>" * 100000 + "</a>" * 100000))
+    with pytest.raises(WildlabError, match="nested more than 64 deep"):
+        gpx.read(Path("x.gpx"), data)
+
+
+def test_no_track():
+    with pytest.raises(WildlabError, match="has no point of a track"):
+        gpx.read(Path("x.gpx"), b'<gpx version="1.1"><wpt lat="1" lon="2"/></gpx>')
+    with pytest.raises(WildlabError, match="has no point of a track; 1 are broken"):
+        gpx.read(Path("x.gpx"), b'<gpx version="1.1"><trk><trkseg><trkpt lat="1" lon="2">')
+
+
+def test_broken_points_are_counted():
+    body = track(6).replace("<ele>102</ele>", "<ele>102</el>").replace('lat="63.0004"', 'lat="sixty"')
+    log = gpx.read(Path("x.gpx"), document(body))
+    assert log.parts["gnss"].rows.tolist() == [1, 2, 3, 4]
+    assert log.lost == ("2 points of 6 could not be read",)
+
+
+def test_points_that_never_end_cost_no_more_than_others():
+    begun = time.perf_counter()
+    with pytest.raises(WildlabError):
+        gpx.read(Path("x.gpx"), b"<gpx><trk><trkseg>" + b'<trkpt lat="1" lon="1">' * 200000)
+    assert time.perf_counter() - begun < 20
+
+
+def test_damage(shared_data):
+    assert survives(gpx.read, document(track(40))) > 100
+    data = shared_data("logs", "target_gpx", "around-visnjan-with-car.gpx").read_bytes()
+    assert survives(gpx.read, data, every=2) > 50

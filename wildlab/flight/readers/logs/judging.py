@@ -1,0 +1,219 @@
+"""What the readers of tracks share: text of any encoding, numbers that may be none, rows that cannot be true.
+
+A row is judged by what it says and by its neighbours; nothing is dropped here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.flight.readers.logs.log import HEIGHTS
+from wildlab.flight.schema import DOWN, SPEED
+from wildlab.flight.time.leap_seconds import GPS_START_S
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: No log is from before GPS, none from after this, s since 1970.
+LATEST_S = datetime(2100, 1, 1, tzinfo=UTC).timestamp()
+#: Receivers that have no place say zero and zero; so near to it nobody flies, degrees.
+_NOWHERE_DEG = 1e-6
+#: Receivers that have no dilution of precision say 99, 99.9 or 99.99.
+NO_DILUTION = 99.0
+#: A gap is so many usual steps long, and at least as many seconds.
+_GAP_STEPS, _GAP_S = 5.0, 2.0
+_EARTH_M = 6371e3
+_HEIGHTS = tuple(name for name in HEIGHTS if name.startswith("height"))
+
+
+def decode(data: bytes) -> str:
+    """Text of a file in UTF-8, in UTF-16 with its mark, or else in Latin-1; never fails."""
+    for mark, codec in ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be")):
+        if data.startswith(mark):
+            return data[len(mark) :].decode(codec, "replace")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+#: Plain decimal numbers only: `float` would read "1_0", "nan" and "infinity" too.
+_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?\s*", re.ASCII)
+
+
+def number(text: str | bytes | None) -> float:
+    """A plain decimal number, NaN where the text is none."""
+    if not text:
+        return math.nan
+    if isinstance(text, bytes):
+        text = text.decode("latin-1")
+    if len(text) > 64 or not _NUMBER.fullmatch(text):
+        return math.nan
+    value = float(text)
+    return value if math.isfinite(value) else math.nan
+
+
+def numbers(texts: Iterable[str | bytes | None]) -> Array:
+    """(N,) plain decimal numbers, NaN where a text is none."""
+    return np.array([number(text) for text in texts], dtype=float)
+
+
+def plural(count: int, singular: str, several: str | None = None) -> str:
+    """``"1 row"``, ``"2 rows"``."""
+    return f"{count} {singular if count == 1 else several or singular + 's'}"
+
+
+def _between(values: Array, bounds: tuple[float, float]) -> Mask:
+    """True where a value is missing, too."""
+    return ~((values < bounds[0]) | (values > bounds[1]))
+
+
+def _increasing(time: Array) -> Mask:
+    """A longest strictly increasing subsequence: one wrong stamp costs one row, whichever way it is wrong."""
+    chosen = np.zeros(len(time), bool)
+    if len(time) < 2 or bool(np.all(np.diff(time) > 0)):
+        chosen[:] = True
+        return chosen
+    tails: list[float] = []
+    at: list[int] = []
+    before = np.full(len(time), -1)
+    for i, value in enumerate(time.tolist()):
+        place = bisect_left(tails, value)
+        before[i] = at[place - 1] if place else -1
+        if place == len(tails):
+            tails.append(value)
+            at.append(i)
+        elif value < tails[place]:
+            # An equal stamp leaves the earlier row in place.
+            tails[place], at[place] = value, i
+    i = at[-1]
+    while i >= 0:
+        chosen[i] = True
+        i = int(before[i])
+    return chosen
+
+
+def _metres(latitude: Array, longitude: Array, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    """m between the rows i and j, on a sphere: good to 0.5 %, which is enough for what is impossible."""
+    p, q = np.radians(latitude[i]), np.radians(latitude[j])
+    turned = np.radians(longitude[j] - longitude[i])
+    half = np.sin((q - p) / 2) ** 2 + np.cos(p) * np.cos(q) * np.sin(turned / 2) ** 2
+    return np.asarray(2 * _EARTH_M * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0))))
+
+
+def _reachable(time: Array, latitude: Array, longitude: Array) -> Mask:
+    """Rows that can be reached from the longest unbroken run of rows, at a speed that the schema allows."""
+    count = len(time)
+    every = np.arange(count)
+    far = _metres(latitude, longitude, every[:-1], every[1:]) > SPEED[1] * np.diff(time)
+    if not far.any():
+        return np.ones(count, bool)
+    starts = np.r_[0, np.flatnonzero(far) + 1]
+    ends = np.r_[starts[1:], count]
+    kept = np.zeros(count, bool)
+    longest = int(np.argmax(ends - starts))
+    kept[starts[longest] : ends[longest]] = True
+
+    def near(i: int, j: int) -> bool:
+        away = _metres(latitude, longitude, np.array([i]), np.array([j]))[0]
+        return bool(away <= SPEED[1] * abs(time[j] - time[i]))
+
+    last = ends[longest] - 1
+    for k in range(longest + 1, len(starts)):
+        if near(last, starts[k]):
+            kept[starts[k] : ends[k]] = True
+            last = ends[k] - 1
+    first = starts[longest]
+    for k in range(longest - 1, -1, -1):
+        if near(ends[k] - 1, first):
+            kept[starts[k] : ends[k]] = True
+            first = starts[k]
+    return kept
+
+
+def judge(
+    columns: Mapping[str, ArrayLike], unusable: Mapping[str, ArrayLike] | None = None
+) -> dict[str, Mask]:
+    """Why rows of a part with places cannot be used, beside what the format itself says of them.
+
+    Parameters
+    ----------
+    columns
+        As for `make_stream`; ``time_s``, ``latitude_deg`` and ``longitude_deg`` among them.
+    unusable
+        Reason -> (N,) bool, as the format has it; these come first.
+
+    Returns
+    -------
+    dict
+        Reason -> (N,) bool for `make_stream`. Rows without any reason have a place, a time (if any row has
+        one), a height (if most rows have one) and strictly increasing times.
+    """
+    have = {name: np.asarray(values, float) for name, values in columns.items() if name not in ("file",)}
+    latitude, longitude, time = have["latitude_deg"], have["longitude_deg"], have["time_s"]
+    found = {reason: np.asarray(mask, bool) for reason, mask in (unusable or {}).items()}
+    placed = np.isfinite(latitude) & np.isfinite(longitude)
+    found["no position"] = ~placed
+    found["impossible position"] = placed & ((np.abs(latitude) > 90) | (np.abs(longitude) > 360))
+    found["position is a placeholder"] = (np.abs(latitude) < _NOWHERE_DEG) & (
+        np.abs(longitude) < _NOWHERE_DEG
+    )
+    heights = [have[name] for name in _HEIGHTS if name in have]
+    found["impossible height"] = np.zeros(len(time), bool)
+    for height in heights:
+        found["impossible height"] |= ~_between(-height, DOWN)
+    found["impossible speed"] = np.zeros(len(time), bool)
+    for name in ("v_north_m_s", "v_east_m_s", "v_down_m_s"):
+        if name in have:
+            found["impossible speed"] |= ~_between(have[name], SPEED)
+    if "hdop" in have:
+        found["no dilution of precision"] = have["hdop"] >= NO_DILUTION
+    if np.isfinite(time).any():
+        found["no time"] = np.isnan(time)
+        found["impossible time"] = (time < GPS_START_S) | (time > LATEST_S)
+    bad = np.logical_or.reduce(list(found.values()))
+    if heights:
+        without = np.logical_and.reduce([np.isnan(height) for height in heights])
+        if without[~bad].mean() < 0.5 if (~bad).any() else False:
+            found["no height"] = without
+            bad |= without
+    _judge_order(time, latitude, longitude, bad, found)
+    return found
+
+
+def _judge_order(time: Array, latitude: Array, longitude: Array, bad: Mask, found: dict[str, Mask]) -> None:
+    good = np.flatnonzero(~bad & np.isfinite(time))
+    if not len(good):
+        return
+    kept = _increasing(time[good])
+    stamps = np.sort(time[good[kept]])
+    left = good[~kept]
+    place = np.clip(np.searchsorted(stamps, time[left]), 0, len(stamps) - 1)
+    again = stamps[place] == time[left]
+    for reason, rows in (("repeated stamp", left[again]), ("stamp out of order", left[~again])):
+        found[reason] = np.zeros(len(time), bool)
+        found[reason][rows] = True
+    good = good[kept]
+    found["impossible jump"] = np.zeros(len(time), bool)
+    found["impossible jump"][good[~_reachable(time[good], latitude[good], longitude[good])]] = True
+
+
+def gaps(time: Array, use: ArrayLike) -> list[str]:
+    """A sentence on where a track is silent, or none."""
+    kept = time[np.asarray(use, bool)]
+    steps = np.diff(kept[np.isfinite(kept)])
+    if len(steps) < 3:
+        return []
+    usual = float(np.median(steps))
+    long = steps[steps > max(_GAP_STEPS * usual, _GAP_S)]
+    if not len(long):
+        return []
+    found = plural(len(long), "gap")
+    return [f"{found} in it, the longest of {long.max():.4g} s, where steps are usually {usual:.3g} s"]
