@@ -51,7 +51,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     "photos": (
         *("file", *_PLACE, "roll_deg", "pitch_deg", "yaw_deg"),
         *("roll_world_deg", "pitch_world_deg", "yaw_world_deg", "sd_horizontal_m", "sd_vertical_m", "fix"),
-        *("width_px", "height_px", "focal_mm", "focal_px", "focal_35mm", "camera"),
+        *("width_px", "height_px", "focal_mm", "focal_px", "focal_35mm", "focal_from", "camera"),
     ),
     # Surveyed points that do not move.
     "marks": ("name", *_PLACE, "sd_horizontal_m", "sd_vertical_m"),
@@ -62,7 +62,7 @@ PARTS: dict[str, tuple[str, ...]] = {
     ),
 }
 #: Columns of text; all others are numbers.
-TEXTS = frozenset({"why", "file", "camera", "name", "image"})
+TEXTS = frozenset({"why", "file", "camera", "focal_from", "name", "image"})
 
 
 class Clock(NamedTuple):
