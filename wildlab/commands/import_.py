@@ -11,7 +11,7 @@ import click
 from wildlab.commands.shared import FILE, FOLDER
 from wildlab.commands.terrain import says_of, terrain_options
 from wildlab.errors import WildlabError
-from wildlab.terminal import print_json, print_table, sentence, shown
+from wildlab.terminal import print_json, print_table, shown, stopped
 
 if TYPE_CHECKING:
     from wildlab.flight.card.importing import Card
@@ -189,10 +189,10 @@ def _say(card: Card, as_json: bool) -> None:
     said = [*sentences_of(card.choices), *card.proposal.said]
     if as_json:
         files = [dict(zip(HEADINGS, row, strict=True)) for row in rows]
-        print_json({"files": files, "said": [sentence(one) for one in said]})
+        print_json({"files": files, "said": [stopped(one) for one in said]})
         return
     # The rest of each row is told in sentences: a terminal is narrow.
     short = [HEADINGS.index(one) for one in ("file", "format", "begins (UTC)", "lasts", "role")]
     print_table([HEADINGS[i] for i in short], [[row[i] for i in short] for row in rows], err=True)
     for one in said:
-        click.echo(sentence(one), err=True)
+        click.echo(stopped(one), err=True)

@@ -12,8 +12,10 @@ from typing import Any
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def dump_toml(data: Mapping[str, Any]) -> str:
+def dump_toml(data: Mapping[str, Any], *, inline: bool = False) -> str:
     """TOML text of nested mappings.
+
+    With `inline`, mappings of plain values inside others stand on one line, as people write recipes.
 
     Values are strings, booleans, integers, finite floats, dates, times, and lists of these; a list of
     mappings is written as an array of tables. Keys whose value is None are left out: TOML has no null.
@@ -26,16 +28,18 @@ def dump_toml(data: Mapping[str, Any]) -> str:
         For any other kind of value.
     """
     lines: list[str] = []
-    _table(data, (), lines)
+    _table(data, (), lines, inline)
     return "\n".join(lines).strip("\n") + "\n"
 
 
-def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
+def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str], inline: bool) -> None:
     below = []
     for key, value in data.items():
         if value is None:
             continue
-        if isinstance(value, Mapping) or (
+        if inline and path and _is_plain(value):
+            lines.append(f"{_key(key)} = {_value(value)}")
+        elif isinstance(value, Mapping) or (
             isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value)
         ):
             below.append((key, value))
@@ -49,7 +53,18 @@ def _table(data: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> 
             else [(item, f"[[{name}]]") for item in value]
         ):
             lines += ["", header]
-            _table(item, (*path, key), lines)
+            _table(item, (*path, key), lines, inline)
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a mapping, or each mapping of a list, has plain values only."""
+    several = value if isinstance(value, list | tuple) and value else [value]
+    return all(
+        isinstance(one, Mapping)
+        and one
+        and not any(isinstance(part, Mapping | list | tuple) for part in one.values())
+        for one in several
+    )
 
 
 def _key(key: str) -> str:
@@ -76,6 +91,9 @@ def _value(value: Any) -> str:
         return value.isoformat().replace("+00:00", "Z")
     if isinstance(value, date | time):
         return value.isoformat()
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items() if one is not None)
+        return f"{{ {inner} }}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(_value(item) for item in value)}]"
     raise TypeError(f"TOML has no place for a {type(value).__name__}")

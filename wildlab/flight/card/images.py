@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
 from wildlab.flight.manifest import CameraPart
@@ -59,8 +60,26 @@ def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPa
         return stated, "as you stated it"
     if images.log is None:
         return None, images.problem
-    found, how = camera_of(images.log)
-    return (None if found is None else CameraPart.model_validate(found)), how
+    try:
+        found = camera_of(images.log)
+    except WildlabError as error:
+        return None, error.problem
+    if found is None:
+        return None, "no tag of theirs says the focal length in pixels"
+    width, height, focal = found["width_px"], found["height_px"], found["focal_px"]
+    camera = CameraPart(
+        name=found["camera"] or "not stated",
+        width_px=width,
+        height_px=height,
+        fx_px=focal,
+        fy_px=focal,
+        cx_px=(width - 1) / 2,
+        cy_px=(height - 1) / 2,
+    )
+    return camera, (
+        f"{width} x {height} px with a focal length of {focal:.0f} px by {found['how']}; its centre and a "
+        "lens without distortion are assumed"
+    )
 
 
 def clock_of_images(

@@ -35,6 +35,8 @@ from wildlab.flight.toml import dump_toml
 
 #: Rows that can be used.
 USED: list[dict[str, Any]] = [{"column": "use", "equals": 1.0}]
+#: Rows that have a time; an image without a place is one.
+TIMED: list[dict[str, Any]] = [{"column": "time_s", "above": 0.0}]
 UTC = {"column": "time_s", "format": "unix"}
 #: Below any angle in degrees: a condition that leaves rows without one out.
 NO_ANGLE = -1e6
@@ -87,7 +89,7 @@ class Proposal:
             role = one.role + (f" {one.target}" if one.target else "")
             lines.append(_comment(f"{one.found.name}: {role} ({one.why})"))
         lines += [_comment(one) for one in self.said]
-        return "\n".join(lines) + "\n\n" + dump_toml(self.data)
+        return "\n".join(lines) + "\n\n" + dump_toml(self.data, inline=True)
 
 
 def _comment(text: str) -> str:
@@ -352,7 +354,7 @@ def _frames(
     if clock.kind == "sequence":
         data["time"] = {"kind": "sequence"}
     else:
-        frames |= {"time": UTC, "where": USED}
+        frames |= {"time": UTC, "where": TIMED}
     if clock.offset_s:
         data["clocks"] = {"camera_offset_s": clock.offset_s}
     data["frames"] = frames

@@ -122,9 +122,7 @@ def walk(data: bytes) -> Frames:
             skipped, places = skipped + pos - covered, places + 1
         pos = covered = end
     table = np.array(rows, dtype=np.int64).reshape(-1, 7).T
-    return Frames(
-        data, table[0] / 1e6, *table[1:], damaged, dict(unknown), skipped, places, length - covered
-    )
+    return Frames(data, table[0] / 1e6, *table[1:], damaged, dict(unknown), skipped, places, length - covered)
 
 
 def _begins(data: bytes, at: int) -> bool:

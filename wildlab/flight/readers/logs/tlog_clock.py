@@ -131,7 +131,9 @@ def _notes(
             "not known"
         )
     if runs > 1:
-        notes.append(f"the vehicle was switched on {runs - 1} more times within it; each has a clock of its own")
+        notes.append(
+            f"the vehicle was switched on {runs - 1} more times within it; each has a clock of its own"
+        )
     return notes
 
 

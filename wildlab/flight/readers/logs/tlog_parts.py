@@ -279,9 +279,7 @@ def _without_empty(columns: dict[str, Array]) -> dict[str, Array]:
     return {name: one for name, one in columns.items() if name.startswith("time") or not np.isnan(one).all()}
 
 
-def _stream(
-    part: str, columns: dict[str, Array], found: Messages, wrong: dict[str, Flags]
-) -> Stream | None:
+def _stream(part: str, columns: dict[str, Array], found: Messages, wrong: dict[str, Flags]) -> Stream | None:
     if not len(found):
         return None
     bad = np.zeros(len(found), bool)
