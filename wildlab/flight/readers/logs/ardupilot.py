@@ -1,0 +1,168 @@
+"""Messages of ArduPilot as parts of a log, in all generations of their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import ardupilot_motion as motion
+from wildlab.flight.readers.logs.ardupilot_messages import Table
+from wildlab.flight.readers.logs.ardupilot_time import Times, gps_utc, own_stamps, placed, times, true_fix
+from wildlab.flight.readers.logs.log import RawLog, Stream
+
+Array = NDArray[np.float64]
+
+#: What an autopilot of this family calls itself, with its version.
+_VEHICLE = re.compile(
+    r"\b(?:Ardu\w+|APM:?\w+|AntennaTracker|Blimp|Rover|Sub)\s+V?\d[\w.()-]*(?: \([0-9a-f]+\))?"
+)
+
+
+def raw_log(
+    path: Path, format_: str, tables: dict[str, Table], lost: Sequence[str], counted_in: str, title: str = ""
+) -> RawLog:
+    """A log of messages.
+
+    Parameters
+    ----------
+    path
+        Only for messages.
+    format_
+        As in `formats.FORMATS`.
+    tables
+        Messages by name.
+    lost
+        Sentences on what could not be read.
+    counted_in
+        What `Table.rows` counts.
+    title
+        What the file says of the vehicle outside of messages.
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    WildlabError
+        Where PX4 wrote it, or no message tells of motion or images.
+    """
+    if any(name in tables and tables[name].has(one) for name, one in (("ATT", "qw"), ("TIME", "StartTime"))):
+        problem = "is a log of PX4's old format sdlog2, whose messages have other units under the same names"
+        raise WildlabError(problem, "log with a newer PX4, as .ulg", file=path)
+    receivers = [one for one in motion.sensors(tables, ("GPS", "GPS2", "GPS3")) if one.has("Lat", "Lng")]
+    receiver = next((one for one in receivers if true_fix(one).any()), receivers[0] if receivers else None)
+    when = times(tables, receiver)
+    parts: dict[str, Stream | None] = {}
+    place = next(
+        (one for name in ("POS", "AHR2", "XKF1", "NKF1") if (one := motion.place_of(name, tables, when))),
+        None,
+    )
+    if receiver is not None:
+        satellites = motion.gnss(receiver, tables, when, counted_in)
+        parts["gnss"] = satellites
+        place = place or motion.place_of_gnss(satellites, receiver)
+    parts["poses"] = motion.poses(tables, when, place, counted_in)
+    parts["imu"] = motion.imu(tables, when, counted_in)
+    parts["magnetometer"] = motion.magnetometer(tables, when, counted_in)
+    parts["gimbal"] = _gimbal(tables, when, counted_in)
+    parts["triggers"] = _triggers(tables, when, counted_in)
+    found = {name: part for name, part in parts.items() if part is not None}
+    if not found:
+        problem = "has no message of attitude, position, sensors or images"
+        raise WildlabError(problem, "log these messages (LOG_BITMASK of the autopilot)", file=path)
+    notes = _notes(tables, when, found, receivers, receiver, place)
+    return RawLog(format_, found, _vehicle(tables, title), when.clock, tuple(lost), tuple(notes))
+
+
+def _vehicle(tables: dict[str, Table], title: str) -> str:
+    said = [text for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
+            for text in tables[name].texts(field)]  # fmt: skip
+    for text in [*said, title]:
+        if match := _VEHICLE.search(text):
+            return match.group()
+    return ""
+
+
+def _gimbal(tables: dict[str, Table], when: Times, counted_in: str) -> Stream | None:
+    """Where the first gimbal looks: against north and the horizon, and its yaw against the airframe."""
+    found = [one for one in motion.sensors(tables, ("MNT", "MNT1", "MOUNT")) if one.has("Roll", "Pitch")]
+    if not found:
+        return None
+    table = found[0]
+    columns = {
+        "roll_world_deg": table.numbers("Roll", unit="deg"),
+        "pitch_world_deg": table.numbers("Pitch", unit="deg"),
+    }
+    if table.has("YawE"):
+        columns["yaw_world_deg"] = table.numbers("YawE", unit="deg")
+    if table.has("YawB"):
+        columns["pan_deg"] = table.numbers("YawB", unit="deg")
+    known = np.logical_and.reduce([np.isfinite(one) for one in columns.values()])
+    return motion.stream(
+        "gimbal", columns, when.of(table), when, table.rows, counted_in, {"no angle": ~known}
+    )
+
+
+def _triggers(tables: dict[str, Table], when: Times, counted_in: str) -> Stream | None:
+    """When the camera took an image: messages CAM, else TRIG, of the first camera."""
+    found = [one for one in motion.sensors(tables, ("CAM", "TRIG")) if one.has("Lat", "Lng")]
+    if not found:
+        return None
+    table = found[0]
+    stamps = own_stamps(table)
+    if stamps is None:
+        # The first generation stamps them with GPS time alone.
+        stamps = when.stamp_of(gps_utc(table))
+        stamps = np.where(np.isfinite(stamps), stamps, when.of(table))
+    get = table.numbers
+    latitude, longitude = get("Lat", unit="deg"), get("Lng", unit="deg")
+    columns = {"latitude_deg": latitude, "longitude_deg": longitude}
+    if table.has("RelAlt"):
+        # Without it, copters and planes meant different things by `Alt`.
+        columns |= {"height_sea_m": get("Alt", unit="m"), "height_home_m": get("RelAlt", unit="m")}
+    columns |= {
+        "roll_deg": get("Roll", "R", unit="deg"),
+        "pitch_deg": get("Pitch", "P", unit="deg"),
+        "yaw_deg": get("Yaw", "Y", unit="deg"),
+    }
+    if table.has("Img"):
+        columns["number"] = get("Img")
+    unusable = {"no place": ~placed(latitude, longitude)}
+    return motion.stream("triggers", columns, stamps, when, table.rows, counted_in, unusable)
+
+
+def _notes(
+    tables: dict[str, Table],
+    when: Times,
+    found: dict[str, Stream],
+    receivers: list[Table],
+    receiver: Table | None,
+    place: motion.Place | None,
+) -> list[str]:
+    notes = []
+    if "imu" not in found:
+        notes.append("The log has no messages of an IMU: no rates of turn and no accelerations.")
+    if when.clock is None:
+        notes.append("Its messages carry no stamps.")
+    elif not when.clock.base:
+        notes.append("No fix of a satellite receiver tells the time: its stamps are not known in UTC.")
+    if "poses" in found and place is not None:
+        heights = [
+            name for name, of in (("sea level", place.sea), ("home", place.home)) if np.isfinite(of).any()
+        ]
+        above = " and ".join(heights)
+        notes.append(
+            f"Positions of poses are those of messages {place.name}; their heights count from {above}."
+        )
+    if receiver is not None and len(receivers) > 1:
+        number = 1 + next(i for i, one in enumerate(receivers) if one is receiver)
+        notes.append(f"It has {len(receivers)} satellite receivers; receiver {number} is used.")
+    if "triggers" in found and "height_sea_m" not in found["triggers"].columns:
+        notes.append("Heights of its messages CAM are left out: it does not say what they count from.")
+    return notes

@@ -1,0 +1,140 @@
+"""Time in ArduPilot logs: stamps since the board was switched on, and UTC from its satellite receiver."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.readers.logs.ardupilot_messages import Table
+from wildlab.flight.readers.logs.log import Clock
+from wildlab.flight.readers.logs.order import in_order
+from wildlab.flight.time.fitting import fit_clock
+from wildlab.flight.time.leap_seconds import week_to_utc
+
+Array = NDArray[np.float64]
+
+#: `Status` of a fix in space, as MAVLink numbers them.
+FIX_3D = 3
+#: The fitted rate is believed where it differs from 1 by so many of its standard deviations.
+SURE_RATE = 4.0
+
+
+class Times(NamedTuple):
+    """Stamps of a log, and what takes them to UTC.
+
+    Attributes
+    ----------
+    rows, stamps
+        (N,) where stamped messages stand in the file, and their stamps in s: for those that carry none.
+    clock
+        None where nothing in the log is stamped.
+    """
+
+    rows: NDArray[np.int64]
+    stamps: Array
+    clock: Clock | None
+
+    def of(self, table: Table) -> Array:
+        """(N,) s since the board was switched on; by their place in the file for messages without stamps."""
+        own = own_stamps(table)
+        if own is not None:
+            return own
+        if not len(self.rows):
+            return np.full(len(table), np.nan)
+        return np.interp(table.rows, self.rows, self.stamps, left=np.nan, right=np.nan)
+
+    def utc(self, stamps: Array) -> Array:
+        """(N,) s since 1970 of stamps; NaN where UTC is not known."""
+        if self.clock is None or not self.clock.base:
+            return np.full(len(stamps), np.nan)
+        return np.asarray(self.clock.offset_s + self.clock.rate * stamps)
+
+    def stamp_of(self, utc_s: Array) -> Array:
+        """(N,) stamps at which it was so late, s."""
+        if self.clock is None or not self.clock.base:
+            return np.full(len(utc_s), np.nan)
+        return np.asarray((utc_s - self.clock.offset_s) / self.clock.rate)
+
+
+def own_stamps(table: Table) -> Array | None:
+    """(N,) s since the board was switched on, of messages that carry them; NaN: 0, which is none."""
+    if table.has("SampleUS"):
+        # When the sensor was read, not when that was written down.
+        stamps = table.numbers("SampleUS") / 1e6
+        if (stamps > 0).any():
+            return np.where(stamps > 0, stamps, np.nan)
+    if table.has("TimeUS"):
+        return table.numbers("TimeUS") / 1e6
+    if _week_in_ms(table):
+        # The first generation calls milliseconds of the week TimeMS, and its stamp T.
+        return table.numbers("T") / 1e3 if table.has("T") else None
+    return table.numbers("TimeMS") / 1e3 if table.has("TimeMS") else None
+
+
+def gps_utc(table: Table) -> Array:
+    """(N,) s since 1970 by week and ms of the week of GPS or CAM messages; NaN where the week is 0."""
+    week = table.numbers("GWk", "Week", "GPSWeek")
+    ms = table.numbers("GMS", "TimeMS" if _week_in_ms(table) else "GMS", "GPSTime")
+    known = (week > 0) & (ms >= 0) & (ms < 7 * 86400e3)
+    return week_to_utc(np.where(known, week, np.nan), np.where(known, ms / 1e3, np.nan))
+
+
+def _week_in_ms(table: Table) -> bool:
+    return table.has("TimeMS") and table.has("Week") and not table.has("GMS")
+
+
+def placed(latitude: Array, longitude: Array) -> NDArray[np.bool_]:
+    """(N,) whether degrees are a place on Earth; 0, 0 stands for none."""
+    with np.errstate(invalid="ignore"):
+        on_earth = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180)
+    return np.asarray(on_earth & ((latitude != 0) | (longitude != 0)))
+
+
+def true_fix(table: Table) -> NDArray[np.bool_]:
+    """(N,) GPS messages with a fix in space, at a place, in a week."""
+    fixed = table.numbers("Status") >= FIX_3D
+    where = placed(table.numbers("Lat"), table.numbers("Lng"))
+    return np.asarray(fixed & where & np.isfinite(gps_utc(table)))
+
+
+def times(tables: dict[str, Table], receiver: Table | None) -> Times:
+    """Stamps of a log, and its clock by the true fixes of a receiver.
+
+    Parameters
+    ----------
+    tables
+        By name.
+    receiver
+        GPS messages, None where there are none.
+
+    Returns
+    -------
+    Times
+    """
+    stamped = [(table, own_stamps(table)) for table in sorted(tables.values(), key=len, reverse=True)[:20]]
+    anchor = next(((table, own) for table, own in stamped if own is not None), None)
+    if anchor is None:
+        return Times(np.empty(0, np.int64), np.empty(0), None)
+    kept = in_order(anchor[1])
+    made = Times(anchor[0].rows[kept], anchor[1][kept], Clock(""))
+    if receiver is None:
+        return made
+    own, utc = made.of(receiver), gps_utc(receiver)
+    fixed = true_fix(receiver)
+    pairs = in_order(own, fixed) & in_order(utc, fixed)
+    return made._replace(clock=_clock(own[pairs], utc[pairs])) if pairs.any() else made
+
+
+def _clock(own: Array, utc: Array) -> Clock:
+    fit = fit_clock(own, utc)
+    used, rate, offset = fit.used, fit.rate, fit.offset_s
+    # A short log cannot tell the rate of its clock: then seconds are seconds.
+    reach = float(np.std(own[used])) * math.sqrt(used.sum())
+    if used.sum() < 10 or abs(rate - 1) * reach <= SURE_RATE * fit.spread_s:
+        rate, offset = 1.0, float(np.median(utc[used] - own[used]))
+    left = utc[used] - offset - rate * own[used]
+    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    return Clock("GPS weeks", rate, offset, spread, float(np.abs(left).max()), int(used.sum()))

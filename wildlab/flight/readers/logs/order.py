@@ -1,0 +1,61 @@
+"""Which rows of a log stand in the order of their stamps, where a few stamps are wrong."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+#: A log does not run for longer than this, s: stamps further from the middle one are wrong.
+LONGEST_S = 7 * 86400.0
+
+
+def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.bool_]:
+    """The most rows whose stamps strictly increase; the others repeat one, go back or leap ahead.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s, in the order of the file; NaN is left out.
+    wanted
+        (N,) bool: rows that count; the others are left out, and do not make others be left out.
+
+    Returns
+    -------
+    (N,) bool
+
+    Examples
+    --------
+    >>> in_order([1.0, 2.0, 2.0, 9000.0, 3.0, 4.0, 0.5, 5.0]).tolist()
+    [True, True, False, False, True, True, False, True]
+    """
+    at = np.asarray(stamps, float)
+    usable = np.isfinite(at) if wanted is None else np.isfinite(at) & np.asarray(wanted, bool)
+    kept = np.zeros(len(at), bool)
+    rows = np.flatnonzero(usable)
+    if not len(rows):
+        return kept
+    rows = rows[np.abs(at[rows] - np.median(at[rows])) <= LONGEST_S]
+    if (np.diff(at[rows]) > 0).all():
+        kept[rows] = True
+        return kept
+    # The longest increasing run of rows: for each length, the row with the smallest stamp that ends one. Of
+    # repeated stamps the first is kept.
+    smallest: list[float] = []
+    ending: list[int] = []
+    before: list[int] = []
+    values = at[rows].tolist()
+    for i, value in enumerate(values):
+        length = bisect_left(smallest, value)
+        before.append(ending[length - 1] if length else -1)
+        if length == len(smallest):
+            smallest.append(value)
+            ending.append(i)
+        elif value < smallest[length]:
+            smallest[length], ending[length] = value, i
+    i = ending[-1]
+    while i >= 0:
+        kept[rows[i]] = True
+        i = before[i]
+    return kept
