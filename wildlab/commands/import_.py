@@ -15,7 +15,7 @@ from wildlab.terminal import print_json, print_table, shown, stopped
 
 if TYPE_CHECKING:
     from wildlab.flight.card.importing import Card
-    from wildlab.flight.card.recipe import Wishes
+    from wildlab.flight.card.proposal import Wishes
 
 ANYTHING = click.Path(path_type=Path)
 
@@ -153,7 +153,8 @@ def _tell(name: str) -> None:
 
 def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -> Wishes:
     from wildlab.flight.camera_file import read_camera
-    from wildlab.flight.card.recipe import Wishes, safe_name
+    from wildlab.flight.card.proposal import Wishes
+    from wildlab.flight.card.recipe import safe_name
     from wildlab.flight.recipe.parts import parse_zone
 
     named = into if into is not None else raw[0]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.files import read_regular
+from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.logs.formats import (
     FOLDERS,
     FORMATS,
@@ -56,6 +56,11 @@ class Found:
     format: str = ""
     log: RawLog | None = None
     problem: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The name as it is told."""
+        return "the folder itself" if self.name == "." else printable(self.name)
 
     @property
     def called(self) -> str:

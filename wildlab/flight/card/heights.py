@@ -85,7 +85,7 @@ def heights_of(streams: Mapping[Key, Stream], geoid_m: float | None) -> Heights:
         said.append(f"{', '.join(moved)}: the geoid is {geoid:.1f} m above the ellipsoid, {why}.")
     elif kind == "sea" and not any("ellipsoid" in kinds for kinds in kinds_of_all):
         said.append("How far that is above the ellipsoid is not known: --geoid says it.")
-    return Heights(kind if done else "ellipsoid", done, said)
+    return Heights(_WORDS[kind].removeprefix("the ") if done else "ellipsoid", done, said)
 
 
 def _kinds(stream: Stream) -> list[Kind]:

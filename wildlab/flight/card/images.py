@@ -12,7 +12,9 @@ from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
 from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.logs.photos import camera_of
+from wildlab.flight.time.matching import match_triggers
 
 #: Time zones are whole quarters of an hour, s.
 QUARTER_S = 900.0
@@ -83,7 +85,10 @@ def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPa
 
 
 def clock_of_images(
-    images: Found, own: Found | None, stated_offset_s: float | None, triggers: str | None = None
+    images: Found,
+    own: Found | None,
+    stated_offset_s: float | None,
+    triggers: tuple[str, Stream] | None = None,
 ) -> ImageClock:
     """How the images meet the vehicle's log.
 
@@ -99,7 +104,7 @@ def clock_of_images(
     stated_offset_s
         What to add to the stamps, where the user states it.
     triggers
-        Name of the recipe's table of triggers, where there is one.
+        Name of the recipe's table of triggers, and its rows, where there is one.
 
     Returns
     -------
@@ -110,13 +115,10 @@ def clock_of_images(
         return ImageClock("sequence", 0.0, "No image can be used.")
     utc, wall = (_known(photos.columns.get(name), photos.used) for name in ("time_s", "time_log_s"))
     offset = 0.0 if stated_offset_s is None else stated_offset_s
-    if triggers is not None:
-        return ImageClock(
-            "utc",
-            offset,
-            "The images have the times of the records of their triggers.",
-            {"triggers": triggers},
-        )
+    if triggers is not None and stated_offset_s is None and (len(wall) or len(utc)):
+        clock = _by_triggers(photos, *triggers)
+        if clock is not None:
+            return clock
     if len(utc):
         return ImageClock("utc", offset, "The images' own stamps are in UTC." + _added(offset))
     if not len(wall):
@@ -149,11 +151,35 @@ def clock_of_images(
     )
 
 
+def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | None:
+    """By the records of triggers; None where they do not fit for certain."""
+    stamps = photos.columns.get("time_log_s", photos.columns.get("time_s"))
+    times = triggers.columns.get("time_s")
+    if stamps is None or times is None:
+        return None
+    try:
+        match = match_triggers(stamps, np.where(triggers.used, times, np.nan))
+    except WildlabError:
+        return None
+    if not match.certain:
+        return None
+    matched = len(stamps) - match.images_left
+    left = f"; {match.images_left} images have none and are left out" if match.images_left else ""
+    left += f"; {match.triggers_left} records have no image" if match.triggers_left else ""
+    return ImageClock(
+        "utc",
+        0.0,
+        f"{matched} of {len(stamps)} images have the time of the record of their trigger, by the pattern of "
+        f"the intervals{left}.",
+        {"triggers": name},
+    )
+
+
 def _known(column: NDArray[Any] | None, used: NDArray[np.bool_]) -> NDArray[np.float64]:
     if column is None:
         return np.empty(0)
     values = np.asarray(column[used], float)
-    return values[np.isfinite(values)]
+    return np.asarray(values[np.isfinite(values)])
 
 
 def _added(offset: float) -> str:

@@ -10,7 +10,8 @@ from pathlib import Path
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.card.found import search, source_folder
-from wildlab.flight.card.recipe import Proposal, Wishes, propose
+from wildlab.flight.card.proposal import Proposal, Wishes
+from wildlab.flight.card.recipe import propose
 from wildlab.flight.card.roles import Choice, choose_roles
 from wildlab.flight.files import printable
 from wildlab.flight.recipe.importing import import_flight
@@ -70,9 +71,7 @@ def read_card(
     except WildlabError as error:
         if error.file is not None:
             raise
-        seen = "; ".join(
-            f"{printable(one.found.name)}: {one.role} ({printable(one.why)})" for one in choices[:20]
-        )
+        seen = "; ".join(f"{one.found.shown}: {one.role} ({printable(one.why)})" for one in choices[:20])
         raise WildlabError(
             f"{error.problem}. Found: {seen}", error.fix, file=source, field=error.field
         ) from None

@@ -27,7 +27,7 @@ def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
 def _row(choice: Choice) -> list[str]:
     found, role = choice.found, choice.role + (f" {choice.target}" if choice.target else "")
     if found.log is None:
-        return [printable(found.name), found.called, "", "", printable(found.problem), "", "", role]
+        return [found.shown, found.called, "", "", printable(found.problem), "", "", role]
     parts = found.log.parts
     times = np.concatenate([np.empty(0), *(_times(one) for one in parts.values())])
     begins = lasts = ""
@@ -38,7 +38,7 @@ def _row(choice: Choice) -> list[str]:
         text for name, text in _REFERENCES.items() if any(name in one.columns for one in parts.values())
     ]
     return [
-        printable(found.name),
+        found.shown,
         found.called,
         begins,
         lasts,
@@ -63,14 +63,14 @@ def _times(stream: Stream) -> NDArray[np.float64]:
     if values is None:
         return np.empty(0)
     used = np.asarray(values[stream.used], float)
-    return used[np.isfinite(used)]
+    return np.asarray(used[np.isfinite(used)])
 
 
 def sentences_of(choices: Sequence[Choice]) -> list[str]:
     """What of each thing is not used and why, what was lost, and what its reader noted."""
     said = []
     for one in choices:
-        name = printable(one.found.name)
+        name = one.found.shown
         if one.found.log is None:
             said.append(f"{name} is not used: {printable(one.why)}")
             continue
@@ -89,11 +89,13 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
                 said.append(f"{name}: {_unused(part, stream)}")
         said += [f"{name}: {printable(text)}" for text in (*one.found.log.lost, *one.found.log.notes)]
         clock = one.found.log.clock
-        if clock is not None and clock.pairs > 2:
+        # Stamps that are UTC already were brought nowhere.
+        if clock is not None and clock.pairs > 2 and (clock.rate != 1.0 or clock.spread_s > 0):
+            ppm = 1e6 * (1 / clock.rate - 1)
+            runs = f"it runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}"
             said.append(
-                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): it runs "
-                f"{1e6 * (clock.rate - 1):+.0f} ppm off, and {1000 * clock.spread_s:.0f} ms are left over "
-                f"(largest {1000 * clock.largest_s:.0f} ms)"
+                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): {runs}, and "
+                f"{1000 * clock.spread_s:.0f} ms are left over (largest {1000 * clock.largest_s:.0f} ms)"
             )
     return said
 

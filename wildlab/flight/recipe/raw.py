@@ -22,8 +22,8 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.logs.formats import FOLDERS, read_folder, read_log
-from wildlab.flight.readers.logs.log import RawLog
-from wildlab.flight.readers.logs.parts import stream_of
+from wildlab.flight.readers.logs.log import RawLog, Stream
+from wildlab.flight.readers.logs.parts import stamped_by, stream_of
 from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
@@ -150,9 +150,23 @@ class RawFiles:
                 self._tables[name, ""] = RawTable(path, tuple(cells), cells, frames, "frame")
             else:
                 stream = stream_of(self._log(block, f"logs.{name}"), block, path)
+                if block.triggers is not None:
+                    stream = stamped_by(stream, self._triggers(block.triggers, name), path)
                 cells = stream.columns
                 self._tables[name, ""] = RawTable(path, tuple(cells), cells, stream.rows, stream.counted_in)
         return self._tables[name, ""]
+
+    def _triggers(self, triggers: str, images: str) -> Stream:
+        """The records that the images of a table have their times from."""
+        other = self.logs.get(triggers)
+        if other is None or other.format == "autoferry":
+            raise WildlabError(
+                f"{triggers!r} is no log of this recipe",
+                did_you_mean(triggers, self.logs),
+                file=self.recipe,
+                field=f"logs.{images}.triggers",
+            )
+        return stream_of(self._log(other, f"logs.{triggers}"), other, self.folder / other.file)
 
     def _log(self, block: LogTable, part: str) -> RawLog:
         key = (block.file, block.format, block.zone)

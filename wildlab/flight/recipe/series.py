@@ -159,7 +159,8 @@ class LogTable(Strict):
 
     ``height`` makes a column ``height_m`` of the heights that count from there, with ``add_m`` added;
     ``offset_s`` is added to ``time_s``, and makes it of ``time_log_s`` where the log does not know UTC;
-    ``zone`` is that of a wall clock without one.
+    ``zone`` is that of a wall clock without one. ``triggers`` names another log, whose records of triggers
+    give images their times.
     """
 
     file: str
@@ -169,6 +170,7 @@ class LogTable(Strict):
     add_m: float = 0.0
     offset_s: float = 0.0
     zone: Zone | None = None
+    triggers: str | None = None
 
     @field_validator("file")
     @classmethod

@@ -9,6 +9,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.log import RawLog, Stream
+from wildlab.flight.time.matching import match_triggers
 
 
 class Wanted(Protocol):
@@ -72,3 +73,42 @@ def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
         if name in columns:
             columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
     return Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+
+
+def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
+    """Images with the times of the records of their triggers; those without a record have none.
+
+    Parameters
+    ----------
+    images
+        With ``time_s`` or ``time_log_s``, by the camera's clock.
+    triggers
+        With ``time_s``.
+    path
+        Only for messages.
+
+    Returns
+    -------
+    Stream
+
+    Raises
+    ------
+    WildlabError
+        Where neither has times, or no image belongs to a record for certain.
+    """
+    stamps = images.columns.get("time_log_s", images.columns.get("time_s"))
+    times = triggers.columns.get("time_s")
+    if stamps is None or times is None:
+        problem = "the images or the records of their triggers have no times"
+        raise WildlabError(problem, "take out triggers", file=path, field="triggers")
+    of_record = np.where(triggers.used, times, np.nan)
+    match = match_triggers(stamps, of_record)
+    if not match.certain:
+        raise WildlabError(
+            "which image belongs to which record of a trigger is not certain",
+            "take out triggers, and give camera_offset_s in [clocks]",
+            file=path,
+            field="triggers",
+        )
+    taken = np.where(match.index >= 0, of_record[np.maximum(match.index, 0)], np.nan)
+    return Stream({**images.columns, "time_s": taken}, images.rows, images.counted_in)

@@ -1,0 +1,103 @@
+"""A recipe in the making: what the user states, the tables that it asks for, and what was decided."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+from wildlab.flight.card.blocks import has_utc, stream_of
+from wildlab.flight.card.heights import Heights, heights_of
+from wildlab.flight.card.roles import Choice
+from wildlab.flight.manifest import CameraPart
+from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.toml import dump_toml
+
+#: Rows that can be used.
+USED: list[dict[str, Any]] = [{"column": "use", "equals": 1.0}]
+#: Rows that have a time; an image without a place is one.
+TIMED: list[dict[str, Any]] = [{"column": "time_s", "above": 0.0}]
+UTC = {"column": "time_s", "format": "unix"}
+#: Below any angle in degrees: a condition that leaves rows without one out.
+NO_ANGLE = -1e6
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What a user states of a flight.
+
+    Attributes
+    ----------
+    name
+        Of the flight.
+    camera
+        From a file of `wildlab camera`, None for what the images say.
+    camera_offset_s
+        What to add to the stamps of the images, None for an estimate.
+    geoid_m
+        How far the geoid is above the ellipsoid there.
+    start
+        When the clock of a log that does not know UTC stood at zero.
+    zone
+        Of wall clocks that carry none.
+    sensitivity
+        Of the places.
+    """
+
+    name: str
+    camera: CameraPart | None = None
+    camera_offset_s: float | None = None
+    geoid_m: float | None = None
+    start: datetime | None = None
+    zone: str | None = None
+    sensitivity: str = "withheld"
+
+
+@dataclass
+class Proposal:
+    """A recipe, as nested mappings and as text, and what was decided on the way, in sentences."""
+
+    data: dict[str, Any]
+    said: list[str] = field(default_factory=list)
+
+    def text(self, choices: Sequence[Choice]) -> str:
+        """The recipe as TOML, with what it rests on in front."""
+        lines = [
+            "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --into FLIGHT"
+        ]
+        for one in choices:
+            role = one.role + (f" {one.target}" if one.target else "")
+            lines.append(_comment(f"{one.found.shown}: {role} ({one.why})"))
+        lines += [_comment(one) for one in self.said]
+        return "\n".join(lines) + "\n\n" + dump_toml(self.data, inline=True)
+
+
+def _comment(text: str) -> str:
+    """One line of a comment, whatever is in the text."""
+    return "# " + re.sub(r"[\x00-\x1f\x7f\u0085\u2028\u2029]+", " ", text)
+
+
+class Sources:
+    """The logs' tables that a recipe asks for, each named once."""
+
+    def __init__(self, wishes: Wishes, streams: dict[tuple[str, str], Stream]) -> None:
+        self.wishes, self.streams = wishes, streams
+        self.heights: Heights = heights_of(streams, wishes.geoid_m)
+        self.logs: dict[str, dict[str, Any]] = {}
+
+    def table(self, choice: Choice, part: str, name: str) -> str:
+        """The name of a table of one part of a log, with its heights and stamps brought to the flight's."""
+        found = choice.found
+        block: dict[str, Any] = {"file": found.name, "format": found.format, "part": part}
+        if self.wishes.zone is not None:
+            block["zone"] = self.wishes.zone
+        chosen = self.heights.of(found.name, part)
+        if chosen is not None:
+            block |= {"height": chosen.kind} | ({"add_m": chosen.add_m} if chosen.add_m else {})
+        stream = stream_of(choice, part)
+        if not has_utc(stream) and self.wishes.start is not None:
+            block["offset_s"] = self.wishes.start.timestamp()
+        self.logs[name] = block
+        return name

@@ -1,0 +1,183 @@
+"""Blocks of a recipe about what was seen: images, pixels of things in them, and where these truly were."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from wildlab.flight.card.blocks import angles, has_utc, position, quantity, stream_of, truth_spreads
+from wildlab.flight.card.images import camera_of_images, clock_of_images
+from wildlab.flight.card.proposal import NO_ANGLE, TIMED, USED, UTC, Proposal, Sources
+from wildlab.flight.card.roles import Choice
+from wildlab.flight.readers.logs.log import Stream
+
+
+def add_frames(
+    proposal: Proposal,
+    sources: Sources,
+    images: Choice,
+    own: Choice | None,
+    triggers: Choice | None,
+    by_role: Mapping[str, Sequence[Choice]],
+    placed: bool,
+) -> None:
+    """The images, with the poses that stand in them."""
+    photos, data, wishes = stream_of(images, "photos"), proposal.data, sources.wishes
+    others = [one for one in by_role["images"] if one is not images]
+    for one in others:
+        proposal.said.append(
+            f"The images of {one.found.shown} are left out: a flight has those of one folder, and "
+            f"{images.found.shown} has more. Import them as a flight of their own."
+        )
+    camera, how = camera_of_images(images.found, wishes.camera)
+    if camera is None:
+        proposal.said.append(f"The images are left out: {how}. Give the camera with --camera.")
+        return
+    data["camera"] = camera.model_dump()
+    proposal.said.append(f"The camera: {how}.")
+    clock = clock_of_images(
+        images.found,
+        None if own is None else own.found,
+        wishes.camera_offset_s,
+        _triggers(sources, own, triggers),
+    )
+    proposal.said.append(clock.said)
+    id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
+    file = sources.table(images, "photos", "images")
+    sources.logs[file] |= clock.block
+    if "triggers" not in clock.block:
+        sources.logs.pop("triggers", None)
+    frames: dict[str, Any] = {"file": file, "id": id_}
+    if clock.kind == "sequence":
+        data["time"] = {"kind": "sequence"}
+    else:
+        frames |= {"time": UTC, "where": TIMED}
+    if clock.offset_s:
+        data["clocks"] = {"camera_offset_s": clock.offset_s}
+    data["frames"] = frames
+    if not placed:
+        return
+    if own is not None and own.found.part("poses") is not None:
+        return
+    _, end = angles(photos) or ("", "_deg")
+    where = [*USED, *({"column": f"{axis}{end}", "above": NO_ANGLE} for axis in ("roll", "pitch", "yaw"))]
+    data.setdefault("poses", {})["camera" if end == "_world_deg" else "images"] = {
+        "file": file,
+        "where": where,
+        "frame": id_,
+        "position": position(),
+        "attitude": {axis: quantity(f"{axis}{end}", "deg") for axis in ("roll", "pitch", "yaw")},
+    }
+
+
+def _triggers(sources: Sources, own: Choice | None, triggers: Choice | None) -> tuple[str, Stream] | None:
+    """The table of the triggers' records, where there are any, and its rows."""
+    for one in (triggers, own):
+        stream = None if one is None else one.found.part("triggers")
+        if one is not None and stream is not None and has_utc(stream):
+            return sources.table(one, "triggers", "triggers"), stream
+    return None
+
+
+def _stems(photos: Stream) -> list[str]:
+    return [PurePosixPath(str(one)).stem for one in photos.columns["file"]]
+
+
+def add_targets(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> None:
+    """Truth: tracks of targets, and points that do not move."""
+    truth = []
+    for one in by_role.get("target", ()):
+        part = "gnss" if one.found.part("gnss") is not None else "poses"
+        stream = stream_of(one, part)
+        block: dict[str, Any] = {
+            "file": sources.table(one, part, f"target-{one.target}"),
+            "where": USED,
+            "target": one.target,
+            "time": UTC,
+            "position": position(),
+        }
+        truth.append(block | truth_spreads(stream))
+    for number, one in enumerate(by_role.get("marks", ()), 1):
+        stream = stream_of(one, "marks")
+        block = {
+            "file": sources.table(one, "marks", f"marks-{number}"),
+            "where": USED,
+            "id": "name",
+            "position": position(),
+        }
+        truth.append(block | truth_spreads(stream))
+    if truth:
+        proposal.data["truth"] = truth
+
+
+def add_seen(
+    proposal: Proposal,
+    sources: Sources,
+    clicks: Sequence[Choice],
+    images: Choice | None,
+    by_role: Mapping[str, Sequence[Choice]],
+) -> None:
+    """What was clicked in the images."""
+    if not clicks:
+        return
+    if images is None or "frames" not in proposal.data:
+        proposal.said.append("The pixels are left out: there are no images that they are of.")
+        return
+    id_ = proposal.data["frames"]["id"]
+    level = _level(proposal, sources, by_role)
+    blocks = []
+    for number, one in enumerate(clicks, 1):
+        stream = stream_of(one, "clicks")
+        block: dict[str, Any] = {
+            "source": "clicks" if len(clicks) == 1 else f"clicks-{number}",
+            "file": sources.table(one, "clicks", f"clicks-{number}"),
+            "prefix": f"click-{number}-",
+            "frame": "stem" if id_ == "stem" else "image",
+            "pixel": {"u": quantity("u_px", "px"), "v": quantity("v_px", "px")},
+        }
+        if "name" in stream.columns:
+            block["target"] = "name"
+        if level is not None:
+            block["ground"] = {"height": {"value": level, "unit": "m"}}
+        blocks.append(block)
+    proposal.data["detections"] = blocks
+
+
+def _level(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> float | None:
+    """Height of level ground: the mean of the surveyed points'; None where there are none."""
+    heights: list[float] = []
+    for one in by_role.get("marks", ()):
+        stream, chosen = stream_of(one, "marks"), sources.heights.of(one.found.name, "marks")
+        if chosen is not None:
+            column = stream.columns[f"height_{chosen.kind}_m"][stream.used] + chosen.add_m
+            heights += column[np.isfinite(column)].tolist()
+    if not heights:
+        return _take_off(proposal, sources)
+    mean, spread = float(np.mean(heights)), float(np.ptp(heights))
+    proposal.said.append(
+        f"The ground is taken to be level at the mean height of {len(heights)} surveyed points, which differ "
+        f"by {spread:.1f} m. An elevation map does better: --terrain."
+    )
+    return math.floor(mean * 1000 + 0.5) / 1000
+
+
+def _take_off(proposal: Proposal, sources: Sources) -> float | None:
+    """Height of the take-off, where a log has heights above it beside others; None else."""
+    for (file, part), stream in sources.streams.items():
+        chosen = sources.heights.of(file, part)
+        home = stream.columns.get("height_home_m")
+        if chosen is None or home is None:
+            continue
+        of_home = (stream.columns[f"height_{chosen.kind}_m"] + chosen.add_m - home)[stream.used]
+        of_home = of_home[np.isfinite(of_home)]
+        if len(of_home):
+            proposal.said.append(
+                "The ground is taken to be level and as high as the take-off, since nothing says how high it "
+                "is. An elevation map does better: --terrain."
+            )
+            return math.floor(float(np.median(of_home)) * 1000 + 0.5) / 1000
+    return None
