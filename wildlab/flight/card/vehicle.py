@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wildlab.flight.card.assumed import assumed
-from wildlab.flight.card.blocks import attitude, position, quantity, spreads, stream_of, velocity
+from wildlab.flight.card.blocks import angles, attitude, position, quantity, spreads, stream_of, velocity
 from wildlab.flight.card.proposal import USED, UTC, Proposal, Sources
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.readers.logs.log import Stream
