@@ -103,3 +103,33 @@ def _edge(dx: Array, late: Array) -> tuple[float, float]:
     (x_1, y_1), (x_2, y_2) = corners[at - 1], corners[at]
     slope = float((y_2 - y_1) / (x_2 - x_1))
     return slope, float(y_1 - slope * x_1)
+
+
+def fit_pairs(own: ArrayLike, reference: ArrayLike) -> ClockFit:
+    """As `fit_clock`, with a rate of 1 where the pairs cannot tell it from 1: a short log says little of it.
+
+    Parameters
+    ----------
+    own, reference
+        (N,) s at the same instants.
+
+    Returns
+    -------
+    ClockFit
+
+    Raises
+    ------
+    WildlabError
+        Where there is no pair.
+    """
+    x, y = np.asarray(own, float), np.asarray(reference, float)
+    fit = fit_clock(x, y)
+    at = x[fit.used]
+    error = fit.spread_s / max(float(np.sqrt(((at - at.mean()) ** 2).sum())), 1e-9)
+    if abs(fit.rate - 1.0) > TOLD_APART * error and len(at) >= 2 * LEAST:
+        return fit
+    left = y - x
+    middle = float(np.median(left[fit.used]))
+    residual = left - middle
+    spread = 1.4826 * float(np.median(np.abs(residual[fit.used])))
+    return ClockFit(fit.own_0, fit.own_0 + middle, 1.0, residual, fit.used, spread)

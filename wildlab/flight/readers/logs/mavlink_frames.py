@@ -1,9 +1,9 @@
 """Frames of a MAVLink telemetry log: where they are, whose they are, and their fields as arrays.
 
 Each frame stands behind its time of receipt, eight bytes, big end first, us since 1970. Which messages there
-are, their fields and what goes into their checksums is pymavlink's knowledge (dialect ardupilotmega 2.0, which
-holds the common messages); walking and decoding is done here, because decoding each message into an object
-takes several times longer.
+are, their fields and what goes into their checksums is pymavlink's knowledge (dialect ardupilotmega 2.0,
+which holds the common messages); walking and decoding is done here, because decoding each message into an
+object takes several times longer.
 """
 
 from __future__ import annotations

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from wildlab.flight.readers.logs.log import Stream, make_stream
 
 Flags = NDArray[np.bool_]
 
@@ -82,3 +85,35 @@ def stamps_that_fail(stamps: ArrayLike) -> dict[str, Flags]:
         "a repeated stamp": repeated,
         "a stamp out of order": near & ~runs & ~repeated,
     }
+
+
+def running_stream(
+    part: str,
+    columns: Mapping[str, ArrayLike],
+    rows: ArrayLike,
+    counted_in: str,
+    unusable: Mapping[str, Flags],
+) -> Stream | None:
+    """As `make_stream`, with rows marked, too, whose ``time_s`` does not run among those that are used.
+
+    Parameters
+    ----------
+    part, columns, rows, counted_in, unusable
+        Of `make_stream`.
+
+    Returns
+    -------
+    Stream, or None where it has no row.
+    """
+    stamps = np.asarray(columns["time_s"], float)
+    if not len(stamps):
+        return None
+    bad = np.zeros(len(stamps), bool)
+    for holds in unusable.values():
+        bad |= holds
+    wrong = dict(unusable)
+    for reason, holds in stamps_that_fail(stamps[~bad]).items():
+        here = np.zeros(len(stamps), bool)
+        here[np.flatnonzero(~bad)[holds]] = True
+        wrong[reason] = wrong.get(reason, np.zeros(len(stamps), bool)) | here
+    return make_stream(part, columns, rows, counted_in, wrong)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.readers.logs.mavlink_frames import Frames, Messages, messages
-from wildlab.flight.time.fitting import ClockFit, fit_clock
-from wildlab.flight.time.receipts import fit_receipts
+from wildlab.flight.time.fitting import ClockFit
+from wildlab.flight.time.receipts import fit_pairs, fit_receipts
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -84,7 +84,7 @@ def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
         inside = near & (told.number >= number[a]) & (told.number <= number[b - 1])
         from_vehicle.append(believed and int(inside.sum()) > 2)
         if from_vehicle[-1]:
-            fit = fit_clock(told["time_boot_ms"][inside] / 1e3, unix[inside])
+            fit = fit_pairs(told["time_boot_ms"][inside] / 1e3, unix[inside])
         fits.append(fit)
         behind.append(float(np.median(received[a:b] - fit.to_reference(own[a:b]))))
     main = int(np.argmax(np.diff(np.r_[starts, len(own)])))

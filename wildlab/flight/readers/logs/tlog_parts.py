@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.flight.clocks import between
-from wildlab.flight.readers.logs.log import Stream, make_stream
+from wildlab.flight.readers.logs.gimbals import device_angles, heading_at, unturned, wrapped
+from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.logs.mavlink_frames import Frames, Messages, messages
 from wildlab.flight.readers.logs.places import impossible_places, placed
-from wildlab.flight.readers.logs.stamps import stamps_that_fail
+from wildlab.flight.readers.logs.stamps import running_stream, stamps_that_fail
 from wildlab.flight.readers.logs.tlog_clock import Boot, Flags, times
-from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,6 @@ _FELT = (0.5, 2.0)
 #: Values that mean "not known" in 8 and 16 bits.
 _NO_8, _NO_16 = 255, 65535
 _FIX_SPACE, _FIX_PLANE = 3, 2
-#: GIMBAL_DEVICE_FLAGS: yaw is held against north; it is given against the vehicle; it is given against north.
-_YAW_LOCK, _YAW_VEHICLE, _YAW_NORTH = 16, 32, 64
 
 
 def read_parts(
@@ -190,18 +188,8 @@ def _gimbal_device(
     if not len(found):
         return None
     columns, wrong = _gimbal_times(found, component, boot, notes)
-    q = found.fields["q"].astype(float)
-    good = np.isfinite(q).all(axis=1) & (np.linalg.norm(q, axis=1) > 0.5)
-    angles = np.degrees(matrix_to_euler(quaternion_to_matrix(np.where(good[:, None], q, [1.0, 0, 0, 0]))))
-    flags = found.fields["flags"].astype(int)
-    north = np.where(flags & (_YAW_NORTH | _YAW_VEHICLE), flags & _YAW_NORTH, flags & _YAW_LOCK) > 0
-    heading = _heading(poses, columns["time_s"])
-    columns |= {
-        "roll_world_deg": angles[:, 0],
-        "pitch_world_deg": angles[:, 1],
-        "yaw_world_deg": np.where(north, angles[:, 2], _wrapped(angles[:, 2] + heading)),
-    }
-    return _stream("gimbal", columns, found, {"no attitude": ~good, **wrong, **_unturned(columns)})
+    angles = device_angles(found.fields["q"], found.fields["flags"], heading_at(poses, columns["time_s"]))
+    return _stream("gimbal", columns | angles, found, wrong | unturned(angles))
 
 
 def _mount_orientation(
@@ -214,9 +202,9 @@ def _mount_orientation(
     yaw = found["yaw_absolute"]
     if not (yaw != 0).any():
         # The extension is not sent; its yaw is against the vehicle.
-        yaw = _wrapped(found["yaw"] + _heading(poses, columns["time_s"]))
+        yaw = wrapped(found["yaw"] + heading_at(poses, columns["time_s"]))
     columns |= {"roll_world_deg": found["roll"], "pitch_world_deg": found["pitch"], "yaw_world_deg": yaw}
-    return _stream("gimbal", columns, found, wrong | _unturned(columns))
+    return _stream("gimbal", columns, found, wrong | unturned(columns))
 
 
 def _mount_status(
@@ -230,13 +218,13 @@ def _mount_status(
         "the gimbal is known from MOUNT_STATUS, which has no stamps (times are those of receipt) and leaves it "
         "open against what it counts: taken as pitch and roll against the horizon, yaw against the vehicle"
     )
-    yaw = found["pointing_c"] / 1e2 + _heading(poses, columns["time_s"])
+    yaw = found["pointing_c"] / 1e2 + heading_at(poses, columns["time_s"])
     columns |= {
         "roll_world_deg": found["pointing_b"] / 1e2,
         "pitch_world_deg": found["pointing_a"] / 1e2,
-        "yaw_world_deg": _wrapped(yaw),
+        "yaw_world_deg": wrapped(yaw),
     }
-    return _stream("gimbal", columns, found, wrong | _unturned(columns))
+    return _stream("gimbal", columns, found, wrong | unturned(columns))
 
 
 def _gimbal_times(
@@ -246,28 +234,6 @@ def _gimbal_times(
     if np.isnan(columns["time_log_s"]).all():
         notes.append("times of the gimbal are those of receipt: its own stamps go by no known clock")
     return columns, wrong
-
-
-def _heading(poses: Stream | None, at: Array) -> Array:
-    """Yaw of the vehicle at times (N,), deg; NaN where it is not known."""
-    if poses is None or not poses.used.any():
-        return np.full(len(at), np.nan)
-    yaw = np.unwrap(poses.columns["yaw_deg"][poses.used], period=360.0)
-    found = np.full(len(at), np.nan)
-    finite = np.isfinite(at)
-    stamps = poses.columns["time_s"][poses.used]
-    found[finite] = between(stamps, yaw[:, None], at[finite], "ATTITUDE")[:, 0]
-    return found
-
-
-def _unturned(columns: dict[str, Array]) -> dict[str, Flags]:
-    turns = np.stack([columns[f"{name}_world_deg"] for name in ("roll", "pitch", "yaw")])
-    with np.errstate(invalid="ignore"):
-        return {"no attitude that is known": ~(np.abs(turns) <= 720).all(axis=0)}
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + 180.0) % 360.0 - 180.0)
 
 
 def _known(values: Array, none: int) -> Array:
@@ -280,13 +246,4 @@ def _without_empty(columns: dict[str, Array]) -> dict[str, Array]:
 
 
 def _stream(part: str, columns: dict[str, Array], found: Messages, wrong: dict[str, Flags]) -> Stream | None:
-    if not len(found):
-        return None
-    bad = np.zeros(len(found), bool)
-    for rows in wrong.values():
-        bad |= rows
-    # Stamps need to run among the rows that are used, and there alone.
-    for reason, rows in stamps_that_fail(columns["time_s"][~bad]).items():
-        wrong[reason] = wrong.get(reason, np.zeros(len(found), bool)).copy()
-        wrong[reason][np.flatnonzero(~bad)[rows]] = True
-    return make_stream(part, columns, found.number, "frame", wrong)
+    return running_stream(part, columns, found.number, "frame", wrong)
