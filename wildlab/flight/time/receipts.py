@@ -8,6 +8,8 @@ that is nearest to them in the mean: it lies along that side of their lower conv
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +21,8 @@ Array = NDArray[np.float64]
 STRETCHES, LEAST = 50, 8
 #: A rate is taken to be another than 1 where it is so many of its standard errors away.
 TOLD_APART = 4.0
+#: A clock that is further from the other's rate is none.
+SLOWEST, FASTEST = 0.5, 2.0
 
 
 def fit_receipts(own: ArrayLike, received: ArrayLike) -> ClockFit:
@@ -50,7 +54,7 @@ def fit_receipts(own: ArrayLike, received: ArrayLike) -> ClockFit:
     base = float(np.median(y[known] - x[known]))
     late = y[known] - x[known] - base
     slope, told, kept = _earliest(dx, late)
-    if told:
+    if told and SLOWEST < 1 + slope < FASTEST:
         slope, offset = _edge(dx[kept], late[kept])
     else:
         slope, offset = 0.0, float(late[kept].min())
@@ -74,7 +78,7 @@ def _earliest(dx: Array, late: Array) -> tuple[float, bool, NDArray[np.bool_]]:
         kept = late >= np.median(late) - max(10 * spread, 1.0)
         return 0.0, False, kept if kept.any() else every
     edges = np.linspace(0, len(dx), count + 1).astype(int)
-    rows = np.array([a + int(np.argmin(late[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    rows = np.array([a + int(np.argmin(late[a:b])) for a, b in pairwise(edges.tolist())])
     fit = fit_clock(dx[rows], late[rows] + dx[rows])
     left = late - (fit.to_reference(dx) - dx)
     slope, at = fit.rate - 1.0, dx[rows][fit.used]
@@ -126,7 +130,8 @@ def fit_pairs(own: ArrayLike, reference: ArrayLike) -> ClockFit:
     fit = fit_clock(x, y)
     at = x[fit.used]
     error = fit.spread_s / max(float(np.sqrt(((at - at.mean()) ** 2).sum())), 1e-9)
-    if abs(fit.rate - 1.0) > TOLD_APART * error and len(at) >= 2 * LEAST:
+    told = abs(fit.rate - 1.0) > TOLD_APART * error and len(at) >= 2 * LEAST
+    if told and SLOWEST < fit.rate < FASTEST:
         return fit
     left = y - x
     middle = float(np.median(left[fit.used]))

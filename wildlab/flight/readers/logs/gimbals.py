@@ -47,14 +47,14 @@ def device_angles(q: ArrayLike, flags: ArrayLike, heading_deg: ArrayLike) -> dic
     return {"roll_world_deg": angles[:, 0], "pitch_world_deg": angles[:, 1], "yaw_world_deg": yaw}
 
 
-def heading_at(poses: Stream | None, times_s: ArrayLike) -> Array:
-    """Yaw of the vehicle at times (N,) in UTC, deg; NaN where its poses do not reach."""
+def heading_at(poses: Stream | None, times_s: ArrayLike, clock: str = "time_s") -> Array:
+    """Yaw of the vehicle at times (N,) of a clock of its poses, deg; NaN where they do not reach."""
     at = np.asarray(times_s, float)
     found = np.full(len(at), np.nan)
     finite = np.isfinite(at)
     if poses is not None and poses.used.any() and finite.any():
         yaw = np.unwrap(poses.columns["yaw_deg"][poses.used], period=360.0)
-        stamps = poses.columns["time_s"][poses.used]
+        stamps = poses.columns[clock][poses.used]
         found[finite] = between(stamps, yaw[:, None], at[finite], "poses")[:, 0]
     return found
 
@@ -63,7 +63,7 @@ def unturned(angles: Mapping[str, Array]) -> dict[str, NDArray[np.bool_]]:
     """Reason -> (N,) rows without all three angles, as `make_stream` takes them."""
     turns = np.stack([angles[f"{name}_world_deg"] for name in ("roll", "pitch", "yaw")])
     with np.errstate(invalid="ignore"):
-        return {"an angle is not known": ~(np.abs(turns) <= _LARGEST_DEG).all(axis=0)}
+        return {"an angle is not known": np.asarray(~(np.abs(turns) <= _LARGEST_DEG).all(axis=0))}
 
 
 def wrapped(angle_deg: ArrayLike) -> Array:

@@ -121,8 +121,10 @@ def walk(data: bytes) -> Frames:
         if pos > covered:
             skipped, places = skipped + pos - covered, places + 1
         pos = covered = end
-    table = np.array(rows, dtype=np.int64).reshape(-1, 7).T
-    return Frames(data, table[0] / 1e6, *table[1:], damaged, dict(unknown), skipped, places, length - covered)
+    received, *table = np.array(rows, dtype=np.int64).reshape(-1, 7).T
+    numbers, kinds, systems, components, at, sizes = table
+    lost = (damaged, dict(unknown), skipped, places, length - covered)
+    return Frames(data, received / 1e6, numbers, kinds, systems, components, at, sizes, *lost)
 
 
 def _begins(data: bytes, at: int) -> bool:
@@ -171,8 +173,8 @@ class Messages:
     def only(self, chosen: NDArray[np.bool_]) -> Messages:
         """Those rows alone."""
         kept = {name: values[chosen] for name, values in self.fields.items()}
-        whence = (self.received_s, self.number, self.system, self.component)
-        return Messages(kept, *(one[chosen] for one in whence))
+        received, number = self.received_s[chosen], self.number[chosen]
+        return Messages(kept, received, number, self.system[chosen], self.component[chosen])
 
 
 def messages(frames: Frames, name: str, system: int | None = None, component: int | None = None) -> Messages:

@@ -14,6 +14,21 @@ Flags = NDArray[np.bool_]
 #: Degrees around zero and zero where nobody flies: receivers without a place say so.
 NOWHERE_DEG = 1e-6
 
+#: What is said where `one_height` holds.
+ONE_HEIGHT = (
+    "the receiver gives one and the same number above the ellipsoid and above sea level: only the latter is "
+    "kept, and may be the former"
+)
+
+
+def one_height(columns: Mapping[str, ArrayLike]) -> bool:
+    """Whether a receiver's heights above the ellipsoid and above sea level are the same in all rows."""
+    if not {"height_sea_m", "height_ellipsoid_m"} <= set(columns):
+        return False
+    apart = np.asarray(columns["height_sea_m"], float) - np.asarray(columns["height_ellipsoid_m"], float)
+    known = np.isfinite(apart)
+    return bool(known.any() and (apart[known] == 0).all())
+
 
 def placed(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Flags:
     """(N,) whether latitudes and longitudes (N,) are numbers, on Earth, and not both zero."""

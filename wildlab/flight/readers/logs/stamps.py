@@ -94,7 +94,9 @@ def running_stream(
     counted_in: str,
     unusable: Mapping[str, Flags],
 ) -> Stream | None:
-    """As `make_stream`, with rows marked, too, whose ``time_s`` does not run among those that are used.
+    """As `make_stream`, with rows marked, too, whose stamps do not run among those that are used.
+
+    Looked at is ``time_s``, or ``time_log_s`` where no row has UTC.
 
     Parameters
     ----------
@@ -106,6 +108,8 @@ def running_stream(
     Stream, or None where it has no row.
     """
     stamps = np.asarray(columns["time_s"], float)
+    if np.isnan(stamps).all() and "time_log_s" in columns:
+        stamps = np.asarray(columns["time_log_s"], float)
     if not len(stamps):
         return None
     bad = np.zeros(len(stamps), bool)

@@ -126,14 +126,12 @@ def _notes(
         notes.append(f"the ground station received {middle:.3f} s after the vehicle's UTC, in the middle")
     else:
         notes.append(
-            "UTC is the ground station's: the vehicle's clock is fitted along the earliest receipts, the others "
-            f"are {middle:.3f} s later in the middle and {worst:.3f} s in 99 of 100; what the quickest took is "
-            "not known"
+            "UTC is the ground station's: the vehicle's clock is fitted along the earliest receipts, the "
+            f"others are {middle:.3f} s later in the middle, 1 of 100 is more than {worst:.3f} s; what the "
+            "quickest took is not known"
         )
     if runs > 1:
-        notes.append(
-            f"the vehicle was switched on {runs - 1} more times within it; each has a clock of its own"
-        )
+        notes.append(f"the vehicle was switched on {runs} times within it; each run has a clock of its own")
     return notes
 
 

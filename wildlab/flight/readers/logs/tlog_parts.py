@@ -9,7 +9,7 @@ from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.gimbals import device_angles, heading_at, unturned, wrapped
 from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.logs.mavlink_frames import Frames, Messages, messages
-from wildlab.flight.readers.logs.places import impossible_places, placed
+from wildlab.flight.readers.logs.places import ONE_HEIGHT, impossible_places, one_height, placed
 from wildlab.flight.readers.logs.stamps import running_stream, stamps_that_fail
 from wildlab.flight.readers.logs.tlog_clock import Boot, Flags, times
 
@@ -46,9 +46,13 @@ def read_parts(
     def own(name: str) -> Messages:
         return messages(frames, name, system, component)
 
+    gnss = _gnss(own("GPS_RAW_INT"), boot)
+    if gnss is not None and one_height(gnss.columns):
+        notes.append(ONE_HEIGHT)
+        del gnss.columns["height_ellipsoid_m"]
     parts = {
         "poses": _poses(own("ATTITUDE"), own("GLOBAL_POSITION_INT"), boot, notes),
-        "gnss": _gnss(own("GPS_RAW_INT"), boot),
+        "gnss": gnss,
         **_inertial({name: own(name) for name in ("HIGHRES_IMU", "SCALED_IMU", "RAW_IMU")}, boot, notes),
     }
     # Cameras and gimbals may be components of their own.
@@ -215,8 +219,8 @@ def _mount_status(
         return None
     columns, wrong = times(found, boot, "")
     notes.append(
-        "the gimbal is known from MOUNT_STATUS, which has no stamps (times are those of receipt) and leaves it "
-        "open against what it counts: taken as pitch and roll against the horizon, yaw against the vehicle"
+        "the gimbal is known from MOUNT_STATUS, which has no stamps (times are those of receipt) and does "
+        "not say against what it counts: taken as pitch and roll against the horizon, yaw against the vehicle"
     )
     yaw = found["pointing_c"] / 1e2 + heading_at(poses, columns["time_s"])
     columns |= {

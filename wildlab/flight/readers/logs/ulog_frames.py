@@ -54,9 +54,9 @@ _UNKNOWN_LONGEST = 10_000
 class Sound(NamedTuple):
     """What holds of a ULog.
 
-    `data`: the same log, of sound messages alone. `skipped`: bytes between sound messages, in so many `places`.
-    `rest`: bytes at the end that are no whole message. `homeless`: topic (or ``""``, not known) -> data
-    messages whose definition is missing or cannot be true. `dropouts`, `dropout_s`: how often the logger fell
+    `data`: the same log, of sound messages alone. `skipped`: bytes between sound messages, in so many
+    `places`. `rest`: bytes at the end that are no whole message. `homeless`: topic (or ``""``, not known) ->
+    data messages whose definition is missing or cannot be true. `dropouts`, `dropout_s`: how often the logger fell
     behind, and how long. `flags`: incompatible ones that are not known, 0 where all are.
     """
 

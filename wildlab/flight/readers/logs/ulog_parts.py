@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.gimbals import device_angles, heading_at, unturned, wrapped
 from wildlab.flight.readers.logs.log import Stream
-from wildlab.flight.readers.logs.places import impossible_places, placed
+from wildlab.flight.readers.logs.places import ONE_HEIGHT, impossible_places, one_height, placed
 from wildlab.flight.readers.logs.stamps import running_stream, stamps_that_fail
 from wildlab.flight.readers.logs.ulog_topics import Flags, Topic, from_local
 from wildlab.flight.time.fitting import ClockFit
@@ -44,10 +44,15 @@ def read_parts(topics: dict[str, Topic], fit: ClockFit | None) -> tuple[dict[str
     parts, notes
     """
     notes: list[str] = []
-    poses = _poses(topics, fit, notes)
+    poses, gnss = _poses(topics, fit, notes), _gnss(topics, fit)
+    if gnss is not None and one_height(gnss.columns):
+        notes.append(ONE_HEIGHT)
+        for stream in (poses, gnss):
+            if stream is not None:
+                stream.columns.pop("height_ellipsoid_m", None)
     parts = {
         "poses": poses,
-        "gnss": _gnss(topics, fit),
+        "gnss": gnss,
         "imu": _imu(topics, fit),
         "magnetometer": _magnetometer(topics, fit),
         "triggers": _triggers(topics, fit),
@@ -64,14 +69,14 @@ def _poses(topics: dict[str, Topic], fit: ClockFit | None, notes: list[str]) -> 
             notes.append(f"{len(place)} positions stand without any attitude: there are no poses")
         return None
     columns = attitude.times(fit)
-    at = columns["time_s"]
+    at = columns["time_log_s"]
     if place is not None and place.has("lat", "latitude_deg"):
-        columns |= _at(place, _from_global(place), fit, at)
+        columns |= _at(place, _from_global(place), at)
         if local is not None:
             motion = _local_motion(local)
-            columns |= {name: one for name, one in _at(local, motion, fit, at).items() if name not in columns}
+            columns |= {name: one for name, one in _at(local, motion, at).items() if name not in columns}
     elif local is not None and local.has("ref_lat"):
-        columns |= _at(local, _from_local(local) | _local_motion(local), fit, at)
+        columns |= _at(local, _from_local(local) | _local_motion(local), at)
         notes.append("positions are those of the local frame on its origin: the log has no global ones")
     else:
         columns |= {"latitude_deg": np.full(len(at), np.nan), "longitude_deg": np.full(len(at), np.nan)}
@@ -137,9 +142,9 @@ def _local_motion(local: Topic) -> dict[str, Array]:
     }
 
 
-def _at(topic: Topic, values: dict[str, Array], fit: ClockFit | None, times_s: Array) -> dict[str, Array]:
-    """Columns of a topic at other times, linear, no gap bridged; without those that have no value."""
-    stamps = topic.times(fit)["time_s"]
+def _at(topic: Topic, values: dict[str, Array], times_s: Array) -> dict[str, Array]:
+    """Columns of a topic at other times since start, linear, no gap bridged; without those of no value."""
+    stamps = topic.taken_s()
     good = np.ones(len(stamps), bool)
     for rows in stamps_that_fail(stamps).values():
         good &= ~rows
@@ -209,8 +214,8 @@ def _imu(topics: dict[str, Topic], fit: ClockFit | None) -> Stream | None:
     largest = np.array([3000.0] * 3 + [400.0] * 3)
     with np.errstate(invalid="ignore"):
         wrong = {
-            "not a number": ~np.isfinite(values).all(axis=1),
-            "more than a sensor can measure": (np.abs(values) > largest).any(axis=1),
+            "not a number": np.asarray(~np.isfinite(values).all(axis=1)),
+            "more than a sensor can measure": np.asarray((np.abs(values) > largest).any(axis=1)),
         }
     return _stream("imu", columns, found, wrong)
 
@@ -227,7 +232,9 @@ def _magnetometer(topics: dict[str, Topic], fit: ClockFit | None) -> Stream | No
             continue
         columns = found.times(fit)
         columns |= {f"field_{axis}_ut": one for axis, one in zip("xyz", field.T * _GAUSS_UT, strict=True)}
-        return _stream("magnetometer", columns, found, {"no measurement": ~np.isfinite(field).all(axis=1)})
+        return _stream(
+            "magnetometer", columns, found, {"no measurement": np.asarray(~np.isfinite(field).all(axis=1))}
+        )
     return None
 
 
@@ -248,14 +255,16 @@ def _gimbal(topics: dict[str, Topic], fit: ClockFit | None, poses: Stream | None
     if found is not None and found.has("q[0]"):
         columns = found.times(fit)
         flags = np.nan_to_num(found.get("device_flags"))
-        angles = device_angles(found.several("q", 4), flags, heading_at(poses, columns["time_s"]))
+        angles = device_angles(
+            found.several("q", 4), flags, heading_at(poses, columns["time_log_s"], "time_log_s")
+        )
         return _stream("gimbal", columns | angles, found, unturned(angles))
     found = topics.get("mount_orientation")
     if found is None:
         return None
     columns = found.times(fit)
     roll, pitch, yaw = np.degrees(found.several("attitude_euler_angle", 3)).T
-    world = wrapped(yaw + heading_at(poses, columns["time_s"]))
+    world = wrapped(yaw + heading_at(poses, columns["time_log_s"], "time_log_s"))
     angles = {"roll_world_deg": roll, "pitch_world_deg": pitch, "yaw_world_deg": world}
     return _stream("gimbal", columns | angles, found, unturned(angles))
 

@@ -39,28 +39,22 @@ class Topic(NamedTuple):
                 return self.data[name].astype(np.float64)
         return np.full(len(self), np.nan)
 
-    def scaled(self, *names: tuple[str, float]) -> Array:
-        """The first of these fields that it has, (N,), times its factor; NaN where it has none."""
-        for name, factor in names:
-            if name in self.data:
-                return self.data[name].astype(np.float64) * factor
-        return np.full(len(self), np.nan)
-
     def several(self, name: str, count: int) -> Array:
         """A field that is an array, (N, count); NaN where it has none."""
         return np.stack([self.get(f"{name}[{at}]") for at in range(count)], axis=1)
 
     def taken_s(self) -> Array:
-        """When each was measured, (N,) s since start: the sample's stamp where it has a true one, else its own."""
+        """When each was measured, (N,) s since start: by the sample's stamp where true, else its own."""
         stamp, sample = self.get("timestamp") / 1e6, self.get("timestamp_sample") / 1e6
         with np.errstate(invalid="ignore"):
             true = (sample > 0) & (sample <= stamp) & (stamp - sample <= _OLDEST_S)
         return np.where(true, sample, stamp)
 
     def times(self, fit: ClockFit | None) -> dict[str, Array]:
-        """Columns ``time_s`` (UTC; time since start where UTC is not known) and ``time_log_s``."""
+        """Columns ``time_s`` (UTC, NaN where that is not known) and ``time_log_s`` (since start)."""
         taken = self.taken_s()
-        return {"time_s": taken if fit is None else fit.to_reference(taken), "time_log_s": taken}
+        utc = np.full(len(taken), np.nan) if fit is None else fit.to_reference(taken)
+        return {"time_s": utc, "time_log_s": taken}
 
 
 def from_local(
@@ -68,8 +62,8 @@ def from_local(
 ) -> tuple[Array, Array]:
     """Latitude and longitude of places in PX4's local frame.
 
-    PX4 lays the frame out by an azimuthal equidistant projection of a sphere; back on the same sphere it gives
-    what its filter held, where an ellipsoid would be off by up to 0.5 % of the distance.
+    PX4 lays the frame out by an azimuthal equidistant projection of a sphere; back on the same sphere it
+    gives what its filter held, where an ellipsoid would be off by up to 0.5 % of the distance.
 
     Parameters
     ----------
