@@ -28,8 +28,10 @@ _CALENDAR = re.compile(r"(\d{4})/(\d{1,2})/(\d{1,2})", re.ASCII)
 _CLOCK = re.compile(r"(\d{1,2}):(\d{1,2}):(\d{1,2}(?:\.\d*)?)", re.ASCII)
 _NAMED = ("latitude", "x-ecef", "e-baseline")
 #: What RTKLIB writes unless told otherwise, for a file whose header is gone.
-_USUAL = "GPST latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio"
+_USUAL = "GPST latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m)"
 _JST_S = 9 * 3600.0
+#: RTKLIB writes up to 22 columns; a header may not ask for a table of any width.
+MOST_COLUMNS = 64
 
 
 class Layout(NamedTuple):
@@ -103,7 +105,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
         notes.append("rows are not in order of time in the file; they were put in order")
     if guessed:
         notes.append(
-            "no header names the columns: taken as latitude, longitude and height above the ellipsoid at GPS time"
+            "no header names the columns: taken as latitude, longitude, ellipsoidal height, at GPS time"
         )
     columns = {name: values[order] for name, values in columns.items()}
     quality = columns.get("fix", np.full(len(order), np.nan))
@@ -111,7 +113,9 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     stream = make_stream("gnss", columns, lines[order], "line", judge(columns, reasons))
     notes += gaps(columns["time_s"], stream.used)
     scales = {layout.scale for layout in found}
-    clock = Clock("GPS time of the rows" if scales == {"GPST"} else "UTC of the log", pairs=len(order))
+    base = "GPS time of the rows" if scales == {"GPST"} else "UTC of the log"
+    ahead = np.nanmedian(columns["time_s"] - columns["time_log_s"])
+    clock = Clock(base, offset_s=float(ahead), pairs=len(order))
     lost = (f"{plural(bad, 'line')} of {bad + len(order)} could not be read",) if bad else ()
     return RawLog("rtklib-pos", {"gnss": stream}, clock=clock, lost=lost, notes=tuple(notes))
 
@@ -162,11 +166,11 @@ def _layout(path: Path, line: str, above_sea: bool) -> Layout:
         # Degrees, minutes and seconds are three columns under one name.
         parts = ("", "_min", "_sec") if name in ("latitude", "longitude") and "(d'" in word else ("",)
         names += [name + part for part in parts]
-    return Layout(words[0].upper(), tuple(names), above_sea)
+    return Layout(words[0].upper(), tuple(names[:MOST_COLUMNS]), above_sea)
 
 
 def _time(tokens: list[str], days: dict[str, float]) -> float | None:
-    """s since 1970 in the file's own scale; the first two tokens are a date and a clock, or a week and a time."""
+    """s since 1970 in the file's own scale, of a date and a clock, or of a week and a time in it."""
     if len(tokens) < 2:
         return None
     if "/" not in tokens[0]:
