@@ -1,0 +1,242 @@
+"""Surveyed points out of KML, GeoJSON and tables: the same points out of each, and sentences for the rest."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import marks_csv, marks_geojson, marks_kml
+from wildlab.flight.readers.logs.log import RawLog
+
+HERE = Path("marks")
+#: Name, latitude, longitude, height.
+POINTS = [("A1", 63.44, 10.4, 39.5), ("B <b>", -12.5, -170.25, 101.0), ("=2+2", 0.5, 0.0, -3.0)]
+
+
+def kml(points: list[tuple[str, float, float, float]], mode: str = "absolute", more: str = "") -> bytes:
+    marks = "".join(
+        f"<Placemark><name>{name.replace('<', '&lt;')}</name><Point><altitudeMode>{mode}</altitudeMode>"
+        f"<coordinates> {lon},{lat},{high} </coordinates></Point></Placemark>"
+        for name, lat, lon, high in points
+    )
+    start = '<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
+    return f"{start}{marks}{more}</Document></kml>".encode()
+
+
+def geojson(points: list[tuple[str, float, float, float]], **more: Any) -> bytes:
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"Name": name},
+            "geometry": {"type": "Point", "coordinates": [lon, lat, high]},
+        }
+        for name, lat, lon, high in points
+    ]
+    return json.dumps({"type": "FeatureCollection", "features": features, **more}).encode()
+
+
+def table(points: list[tuple[str, float, float, float]], header: str, sign: str = ",") -> bytes:
+    rows = [sign.join([name, *map(repr, numbers)]) for name, *numbers in points]
+    if sign == ";":
+        rows = [row.replace(".", ",") for row in rows]
+    return "\r\n".join([header, *rows, ""]).encode()
+
+
+def values(log: RawLog, name: str) -> list[Any]:
+    return list(log.parts["marks"].columns[name])
+
+
+def check_points(log: RawLog, height: str) -> None:
+    for name, at in (("name", 0), ("latitude_deg", 1), ("longitude_deg", 2), (height, 3)):
+        assert values(log, name) == [one[at] for one in POINTS]
+    assert values(log, "use") == [1.0] * 3
+    assert [name for name in log.parts["marks"].columns if name.startswith("height_")] == [height]
+
+
+def test_kml_gives_its_points_above_sea_level() -> None:
+    data = kml(POINTS)
+    assert marks_kml.recognise(data[:8192], "x")
+    check_points(marks_kml.read(HERE, data), "height_sea_m")
+
+
+def test_geojson_gives_its_points_above_the_ellipsoid() -> None:
+    data = geojson(POINTS)
+    assert marks_geojson.recognise(data[:8192], "x")
+    check_points(marks_geojson.read(HERE, data), "height_ellipsoid_m")
+
+
+@pytest.mark.parametrize(
+    ("header", "sign", "height"),
+    [
+        ("name,latitude,longitude,height_ellipsoid", ",", "height_ellipsoid_m"),
+        ("Point ID;Lat;Lon;H [m MSL]", ";", "height_sea_m"),
+        ("ID\tLatitude (deg)\tLng\tEllipsoidal height (m)", "\t", "height_ellipsoid_m"),
+        ("GCP,lat_dd,long_dd,HAE", ",", "height_ellipsoid_m"),
+        ("station,LATITUDE,LONGITUDE,orthometric_height", ",", "height_sea_m"),
+        ("Punkt;Breite;Laenge;height_sea_m", ";", "height_sea_m"),
+        ("marker,lat,lon,elevation_egm96", ",", "height_sea_m"),
+    ],
+)
+def test_tables_under_many_names(header: str, sign: str, height: str) -> None:
+    data = table(POINTS, header, sign)
+    assert marks_csv.recognise(data[:8192], "x")
+    check_points(marks_csv.read(HERE, data), height)
+
+
+def test_order_comments_and_spreads_of_a_table() -> None:
+    data = b"# surveyed\n\nsd_vertical;height_ellipsoid;lon;lat;sd_horizontal_m;name\n"
+    data += b"0.02;40;10.4;63.44;0.01;A\n"
+    log = marks_csv.read(HERE, data)
+    found = [values(log, one)[0] for one in ("name", "latitude_deg", "longitude_deg", "height_ellipsoid_m")]
+    assert found == ["A", 63.44, 10.4, 40.0]
+    assert (values(log, "sd_horizontal_m"), values(log, "sd_vertical_m")) == ([0.01], [0.02])
+    assert log.parts["marks"].rows.tolist() == [4]
+
+
+@pytest.mark.parametrize(
+    ("header", "problem", "fix"),
+    [
+        (
+            "name,lat,lon,height",
+            "'height' does not say what heights count from",
+            "height_ellipsoid or height_sea",
+        ),
+        ("name,lat,lon,altitude", "'altitude' does not say", "height_ellipsoid or height_sea"),
+        ("name,lat,lon,note", "no column of heights", "height_ellipsoid or height_sea"),
+        ("name,northing,easting,h", "eastings and northings", "latitude and longitude, in degrees"),
+        ("name,a,b,c", "no latitude and longitude", "latitude and longitude, in degrees"),
+    ],
+)
+def test_a_table_that_does_not_say_enough(header: str, problem: str, fix: str) -> None:
+    with pytest.raises(WildlabError) as error:
+        marks_csv.read(HERE, table(POINTS, header))
+    assert problem in error.value.problem
+    assert fix in error.value.fix
+
+
+def test_a_table_over_time_is_no_marks() -> None:
+    assert not marks_csv.recognise(b"time,lat,lon,height_sea\n1,2,3,4\n", "x")
+    assert not marks_csv.recognise(b"GPS date,lat,lon,alt\n", "x")
+    assert not marks_csv.recognise(b"\x00\x01lat,lon\n", "x")
+    assert not marks_csv.recognise("lat,lon,h\xf8yde_msl\n".encode("latin-1")[:3], "x")
+
+
+def test_rows_that_cannot_be_used_stay_and_say_why() -> None:
+    rows = [("A", 63.0, 10.0, 1.0), ("A", 63.1, 10.0, 1.0), ("C", 0.0, 0.0, 1.0), ("D", 91.0, 0.0, 1.0)]
+    data = table(rows, "name,lat,lon,height_sea") + b"E,x,10,1\nF,63,10,\nG,63\n,64,11,5\n"
+    log = marks_csv.read(HERE, data)
+    assert values(log, "why") == [
+        "",
+        "a name that stands there twice",
+        "placeholder of a position",
+        "position that is none on Earth",
+        "no position",
+        "no height",
+        "",
+    ]
+    assert values(log, "name")[-1] == "7"
+    assert log.lost == ("1 line without 4 values, the first is line 8",)
+    assert "1 of 7 marks: no height" in log.notes
+
+
+def test_heights_of_kml_count_only_where_they_are_absolute() -> None:
+    log = marks_kml.read(HERE, kml(POINTS, "relativeToGround"))
+    assert np.isnan(values(log, "height_sea_m")).all()
+    assert set(values(log, "why")) == {"no height"}
+    assert "altitudeMode is not absolute" in log.notes[0]
+
+
+def test_other_geometries_are_counted() -> None:
+    line = (
+        "<Placemark><name>way</name><LineString><coordinates>1,2 3,4</coordinates></LineString></Placemark>"
+    )
+    ring = "<LinearRing><coordinates>1,2 3,4 5,6 1,2</coordinates></LinearRing>"
+    area = f"<Placemark><Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon></Placemark>"
+    log = marks_kml.read(HERE, kml(POINTS, more=line + area))
+    assert values(log, "name") == [one[0] for one in POINTS]
+    assert log.lost == ("2 lines, areas or models: only points are marks",)
+    other = {"type": "LineString", "coordinates": [[1, 2], [3, 4]]}
+    both = {
+        "type": "GeometryCollection",
+        "geometries": [other, {"type": "MultiPoint", "coordinates": [[1, 2, 3]]}],
+    }
+    log = marks_geojson.read(HERE, json.dumps(both).encode())
+    assert (values(log, "name"), values(log, "height_ellipsoid_m")) == (["1"], [3.0])
+    assert log.lost == ("1 geometries that are no points",)
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"<kml><Document/></kml>", "has no point"),
+        (b"<gpx/>", "is XML, and no KML"),
+        (b"<kml><Placemark>", "is not KML"),
+        (b'<!DOCTYPE kml [<!ENTITY a "b">]><kml>&a;</kml>', "declares a document type"),
+        (b"<kml>" + b"<a>" * 500, "too deep"),
+        (
+            b"<kml><Placemark><Point><coordinates>a,b</coordinates></Point></Placemark></kml>",
+            "is no coordinate",
+        ),
+    ],
+)
+def test_kml_that_is_refused(data: bytes, problem: str) -> None:
+    with pytest.raises(WildlabError, match=problem):
+        marks_kml.read(HERE, data)
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"{", "is not readable JSON"),
+        (b"[" * 100_000, "is not readable JSON"),
+        (b'{"type": "FeatureCollection", "features": 5}', "has no point"),
+        (b'{"type": "Point", "coordinates": ["a"]}', "has no point"),
+        (b"5", "has no point"),
+        (
+            geojson(POINTS, crs={"properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}),
+            "another coordinate system",
+        ),
+    ],
+)
+def test_geojson_that_is_refused(data: bytes, problem: str) -> None:
+    with pytest.raises(WildlabError, match=problem):
+        marks_geojson.read(HERE, data)
+
+
+def test_the_older_standards_words_for_the_same_system_are_taken() -> None:
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
+    check_points(marks_geojson.read(HERE, geojson(POINTS, crs=crs)), "height_ellipsoid_m")
+
+
+@pytest.mark.parametrize(
+    ("reader", "data"),
+    [
+        (marks_kml, kml(POINTS * 5)),
+        (marks_geojson, geojson(POINTS * 5)),
+        (marks_csv, table(POINTS * 5, "name,lat,lon,height_sea")),
+    ],
+)
+def test_damaged_files_end_in_a_sentence(reader: Any, data: bytes) -> None:
+    random = np.random.default_rng(14)
+    for place in random.integers(0, len(data), 50):
+        _try(reader, data[:place])
+    for _ in range(50):
+        spoilt = np.frombuffer(data, np.uint8).copy()
+        spoilt[random.integers(0, len(data), 100)] = random.integers(0, 256, 100)
+        _try(reader, spoilt.tobytes())
+
+
+def _try(reader: Any, data: bytes) -> None:
+    reader.recognise(data[:8192], "x")
+    try:
+        log = reader.read(HERE, data)
+    except WildlabError:
+        return
+    used = log.parts["marks"].used
+    for name in ("latitude_deg", "longitude_deg"):
+        assert np.isfinite(log.parts["marks"].columns[name][used]).all()
