@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs import ardupilot_motion as motion
 from wildlab.flight.readers.logs.ardupilot_messages import Table
-from wildlab.flight.readers.logs.ardupilot_time import Times, gps_utc, own_stamps, placed, times, true_fix
+from wildlab.flight.readers.logs.ardupilot_time import (
+    Times,
+    gps_utc,
+    longest_run,
+    own_stamps,
+    placed,
+    times,
+    true_fix,
+)
 from wildlab.flight.readers.logs.log import RawLog, Stream
 
 Array = NDArray[np.float64]
@@ -23,6 +31,8 @@ _VEHICLE = re.compile(
 )
 
 
+# Damaged values may be anything: they are marked, not warned of.
+@np.errstate(all="ignore")
 def raw_log(
     path: Path, format_: str, tables: dict[str, Table], lost: Sequence[str], counted_in: str, title: str = ""
 ) -> RawLog:
@@ -55,6 +65,7 @@ def raw_log(
     if any(name in tables and tables[name].has(one) for name, one in (("ATT", "qw"), ("TIME", "StartTime"))):
         problem = "is a log of PX4's old format sdlog2, whose messages have other units under the same names"
         raise WildlabError(problem, "log with a newer PX4, as .ulg", file=path)
+    tables, left_out = longest_run(tables)
     receivers = [one for one in motion.sensors(tables, ("GPS", "GPS2", "GPS3")) if one.has("Lat", "Lng")]
     receiver = next((one for one in receivers if true_fix(one).any()), receivers[0] if receivers else None)
     when = times(tables, receiver)
@@ -77,7 +88,9 @@ def raw_log(
         problem = "has no message of attitude, position, sensors or images"
         raise WildlabError(problem, "log these messages (LOG_BITMASK of the autopilot)", file=path)
     notes = _notes(tables, when, found, receivers, receiver, place)
-    return RawLog(format_, found, _vehicle(tables, title), when.clock, tuple(lost), tuple(notes))
+    return RawLog(
+        format_, found, _vehicle(tables, title), when.clock, (*lost, *filter(None, [left_out])), tuple(notes)
+    )
 
 
 def _vehicle(tables: dict[str, Table], title: str) -> str:

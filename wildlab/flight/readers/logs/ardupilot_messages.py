@@ -70,7 +70,9 @@ class Table:
         for name in names:
             at = self.fields.index(name) if name in self.fields else -1
             if at >= 0 and self.characters[at] not in TEXT_CHARACTERS + "a":
-                values = np.asarray(self.column(at)).astype(np.float64)
+                # NaN of the signalling kind in a damaged log is a NaN like others.
+                with np.errstate(invalid="ignore"):
+                    values = np.asarray(self.column(at)).astype(np.float64)
                 return values if unit is None else values * self._factor(at, unit)
         return np.full(len(self), np.nan)
 

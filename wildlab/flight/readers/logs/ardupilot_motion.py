@@ -12,13 +12,12 @@ from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.ardupilot_messages import Table
 from wildlab.flight.readers.logs.ardupilot_time import FIX_3D, Times, gps_utc, placed
 from wildlab.flight.readers.logs.log import Stream, make_stream
-from wildlab.flight.readers.logs.order import in_order
+from wildlab.flight.readers.logs.order import FASTEST_M_S, in_order, leaps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Faster, or dilution of this and more, is no measurement.
-FASTEST_M_S = 700.0
+#: Dilution of this and more is no measurement.
 WORST_HDOP = 99.0
 #: Spreads of this and more are what 16 bits hold, not what a receiver found.
 WORST_SPREAD_M = 655.0
@@ -94,17 +93,27 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
         name: values for name, values in columns.items() if name in _NEEDED or np.isfinite(values).any()
     }
     week = get("GWk", "Week")
-    with np.errstate(invalid="ignore"):
-        unusable = {
-            "no fix": ~(fix >= FIX_3D - 1),
-            "fix without height": ~(fix >= FIX_3D),
-            "no place": ~placed(latitude, longitude),
-            "no height": ~np.isfinite(height),
-            "no GPS week": np.isfinite(week) & np.isnan(gps_utc(receiver)),
-            "HDOP of 99 or more": hdop >= WORST_HDOP,
-            "faster than 700 m/s": (speed > FASTEST_M_S) | (np.abs(down) > FASTEST_M_S),
-        }
+    unusable = {
+        "no fix": ~(fix >= FIX_3D - 1),
+        "fix without height": ~(fix >= FIX_3D),
+        "no place": ~placed(latitude, longitude),
+        "no height": ~np.isfinite(height),
+        "no GPS week": np.isfinite(week) & np.isnan(gps_utc(receiver)),
+        "HDOP of 99 or more": hdop >= WORST_HDOP,
+        "faster than 700 m/s": (speed > FASTEST_M_S) | (np.abs(down) > FASTEST_M_S),
+    }
+    unusable["leap that nothing makes"] = _leaps(stamps, latitude, longitude, height, unusable)
     return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable)
+
+
+def _leaps(
+    stamps: Array, latitude: Array, longitude: Array, height: Array, unusable: dict[str, Mask]
+) -> Mask:
+    """(N,) rows far from their neighbours, among those that are not marked yet."""
+    rows = np.flatnonzero(in_order(stamps, ~np.logical_or.reduce(list(unusable.values()))))
+    marked = np.zeros(len(stamps), bool)
+    marked[rows] = leaps(stamps[rows], latitude[rows], longitude[rows], height[rows])
+    return marked
 
 
 def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array) -> dict[str, Array]:
@@ -124,8 +133,7 @@ def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array) -> dic
             name: str, most: float, at: NDArray[np.intp] = at, met: Mask = met, table: Table = table
         ) -> Array:
             values = table.numbers(name)[at]
-            with np.errstate(invalid="ignore"):
-                return np.where(met & (values != 0) & (np.abs(values) < most), values, np.nan)
+            return np.where(met & (values != 0) & (np.abs(values) < most), values, np.nan)
 
         made = {
             "sd_horizontal_m": column("HAcc", WORST_SPREAD_M),
@@ -176,11 +184,10 @@ def magnetometer(tables: dict[str, Table], times: Times, counted_in: str) -> Str
         return None
     field = np.column_stack([found[0].numbers(f"Mag{axis}", unit="uT") for axis in "XYZ"])
     columns = {f"field_{axis}_ut": field[:, i] for i, axis in enumerate("xyz")}
-    with np.errstate(invalid="ignore"):
-        unusable = {
-            "no value": ~np.isfinite(field).all(axis=1) | (field == 0).all(axis=1),
-            "beyond any sensor": (np.abs(field) > MOST_FIELD).any(axis=1),
-        }
+    unusable = {
+        "no value": ~np.isfinite(field).all(axis=1) | (field == 0).all(axis=1),
+        "beyond any sensor": (np.abs(field) > MOST_FIELD).any(axis=1),
+    }
     return stream("magnetometer", columns, times.of(found[0]), times, found[0].rows, counted_in, unusable)
 
 
@@ -213,6 +220,7 @@ def place_of(name: str, tables: dict[str, Table], times: Times) -> Place | None:
             nowhere = np.isnan(table.numbers("RelOriginAlt"))
             sea, home = np.where(nowhere, np.nan, sea), np.where(nowhere, np.nan, home)
     true = placed(latitude, longitude) & (np.isfinite(sea) | np.isfinite(home))
+    true &= ~_leaps(stamps, latitude, longitude, sea, {"": ~true})
     kept = in_order(stamps, true)
     if not kept.any():
         return None
@@ -277,8 +285,7 @@ def poses(tables: dict[str, Table], times: Times, place: Place | None, counted_i
     if "q_w" in columns:
         norm = np.sqrt(sum(np.square(one) for one in columns.values()))
         known &= np.abs(norm - 1) < 0.01
-    with np.errstate(invalid="ignore"):
-        turned = np.logical_or.reduce([np.abs(one) > 361 for one in columns.values()])
+    turned = np.logical_or.reduce([np.abs(one) > 361 for one in columns.values()])
     unusable: dict[str, Mask] = {"no attitude": ~known, "angle beyond a full turn": turned}
     where = _at(place, stamps)
     unusable["no position at that time"] = ~np.isfinite(where["latitude_deg"])

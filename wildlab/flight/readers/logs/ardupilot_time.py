@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from wildlab.flight.readers.logs.ardupilot_messages import Table
@@ -20,6 +21,10 @@ Array = NDArray[np.float64]
 FIX_3D = 3
 #: The fitted rate is believed where it differs from 1 by so many of its standard deviations.
 SURE_RATE = 4.0
+#: So many messages on both sides of a step back make it one of the board, not of a damaged stamp.
+_SURE_ROWS = 5
+#: Messages that say something of the whole log.
+_LASTING = frozenset({"FMT", "FMTU", "UNIT", "MULT", "PARM", "VER", "MSG"})
 
 
 class Times(NamedTuple):
@@ -114,8 +119,7 @@ def times(tables: dict[str, Table], receiver: Table | None) -> Times:
     -------
     Times
     """
-    stamped = [(table, own_stamps(table)) for table in sorted(tables.values(), key=len, reverse=True)[:20]]
-    anchor = next(((table, own) for table, own in stamped if own is not None), None)
+    anchor = _stamped(tables)
     if anchor is None:
         return Times(np.empty(0, np.int64), np.empty(0), None)
     kept = in_order(anchor[1])
@@ -126,6 +130,49 @@ def times(tables: dict[str, Table], receiver: Table | None) -> Times:
     fixed = true_fix(receiver)
     pairs = in_order(own, fixed) & in_order(utc, fixed)
     return made._replace(clock=_clock(own[pairs], utc[pairs])) if pairs.any() else made
+
+
+def longest_run(tables: dict[str, Table]) -> tuple[dict[str, Table], str]:
+    """The messages of one time that the board was on, and a sentence on those that are left out.
+
+    Stamps begin again where it was switched on again within a log: the longest time is kept, by its messages.
+    A few wrong stamps make no new time.
+    """
+    anchor = _stamped(tables)
+    if anchor is None or len(anchor[1]) < 2 * _SURE_ROWS:
+        return tables, ""
+    rows, stamps = anchor[0].rows, anchor[1]
+    middle = np.median(sliding_window_view(stamps, _SURE_ROWS), axis=1)
+    back = np.flatnonzero(middle[_SURE_ROWS:] < middle[:-_SURE_ROWS] - 1.0) + _SURE_ROWS
+    # Some places in a row see the same step: it is the one with the largest step between neighbours.
+    groups = np.split(back, np.flatnonzero(np.diff(back) > 1) + 1) if len(back) else []
+    begins = [int(group[np.argmin(stamps[group] - stamps[group - 1])]) for group in groups]
+    if not begins:
+        return tables, ""
+    edges = np.array([0, *rows[begins], np.iinfo(np.int64).max])
+    every = np.concatenate([table.rows for table in tables.values()])
+    counts = np.histogram(every, edges.astype(float))[0]
+    best = int(np.argmax(counts))
+    kept = {
+        name: table
+        if name in _LASTING
+        else table.take((table.rows >= edges[best]) & (table.rows < edges[best + 1]))
+        for name, table in tables.items()
+    }
+    left_out = int(counts.sum() - counts[best])
+    said = (
+        f"The board was switched on again within the log: of {len(counts)} stretches the longest is used, "
+        f"{left_out} of {counts.sum()} messages ({100 * left_out / counts.sum():.2g} %) are not."
+    )
+    return {name: table for name, table in kept.items() if len(table)}, said
+
+
+def _stamped(tables: dict[str, Table]) -> tuple[Table, Array] | None:
+    """The most frequent messages with stamps, and these."""
+    for table in sorted(tables.values(), key=len, reverse=True):
+        if (own := own_stamps(table)) is not None:
+            return table, own
+    return None
 
 
 def _clock(own: Array, utc: Array) -> Clock:

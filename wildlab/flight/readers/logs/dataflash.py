@@ -59,5 +59,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     if records.lost_bytes:
         share = 100 * records.lost_bytes / len(data)
         where = "one place" if records.places == 1 else f"{records.places} places"
-        lost = (f"{records.lost_bytes} of {len(data)} bytes ({share:.2g} %) in {where} belong to no message",)
+        lost = (
+            f"{records.lost_bytes} of {len(data)} bytes ({share:.2g} %) in {where} belong to no message.",
+        )
     return ardupilot.raw_log(path, "dataflash", records.tables, lost, "message")

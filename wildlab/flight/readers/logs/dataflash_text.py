@@ -61,6 +61,8 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
         Where no message of it can be read, or PX4 wrote it.
     """
     lines = data.decode("utf-8", errors="replace").split("\n")
+    if not lines[-1].strip():
+        lines = lines[:-1]
     known = _definitions(lines)
     tables, lost = _tables(lines, known)
     if not set(tables) - {"FMT"}:
@@ -108,13 +110,16 @@ def _tables(lines: list[str], known: dict[str, _Definition]) -> tuple[dict[str, 
         short += without
         if len(table):
             tables[name] = table
-    lost = [
-        f"{count} lines {name} have no line FMT that says what they hold" for name, count in undefined.items()
-    ]
+    lost = []
+    if undefined:
+        names = ", ".join([*list(undefined)[:3], *(["..."] if len(undefined) > 3 else [])])
+        lost.append(
+            f"{_of(sum(undefined.values()), lines)} have no line FMT that says what they hold: {names}."
+        )
     if short:
-        lost.append(f"{short} of {len(lines)} lines have not as many values as their message")
+        lost.append(f"{_of(short, lines)} have more or fewer values than their FMT says.")
     if strange:
-        lost.append(f"{strange} of {len(lines)} lines are no message")
+        lost.append(f"{_of(strange, lines)} are no messages.")
     return with_units(tables, {name: known[name].kind for name in tables}), lost
 
 
@@ -138,6 +143,10 @@ def _table(lines: list[str], one: _Definition, at: list[int]) -> tuple[Table, in
             return np.array([_number(word) for word in words], dtype=np.float64)
 
     return Table(one.name, one.fields, one.characters, rows, column), len(at) - len(whole)
+
+
+def _of(count: int, lines: list[str]) -> str:
+    return f"{count} of {len(lines)} lines ({100 * count / len(lines):.2g} %)"
 
 
 def _number(word: str) -> float:

@@ -1,4 +1,4 @@
-"""Which rows of a log stand in the order of their stamps, where a few stamps are wrong."""
+"""Which rows of a log stand in the order of their stamps, and which lie where nothing can have been."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from bisect import bisect_left
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import median_filter
 
 #: A log does not run for longer than this, s: stamps further from the middle one are wrong.
 LONGEST_S = 7 * 86400.0
+#: Nothing that carries a log moves faster, and no stretch of time is taken to be shorter than this.
+FASTEST_M_S, SHORTEST_S = 700.0, 1.0
+_DEGREE_M = 111_000.0
 
 
 def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.bool_]:
@@ -59,3 +63,33 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.b
         kept[rows[i]] = True
         i = before[i]
     return kept
+
+
+def leaps(
+    stamps: ArrayLike, latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike
+) -> NDArray[np.bool_]:
+    """Rows that lie further from the middle of their neighbours than 700 m/s over these would carry them.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s, increasing.
+    latitude, longitude, height
+        (N,) deg and m; a height that is NaN is not looked at.
+
+    Returns
+    -------
+    (N,) bool; none where there are fewer than five rows.
+    """
+    at, lat = np.asarray(stamps, float), np.asarray(latitude, float)
+    lon, up = np.asarray(longitude, float), np.nan_to_num(np.asarray(height, float))
+    if len(at) < 5:
+        return np.zeros(len(at), bool)
+    east = lon - median_filter(lon, 5, mode="nearest")
+    east = ((east + 180) % 360 - 180) * np.cos(np.radians(lat))
+    north = lat - median_filter(lat, 5, mode="nearest")
+    rise = up - median_filter(up, 5, mode="nearest")
+    away = np.sqrt(np.square(_DEGREE_M * north) + np.square(_DEGREE_M * east) + np.square(rise))
+    rows = np.arange(len(at))
+    took = at[np.minimum(rows + 2, len(at) - 1)] - at[np.maximum(rows - 2, 0)]
+    return np.asarray(away > FASTEST_M_S * np.maximum(took, SHORTEST_S))
