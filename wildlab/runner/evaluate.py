@@ -34,7 +34,8 @@ def evaluate_flight(
 ) -> list[Outcome]:
     """Judge a flight folder by all that it has the data for.
 
-    Its georeferencing goes to ``<reports>/<name of the flight>/`` (without truth: how far apart sightings of
+    An overview, with what is most worth fixing, goes to ``<reports>/<name of the flight>-overview/``, whatever
+    the flight lacks; its georeferencing to ``<name>`` (without truth: how far apart sightings of
     the same things lie), its navigation (inertial unit and GNSS
     against the attitude found on board) to ``<name>-navigation``.
 
@@ -50,14 +51,14 @@ def evaluate_flight(
     Returns
     -------
     list of Outcome
-        One for each report, also where it failed or, some of its data being there, was skipped.
+        One for each report, the overview first, also where it failed or, some of its data being there, was
+        skipped.
 
     Raises
     ------
     WildlabError
-        If the folder is not a flight, nothing of it can be judged, it is not clear which poses are meant, its
-        name is that of a study, the report of another flight of this name would be replaced, or the
-        calibration is of another camera.
+        If the folder is not a flight, it is not clear which poses are meant, its name is that of a study, the
+        report of another flight of this name would be replaced, or the calibration is of another camera.
     """
     flight = load_flight(folder)
     studies = load_studies(notebooks / "studies.toml")
@@ -101,27 +102,28 @@ def evaluate_flight(
     elif lacks_only_truth(flight) and calibration is None:
         found, _ = flight.pose_source(source)
         prepare(flight.name, "repeat-sightings.ipynb", {"source": found}, f"{again} --source {found}")
-    elif source is not None or calibration is not None:
-        option = "--source" if source is not None else "--calibration"
-        what = "poses are named" if source is not None else "a calibration is named"
+    elif calibration is not None:
         raise WildlabError(
-            f"{what}, and the georeferencing cannot be judged: {places.why}",
-            f"see what is amiss: wildlab check; or leave {option} out",
+            f"a calibration is named, and the georeferencing cannot be judged: {places.why}",
+            "see what is amiss: wildlab check; or leave --calibration out",
             file=folder,
-            field=option,
+            field="--calibration",
         )
+    elif source is not None:
+        flight.pose_source(source)
     lacking = lacking_for_navigation(flight, uses["navigation"])
     if not lacking:
         prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
     elif flight.imu is not None and flight.manifest.twin is None:
         skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
-    if not jobs:
-        raise WildlabError(
-            f"nothing of this flight can be judged. Georeferencing: {places.why}. Navigation: {lacking}",
-            "see what is amiss: wildlab check",
-            file=folder,
-        )
-    return run_all([jobs], skipped, studies, reports, console)
+    # The last to be run, since it lists what the others measured, and the first to be read.
+    beside = [job.name for job in jobs]
+    reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
+    reasons += [f"navigation ({lacking})"] if lacking else []
+    about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": source or ""}
+    prepare(f"{flight.name}-overview", "overview.ipynb", about, again)
+    outcomes = run_all([jobs[:-1], jobs[-1:]], skipped, studies, reports, console)
+    return sorted(outcomes, key=lambda one: one.name != jobs[-1].name)
 
 
 def refuse_other_flight(folder: Path, report: Path) -> None:

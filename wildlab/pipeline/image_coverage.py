@@ -1,0 +1,182 @@
+"""What the images of a flight have shown of the ground: footprints, the area of all, how they overlap."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import frame_poses, gimbal_angles
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.georeference import georeference_pixels, pixel_rays
+from wildlab.geometry.terrain import pixels_to_terrain
+
+Array = NDArray[np.float64]
+
+#: Rays along each side of an image, and how far below the horizon (rad) all of them have to point: flatter
+#: ones end anywhere.
+SIDE, FLATTEST = 5, np.radians(5.0)
+#: Cells of the grid across the narrower side of a usual footprint, and at most in all.
+ACROSS, MOST_CELLS = 40, 4_000_000
+
+
+class Coverage(NamedTuple):
+    """Images on the ground.
+
+    Attributes
+    ----------
+    images
+        How many the flight has.
+    posed
+        (N,) bool, those with a pose and gimbal angles.
+    flat
+        (N,) bool, posed ones that look too near the horizon to have a footprint.
+    outlines
+        (N, B, 2) m north and east, the border of each on the ground; NaN where it has none.
+    counts
+        (R, C) how many images show a cell.
+    north, east, step
+        Of the centre of the cell (0, 0), and between cells, m; rows run north.
+    ground
+        In words: what the footprints lie on.
+    """
+
+    images: int
+    posed: NDArray[np.bool_]
+    flat: NDArray[np.bool_]
+    outlines: Array
+    counts: NDArray[np.int32]
+    north: float
+    east: float
+    step: float
+    ground: str
+
+    @property
+    def placed(self) -> NDArray[np.bool_]:
+        """(N,) bool: the images with a footprint."""
+        return np.asarray(np.isfinite(self.outlines).all(axis=(1, 2)))
+
+    @property
+    def area_m2(self) -> float:
+        """Of the ground that at least one image shows."""
+        return float((self.counts > 0).sum()) * self.step**2
+
+    @property
+    def looks(self) -> float:
+        """Images that show a place, mean over what was seen at all; NaN where nothing was."""
+        seen = self.counts[self.counts > 0]
+        return float(seen.mean()) if len(seen) else float("nan")
+
+    @property
+    def twice(self) -> float:
+        """Share of what was seen that two images or more show; NaN where nothing was."""
+        seen = self.counts[self.counts > 0]
+        return float((seen > 1).mean()) if len(seen) else float("nan")
+
+
+def ground_height(flight: Flight) -> tuple[float, str] | None:
+    """Down coordinate of level ground, and where it is from: the truth, else the detections; None without."""
+    truth, detections = flight.truth, flight.detections
+    if truth is not None and np.isfinite(truth["down_m"]).any():
+        return float(np.nanmedian(truth["down_m"])), "level ground at the median height of the truth"
+    if detections is not None and "plane_down_m" in detections:
+        stated = detections["plane_down_m"].to_numpy(float)
+        if np.isfinite(stated).any():
+            return float(np.nanmedian(stated)), "level ground at the median height stated of the detections"
+    return None
+
+
+def cover_images(flight: Flight, source: str | None) -> tuple[Coverage | None, str]:
+    """What the images of a flight have shown of the ground, as far as their poses and the ground are known.
+
+    Parameters
+    ----------
+    flight
+        The flight.
+    source
+        Name of the ``nav`` table, or None where it has none.
+
+    Returns
+    -------
+    (Coverage or None, str)
+        Where there is none, why not, as a clause.
+    """
+    frames, manifest = flight.frames, flight.manifest
+    lacks = [
+        *(["images"] if frames is None or not len(frames) else []),
+        *(["poses"] if source is None else []),
+        *(["a camera"] if manifest.camera is None else []),
+    ]
+    if lacks or frames is None or source is None:
+        return None, f"it lacks {' and '.join(lacks)}"
+    level = ground_height(flight) if flight.terrain is None else None
+    if flight.terrain is None and level is None:
+        return None, "the height of the ground is not known: there is neither terrain nor truth"
+    try:
+        p, R, _ = frame_poses(flight, source)
+        pan, tilt = gimbal_angles(flight)
+    except WildlabError as error:
+        return None, error.problem
+    posed = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2)) & np.isfinite(pan + tilt)
+    poses = CameraPoses(
+        manifest.geometry_camera(), manifest.geometry_mount(), p[posed], R[posed], pan[posed], tilt[posed]
+    )
+    uv = _border(poses.camera.width, poses.camera.height)
+    outlines = np.full((len(frames), len(uv), 2), np.nan)
+    flat = np.zeros(len(frames), bool)
+    if posed.any():
+        each = poses.take(np.repeat(np.arange(posed.sum()), len(uv)))
+        pixels = np.tile(uv, (int(posed.sum()), 1))
+        down = pixel_rays(poses.camera, pixels, each.R_nc)
+        steep = down[:, 2] / np.linalg.norm(down, axis=1) > np.sin(FLATTEST)
+        steep = steep.reshape(-1, len(uv)).all(axis=1)
+        flat[np.flatnonzero(posed)[~steep]] = True
+        if flight.terrain is not None:
+            points = pixels_to_terrain(each, pixels, flight.terrain).points
+        else:
+            assert level is not None  # noqa: S101 - for the type checker: it was looked for above
+            points = georeference_pixels(each, pixels, np.full(len(pixels), level[0]))
+        border = points[:, :2].reshape(-1, len(uv), 2)
+        border[~steep] = np.nan
+        outlines[posed] = border
+    words = "the flight's terrain" if level is None else level[1]
+    return _counted(len(frames), posed, flat, outlines, words), ""
+
+
+def _border(width: int, height: int) -> Array:
+    """(4 (SIDE - 1), 2) pixels around an image, in order."""
+    along = np.linspace(0, 1, SIDE)[:-1]
+    u, v = float(width), float(height)
+    sides = [(along * u, 0 * along), (0 * along + u, along * v), (u - along * u, 0 * along + v)]
+    sides.append((0 * along, v - along * v))
+    return np.concatenate([np.stack(side, axis=1) for side in sides])
+
+
+def _counted(
+    images: int, posed: NDArray[np.bool_], flat: NDArray[np.bool_], outlines: Array, ground: str
+) -> Coverage:
+    known = outlines[np.isfinite(outlines).all(axis=(1, 2))]
+    if not len(known):
+        return Coverage(images, posed, flat, outlines, np.zeros((1, 1), np.int32), 0.0, 0.0, 1.0, ground)
+    # Imported where it is called: it takes its time.
+    from rasterio import Affine
+    from rasterio.enums import MergeAlg
+    from rasterio.features import rasterize
+
+    low, high = known.reshape(-1, 2).min(axis=0), known.reshape(-1, 2).max(axis=0)
+    extent = high - low
+    size = float(np.median(np.ptp(known, axis=1).min(axis=1)))
+    step = max(size / ACROSS, float(np.sqrt(extent.prod() / MOST_CELLS)), 1e-3)
+    rows, columns = (int(cells) for cells in np.ceil(extent / step).astype(int) + 1)
+    # Columns run east and rows north; a cell counts where its centre is inside.
+    grid = Affine(step, 0, low[1] - step / 2, 0, step, low[0] - step / 2)
+    shapes = [({"type": "Polygon", "coordinates": [one[:, ::-1].tolist()]}, 1) for one in _closed(known)]
+    counts = rasterize(shapes, (rows, columns), transform=grid, merge_alg=MergeAlg.add, dtype="int32")
+    return Coverage(images, posed, flat, outlines, counts, float(low[0]), float(low[1]), step, ground)
+
+
+def _closed(outlines: Array) -> Array:
+    return np.concatenate([outlines, outlines[:, :1]], axis=1)

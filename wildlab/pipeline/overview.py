@@ -1,0 +1,442 @@
+"""What there is to know of a flight whatever it lacks: streams, their pauses, the path, what is wrong on it.
+
+Nothing here needs a certain table: where one lacks, what would come of it is None, or an empty table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.streams import Pace, pace_of, runs_of
+from wildlab.evaluation.vibration import FINE, Vibration, vibration_of
+from wildlab.flight.checks.check import Use, find, usable_for
+from wildlab.flight.clocks import between, frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.pipeline.image_coverage import Coverage, cover_images, ground_height
+
+Array = NDArray[np.float64]
+
+POSITION = ["north_m", "east_m", "down_m"]
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
+FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
+RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
+#: Poses that are shown where nobody names some, best first; any other before the truth of a twin.
+PREFERRED = ("logged", "onboard", "autopilot")
+#: Four satellites give a place, five show that one of them is wrong, and six which.
+FEW_SATELLITES = 6
+#: A position that is this many times as uncertain as it usually is.
+UNSURE = 3.0
+#: A step between poses that is off by so many usual differences from what their speeds say, and by so much (m).
+JUMP, JUMP_M = 8.0, 3.0
+#: What may be wrong on a path, worst first.
+TROUBLES = (
+    "no poses",
+    "position jumps",
+    "no satellite positions",
+    f"fewer than {FEW_SATELLITES} satellites",
+    f"satellite position {UNSURE:g} times as uncertain as usual",
+    f"shaken by more than {FINE:g} m/s²",
+    "no inertial samples",
+)
+
+
+class Path(NamedTuple):
+    """Where a platform, or else a receiver or a target, was: (N,) times in s and (N, 3) m in n.
+
+    ``who`` is what it is of, ``timed`` whether the times are times and do not merely number the images.
+    """
+
+    who: str
+    times: Array
+    place: Array
+    timed: bool
+
+
+class Trouble(NamedTuple):
+    """One thing that is wrong for some time: one of `TROUBLES`, and (K, 2) begin and end, s."""
+
+    what: str
+    spells: Array
+
+    @property
+    def seconds(self) -> float:
+        """All spells together."""
+        return float(np.diff(self.spells, axis=1).sum())
+
+
+class Recovered(NamedTuple):
+    """Data that are lost: ``count`` of ``of``, what they are, and why they are lost."""
+
+    key: str
+    count: int
+    of: int
+    what: str
+    why: str
+
+    @property
+    def share(self) -> float:
+        """Of all."""
+        return self.count / self.of if self.of else 0.0
+
+
+@dataclass(frozen=True)
+class Overview:
+    """Everything that the overview of a flight shows.
+
+    Attributes
+    ----------
+    flight, source
+        The flight, and the poses that are shown of it, if there are any.
+    streams
+        Pace of every stream by its name.
+    length_s
+        From the first to the last stamp of what was carried, s; NaN where there is no time.
+    path
+        Where it flew, or the nearest to that which is known.
+    troubles
+        Those of `TROUBLES` that there are.
+    series
+        Over time: ``height``, ``speed``, ``attitude``, ``turning``, each {name: (times, values)}.
+    above
+        Height above ground: (N,) m along the path, and what the ground is; None where it is not known.
+    vibration
+        Of the inertial sensor, and the (N,) stamps of its samples; None where it cannot be told.
+    coverage, uncovered
+        What the images showed, or why that is not known.
+    detections
+        How many, in how many of the images, and how many of their pixels have a place on the ground.
+    lost
+        Data that are lost, most first.
+    uses
+        What the flight is good for.
+    problems, warnings
+        How many findings of either kind the checks of its tables have.
+    """
+
+    flight: Flight
+    source: str | None
+    streams: dict[str, Pace]
+    length_s: float
+    path: Path | None
+    troubles: tuple[Trouble, ...]
+    series: dict[str, dict[str, tuple[Array, Array]]]
+    above: tuple[Array, str] | None
+    vibration: tuple[Vibration, Array] | None
+    coverage: Coverage | None
+    uncovered: str
+    detections: tuple[int, int, int]
+    lost: tuple[Recovered, ...]
+    uses: tuple[Use, ...]
+    problems: int
+    warnings: int
+
+
+def look_over(flight: Flight, source: str | None = None) -> Overview:
+    """Collect what there is to know of a flight.
+
+    Parameters
+    ----------
+    flight
+        With anything missing.
+    source
+        Name of the ``nav`` table to show; left out, the best known one.
+
+    Returns
+    -------
+    Overview
+
+    Raises
+    ------
+    WildlabError
+        Where a source is named that the flight has not.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> found = look_over(simulate_twin("large-ship", 1))
+    >>> found.path.who, found.problems
+    ('nav/autopilot', 0)
+    """
+    if source is not None:
+        flight.pose_source(source)
+    source = source or best_source(flight)
+    streams = paces(flight)
+    timed = flight.manifest.time.kind == "utc"
+    carried = [pace for name, pace in streams.items() if pace.n and name != "truth"] or [
+        pace for pace in streams.values() if pace.n
+    ]
+    length = max(p.end for p in carried) - min(p.begin for p in carried) if carried and timed else np.nan
+    path = _path(flight, source)
+    vibration = _vibration(flight)
+    coverage, uncovered = cover_images(flight, source)
+    findings = [one.level for one in find(flight, meaning=False)]
+    return Overview(
+        flight=flight,
+        source=source,
+        streams=streams,
+        length_s=float(length),
+        path=path,
+        troubles=tuple(_troubles(flight, source, streams, vibration)) if timed else (),
+        series=_series(flight) if timed else {},
+        above=_above(flight, path),
+        vibration=vibration,
+        coverage=coverage,
+        uncovered=uncovered,
+        detections=_detections(flight, source),
+        lost=tuple(sorted(_lost(flight, source, streams), key=lambda one: -one.share)),
+        uses=tuple(usable_for(flight)),
+        problems=findings.count("problem"),
+        warnings=findings.count("warning"),
+    )
+
+
+def best_source(flight: Flight) -> str | None:
+    """The poses that are shown where nobody names some; None where there are none."""
+    named = [name for name, nav in flight.nav.items() if len(nav)]
+    known = [name for name in PREFERRED if name in named]
+    others = [name for name in named if not name.startswith("truth")]
+    return next(iter([*known, *others, *named]), None)
+
+
+def paces(flight: Flight) -> dict[str, Pace]:
+    """Pace of every stream of a flight by the name of its table; of a table without stamps there is none."""
+    tables = {f"nav/{name}": nav for name, nav in flight.nav.items()} | flight.tables
+    found = {}
+    for name, table in tables.items():
+        if name == "detections" or "time_s" not in table:
+            continue
+        stamps = table["time_s"].to_numpy(float)
+        if name == "frames":
+            stamps = frame_times(flight)
+        elif name == "gnss":
+            stamps = gnss_times(flight)
+        elif name == "truth":
+            # One of many targets stands for when all were followed.
+            stamps = np.unique(stamps[np.isfinite(stamps)]) + flight.manifest.clocks.truth_offset_s
+        known = np.sort(stamps[np.isfinite(stamps)])
+        found[name] = pace_of(stamps, longest_gap(known))
+    return found
+
+
+def _ordered(table: pd.DataFrame, stamps: Array, columns: list[str]) -> tuple[Array, Array]:
+    """Increasing stamps (N,) and values (N, K): what is finite, in order, the first of equal stamps."""
+    values = table[columns].to_numpy(float)
+    known = np.isfinite(stamps) & np.isfinite(values).all(axis=1)
+    t, values = stamps[known], values[known]
+    _, first = np.unique(t, return_index=True)
+    return t[first], values[first]
+
+
+def _path(flight: Flight, source: str | None) -> Path | None:
+    timed = flight.manifest.time.kind == "utc"
+    if source is not None:
+        nav = flight.nav[source]
+        t, place = _ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        if len(t):
+            return Path(f"nav/{source}", t, place, timed)
+    if flight.gnss is not None:
+        t, place = _ordered(flight.gnss, gnss_times(flight), POSITION)
+        if len(t):
+            return Path("gnss", t, place, timed)
+    truth = flight.truth
+    if truth is not None and len(truth):
+        first = truth[truth["target_id"] == truth["target_id"].iloc[0]]
+        t, place = _ordered(first, first["time_s"].to_numpy(float), POSITION)
+        if len(t) > 1:
+            return Path("truth", t + flight.manifest.clocks.truth_offset_s, place, timed)
+    return None
+
+
+def _troubles(
+    flight: Flight, source: str | None, streams: dict[str, Pace], vibration: tuple[Vibration, Array] | None
+) -> list[Trouble]:
+    found: dict[str, Array] = {}
+    nav = flight.nav.get(source) if source is not None else None
+    if nav is not None and "frame_id" not in nav:
+        found["no poses"] = streams[f"nav/{source}"].gaps
+        found["position jumps"] = _jumps(nav, streams[f"nav/{source}"])
+    if flight.gnss is not None and "gnss" in streams:
+        gnss, stamps = flight.gnss, gnss_times(flight)
+        found["no satellite positions"] = streams["gnss"].gaps
+        if "satellites" in gnss:
+            t, count = _ordered(gnss, stamps, ["satellites"])
+            found[TROUBLES[3]] = runs_of(count[:, 0] < FEW_SATELLITES, t)
+        if "sd_horizontal_m" in gnss:
+            t, sd = _ordered(gnss, stamps, ["sd_horizontal_m"])
+            if len(t):
+                found[TROUBLES[4]] = runs_of(sd[:, 0] > UNSURE * np.median(sd), t)
+    if vibration is not None:
+        found[TROUBLES[5]] = runs_of(vibration[0].worst > FINE, vibration[1])
+    if "imu" in streams:
+        found["no inertial samples"] = streams["imu"].gaps
+    return [Trouble(what, found[what]) for what in TROUBLES if len(found.get(what, ()))]
+
+
+def _jumps(nav: pd.DataFrame, pace: Pace) -> Array:
+    """Steps between poses that the speeds before and after do not explain."""
+    if not set(VELOCITY) <= set(nav):
+        return np.empty((0, 2))
+    t, values = _ordered(nav, nav["time_s"].to_numpy(float), POSITION + VELOCITY)
+    if len(t) < 3:
+        return np.empty((0, 2))
+    step = np.diff(t)[:, None]
+    off = np.linalg.norm(
+        np.diff(values[:, :3], axis=0) - (values[1:, 3:] + values[:-1, 3:]) / 2 * step, axis=1
+    )
+    usual = float(np.median(off))
+    far = (off > max(JUMP * usual, JUMP_M)) & (step[:, 0] <= MOST_STEPS * pace.step_s)
+    return np.stack([t[:-1][far], t[1:][far]], axis=1)
+
+
+#: Steps longer than so many usual ones are pauses, over which speeds explain nothing.
+MOST_STEPS = 3.0
+
+
+def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
+    height, speed, attitude, turning = {}, {}, {}, {}
+    for name, nav in flight.nav.items():
+        t, place = _ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        if not len(t):
+            continue
+        height[name] = t, -place[:, 2]
+        if set(VELOCITY) <= set(nav) and nav[VELOCITY].notna().any().all():
+            at, v = _ordered(nav, nav["time_s"].to_numpy(float), VELOCITY)
+            speed[name] = at, np.hypot(v[:, 0], v[:, 1])
+        at, q = _ordered(nav, nav["time_s"].to_numpy(float), QUATERNION)
+        good = np.linalg.norm(q, axis=1) > 0
+        if good.any():
+            attitude[name] = at[good], np.degrees(matrix_to_euler(quaternion_to_matrix(q[good])))
+    if flight.gnss is not None:
+        t, place = _ordered(flight.gnss, gnss_times(flight), POSITION)
+        if len(t):
+            height["satellites"] = t, -place[:, 2]
+        if set(VELOCITY) <= set(flight.gnss):
+            t, v = _ordered(flight.gnss, gnss_times(flight), VELOCITY)
+            if len(t):
+                speed["satellites"] = t, np.hypot(v[:, 0], v[:, 1])
+    if flight.imu is not None:
+        t, w = _ordered(flight.imu, flight.imu["time_s"].to_numpy(float), RATE)
+        if len(t):
+            turning["inertial sensor"] = t, np.degrees(w)
+    return {"height": height, "speed": speed, "attitude": attitude, "turning": turning}
+
+
+def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
+    if path is None or path.who == "truth":
+        return None
+    if flight.terrain is not None:
+        ground = flight.terrain.heights_at(path.place[:, :2])
+        return -path.place[:, 2] - ground, "the flight's terrain"
+    level = ground_height(flight)
+    return None if level is None else (level[0] - path.place[:, 2], level[1])
+
+
+def _vibration(flight: Flight) -> tuple[Vibration, Array] | None:
+    if flight.imu is None or flight.manifest.time.kind != "utc":
+        return None
+    t, force = _ordered(flight.imu, flight.imu["time_s"].to_numpy(float), FORCE)
+    found = vibration_of(t, force)
+    return None if found is None else (found, t)
+
+
+def _detections(flight: Flight, source: str | None) -> tuple[int, int, int]:
+    detections = flight.detections
+    if detections is None:
+        return 0, 0, 0
+    images = 0 if flight.frames is None else int(flight.frames["frame_id"].isin(detections["frame_id"]).sum())
+    placed, _ = _placed(flight, source)
+    return len(detections), images, int(placed.sum())
+
+
+def _placed(flight: Flight, source: str | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Of the pixel detections, which have a place on the ground, and which a pose; nothing without poses."""
+    from wildlab.geometry.georeference import georeference_pixels
+    from wildlab.pipeline.georeference import observe
+
+    none = np.zeros(0, bool)
+    if source is None or flight.manifest.camera is None:
+        return none, none
+    try:
+        seen = observe(flight, source)
+    except WildlabError:
+        return none, none
+    posed = np.isfinite(seen.poses.p_nc).all(axis=-1)
+    points = georeference_pixels(seen.poses, seen.uv, seen.plane_down)
+    return np.isfinite(points).all(axis=1), posed
+
+
+def _lost(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Recovered]:
+    """What is lost, with its denominator: images, detections, seconds."""
+    found = []
+    frames, timed = flight.frames, flight.manifest.time.kind == "utc"
+    if frames is not None and len(frames) and source is not None:
+        try:
+            p, _, _ = frame_poses(flight, source)
+            pan, tilt = gimbal_angles(flight)
+        except WildlabError:
+            p, pan, tilt = np.full((len(frames), 3), np.nan), np.zeros(len(frames)), np.zeros(len(frames))
+        posed = np.isfinite(p).all(axis=1)
+        why = _why_unposed(flight, source, ~posed) if timed and (~posed).any() else ""
+        found.append(Recovered("images_without_pose", int((~posed).sum()), len(frames), "images", why))
+        turned = np.isfinite(pan + tilt)
+        missing = int((posed & ~turned).sum())
+        found.append(Recovered("images_without_gimbal", missing, len(frames), "images", ""))
+        placed, has_pose = _placed(flight, source)
+        away = int((has_pose & ~placed).sum())
+        found.append(Recovered("detections_off_ground", away, len(placed), "detections", ""))
+    for key, name in (("time_without_satellites", "gnss"), ("time_without_inertial", "imu")):
+        pace = streams.get(name)
+        if timed and pace is not None and pace.length_s > 0:
+            found.append(Recovered(key, round(pace.paused_s), max(1, round(pace.length_s)), "seconds", ""))
+    imu = streams.get("imu")
+    if timed and imu is not None and imu.missing:
+        found.append(Recovered("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples", ""))
+    found += _untrue(flight)
+    return [one for one in found if one.count]
+
+
+def _why_unposed(flight: Flight, source: str, unposed: NDArray[np.bool_]) -> str:
+    nav, times = flight.nav[source], frame_times(flight)[unposed]
+    if "frame_id" in nav:
+        return "no pose bears their name"
+    stamps = nav["time_s"].to_numpy(float)
+    outside = int(((times < np.nanmin(stamps)) | (times > np.nanmax(stamps))).sum())
+    within = int(unposed.sum()) - outside
+    said = [
+        *([f"{outside} before the log of the poses begins or after it ends"] if outside else []),
+        *([f"{within} in its pauses"] if within else []),
+    ]
+    return " and ".join(said)
+
+
+def _untrue(flight: Flight) -> list[Recovered]:
+    """Detections that name a target whose truth is not known at the time."""
+    truth, detections, frames = flight.truth, flight.detections, flight.frames
+    if truth is None or detections is None or frames is None or "target_id" not in detections or truth.empty:
+        return []
+    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
+    times = np.where(at >= 0, frame_times(flight)[at], np.nan)
+    named = detections["target_id"].fillna("").to_numpy(str)
+    missing = 0
+    for name in np.unique(named[named != ""]):
+        rows = truth[truth["target_id"] == name]
+        own = times[named == name]
+        if rows.empty:
+            missing += len(own)
+            continue
+        stamps = rows["time_s"].to_numpy(float)
+        if np.isnan(stamps).all():
+            continue
+        t, place = _ordered(rows, stamps + flight.manifest.clocks.truth_offset_s, POSITION)
+        if len(t):
+            missing += int(np.isnan(between(t, place, own, "truth")[:, 0]).sum())
+    total = int((named != "").sum())
+    return [Recovered("detections_without_truth", missing, total, "detections that name a target", "")]

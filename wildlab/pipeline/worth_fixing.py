@@ -1,0 +1,163 @@
+"""What is most worth fixing on a flight, by what was measured: metres gained, or data that would not be lost.
+
+A gain in metres is one that the report on the georeferencing measured on images which a correction was not
+estimated from. Data that are lost are counted. Both are put in order by their share: of the error, or of the
+data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from wildlab.pipeline.overview import Overview, Recovered
+
+#: Shares below which a gain is not listed, and from which on it is said to be worth fixing.
+LISTED, WORTH = 0.005, 0.1
+#: How many are listed.
+MOST = 3
+
+#: What a flight comes to, and the colour of it.
+MEND, FIX, SOUND, UNJUDGED = "mend first", "worth fixing", "sound", "not judged"
+LEVELS = {MEND: "bad", FIX: "warn", SOUND: "good", UNJUDGED: "neutral"}
+
+#: Which parameters of a calibration tell which cause, by the names of their metrics.
+CAUSES = {
+    "position": ("north_offset", "east_offset"),
+    "height": ("down_offset",),
+    "boresight": ("boresight_roll", "boresight_tilt", "boresight_pan"),
+    "camera's clock": ("clock_offset",),
+    "lens": ("focal_offset", "aspect_offset", "centre_u_offset", "centre_v_offset"),
+}
+
+#: Numbers of reports by name and subject, as ``metrics.json`` has them.
+Numbers = Mapping[tuple[str, str], Mapping[str, Any]]
+
+
+class Gain(NamedTuple):
+    """One thing to fix.
+
+    Attributes
+    ----------
+    key
+        ``cause``, ``far_out``, or what is lost: `wildlab.pipeline.overview.Recovered`.
+    causes
+        Of a constant error, which; else empty.
+    value, low, high, unit
+        What is gained, with its interval where there is one: metres, or how many.
+    of, what
+        Of how many, or of how many metres; what they are.
+    share
+        Of the error or of the data.
+    why
+        What is known of the reason, as a clause; may be empty.
+    """
+
+    key: str
+    causes: tuple[str, ...]
+    value: float
+    low: float
+    high: float
+    unit: str
+    of: float
+    what: str
+    share: float
+    why: str
+
+
+def numbers_of(documents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], Mapping[str, Any]]:
+    """Numbers of ``metrics.json`` documents by name and subject; the first of equal ones.
+
+    Parameters
+    ----------
+    documents
+        As `wildlab.reporting.metrics.read_metrics` gives them.
+
+    Returns
+    -------
+    dict
+    """
+    found: dict[tuple[str, str], Mapping[str, Any]] = {}
+    for document in documents:
+        for entry in document["metrics"]:
+            found.setdefault((entry["name"], entry["subject"]), entry)
+    return found
+
+
+def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
+    """Everything that was measured to be worth something, most first.
+
+    Parameters
+    ----------
+    overview
+        Of the flight.
+    numbers
+        Of its other reports, from `numbers_of`; may be empty.
+
+    Returns
+    -------
+    list of Gain
+    """
+    found = [*_metres(numbers), *(_data(one) for one in overview.lost)]
+    return sorted((one for one in found if one.share >= LISTED), key=lambda one: -one.share)
+
+
+def _metres(numbers: Numbers) -> Iterable[Gain]:
+    gain, after = numbers.get(("gain", "winner")), numbers.get(("horizontal_error_mean", "calibrated-pose"))
+    # The mean error afterwards is only recorded where the gain is certain.
+    if gain is not None and after is not None and _known(gain["value"], after["value"]):
+        before = gain["value"] + after["value"]
+        fitted = {name for name, subject in numbers if subject == "calibration"}
+        causes = tuple(cause for cause, names in CAUSES.items() if fitted & set(names))
+        low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
+        share = gain["value"] / before if before > 0 else 0.0
+        yield Gain("cause", causes, gain["value"], low, high, "m", before, "mean error", share, "")
+    far = numbers.get(("gain", "without-far-out"))
+    left = numbers.get(("horizontal_error_mean", "without-far-out"))
+    points = numbers.get(("points_far_out", "winner"))
+    if far and left and points and _known(far["value"], left["value"], points["value"]):
+        before = far["value"] + left["value"]
+        share = far["value"] / before if before > 0 else 0.0
+        why = f"{points['value']:.0f} of {points['n']} points"
+        yield Gain("far_out", (), far["value"], math.nan, math.nan, "m", before, "mean error", share, why)
+
+
+def _known(*values: Any) -> bool:
+    return all(value is not None and math.isfinite(value) for value in values)
+
+
+def _data(lost: Recovered) -> Gain:
+    nan = math.nan
+    return Gain(
+        lost.key, (), float(lost.count), nan, nan, "1", float(lost.of), lost.what, lost.share, lost.why
+    )
+
+
+def verdict_of(problems: int, worth: int, judged: int) -> str:
+    """What a flight comes to, in a word or two.
+
+    Parameters
+    ----------
+    problems
+        Things in its tables that cannot be used or contradict each other.
+    worth
+        Gains of `WORTH` or more.
+    judged
+        Its other reports.
+
+    Returns
+    -------
+    str
+        A key of `LEVELS`.
+
+    Examples
+    --------
+    >>> verdict_of(0, 2, 1), verdict_of(1, 0, 0), verdict_of(0, 0, 0)
+    ('worth fixing', 'mend first', 'not judged')
+    """
+    if problems:
+        return MEND
+    if worth:
+        return FIX
+    return SOUND if judged else UNJUDGED

@@ -1,0 +1,271 @@
+"""What the overview of a flight says: every sentence follows from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
+from wildlab.pipeline.image_coverage import Coverage
+from wildlab.pipeline.overview import Overview, Trouble
+from wildlab.pipeline.worth_fixing import FIX, MEND, MOST, SOUND, WORTH, Gain
+from wildlab.reporting.georeferencing_cause import listed, metres
+from wildlab.reporting.text import percent
+
+_CAUSES = {
+    "position": "the position (north and east)",
+    "height": "the height",
+    "boresight": "the boresight (how the camera sits on the airframe)",
+    "camera's clock": "the camera's clock",
+    "lens": "the lens",
+}
+_TITLES = {
+    "images_without_pose": "Images without a pose",
+    "images_without_gimbal": "Images without gimbal angles",
+    "detections_off_ground": "Detections whose ray meets no ground",
+    "detections_without_truth": "Detections without a truth at their time",
+    "time_without_satellites": "Pauses of the satellite receiver",
+    "time_without_inertial": "Pauses of the inertial sensor",
+    "inertial_samples": "Inertial samples that are missing",
+    "far_out": "Points that are far out",
+}
+_REMEDIES = {
+    "cause": "Learn it with `wildlab calibrate` and judge it on another flight with `--calibration`.",
+    "far_out": "The report on the georeferencing names the photos, marks and clicks; look at these.",
+    "images_without_pose": "Log poses from before the first image until after the last one, and without "
+    "pauses; where they are there, look at the clocks.",
+    "images_without_gimbal": "Log the gimbal from before the first image until after the last one.",
+    "detections_off_ground": "Look at the height of the ground, and at where the camera looks.",
+    "detections_without_truth": "Log the targets for as long as images are taken, and name them alike.",
+    "time_without_satellites": "Look at the antenna, and at how often the log is written.",
+    "time_without_inertial": "Look at how often the log is written, and at the card.",
+    "inertial_samples": "Look at how often the log is written, and at the card.",
+}
+
+
+def duration_words(seconds: float) -> str:
+    """``37 s``, ``25 min``, ``2 h 5 min``; says so where there is none."""
+    if not np.isfinite(seconds):
+        return "of unknown length"
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def length_words(way_m: float) -> str:
+    """``840 m``, ``3.4 km``."""
+    return f"{way_m:.0f} m" if way_m < 1000 else f"{way_m / 1000:.1f} km"
+
+
+def area_words(area_m2: float) -> str:
+    """``840 m²``, ``3.4 ha``, ``12 km²``."""
+    if area_m2 < 1e4:
+        return f"{area_m2:.0f} m²"
+    return f"{area_m2 / 1e4:.1f} ha" if area_m2 < 1e6 else f"{area_m2 / 1e6:.1f} km²"
+
+
+def way_of(overview: Overview) -> float:
+    """Length of the path over the ground, m; NaN without one. Steps below a tenth of a second are joined."""
+    path = overview.path
+    if path is None or len(path.times) < 2:
+        return float("nan")
+    keep = np.concatenate([[0], np.flatnonzero(np.diff(np.floor(path.times * 2)) > 0) + 1])
+    place = path.place[keep if path.timed else slice(None), :2]
+    return float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
+
+
+def gain_title(gain: Gain) -> str:
+    """What it is."""
+    if gain.key == "cause":
+        what = listed([_CAUSES[cause] for cause in gain.causes]) if gain.causes else "what was fitted"
+        return f"A constant error of {what}"
+    return _TITLES[gain.key]
+
+
+def gain_measured(gain: Gain) -> str:
+    """What it would gain, with denominator and interval."""
+    share = percent(gain.share, 0)
+    if gain.key == "cause":
+        return (
+            f"Taking it off gains {metres(gain.value, gain.low, gain.high)} of a mean error of "
+            f"{metres(gain.of)} on images that it was not estimated from: {share} of it."
+        )
+    if gain.key == "far_out":
+        return (
+            f"{gain.why} are far out; without them the mean error is {metres(gain.of - gain.value)} "
+            f"and not {metres(gain.of)}: {share} less."
+        )
+    return f"{gain.value:.0f} of {gain.of:.0f} {gain.what} ({share})" + (
+        f": {gain.why}." if gain.why else "."
+    )
+
+
+def gain_sentence(gain: Gain) -> str:
+    """All of it, for a list."""
+    return f"**{gain_title(gain)}.** {gain_measured(gain)} {_REMEDIES[gain.key]}"
+
+
+def headline(overview: Overview, word: str, gains: Sequence[Gain], problems: int) -> str:
+    """The first sentence: what the flight comes to."""
+    if word == MEND:
+        some = "one thing" if problems == 1 else f"{problems} things"
+        return f"Mend this flight first: {some} in it cannot be used or contradict each other."
+    if word == FIX:
+        worth = [gain for gain in gains if gain.share >= WORTH]
+        first = _lower(gain_title(worth[0]))
+        more = f", and {len(worth) - 1} more" if len(worth) > 1 else ""
+        return f"Something is worth fixing: {first}{more}."
+    if word == SOUND:
+        return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
+    return "This flight is shown, not judged: none of the other reports could be made of it."
+
+
+def _lower(text: str) -> str:
+    return f"{text[:1].lower()}{text[1:]}"
+
+
+def summary_sentences(
+    overview: Overview, word: str, gains: Sequence[Gain], problems: int, lacking: Sequence[str]
+) -> list[str]:
+    """The summary: the verdict, its measure, and what could not be judged."""
+    said = [headline(overview, word, gains, problems)]
+    if gains:
+        what = "" if word == FIX else f"The most: {_lower(gain_title(gains[0]))}. "
+        said.append(f"{what}{gain_measured(gains[0])}")
+    elif word != SOUND:
+        said.append("No gain was measured.")
+    if lacking:
+        said.append(f"Not judged: {'; '.join(lacking)}.")
+    return said
+
+
+def subtitle(overview: Overview) -> str:
+    """What the flight is, in a line."""
+    way = way_of(overview)
+    parts = [duration_words(overview.length_s)]
+    if np.isfinite(way):
+        parts.append(length_words(way))
+    if overview.above is not None:
+        low, high = np.nanquantile(overview.above[0], [0.05, 0.95]) if _any(overview.above[0]) else (0, 0)
+        if _any(overview.above[0]):
+            parts.append(f"mostly {low:.0f} to {high:.0f} m above {overview.above[1]}")
+    parts.append(f"poses: {overview.source}" if overview.source else "no poses")
+    return ", ".join(parts)
+
+
+def _any(values: np.ndarray) -> bool:
+    return bool(np.isfinite(values).any())
+
+
+def path_title(overview: Overview) -> str:
+    """What is wrong along the path, in a line."""
+    if not overview.troubles:
+        return "Nothing wrong was found along the path"
+    worst = overview.troubles[0]
+    if not np.isfinite(overview.length_s) or overview.length_s <= 0 or worst.seconds < 1:
+        return f"Along the path: {worst.what}"
+    return f"{trouble_share(overview, worst)} of the time: {worst.what}"
+
+
+def trouble_share(overview: Overview, trouble: Trouble) -> str:
+    """Share of the time."""
+    return percent(min(1.0, trouble.seconds / overview.length_s), 0)
+
+
+def coverage_sentences(coverage: Coverage, detections: tuple[int, int, int]) -> list[str]:
+    """Area, overlap, and which images are not in them."""
+    placed, posed = int(coverage.placed.sum()), int(coverage.posed.sum())
+    said = [
+        f"{placed} of {coverage.images} images have a footprint on {coverage.ground}; together they show "
+        f"{area_words(coverage.area_m2)}."
+    ]
+    if placed:
+        said.append(
+            f"A place in it is in {coverage.looks:.1f} images in the mean; {percent(coverage.twice, 0)} of it is "
+            "in two or more."
+        )
+    if coverage.images > posed:
+        said.append(f"{coverage.images - posed} images have no pose or no gimbal angles.")
+    if flat := int(coverage.flat.sum()):
+        said.append(f"{flat} look too near the horizon to have a footprint.")
+    if away := posed - placed - flat:
+        said.append(f"The view of {away} leaves the ground that is known.")
+    count, images, located = detections
+    if count:
+        said.append(
+            f"{count} detections lie in {images} of {coverage.images} images "
+            f"({percent(images / coverage.images, 0)}); {located} have a place on the ground."
+        )
+    return said
+
+
+def streams_title(overview: Overview) -> str:
+    """How many pauses, and the longest."""
+    gaps = [(gap[1] - gap[0], name) for name, pace in overview.streams.items() for gap in pace.gaps]
+    if not gaps:
+        return "No stream pauses for longer than its rate explains"
+    longest, name = max(gaps)
+    count = "One pause" if len(gaps) == 1 else f"{len(gaps)} pauses"
+    return f"{count}; the longest is of {name}, {longest:.1f} s"
+
+
+def streams_table(overview: Overview) -> pd.DataFrame:
+    """A row for each stream: samples, rate, how much the steps waver, what is missing, pauses."""
+    rows = []
+    for name, pace in overview.streams.items():
+        even = pace.even and np.isfinite(pace.rate_hz)
+        rows.append(
+            {
+                "stream": name,
+                "n": pace.n,
+                "rate": pace.rate_hz if even else np.nan,
+                "wavering": 1e3 * pace.wavering_s if even else np.nan,
+                "missing": 100 * pace.missing_share if even else np.nan,
+                "pauses": len(pace.gaps),
+                "paused": pace.paused_s,
+                "longest": float(np.diff(pace.gaps, axis=1).max()) if len(pace.gaps) else np.nan,
+                "unordered": pace.unordered,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def shaking_sentence(found: Vibration) -> str:
+    """How much it shakes, against the limits."""
+    worst = found.worst
+    usual, most = float(np.median(worst)), float(worst.max())
+    said = f"It shakes by {usual:.1f} m/s² in the median and {most:.1f} m/s² at most"
+    above = found.share_above(FINE)
+    if above:
+        harmful = found.share_above(HARMFUL)
+        also = f", and above {HARMFUL:g} in {percent(harmful, 1)}" if harmful else ""
+        said += f"; above {FINE:g} in {percent(above, 1)} of the samples{also}"
+    return f"{said}."
+
+
+def shaking_title(found: Vibration) -> str:
+    """The verdict by the limits."""
+    if found.share_above(HARMFUL):
+        return f"It shakes by more than {HARMFUL:g} m/s²"
+    if found.share_above(FINE):
+        return f"It shakes by more than {FINE:g} m/s² at times"
+    return f"It shakes by less than {FINE:g} m/s²"
+
+
+def bands_title(found: Vibration) -> str:
+    """Where most of it is."""
+    strongest = int(np.argmax((found.rms**2).sum(axis=1)))
+    low, high = found.bands[strongest]
+    return f"Most of it is between {low:.0f} and {high:.0f} Hz"
+
+
+def first_of(gains: Sequence[Gain]) -> str:
+    """What is said above the list."""
+    shown = min(MOST, len(gains))
+    if not gains:
+        return "Nothing was measured that would gain metres, or bring back data."
+    of = f" of {len(gains)}" if len(gains) > shown else ""
+    return f"{shown}{of}, by the share of the error or of the data that each would gain. Only what was measured is listed."
