@@ -10,13 +10,19 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 
 - `run_filter`: Kalman, extended or Schmidt filter over a whole flight; `run_batch`: many runs at once.
 - `run_coloured`, `run_unscented`, `run_imm`: differenced measurements, sigma points, several motion models.
-- `motion`, `measurement`, `noise`, `maritime`: what the filters are told of target, sensor and errors.
+- `run_smoothed`, `smooth`: back over a track, for flights that are over. `follow`: any of them by its name.
+- `consider`, `considering`: errors of poses, clocks, lenses and sensors that a filter keeps in mind.
+- `motion`, `measurement`, `platforms`, `noise`, `maritime`: what the filters are told of target, sensor and
+  errors.
 - `kalman`, `schmidt`, `association`: the single steps.
 """
 
 from wildlab.tracking.association import distances, nearest_within
 from wildlab.tracking.batch import BatchTracks, View, run_batch
 from wildlab.tracking.coloured import run_coloured, thin
+from wildlab.tracking.considered import Considered, consider, consider_all
+from wildlab.tracking.considering import considering, renamed
+from wildlab.tracking.following import FILTERS, follow
 from wildlab.tracking.imm import ModeTrack, run_imm
 from wildlab.tracking.kalman import filter_at_rest
 from wildlab.tracking.measurement import (
@@ -38,12 +44,16 @@ from wildlab.tracking.motion import (
     singer,
 )
 from wildlab.tracking.noise import constant_noise, noise_by_altitude, noise_by_direction
+from wildlab.tracking.platforms import measured_from, polar
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first
 from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
 
 __all__ = [
+    "FILTERS",
     "BatchTracks",
+    "Considered",
     "ModeTrack",
     "Motion",
     "PoseUncertainty",
@@ -53,27 +63,36 @@ __all__ = [
     "View",
     "azimuths_elevations",
     "bearings",
+    "consider",
+    "consider_all",
+    "considering",
     "constant_noise",
     "constant_position",
     "constant_velocity",
     "distances",
     "filter_at_rest",
+    "follow",
     "in_steps",
+    "measured_from",
     "nearest_within",
     "noise_by_altitude",
     "noise_by_direction",
     "pixels",
+    "polar",
     "positions",
     "positions_or_velocities",
     "random_walk",
     "ranges_bearings",
+    "renamed",
     "rest",
     "run_batch",
     "run_coloured",
     "run_filter",
     "run_imm",
+    "run_smoothed",
     "run_unscented",
     "singer",
+    "smooth",
     "start_from_first",
     "thin",
 ]

@@ -18,8 +18,9 @@ from wildlab.geometry.compilation import announced
 from wildlab.geometry.frames import Array
 from wildlab.tracking import kalman, schmidt
 from wildlab.tracking.batch_kernels import Flags, run_lanes
+from wildlab.tracking.inputs import check_rows, check_start, checked
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, Track, check_rows, check_start, checked
+from wildlab.tracking.records import Start, Track
 from wildlab.tracking.schmidt import PoseUncertainty
 
 

@@ -1,6 +1,7 @@
 """Interacting multiple models (IMM), H 3.2.3: extended filters with different motions, through filterpy.
 
-Same arguments as `wildlab.tracking.run.run_filter`; one detection per row, and poses are taken as true.
+Same arguments as `wildlab.tracking.run.run_filter`; one detection per row. Errors of the pose widen the noise
+of the measurement.
 """
 
 from __future__ import annotations
@@ -16,20 +17,13 @@ from scipy.linalg import expm
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.association import nearest_detection
+from wildlab.tracking.considered import Considers, Errors, errors_of
+from wildlab.tracking.inputs import check_rows, check_start, checked, single_detection
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Prediction, Sensor, check_states, difference, on_state
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import (
-    Start,
-    State,
-    Track,
-    check_rows,
-    check_start,
-    checked,
-    record,
-    single_detection,
-    step_through,
-)
+from wildlab.tracking.predictions import Prediction
+from wildlab.tracking.records import Start, State, Track, record, step_through
+from wildlab.tracking.sensors import Sensor, angles_at, check_states, difference, on_state
 
 #: A mode that fits this much worse than the best keeps so small a share, and can come back.
 LEAST_LIKELIHOOD = 1e-100
@@ -55,14 +49,15 @@ class _Mode:
     def predict(self, u: None = None) -> None:
         self.x, self.P = predict(self.x, self.P, self.F, self.Q)
 
-    def evaluate(self, row: int, z: Array, R: Array, sensor: Sensor) -> bool:
+    def evaluate(self, row: int, z: Array, R: Array, sensor: Sensor, errors: Errors | None) -> bool:
         """Whether this mode's target would be seen; then innovation and ``S`` are there."""
         expected = sensor.predict(row, self.x[: sensor.states])
+        R = R if errors is None else R + errors.spread(row, expected.H_pose)
         self.expected, self.R = expected, R
-        if not (np.isfinite(expected.z).all() and np.isfinite(expected.H_position).all()):
+        if not all(np.isfinite(part).all() for part in (expected.z, expected.H_position, R)):
             return False
         H = on_state(expected.H_position, len(self.x))
-        near = nearest_detection(z[None], expected.z, H @ self.P @ H.T, R[None], sensor.angles, row)
+        near = nearest_detection(z[None], expected.z, H @ self.P @ H.T, R[None], angles_at(sensor, row), row)
         if near is None:
             return False
         self.innovation, self.S = near.innovation, near.S
@@ -89,6 +84,7 @@ def run_imm(
     mean_stay: Sequence[float],
     start: Start,
     *,
+    pose: Considers | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> ModeTrack:
@@ -113,6 +109,9 @@ def run_imm(
         switching over a step follow from it for any step.
     start
         ``x`` (n,) and ``P`` (n, n), see `wildlab.tracking.run.Start`.
+    pose
+        Errors to consider, as in `run_filter`; but as if they were new at every measurement, H (7.40)-(7.41):
+        ``R + H^o P^o H^o'``, with the derivatives at each mode's state. None: poses are taken as true.
     gate_probability
         Probability that the target's own measurement is let in, H (3.9), in (0, 1]; 1 is no gate.
     output_times
@@ -129,10 +128,11 @@ def run_imm(
         As `wildlab.tracking.run.run_filter`; several detections in a frame; fewer than two models, or not
         one ``mean_stay`` above zero for each.
     """
-    given = single_detection(checked(times, measurements, R, gate_probability, output_times))
+    given = single_detection(checked(times, measurements, R, gate_probability, output_times, sensor.sizes))
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")
     check_states(sensor, len(start.x))
+    errors = errors_of(pose, sensor, len(given.times))
     K, stay = len(motions), np.asarray(mean_stay, float)
     if K < 2 or stay.shape != (K,) or not (stay > 0).all():
         raise WildlabError(
@@ -164,12 +164,13 @@ def run_imm(
         imm.predict()
         weights = imm.cbar
         z = given.z[row, 0]
-        if np.isfinite(z).all() and all([mode.evaluate(row, z, given.R[row, 0], sensor) for mode in modes]):
+        R_now = given.R[row, 0]
+        if np.isfinite(z).all() and all([one.evaluate(row, z, R_now, sensor, errors) for one in modes]):
             middle = modes[0].innovation  # angles: the others' are near it, on the same side of the wrap
-            gaps = [middle + difference(one.innovation, middle, sensor.angles) for one in modes]
+            gaps = [middle + difference(one.innovation, middle, angles_at(sensor, row)) for one in modes]
             innovation, S = mixed(gaps, [mode.S for mode in modes], weights)
             nis = float(innovation @ np.linalg.solve(S, innovation))
-            record(track, row, innovation, S, nis, 0, nis <= given.threshold)
+            record(track, row, innovation, S, nis, 0, nis <= given.thresholds[row])
             if track.used[row]:
                 logs = np.array([mode.log_likelihood() for mode in modes])
                 for mode, relative in zip(modes, np.exp(logs - logs.max()), strict=True):

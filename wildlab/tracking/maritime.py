@@ -1,8 +1,9 @@
 """Boats seen from a boat: a motion model for sensors of any rate, and sensors whose clock may be wrong too.
 
-Of the six errors of a pose that `wildlab.tracking.schmidt` considers, a level platform has three: `NORTH` and
-`EAST` of its position (and of the part of the hull that is seen), and `YAW`, its heading. The third, down,
-moves nothing on a level sea; its place is taken by `CLOCK`, the error of the stamp in seconds.
+Of the errors that `wildlab.tracking.considered` knows, a level platform has `NORTH` and `EAST` of its
+position (and of the part of the hull that is seen), and `YAW`, its heading. Down moves nothing on a level
+sea; its place among the six of a pose is taken by `CLOCK`, the error of the stamp in seconds. `CONSIDERED` has
+their names.
 """
 
 from __future__ import annotations
@@ -11,11 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
-from wildlab.tracking.measurement import Prediction, Sensor, predict_range_bearing
+from wildlab.tracking.considering import considering
 from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.platforms import bearings, measured_from
+from wildlab.tracking.predictions import Prediction, predict_range_bearing
+from wildlab.tracking.predictions import predict_position as measured_position
+from wildlab.tracking.sensors import Sensor
 
 #: Columns of ``H_pose``, rows and columns of the covariance of the errors: m, m, s, rad.
 NORTH, EAST, CLOCK, YAW = 0, 1, 2, 5
+CONSIDERED = ("platform_north", "platform_east", "clock", "roll", "pitch", "heading")
 
 
 def white_acceleration(dt: float, density: float) -> tuple[Array, Array]:
@@ -48,36 +54,34 @@ def predict_position(position: ArrayLike, platform: ArrayLike, drift: ArrayLike)
 
     Returns
     -------
-    Prediction of (..., 2) with ``H_pose`` for the errors of this module: with ``p = p_hat + dp`` the position
-    is measured too far back by ``dp``; with the yaw too small by a little, turned back about the platform by
-    it; a stamp too early by a little, ahead by the drift.
+    Prediction of (..., 2) with ``H_pose`` for `CONSIDERED`: that of
+    `wildlab.tracking.predictions.predict_position`, and a stamp too early by a little, ahead by the drift.
     """
-    p = np.asarray(position, float)
-    offset, drift = np.broadcast_arrays(p - np.asarray(platform, float), np.asarray(drift, float))
-    pose = np.zeros((*p.shape, 6))
-    pose[..., 0, NORTH] = pose[..., 1, EAST] = -1.0
-    pose[..., CLOCK] = drift
-    pose[..., 0, YAW], pose[..., 1, YAW] = offset[..., 1], -offset[..., 0]
-    return Prediction(p, np.broadcast_to(np.eye(2), (*p.shape, 2)), pose)
+    return _with_clock(measured_position(position, platform), drift)
 
 
 def predict_bearing(position: ArrayLike, platform: ArrayLike, drift: ArrayLike) -> Prediction:
     """A target's bearing from north (..., 1), with the same errors; NaN at the platform itself."""
     both = predict_range_bearing(position, platform, 0.0)
-    pose = both.H_pose[..., 1:, :].copy()
-    pose[..., CLOCK] = np.einsum("...ij,...j->...i", both.H_position[..., 1:, :], np.asarray(drift, float))
-    return Prediction(both.z[..., 1:], both.H_position[..., 1:, :], pose)
+    one = Prediction(both.z[..., 1:], both.H_position[..., 1:, :], both.H_pose[..., 1:, :])
+    return _with_clock(one, drift)
+
+
+def _with_clock(seen: Prediction, drift: ArrayLike) -> Prediction:
+    moved = np.einsum("...ij,...j->...i", seen.H_position, np.asarray(drift, float))
+    pose = np.array(np.broadcast_to(seen.H_pose, (*moved.shape, len(CONSIDERED))))
+    pose[..., CLOCK] = moved
+    return seen._replace(H_pose=pose)
 
 
 def positions_from(platform: ArrayLike, drift: ArrayLike) -> Sensor:
-    """Positions (N, 2) measured from a platform at (N, 2), with the target's (N, 2) drift relative to it."""
-    at, moves = np.asarray(platform, float), np.asarray(drift, float)
-    return Sensor(
-        lambda row, position: predict_position(position, at[row], moves[row]), (False, False), len(at)
-    )
+    """Positions (N, 2) measured from a platform at (N, 2), with the target's (N, 2) drift relative to it.
+
+    The drift, m/s, is what an error of the clock moves.
+    """
+    return considering(measured_from(platform), CONSIDERED, velocity=drift)
 
 
 def bearings_from(platform: ArrayLike, drift: ArrayLike) -> Sensor:
     """Bearings from north (N, 1), likewise."""
-    at, moves = np.asarray(platform, float), np.asarray(drift, float)
-    return Sensor(lambda row, position: predict_bearing(position, at[row], moves[row]), (True,), len(at))
+    return considering(bearings(platform, 0.0), CONSIDERED, velocity=drift)

@@ -1,142 +1,48 @@
 """A whole flight through a filter: arrays of measurements in, estimates at the requested times out.
 
 The same few arguments for every filter: times, measurements, their covariances, a `Sensor` that knows the
-poses, a motion model, a `Start`. Nothing is kept between calls. The filter steps to every row, also to rows
-without a usable measurement; see `wildlab.tracking.motion` for where that matters.
+poses, a motion model, a `Start`, the errors to consider. Nothing is kept between calls. The filter steps to
+every row, also to rows without a usable measurement; see `wildlab.tracking.motion` for where that matters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
-from wildlab.geometry.validation import check_covariance, gate_threshold
 from wildlab.tracking import schmidt
 from wildlab.tracking.association import nearest_detection
+from wildlab.tracking.considered import Considers, Errors, errors_of
+from wildlab.tracking.inputs import check_cross, check_rows, check_start, checked
 from wildlab.tracking.kalman import correct, predict
-from wildlab.tracking.measurement import Sensor, check_states, on_state
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.records import Start as Start
+from wildlab.tracking.records import State, predict_by_motion, record, step_through
+from wildlab.tracking.records import Track as Track
+from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
+from wildlab.tracking.starts import start_from_first as start_from_first
 
 
-class Start(NamedTuple):
-    """What is known before the filter runs.
+class Step(NamedTuple):
+    """What a filter did at one row; ``gain`` and what belongs to it are None where nothing was used."""
 
-    Attributes
-    ----------
-    time
-        s; earlier measurements are not used.
-    x, P
-        (n,) and (n, n), in the order of the motion model.
-    row
-        The measurement that ``x`` was made from, which is not used again, nor any before it. -1: none.
-    """
-
+    row: int
     time: float
+    F: Array  # (n, n) from the row before, or from the start
+    Q: Array
+    x_prior: Array  # (n,)
+    P_prior: Array
+    C_prior: Array  # (n, k)
     x: Array
     P: Array
-    row: int = -1
-
-
-class Track(NamedTuple):
-    """What a filter made of N measurements, asked at M times.
-
-    Attributes
-    ----------
-    times, x, P
-        (M,), (M, n), (M, n, n): estimates with all measurements up to and including that time; NaN before
-        the start.
-    innovation, S, nis
-        (N, m), (N, m, m), (N,): of each row's measurement, whether it passed the gate or not; NaN where
-        there was nothing to compare (no detection, target not in front of the camera, before the start).
-    used
-        (N,) bool: the measurement changed the estimate, or started it. An unused row with a NIS was
-        left out by the gate, one without had nothing usable.
-    chosen
-        (N,) index of the detection that was nearest, -1 where there was none to choose from.
-    limited
-        (N,) bool: the Schmidt filter's cross-covariance had to be shortened here (`schmidt.limit_cross`).
-    """
-
-    times: Array
-    x: Array
-    P: Array
-    innovation: Array
-    S: Array
-    nis: Array
-    used: NDArray[np.bool_]
-    chosen: NDArray[np.int64]
-    limited: NDArray[np.bool_]
-
-
-class FilterInputs(NamedTuple):
-    """Checked measurements: K detections in each of N rows."""
-
-    times: Array  # (N,)
-    z: Array  # (N, K, m)
-    R: Array  # (N, K, m, m)
-    output_times: Array  # (M,)
-    threshold: float  # largest NIS that is let in
-
-
-#: State of a filter: when, estimate, covariance.
-State = tuple[float, Array, Array]
-#: State and a later time -> estimate and covariance then.
-PredictTo = Callable[[State, float], tuple[Array, Array]]
-
-
-def start_from_first(
-    times: ArrayLike,
-    positions: ArrayLike,
-    sd_position: float,
-    sd_velocity: float = 0.0,
-    n: int = 4,
-    **more: float,
-) -> Start:
-    """Start on the first georeferenced position, with zero speed (H 6.2.4, 6.3.3).
-
-    Parameters
-    ----------
-    times
-        (N,) s.
-    positions
-        (N, 2) or (N, 3): north, east in n, m, and what is not looked at; the first row with a time and
-        without NaN is taken.
-    sd_position, sd_velocity
-        m and m/s, the same north and east.
-    n
-        Number of states: 2, 4 or 6.
-    more
-        ``sd_acceleration``, m/s^2, with six states; zero where it is left out. No other name is looked at.
-
-    Returns
-    -------
-    Start
-        At the time of that row, which is not used again, with a diagonal ``P`` (n, n).
-
-    Raises
-    ------
-    WildlabError
-        Without any position.
-    """
-    t, p = np.asarray(times, float), np.asarray(positions, float)[:, :2]
-    there = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(t))
-    if not len(there):
-        raise WildlabError(
-            "no measurement gives a position to start from",
-            "check poses and plane, or give the filter a start of its own",
-            field="positions",
-        )
-    row = int(there[0])
-    sd = np.repeat([sd_position, sd_velocity, more.get("sd_acceleration", 0.0)], 2)[:n]
-    x = np.zeros(n)
-    x[:2] = p[row]
-    return Start(float(t[row]), x, np.diag(sd**2), row)
+    C: Array
+    gain: Array | None = None  # (n, m)
+    H: Array | None = None  # (m, n)
+    H_errors: Array | None = None  # (m, k)
+    R: Array | None = None  # (m, m)
 
 
 def run_filter(
@@ -147,7 +53,7 @@ def run_filter(
     motion: Motion,
     start: Start,
     *,
-    pose: PoseUncertainty | None = None,
+    pose: Considers | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
 ) -> Track:
@@ -172,7 +78,8 @@ def run_filter(
     start
         See `Start`, `start_from_first`.
     pose
-        Uncertainty of the poses: the Schmidt filter, H (7.32)-(7.38). None: poses are taken as true.
+        Errors to consider: the Schmidt filter, H (7.32)-(7.38). Those of the poses (`PoseUncertainty`), or
+        any (`consider`). None: poses are taken as true.
     gate_probability
         Probability that the target's own measurement is let in, H (3.9); what falls outside the validation
         region is not used. In (0, 1]; 1 is no gate.
@@ -189,8 +96,8 @@ def run_filter(
     WildlabError
         Naming field and row: shapes that do not fit each other, times missing or out of order, an ``R`` or
         an ``S`` that is not positive definite, a start that is not finite or whose ``P`` is no covariance,
-        poses of another length than the measurements, a sensor that sees more states than there are, a
-        ``gate_probability`` outside (0, 1].
+        poses of another length than the measurements, a sensor that sees more states than there are, an
+        error that it has no derivative for, a ``gate_probability`` outside (0, 1].
 
     Examples
     --------
@@ -204,206 +111,75 @@ def run_filter(
     >>> track.x[-1].round(2).tolist(), np.sqrt(track.P[-1, 0, 0]).round(2).item()
     ([9.97, 0.0], 0.58)
     """
-    given = checked(times, measurements, R, gate_probability, output_times)
+    return filter_in_steps(
+        times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability,
+        output_times=output_times,
+    )[0]  # fmt: skip
+
+
+def filter_in_steps(
+    times: ArrayLike,
+    measurements: ArrayLike,
+    R: ArrayLike,
+    sensor: Sensor,
+    motion: Motion,
+    start: Start,
+    *,
+    pose: Considers | None = None,
+    gate_probability: float = 1.0,
+    output_times: ArrayLike | None = None,
+) -> tuple[Track, list[Step], Errors | None]:
+    """`run_filter`, with what it did at every row, and the considered errors as it worked with them."""
+    given = checked(times, measurements, R, gate_probability, output_times, sensor.sizes)
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")
     check_states(sensor, len(start.x))
-    if pose is not None and np.shape(pose.covariance) != (len(given.times), 6, 6):
-        raise WildlabError(
-            f"shape {np.shape(pose.covariance)} for {len(given.times)} rows of measurements",
-            "give one (6, 6) covariance for each measurement",
-            field="pose.covariance",
-        )
-    n = len(start.x)
-    C = np.zeros((n, 6))
-    covariances = np.zeros((len(given.times), 6, 6)) if pose is None else np.asarray(pose.covariance, float)
-    transitions = None if pose is None else schmidt.transitions_of_pose(covariances, pose.change)
+    errors = errors_of(pose, sensor, len(given.times))
+    n, steps = len(start.x), list[Step]()
+    C = check_cross(start, n, errors.k) if errors is not None else np.zeros((n, 0))
 
     def step(row: int, state: State, track: Track) -> State:
         nonlocal C
         then, x, P = state
-        dt = given.times[row] - then
+        now, dt = float(given.times[row]), given.times[row] - then
         F, Q = motion(dt)
         x, P = predict(x, P, F, Q)
-        if pose is not None and transitions is not None:
-            C = F @ C @ transitions[row].T * schmidt.fade(dt, pose.correlation_time)
+        C = C if errors is None else errors.carry(C, F, row, dt)
+        done = Step(row, now, F, Q, x, P, C, x, P, C)
+        steps.append(done)
         if not np.isfinite(given.z[row]).all(axis=-1).any():
-            return given.times[row], x, P
+            return now, x, P
         expected = sensor.predict(row, x[: sensor.states])
-        P_pose = covariances[row]
         H = on_state(expected.H_position, n)
-        if not (np.isfinite(expected.z).all() and np.isfinite(H).all() and np.isfinite(P_pose).all()):
-            return given.times[row], x, P
-        if pose is None:
+        if not (np.isfinite(expected.z).all() and np.isfinite(H).all()):
+            return now, x, P
+        H_errors = np.zeros((len(H), 0))
+        if errors is None:
             spread = H @ P @ H.T
         else:
+            P_pose, H_errors = errors.covariance[row], errors.of(expected.H_pose)
+            if not (np.isfinite(P_pose).all() and np.isfinite(H_errors).all()):
+                return now, x, P
             C, track.limited[row] = schmidt.limit_cross(C, P, P_pose)
-            spread = schmidt.spread_of_prediction(P, C, P_pose, H, expected.H_pose)
+            steps[-1] = done = done._replace(C_prior=C, C=C)
+            spread = schmidt.spread_of_prediction(P, C, P_pose, H, H_errors)
         with np.errstate(invalid="ignore"):
-            best = nearest_detection(given.z[row], expected.z, spread, given.R[row], sensor.angles, row)
+            angles = angles_at(sensor, row)
+            best = nearest_detection(given.z[row], expected.z, spread, given.R[row], angles, row)
         if best is None:
-            return given.times[row], x, P
-        record(track, row, best.innovation, best.S, best.nis, best.detection, best.nis <= given.threshold)
-        if not track.used[row]:
-            return given.times[row], x, P
+            return now, x, P
+        let_in = best.nis <= given.thresholds[row]
+        record(track, row, best.innovation, best.S, best.nis, best.detection, let_in)
+        if not let_in:
+            return now, x, P
         noise = given.R[row, best.detection]
-        if pose is None:
-            done = correct(x, P, best.innovation, H, noise)
-            return given.times[row], done.x, done.P
-        update = schmidt.update_schmidt(x, P, C, P_pose, best.innovation, H, expected.H_pose, noise)
-        C = update.C
-        return given.times[row], update.x, update.P
+        if errors is None:
+            update = correct(x, P, best.innovation, H, noise)
+            x, P, gain = update.x, update.P, update.gain
+        else:
+            considered = schmidt.update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
+            x, P, C, gain = considered.x, considered.P, considered.C, considered.gain
+        steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)
+        return now, x, P
 
-    return step_through(given, start, predict_by_motion(motion), step)
-
-
-def record(track: Track, row: int, innovation: Array, S: Array, nis: float, chosen: int, used: bool) -> None:
-    """Enter a row's innovation with its covariance and NIS, and whether the measurement was used."""
-    track.innovation[row], track.S[row], track.nis[row] = innovation, S, nis
-    track.chosen[row], track.used[row] = chosen, used
-
-
-def predict_by_motion(motion: Motion) -> PredictTo:
-    """Prediction with a motion model."""
-    return lambda state, time: predict(state[1], state[2], *motion(time - state[0]))
-
-
-def step_through(
-    given: FilterInputs, start: Start, predict_to: PredictTo, step: Callable[[int, State, Track], State]
-) -> Track:
-    """Apply a filter's ``step`` to the rows in order, and predict to the requested times in between.
-
-    ``predict_to`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and
-    may leave it at an earlier time.
-    """
-    N, _, m = given.z.shape
-    M, n = len(given.output_times), len(start.x)
-    track = Track(
-        given.output_times,
-        np.full((M, n), np.nan),
-        np.full((M, n, n), np.nan),
-        np.full((N, m), np.nan),
-        np.full((N, m, m), np.nan),
-        np.full(N, np.nan),
-        np.zeros(N, bool),
-        np.full(N, -1),
-        np.zeros(N, bool),
-    )
-    state: State = (float(start.time), np.asarray(start.x, float), np.asarray(start.P, float))
-    if start.row >= 0:
-        track.used[start.row] = True
-        track.chosen[start.row] = 0
-    first = max(int(np.searchsorted(given.times, start.time, "left")), start.row + 1)
-    out = int(np.searchsorted(given.output_times, start.time, "left"))
-
-    def write_until(time: float, out: int) -> int:
-        while out < M and given.output_times[out] < time:
-            track.x[out], track.P[out] = predict_to(state, float(given.output_times[out]))
-            out += 1
-        return out
-
-    for row in range(first, N):
-        out = write_until(given.times[row], out)
-        state = step(row, state, track)
-    write_until(np.inf, out)
-    return track
-
-
-def checked(
-    times: ArrayLike,
-    measurements: ArrayLike,
-    R: ArrayLike,
-    gate_probability: float,
-    output_times: ArrayLike | None,
-) -> FilterInputs:
-    """FilterInputs of a run with all their axes, or a `WildlabError` that names the row."""
-    t, z = np.asarray(times, float), np.asarray(measurements, float)
-    if z.ndim == 2:
-        z = z[:, None, :]
-    if t.ndim != 1 or z.ndim != 3 or len(z) != len(t):
-        raise WildlabError(
-            f"{t.shape} times and {np.shape(measurements)} measurements",
-            "give one row of measurements for each time",
-            field="measurements",
-        )
-    _check_order(t, "times")
-    out = t if output_times is None else np.asarray(output_times, float)
-    _check_order(out, "output_times")
-    N, K, m = z.shape
-    R = np.asarray(R, float)
-    R = R[:, None] if R.ndim == 3 else R
-    if R.shape not in ((m, m), (N, 1, m, m), (N, K, m, m)):
-        raise WildlabError(
-            f"R has the shape {R.shape} for {N} rows of {K} measurements with {m} elements",
-            "give (m, m), (N, m, m) or (N, K, m, m)",
-            field="R",
-        )
-    known = np.isfinite(R).all(axis=(-1, -2))
-    flat = R[known]
-    lowest = np.linalg.eigvalsh(flat)
-    bad = (lowest[:, 0] <= 1e-14 * np.abs(lowest[:, -1])) | (
-        np.abs(flat - np.swapaxes(flat, -1, -2)).max(axis=(-1, -2)) > 1e-9 * np.abs(lowest[:, -1])
-    )
-    if bad.any():
-        marked = np.zeros(known.shape, bool)
-        marked[known] = bad
-        row = int(np.flatnonzero(np.broadcast_to(marked, (N, K)).any(axis=1))[0])
-        raise WildlabError(
-            f"R of row {row} is not a covariance: it is not symmetric or not positive definite",
-            "give every measurement a noise in all its elements",
-            field="R",
-        )
-    # A measurement of which a part is missing is none, and neither is one without a covariance.
-    usable = np.where((known & np.isfinite(z).all(axis=-1))[..., None], z, np.nan)
-    threshold = gate_threshold(gate_probability, m)
-    return FilterInputs(t, usable, np.broadcast_to(R, (N, K, m, m)), out, threshold)
-
-
-def single_detection(given: FilterInputs) -> FilterInputs:
-    """The same inputs, for a filter that takes no more than one detection a row."""
-    if given.z.shape[1] != 1:
-        raise WildlabError(
-            "several detections in a frame", "choose one first, or use run_filter", field="measurements"
-        )
-    return given
-
-
-def check_start(start: Start) -> None:
-    """Refuse a start that is not finite, whose shapes do not fit, or whose ``P`` is no covariance.
-
-    ``x`` may be (n,) or (B, n), ``P`` (n, n) or (B, n, n).
-    """
-    x, P = np.asarray(start.x, float), np.asarray(start.P, float)
-    if x.ndim not in (1, 2) or P.ndim not in (2, 3) or P.shape[-2:] != (x.shape[-1],) * 2:
-        raise WildlabError(f"x of the shape {x.shape}, P {P.shape}", "give (n,) and (n, n)", field="start")
-    if not np.isfinite(start.time):
-        raise WildlabError(f"a time of {start.time}", "give seconds", field="start.time")
-    lost = np.argwhere(~np.isfinite(x))
-    if len(lost):
-        row = ", ".join(str(i) for i in lost[0])
-        raise WildlabError(
-            f"row {row} is {x[tuple(lost[0])]}", "give every state a value to start from", field="start.x"
-        )
-    check_covariance(P, "start.P")
-
-
-def check_rows(rows: int | None, wanted: int, what: str) -> None:
-    """Refuse ``rows`` of something that goes with ``wanted`` measurements; None is one value for all."""
-    if rows is not None and rows != wanted:
-        raise WildlabError(
-            f"{rows} rows for {wanted} rows of measurements", "give one for each measurement", field=what
-        )
-
-
-def _check_order(times: Array, field: str) -> None:
-    lost = np.flatnonzero(~np.isfinite(times))
-    if len(lost):
-        raise WildlabError(f"row {lost[0]} has no time ({times[lost[0]]})", "leave the row out", field=field)
-    back = np.flatnonzero(np.diff(times) < 0)
-    if len(back):
-        row = int(back[0]) + 1
-        raise WildlabError(
-            f"row {row} at {times[row]} s comes after row {row - 1} at {times[row - 1]} s",
-            "sort the rows by time, with all that belongs to them",
-            field=field,
-        )
+    return step_through(given, start, predict_by_motion(motion), step), steps, errors

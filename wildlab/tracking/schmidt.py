@@ -1,7 +1,8 @@
 """The Schmidt-Kalman filter, H 7.4: the errors of the pose are considered, not estimated.
 
 Beside the target's covariance ``P`` (n, n) the filter keeps its cross-covariance ``C`` (n, 6) with the errors
-of the pose, whose own covariance ``P^o`` (6, 6) comes anew from the navigation filter at every frame.
+of the pose, whose own covariance ``P^o`` (6, 6) comes anew from the navigation filter at every frame. Nothing
+here asks for six: other errors, by name and in any number, are in `wildlab.tracking.considered`.
 
 With ``F^o = I`` H (7.32) keeps ``C`` from frame to frame while ``P^o`` changes. Where ``P^o`` grows that is
 the model of an error with a random walk, and sound. Where it shrinks, ``[P C; C' P^o]`` stops being a
@@ -68,7 +69,7 @@ class SchmidtUpdate(NamedTuple):
 
     x: Array  # (n,)
     P: Array  # (n, n)
-    C: Array  # (n, 6)
+    C: Array  # (n, k)
     innovation: Array  # (m,)
     S: Array  # (m, m)
     gain: Array  # (n, m)
@@ -89,11 +90,11 @@ def update_schmidt(
     Parameters
     ----------
     x, P, C
-        Prior estimate (n,), covariance (n, n) and cross-covariance (n, 6).
+        Prior estimate (n,), covariance (n, n) and cross-covariance (n, k) with k errors.
     P_pose
-        (6, 6).
+        (k, k).
     innovation, H, H_pose, R
-        (m,), (m, n), (m, 6), (m, m), at ``x`` and the nominal pose.
+        (m,), (m, n), (m, k), (m, m), at ``x`` and the nominal pose.
     """
     S = spread_of_prediction(P, C, P_pose, H, H_pose) + R
     gain = np.asarray(np.linalg.solve(S, H @ P + H_pose @ C.T).T, float)
@@ -125,7 +126,7 @@ def _root(covariance: Array) -> tuple[Array, Array]:
 
 
 def transition_of_pose(before: Array, after: Array, change: Change) -> Array:
-    """``Phi`` (6, 6), see the module, from the pose's covariance before to that after."""
+    """``Phi`` (k, k), see the module, from the pose's covariance before to that after."""
     root, inverse = _root(before)
     values, axes = np.linalg.eigh(inverse @ after @ inverse.T)
     values = _without_noise(values)
@@ -143,12 +144,12 @@ def _without_noise(values: Array) -> Array:
 
 
 def transitions_of_pose(covariances: Array, change: Change) -> Array:
-    """``Phi`` (N, 6, 6) from each row's predecessor to it; rows of NaN are passed over, with the identity.
+    """``Phi`` (N, k, k) from each row's predecessor to it; rows of NaN are passed over, with the identity.
 
     Row by row what `transition_of_pose` gives, all rows together: directions without variance are not left
     out but have a length of zero.
     """
-    phi = np.tile(np.eye(6), (len(covariances), 1, 1))
+    phi = np.tile(np.eye(covariances.shape[-1]), (len(covariances), 1, 1))
     known = np.flatnonzero(np.isfinite(covariances).all(axis=(1, 2)))
     rows, before, after = known[1:], covariances[known[:-1]], covariances[known[1:]]
     differ = (before != after).any(axis=(1, 2))
