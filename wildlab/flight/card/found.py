@@ -131,7 +131,8 @@ def search(
     found = []
     for path, folder in _items(paths):
         name = path.resolve().relative_to(source.resolve()).as_posix()
-        tell(name)
+        if folder or path.suffix.lower() not in KNOWN_OTHERS:
+            tell(name)
         found.append(_read_folder(path, name, folder, zone) if folder else _read_file(path, name, zone))
     return [one for one in found if one is not None]
 

@@ -1,0 +1,171 @@
+"""A card in, a flight out: what is seen where it truly is, by an independent projection."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card
+from click.testing import CliRunner
+
+from wildlab.api.points import evaluate_points, georeference
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.card.importing import import_card, read_card, recipe_beside
+from wildlab.flight.card.proposal import Wishes
+from wildlab.flight.recipe.importing import import_flight
+from wildlab.flight.store import load_flight
+
+
+def test_points_of_a_card_lie_where_they_were_surveyed(tmp_path: Path):
+    write_card(tmp_path / "card")
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    flight = import_card(card, tmp_path / "flight")
+    assert {one.role for one in card.choices} == {"images", "marks", "clicks"}
+    assert flight.manifest.vertical.reference == "ellipsoid"
+    points = georeference(flight)
+    assert len(points.table) >= 8
+    errors = np.hypot(points.table["error_north_m"], points.table["error_east_m"])
+    # What is left is the Earth's curvature beside a level plane, and the rounding of what was written.
+    assert errors.max() < 0.02
+    assert set(points.table["target_id"]) <= set(MARKS)
+    assert "horizontal" in str(evaluate_points(points)).lower() or len(points.table)
+
+
+def test_the_recipe_beside_a_flight_makes_it_again(tmp_path: Path):
+    write_card(tmp_path / "card")
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    first = import_card(card, tmp_path / "flight")
+    again = import_flight(recipe_beside(tmp_path / "flight"), tmp_path / "card", tmp_path / "again")
+    for name, table in first.tables.items():
+        assert table.equals(again.tables[name]), name
+    said = tomllib.loads(recipe_beside(tmp_path / "flight").read_text(encoding="utf-8"))
+    assert said["camera"]["fx_px"] == 800.0
+    assert said["locations"] == {"sensitivity": "withheld"}
+
+
+def test_a_track_beside_the_images_is_a_target(tmp_path: Path):
+    write_card(tmp_path / "card")
+    (tmp_path / "card" / "fox <b>.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", geoid_m=0.0), {})
+    target = next(one for one in card.choices if one.role == "target")
+    assert target.target == "fox-b"
+    flight = import_card(card, tmp_path / "flight")
+    assert flight.truth is not None
+    fox = flight.truth[flight.truth["target_id"] == "fox-b"]
+    assert np.allclose(np.diff(fox["north_m"]), 0.5, atol=1e-3)
+
+
+def test_heights_that_cannot_be_compared_are_refused(tmp_path: Path):
+    write_card(tmp_path / "card")
+    (tmp_path / "card" / "fox.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(20)]))
+    with pytest.raises(WildlabError) as caught:
+        read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    assert "heights count from different things" in str(caught.value)
+    assert "--geoid" in str(caught.value)
+    assert "fox.gpx" in str(caught.value)
+
+
+def test_a_dry_run_writes_nothing_and_gives_a_recipe(tmp_path: Path):
+    write_card(tmp_path / "card")
+    before = sorted(tmp_path.rglob("*"))
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
+    assert result.exit_code == 0, result.output
+    assert tomllib.loads(result.stdout)["frames"]["id"] == "stem"
+    assert "100MEDIA" in result.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--json"])
+    told = json.loads(result.stdout)
+    assert {one["role"] for one in told["files"]} == {"images", "marks", "clicks"}
+
+
+def test_no_place_is_told(tmp_path: Path):
+    write_card(tmp_path / "card")
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
+    for part in ("59.05", "10.12", "59.0", "10.1"):
+        assert part not in result.output
+
+
+def test_the_zone_of_a_wall_clock_by_the_flight(tmp_path: Path):
+    """The camera runs two hours ahead of UTC, the track on board says when it flew."""
+    write_card(tmp_path / "card")
+    # A receiver on board: where the images are taken, in UTC two hours before their wall clock.
+    track = [(-7200.0 + t, -30.0 + 1.6 * t, -8.0 + 2 * t, 100.0) for t in range(-20, 40)]
+    (tmp_path / "card" / "own.gpx").write_text(gpx(track))
+    card = read_card([tmp_path / "card"], Wishes("card", geoid_m=0.0), {"own.gpx": "own"})
+    assert any("2 h ahead of UTC" in one for one in card.proposal.said)
+    flight = import_card(card, tmp_path / "flight")
+    assert flight.manifest.clocks.camera_offset_s == -7200.0
+
+
+def test_overwriting_takes_a_word(tmp_path: Path):
+    write_card(tmp_path / "card")
+    arguments = ["import", str(tmp_path / "card"), "--into", str(tmp_path / "flight"), "--zone", "UTC"]
+    assert CliRunner().invoke(wildlab, arguments).exit_code == 0
+    recipe = recipe_beside(tmp_path / "flight").read_text(encoding="utf-8")
+    second = CliRunner().invoke(wildlab, arguments)
+    assert isinstance(second.exception, WildlabError)
+    assert "there is a recipe beside this flight already" in str(second.exception)
+    assert CliRunner().invoke(wildlab, [*arguments, "--overwrite"]).exit_code == 0
+    assert recipe_beside(tmp_path / "flight").read_text(encoding="utf-8") == recipe
+    assert load_flight(tmp_path / "flight").name == "flight"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--role", "marks.csv"], "names no role"),
+        (["--role", "marks.csv=boss"], "'boss' is no role"),
+        (["--role", "mark.csv=marks"], "nothing called 'mark.csv' was found"),
+        (["--zone", "Nowhere"], "is not a time zone"),
+        (["--start", "yesterday"], "is no time with a zone"),
+    ],
+)
+def test_what_is_stated_wrongly(tmp_path: Path, arguments: list[str], said: str):
+    write_card(tmp_path / "card", 1)
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", *arguments])
+    assert isinstance(result.exception, WildlabError)
+    assert said in str(result.exception)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "Name the folder of the flight"),
+        (["--into", "x", "--json"], "--json goes with --dry-run"),
+        (["--into", "x", "--source", "y"], "--source is for a recipe"),
+    ],
+)
+def test_options_that_do_not_go_together(tmp_path: Path, arguments: list[str], said: str):
+    write_card(tmp_path / "card", 1)
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), *arguments])
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+def test_a_recipe_takes_no_roles(tmp_path: Path):
+    result = CliRunner().invoke(wildlab, ["import", "r.toml", "--into", "x", "--zone", "UTC"])
+    assert result.exit_code == 2
+    assert "--zone is for raw files" in result.output
+
+
+def test_an_empty_card_and_one_that_says_nothing(tmp_path: Path):
+    (tmp_path / "card").mkdir()
+    with pytest.raises(WildlabError, match="nothing in it is a log or an image"):
+        read_card([tmp_path / "card"], Wishes("card"), {})
+    (tmp_path / "card" / "notes.bin").write_bytes(b"\x00" * 100)
+    with pytest.raises(WildlabError, match="nothing here says where a camera was"):
+        read_card([tmp_path / "card"], Wishes("card"), {})
+    with pytest.raises(WildlabError, match="there is no such file or folder"):
+        read_card([tmp_path / "lost"], Wishes("card"), {})
+
+
+def test_taken_is_what_the_frames_say(tmp_path: Path):
+    write_card(tmp_path / "card")
+    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    assert flight.frames is not None
+    assert np.allclose(flight.frames["time_s"], [0.0, 2.5, 5.0, 7.5], atol=1e-6)
+    assert flight.manifest.time.epoch == TAKEN
