@@ -30,6 +30,8 @@ NO_DILUTION = 99.0
 #: A gap is so many usual steps long, and at least as many seconds.
 _GAP_STEPS, _GAP_S = 5.0, 2.0
 _EARTH_M = 6371e3
+#: Places of one moment may be so far apart by their noise, m.
+_NOISE_M = 30.0
 _HEIGHTS = tuple(name for name in HEIGHTS if name.startswith("height"))
 
 
@@ -46,6 +48,8 @@ def decode(data: bytes) -> str:
 
 #: Plain decimal numbers only: `float` would read "1_0", "nan" and "infinity" too.
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?\s*", re.ASCII)
+#: What plain numbers have none of.
+_STRANGE = re.compile(r"[^0-9eE+. -]")
 
 
 def number(text: str | bytes | None) -> float:
@@ -62,6 +66,14 @@ def number(text: str | bytes | None) -> float:
 
 def numbers(texts: Iterable[str | bytes | None]) -> Array:
     """(N,) plain decimal numbers, NaN where a text is none."""
+    texts = list(texts)
+    try:
+        words = [text or "nan" for text in texts if not isinstance(text, bytes)]
+        if len(words) == len(texts) and not _STRANGE.search("".join(text for text in texts if text)):
+            values = np.array(list(map(float, words)))
+            return np.where(np.isfinite(values), values, np.nan)
+    except ValueError:
+        pass
     return np.array([number(text) for text in texts], dtype=float)
 
 
@@ -112,7 +124,7 @@ def _reachable(time: Array, latitude: Array, longitude: Array) -> Mask:
     """Rows that can be reached from the longest unbroken run of rows, at a speed that the schema allows."""
     count = len(time)
     every = np.arange(count)
-    far = _metres(latitude, longitude, every[:-1], every[1:]) > SPEED[1] * np.diff(time)
+    far = _metres(latitude, longitude, every[:-1], every[1:]) > _NOISE_M + SPEED[1] * np.diff(time)
     if not far.any():
         return np.ones(count, bool)
     starts = np.r_[0, np.flatnonzero(far) + 1]
@@ -121,20 +133,24 @@ def _reachable(time: Array, latitude: Array, longitude: Array) -> Mask:
     longest = int(np.argmax(ends - starts))
     kept[starts[longest] : ends[longest]] = True
 
-    def near(i: int, j: int) -> bool:
-        away = _metres(latitude, longitude, np.array([i]), np.array([j]))[0]
-        return bool(away <= SPEED[1] * abs(time[j] - time[i]))
+    def near(one: int, begin: int, end: int) -> NDArray[np.intp]:
+        """Rows from begin to end that can be reached from one."""
+        rows = np.arange(begin, end)
+        away = _metres(latitude, longitude, np.full(len(rows), one), rows)
+        return rows[away <= _NOISE_M + SPEED[1] * np.abs(time[rows] - time[one])]
 
-    last = ends[longest] - 1
+    last = int(ends[longest]) - 1
     for k in range(longest + 1, len(starts)):
-        if near(last, starts[k]):
-            kept[starts[k] : ends[k]] = True
-            last = ends[k] - 1
-    first = starts[longest]
+        reached = near(last, starts[k], ends[k])
+        if len(reached):
+            kept[reached[0] : ends[k]] = True
+            last = int(ends[k]) - 1
+    first = int(starts[longest])
     for k in range(longest - 1, -1, -1):
-        if near(ends[k] - 1, first):
-            kept[starts[k] : ends[k]] = True
-            first = starts[k]
+        reached = near(first, starts[k], ends[k])
+        if len(reached):
+            kept[starts[k] : reached[-1] + 1] = True
+            first = int(starts[k])
     return kept
 
 
