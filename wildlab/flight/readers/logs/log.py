@@ -46,7 +46,10 @@ PARTS: dict[str, tuple[str, ...]] = {
     # or against the airframe (pan and tilt as `wildlab.geometry.mount` has them).
     "gimbal": ("roll_world_deg", "pitch_world_deg", "yaw_world_deg", "pan_deg", "tilt_deg"),
     # Records of the autopilot that the camera was triggered.
-    "triggers": ("number", *_PLACE, "roll_deg", "pitch_deg", "yaw_deg", "file"),
+    "triggers": (
+        *("number", *_PLACE, "roll_deg", "pitch_deg", "yaw_deg"),
+        *("sd_horizontal_m", "sd_vertical_m", "fix", "file"),
+    ),
     # Images with what stands in them; `time_log_s` is the camera's own wall clock as if it were UTC.
     "photos": (
         *("file", *_PLACE, "roll_deg", "pitch_deg", "yaw_deg"),
