@@ -1,0 +1,69 @@
+"""DJI's log of images: rows written here and read back, missing parts, damage."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.flight.readers.tracks import check, survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import dji_mrk
+from wildlab.flight.time.leap_seconds import week_to_utc
+
+
+def row(k: int, **other: object) -> str:
+    sds = other.get("sds", "0.012000, 0.016000, 0.030000")
+    return (
+        f"{k}\t{302400 + 2.5 * k:.6f}\t[{other.get('week', 2200)}]\t    18,N\t    -9,E\t   194,V\t"
+        f"{other.get('latitude', 63.4 + 1e-5 * k):.8f},Lat\t{other.get('longitude', 10.4):.8f},Lon\t"
+        f"{100.0 + 0.1 * k:.3f},Ellh\t{sds}\t{other.get('state', 50)},Q\n"
+    )
+
+
+def test_values():
+    data = "".join(map(row, range(1, 21))).encode()
+    assert dji_mrk.recognise(data[:8192], "x.MRK")
+    log = dji_mrk.read(Path("x.MRK"), data)
+    check(log)
+    k = np.arange(1, 21)
+    columns = log.parts["triggers"].columns
+    np.testing.assert_array_equal(columns["number"], k)
+    np.testing.assert_allclose(columns["time_s"], week_to_utc(2200, 302400 + 2.5 * k), atol=1e-6)
+    np.testing.assert_allclose(columns["latitude_deg"], 63.4 + 1e-5 * k, atol=1e-9)
+    np.testing.assert_allclose(columns["height_ellipsoid_m"], 100 + 0.1 * k, atol=1e-9)
+    np.testing.assert_allclose(columns["sd_horizontal_m"], np.sqrt((0.012**2 + 0.016**2) / 2))
+    np.testing.assert_allclose(columns["sd_vertical_m"], 0.03)
+    assert (columns["fix"] == 6.0).all()
+    assert columns["use"].all()
+    assert log.clock is not None
+    assert log.clock.offset_s == 315964800.0 - 18.0
+
+
+def test_states_placeholders_and_repetition():
+    cases = [{}, {"state": 0}, {"state": 16}, {"state": 34}, {"latitude": 0.0, "longitude": 0.0}]
+    text = "".join(row(k, **case) for k, case in enumerate(cases)) + row(3) + row(9, week=99999)
+    log = dji_mrk.read(Path("x.MRK"), text.encode())
+    columns = log.parts["triggers"].columns
+    assert columns["fix"].tolist() == [6.0, 0.0, 3.0, 5.0, 6.0, 6.0, 6.0]
+    assert columns["why"].tolist() == [
+        *("", "no fix", "", "", "position is a placeholder", "repeated stamp", "impossible time")
+    ]
+
+
+@pytest.mark.parametrize("codec", ["utf-8-sig", "utf-16", "latin-1"])
+def test_encodings_missing_fields_and_lost_lines(codec):
+    text = row(1) + row(2).replace("    18,N\t    -9,E\t   194,V\t", "") + row(3, sds="") + "<b>=1+1</b>\n"
+    log = dji_mrk.read(Path("x.MRK"), (text + row(4)[:60]).replace("\n", "\r\n").encode(codec))
+    assert len(log.parts["triggers"]) == 3
+    assert log.parts["triggers"].used.all()
+    assert log.lost == ("2 lines of 5 could not be read",)
+
+
+def test_nothing_in_it():
+    with pytest.raises(WildlabError, match="1 line, and none is a record of an image"):
+        dji_mrk.read(Path("x.MRK"), b"hello")
+    assert not dji_mrk.recognise(b"1 2 3\n", "x.MRK")
+
+
+def test_damage():
+    assert survives(dji_mrk.read, "".join(map(row, range(1, 30))).encode()) > 140

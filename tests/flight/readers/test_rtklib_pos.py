@@ -1,0 +1,215 @@
+"""RTKLIB positions: each way of writing the same made-up track gives the same track."""
+
+import math
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pymap3d
+import pytest
+
+from tests.flight.readers.tracks import check, survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import rtklib_pos
+from wildlab.flight.time.leap_seconds import leap_seconds
+
+START = datetime(2025, 3, 1, 23, 59, 50, tzinfo=UTC)
+COUNT = 40
+K = np.arange(COUNT)
+UTC_S = START.timestamp() + 0.2 * K
+LATITUDE, LONGITUDE, HEIGHT = -33.5 - 1e-6 * K, -70.25 + 2e-6 * K, 500.0 + 0.01 * K
+LLH = "latitude(deg) longitude(deg)  height(m)"
+REST = "Q  ns   sdn(m)   sde(m)   sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio"
+WGS84 = "% (lat/lon/height=WGS84/{},Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)\n"
+
+
+def calendar(utc_s: float, ahead: float, sep: str = " ") -> str:
+    at = datetime.fromtimestamp(0, UTC) + timedelta(seconds=round(utc_s + ahead, 3))
+    return f"{at:%Y/%m/%d}{sep}{at:%H:%M:%S}.{at.microsecond // 1000:03d}"
+
+
+def week(utc_s: float, sep: str = " ") -> str:
+    gps = utc_s - 315964800 + 18
+    return f"{int(gps // 604800)}{sep}{gps % 604800:.3f}"
+
+
+def dms(value: float) -> str:
+    size = abs(value)
+    minutes = (size - int(size)) * 60
+    sign = "-" if value < 0 else ""
+    return f"{sign}{int(size)} {int(minutes):02d} {(minutes - int(minutes)) * 60:.7f}"
+
+
+def document(scale: str, stamps: list[str], places: list[str], **other: object) -> str:
+    names, rest, sep = other.get("names", LLH), other.get("rest", REST), str(other.get("sep", " "))
+    quality = other.get("quality", [1] * len(stamps))
+    head = "% program   : RTKPOST ver.demo5 b34f\n% ref pos   : 1.0 2.0 3.0\n"
+    head += WGS84.format(other.get("vertical", "ellipsoidal"))
+    head += f"%  {scale}                  {names}   {rest}\n"
+    tail = other.get("tail", "0.3 0.4 0.9 0.1 0.1 0.1 0.00 9.9")
+    lines = [f"{t} {p} {q} 12 {tail}" for t, p, q in zip(stamps, places, quality, strict=True)]
+    if sep != " ":
+        lines = [sep.join(line.split()) for line in lines]
+        lines = [line.replace(sep, " ", 1) if "/" in line else line for line in lines]
+    return head + "\n".join(lines) + "\n"
+
+
+def llh() -> list[str]:
+    return [f"{a:.9f} {b:.9f} {c:.4f}" for a, b, c in zip(LATITUDE, LONGITUDE, HEIGHT, strict=True)]
+
+
+def ecef() -> list[str]:
+    xyz = np.column_stack(pymap3d.geodetic2ecef(LATITUDE, LONGITUDE, HEIGHT))
+    return ["{:.6f} {:.6f} {:.6f}".format(*one) for one in xyz]
+
+
+def in_dms() -> list[str]:
+    return [f"{dms(a)} {dms(b)} {c:.4f}" for a, b, c in zip(LATITUDE, LONGITUDE, HEIGHT, strict=True)]
+
+
+GPST = [calendar(at, 18.0) for at in UTC_S]
+WAYS = {
+    "calendar GPST": document("GPST", GPST, llh()),
+    "week and time": document("GPST", [week(at) for at in UTC_S], llh()),
+    "UTC": document("UTC", [calendar(at, 0.0) for at in UTC_S], llh()),
+    "JST": document("JST", [calendar(at, 9 * 3600.0) for at in UTC_S], llh()),
+    "commas": document("GPST", GPST, llh(), sep=","),
+    "semicolons, week": document("GPST", [week(at) for at in UTC_S], llh(), sep=";"),
+    "dms": document("GPST", GPST, in_dms(), names="latitude(d'\") longitude(d'\")  height(m)"),
+    "ecef": document("GPST", GPST, ecef(), names="x-ecef(m) y-ecef(m) z-ecef(m)"),
+    "no header": "".join(f"{t} {p} 1 12 0.3 0.4 0.9\n" for t, p in zip(GPST, llh(), strict=True)),
+    "CRLF": document("GPST", GPST, llh()).replace("\n", "\r\n"),
+    "backwards": document("GPST", GPST[::-1], llh()[::-1]),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_way_gives_the_same_track(way):
+    data = WAYS[way].encode()
+    assert rtklib_pos.recognise(data[:8192], "x")
+    log = rtklib_pos.read(Path("x.pos"), data)
+    check(log)
+    stream = log.parts["gnss"]
+    assert stream.used.all()
+    np.testing.assert_allclose(stream.columns["time_s"], UTC_S, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(stream.columns["latitude_deg"], LATITUDE, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(stream.columns["longitude_deg"], LONGITUDE, rtol=0, atol=2e-9)
+    np.testing.assert_allclose(stream.columns["height_ellipsoid_m"], HEIGHT, rtol=0, atol=1e-4)
+    assert (stream.columns["fix"] == 6.0).all()
+    if way != "ecef":
+        np.testing.assert_allclose(stream.columns["sd_horizontal_m"], math.sqrt((0.3**2 + 0.4**2) / 2))
+        np.testing.assert_allclose(stream.columns["sd_vertical_m"], 0.9)
+    assert ("put in order" in " ".join(log.notes)) == (way == "backwards")
+    assert ("no header names the columns" in " ".join(log.notes)) == (way == "no header")
+    assert stream.rows[0] == {"backwards": 4 + COUNT, "no header": 1}.get(way, 5)
+
+
+def test_equals_pandas(shared_data):
+    path = shared_data("logs", "target_car_rtk_pos", "demo5_b34f_f.pos")
+    data = path.read_bytes()
+    log = rtklib_pos.read(path, data)
+    check(log)
+    table = pd.read_csv(path, sep=r"\s+", comment="%", header=None)
+    columns = log.parts["gnss"].columns
+    assert not log.lost
+    for k, name in ((2, "latitude_deg"), (3, "longitude_deg"), (4, "height_ellipsoid_m"), (6, "satellites")):
+        np.testing.assert_array_equal(columns[name], table[k])
+    stamps = pd.to_datetime(table[0] + " " + table[1], utc=True)
+    seconds = (stamps - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy() - 18.0
+    np.testing.assert_allclose(columns["time_s"], seconds, rtol=0, atol=1e-6)
+    assert (columns["fix"] == 6.0).sum() == (table[5] == 1).sum()
+
+
+def test_leap_seconds_by_date():
+    for year in (2014, 2025):
+        at = datetime(year, 5, 5, 12, tzinfo=UTC).timestamp()
+        ahead = float(leap_seconds(at))
+        data = document("GPST", [calendar(at, ahead)], llh()[:1]).encode()
+        assert rtklib_pos.read(Path("x"), data).parts["gnss"].columns["time_s"][0] == at
+
+
+def test_geodetic_heights_velocities_and_quality():
+    rest = "Q ns sdn(m) sde(m) sdu(m) vn(m/s) ve(m/s) vu(m/s)"
+    data = document(
+        *("UTC", [calendar(at, 0.0) for at in UTC_S], llh()),
+        **{"vertical": "geodetic", "rest": rest, "tail": "1 1 1 3.0 -4.0 0.5", "quality": [*range(8)] * 5},
+    )
+    columns = rtklib_pos.read(Path("x"), data.encode()).parts["gnss"].columns
+    np.testing.assert_allclose(columns["height_sea_m"], HEIGHT, atol=1e-4)
+    assert "height_ellipsoid_m" not in columns
+    assert (columns["v_north_m_s"][0], columns["v_east_m_s"][0], columns["v_down_m_s"][0]) == (
+        3.0,
+        -4.0,
+        -0.5,
+    )
+    assert columns["fix"][:8].tolist() == [0.0, 6.0, 5.0, 4.0, 4.0, 3.0, 8.0, 1.0]
+    assert columns["why"][:8].tolist() == ["no fix", *[""] * 6, "estimated, not measured"]
+
+
+def test_spreads_and_velocity_of_ecef():
+    """A covariance and a velocity turned by pymap3d come back."""
+    rest = "Q ns sdx(m) sdy(m) sdz(m) sdxy(m) sdyz(m) sdzx(m) vx(m/s) vy(m/s) vz(m/s)"
+    ned = np.diag([0.2, 0.3, 0.8]) ** 2
+    turn = np.column_stack(
+        [pymap3d.enu2uvw(east, north, up, LATITUDE[0], LONGITUDE[0]) for north, east, up in np.eye(3)]
+    )
+    cov = turn @ ned @ turn.T
+    roots = np.sign(cov) * np.sqrt(np.abs(cov))
+    speed = turn @ [1.0, 2.0, 3.0]
+    tail = " ".join(f"{v:.9f}" for v in [*roots.diagonal(), roots[0, 1], roots[1, 2], roots[2, 0], *speed])
+    names = "x-ecef(m) y-ecef(m) z-ecef(m)"
+    data = document("GPST", GPST[:1], ecef()[:1], names=names, rest=rest, tail=tail)
+    columns = rtklib_pos.read(Path("x"), data.encode()).parts["gnss"].columns
+    assert columns["sd_horizontal_m"][0] == pytest.approx(math.sqrt((0.04 + 0.09) / 2), abs=1e-6)
+    assert columns["sd_vertical_m"][0] == pytest.approx(0.8, abs=1e-6)
+    found = [columns[f"v_{axis}_m_s"][0] for axis in ("north", "east", "down")]
+    np.testing.assert_allclose(found, [1.0, 2.0, -3.0], atol=1e-6)
+
+
+def test_reordered_and_missing_columns():
+    text = "% GPST height(m) longitude(deg) latitude(deg)\n"
+    text += "".join(
+        f"{t} {h:.4f} {b:.9f} {a:.9f}\n" for t, a, b, h in zip(GPST, LATITUDE, LONGITUDE, HEIGHT, strict=True)
+    )
+    columns = rtklib_pos.read(Path("x"), text.encode()).parts["gnss"].columns
+    np.testing.assert_allclose(columns["latitude_deg"], LATITUDE, atol=1e-9)
+    np.testing.assert_allclose(columns["height_ellipsoid_m"], HEIGHT, atol=1e-4)
+    assert "fix" not in columns
+    assert "sd_horizontal_m" not in columns
+
+
+def test_repeated_rows():
+    stamps = [*GPST[:5], GPST[4], *GPST[5:10]]
+    data = document("GPST", stamps, [llh()[0]] * 11)
+    log = rtklib_pos.read(Path("x"), data.encode())
+    check(log)
+    assert log.parts["gnss"].columns["why"].tolist() == [*[""] * 5, "repeated stamp", *[""] * 5]
+
+
+def test_baselines_are_refused():
+    data = document("GPST", GPST, llh(), names="e-baseline(m) n-baseline(m) u-baseline(m)")
+    with pytest.raises(WildlabError, match="has baselines from its base station, and no places"):
+        rtklib_pos.read(Path("x"), data.encode())
+
+
+def test_nothing_in_it():
+    with pytest.raises(WildlabError, match="has no position; 2 lines cannot be read"):
+        rtklib_pos.read(Path("x"), b"%  GPST latitude(deg) longitude(deg) height(m)\nhello\n1,2\n")
+    # A baseline without a header cannot be told from a place but by its digits.
+    assert not rtklib_pos.recognise(f"{GPST[0]} 12.3456 5.6789 1.2345 1 12\n".encode(), "x.pos")
+
+
+def test_lost_lines_and_wide_headers():
+    text = document("GPST", GPST, llh()).replace(GPST[3], "2025/13/45 99:00:00")
+    text = text.replace("ratio", "ratio " + "x " * 10000)
+    log = rtklib_pos.read(Path("x"), text.encode("utf-8-sig"))
+    assert log.lost == (f"1 line of {COUNT} could not be read",)
+    assert len(log.parts["gnss"]) == COUNT - 1
+
+
+def test_damage(shared_data):
+    assert survives(rtklib_pos.read, WAYS["calendar GPST"].encode()) > 140
+    assert survives(rtklib_pos.read, WAYS["ecef"].encode()) > 140
+    data = shared_data("logs", "target_car_rtk_pos", "demo5_b34f_f.pos").read_bytes()
+    assert survives(rtklib_pos.read, data, every=10) > 13
