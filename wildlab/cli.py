@@ -20,6 +20,7 @@ from wildlab import __version__
 from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
+from wildlab.commands.click import click_
 from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
 from wildlab.commands.import_ import import_
@@ -66,8 +67,18 @@ def wildlab() -> None:
 
 
 for _command in (
-    *(studies.list_, studies.run, studies.vary, studies.evaluate),
-    *(import_, georeference, camera, detect, calibrate, terrain, plan),
+    studies.list_,
+    studies.run,
+    studies.vary,
+    studies.evaluate,
+    import_,
+    click_,
+    georeference,
+    camera,
+    detect,
+    calibrate,
+    terrain,
+    plan,
 ):
     wildlab.add_command(_command)
 

@@ -152,3 +152,32 @@ def said_of_short(table: TextTable) -> list[str]:
     count = len(table.short)
     lines = "1 line" if count == 1 else f"{count:,} lines"
     return [f"{lines} without {len(table.header)} values, the first is line {table.short[0]}"]
+
+
+#: With what a program of tables takes a value for a formula.
+_FORMULA = ("=", "+", "-", "@", "\t", "'")
+
+
+def guarded(text: str) -> str:
+    """Text as a value of a table that no program of tables takes for a formula; `unguarded` gives it back.
+
+    Parameters
+    ----------
+    text
+        Of one value.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> guarded("=2+2"), unguarded(guarded("=2+2")), guarded("A-1")
+    ("'=2+2", '=2+2', 'A-1')
+    """
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def unguarded(text: str) -> str:
+    """What `guarded` was given."""
+    return text[1:] if text.startswith("'") and text[1:].startswith(_FORMULA) else text
