@@ -14,7 +14,6 @@ from wildlab.flight.readers.logs import ardupilot_motion as motion
 from wildlab.flight.readers.logs.ardupilot_messages import Table
 from wildlab.flight.readers.logs.ardupilot_time import (
     Times,
-    gps_utc,
     longest_run,
     own_stamps,
     placed,
@@ -77,7 +76,7 @@ def raw_log(
     if receiver is not None:
         satellites = motion.gnss(receiver, tables, when, counted_in)
         parts["gnss"] = satellites
-        place = place or motion.place_of_gnss(satellites, receiver)
+        place = place or motion.place_of_gnss(satellites, receiver, when)
     parts["poses"] = motion.poses(tables, when, place, counted_in)
     parts["imu"] = motion.imu(tables, when, counted_in)
     parts["magnetometer"] = motion.magnetometer(tables, when, counted_in)
@@ -128,14 +127,16 @@ def _triggers(tables: dict[str, Table], when: Times, counted_in: str) -> Stream 
     if not found:
         return None
     table = found[0]
-    stamps = own_stamps(table)
-    if stamps is None:
-        # The first generation stamps them with GPS time alone.
-        stamps = when.stamp_of(gps_utc(table))
-        stamps = np.where(np.isfinite(stamps), stamps, when.of(table))
+    # The first generation has only GPS time, of the fix before: the messages around tell more closely.
+    stamps = when.of(table)
     get = table.numbers
     latitude, longitude = get("Lat", unit="deg"), get("Lng", unit="deg")
-    columns = {"latitude_deg": latitude, "longitude_deg": longitude}
+    # Before the first fix images have no place, but they were taken.
+    known = placed(latitude, longitude)
+    columns = {
+        "latitude_deg": np.where(known, latitude, np.nan),
+        "longitude_deg": np.where(known, longitude, np.nan),
+    }
     if table.has("RelAlt"):
         # Without it, copters and planes meant different things by `Alt`.
         columns |= {"height_sea_m": get("Alt", unit="m"), "height_home_m": get("RelAlt", unit="m")}
@@ -146,8 +147,7 @@ def _triggers(tables: dict[str, Table], when: Times, counted_in: str) -> Stream 
     }
     if table.has("Img"):
         columns["number"] = get("Img")
-    unusable = {"no place": ~placed(latitude, longitude)}
-    return motion.stream("triggers", columns, stamps, when, table.rows, counted_in, unusable)
+    return motion.stream("triggers", columns, stamps, when, table.rows, counted_in, {})
 
 
 def _notes(
@@ -159,6 +159,14 @@ def _notes(
     place: motion.Place | None,
 ) -> list[str]:
     notes = []
+    unstamped = [
+        name
+        for name in ("GPS", "ATT", "IMU", "CAM", "TRIG")
+        if name in tables and own_stamps(tables[name]) is None
+    ]
+    if unstamped and when.clock is not None:
+        names = " and ".join(unstamped)
+        notes.append(f"Messages {names} carry no stamps: their times are those of the messages around them.")
     if "imu" not in found:
         notes.append("The log has no messages of an IMU: no rates of turn and no accelerations.")
     if when.clock is None:

@@ -63,15 +63,20 @@ def stream(
     rows: NDArray[np.int64],
     counted_in: str,
     unusable: dict[str, Mask],
+    utc: Array | None = None,
 ) -> Stream:
-    """A part with its times; rows whose stamps are not in order are marked behind all other reasons."""
+    """A part with its times; rows whose stamps are not in order are marked behind all other reasons.
+
+    `utc` are times (N,) in s since 1970 that the messages know better than their stamps.
+    """
+    both = {"time_s": times.utc(stamps) if utc is None else utc, "time_log_s": stamps}
+    judged = both["time_s"] if np.isfinite(both["time_s"]).any() else stamps
     wanted = ~np.logical_or.reduce([*unusable.values(), np.zeros(len(stamps), bool)])
-    kept = in_order(stamps, wanted) if np.isfinite(stamps).any() else np.ones(len(stamps), bool)
+    kept = in_order(judged, wanted) if np.isfinite(judged).any() else np.ones(len(stamps), bool)
     same = np.zeros(len(stamps), bool)
-    same[1:] = stamps[1:] == stamps[:-1]
-    marks = {**unusable, "no stamp": ~np.isfinite(stamps) & ~kept}
+    same[1:] = judged[1:] == judged[:-1]
+    marks = {**unusable, "no stamp": ~np.isfinite(judged) & ~kept}
     marks |= {"repeated stamp": ~kept & same, "stamp out of order": ~kept}
-    both = {"time_s": times.utc(stamps), "time_log_s": stamps}
     return make_stream(part, both | columns, rows, counted_in, marks)
 
 
@@ -102,8 +107,10 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
         "HDOP of 99 or more": hdop >= WORST_HDOP,
         "faster than 700 m/s": (speed > FASTEST_M_S) | (np.abs(down) > FASTEST_M_S),
     }
-    unusable["leap that nothing makes"] = _leaps(stamps, latitude, longitude, height, unusable)
-    return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable)
+    utc = times.utc_of_fixes(receiver)
+    judged = utc if np.isfinite(utc).any() else stamps
+    unusable["leap that nothing makes"] = _leaps(judged, latitude, longitude, height, unusable)
+    return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable, utc)
 
 
 def _leaps(
@@ -227,15 +234,17 @@ def place_of(name: str, tables: dict[str, Table], times: Times) -> Place | None:
     return Place(name, stamps[kept], latitude[kept], longitude[kept], sea[kept], home[kept])
 
 
-def place_of_gnss(part: Stream, receiver: Table) -> Place | None:
+def place_of_gnss(part: Stream, receiver: Table, times: Times) -> Place | None:
     """Positions of the satellite receiver; heights above home where its messages have the autopilot's."""
-    used = part.used & np.isfinite(part.columns["time_log_s"])
+    stamps = times.stamp_of(part.columns["time_s"])
+    stamps = stamps if np.isfinite(stamps).any() else part.columns["time_log_s"]
+    used = part.used & np.isfinite(stamps)
     if not used.any():
         return None
     names = ("latitude_deg", "longitude_deg", "height_sea_m")
     latitude, longitude, sea = (part.columns[one][used] for one in names)
     home = receiver.numbers("RelAlt", "RAlt", unit="m")[used]
-    return Place(receiver.name, part.columns["time_log_s"][used], latitude, longitude, sea, home)
+    return Place(receiver.name, stamps[used], latitude, longitude, sea, home)
 
 
 def _from_origin(

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 FIX_3D = 3
 #: The fitted rate is believed where it differs from 1 by so many of its standard deviations.
 SURE_RATE = 4.0
+#: No fix is written down later than this, s.
+LATEST_S = 5.0
 #: So many messages on both sides of a step back make it one of the board, not of a damaged stamp.
 _SURE_ROWS = 5
 #: Messages that say something of the whole log.
@@ -56,6 +58,14 @@ class Times(NamedTuple):
         if self.clock is None or not self.clock.base:
             return np.full(len(stamps), np.nan)
         return np.asarray(self.clock.offset_s + self.clock.rate * stamps)
+
+    def utc_of_fixes(self, receiver: Table) -> Array:
+        """(N,) s since 1970 of GPS messages: the receiver's own time where it has a fix, else the clock's.
+
+        A fix may be written down late; its own time then says so. One far from the clock's is damaged.
+        """
+        clock, own = self.utc(self.of(receiver)), gps_utc(receiver)
+        return np.where(true_fix(receiver) & (np.abs(own - clock) < LATEST_S), own, clock)
 
     def stamp_of(self, utc_s: Array) -> Array:
         """(N,) stamps at which it was so late, s."""
@@ -149,7 +159,8 @@ def longest_run(tables: dict[str, Table]) -> tuple[dict[str, Table], str]:
     begins = [int(group[np.argmin(stamps[group] - stamps[group - 1])]) for group in groups]
     if not begins:
         return tables, ""
-    edges = np.array([0, *rows[begins], np.iinfo(np.int64).max])
+    # What stands before the first stamp of a time, as an origin or a version, belongs to it.
+    edges = np.array([0, *(rows[np.array(begins) - 1] + 1), np.iinfo(np.int64).max])
     every = np.concatenate([table.rows for table in tables.values()])
     counts = np.histogram(every, edges.astype(float))[0]
     best = int(np.argmax(counts))

@@ -1,0 +1,295 @@
+"""A small writer of DataFlash logs, binary and as text, and one flight in three generations of names."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: struct's letter and the factor of each format character.
+LETTERS: dict[str, tuple[str, float]] = {
+    **{"b": ("b", 1), "B": ("B", 1), "h": ("h", 1), "H": ("H", 1), "i": ("i", 1), "I": ("I", 1)},
+    **{"f": ("f", 1), "d": ("d", 1), "q": ("q", 1), "Q": ("Q", 1), "M": ("B", 1), "g": ("e", 1)},
+    **{"c": ("h", 100), "C": ("H", 100), "e": ("i", 100), "E": ("I", 100), "L": ("i", 1e7)},
+    **{"n": ("4s", 0), "N": ("16s", 0), "Z": ("64s", 0)},
+}
+
+
+def fmt(kind: int, name: str, characters: str, columns: str, length: int | None = None) -> bytes:
+    size = struct.calcsize("<" + "".join(LETTERS[one][0] for one in characters if one in LETTERS)) + 3
+    texts = (name.encode(), characters.encode(), columns.encode())
+    said = size if length is None else length
+    return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, said, *texts)
+
+
+@dataclass
+class Log:
+    """Messages with values in their units; each is defined where it is used first."""
+
+    kinds: dict[str, tuple[int, str, str]] = field(default_factory=dict)
+    messages: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
+
+    def define(self, name: str, characters: str, columns: str) -> None:
+        self.kinds[name] = (len(self.kinds) + 1, characters, columns)
+
+    def add(self, name: str, *values: Any) -> None:
+        assert len(values) == len(self.kinds[name][1]), name
+        self.messages.append((name, values))
+
+    def body(self, name: str, values: tuple[Any, ...]) -> bytes:
+        kind, characters, _ = self.kinds[name]
+        made = b""
+        for value, character in zip(values, characters, strict=True):
+            letter, factor = LETTERS[character]
+            if factor == 0:
+                made += struct.pack("<" + letter, str(value).encode())
+            elif letter in "fde":
+                made += struct.pack("<" + letter, value)
+            else:
+                made += struct.pack("<" + letter, round(value * factor))
+        return b"\xa3\x95" + bytes([kind]) + made
+
+    def pieces(self) -> list[bytes]:
+        """All messages, definitions too, each as its bytes."""
+        made = [fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
+        seen = set()
+        for name, values in self.messages:
+            if name not in seen:
+                kind, characters, columns = self.kinds[name]
+                made.append(fmt(kind, name, characters, columns))
+                seen.add(name)
+            made.append(self.body(name, values))
+        return made
+
+    def binary(self) -> bytes:
+        return b"".join(self.pieces())
+
+    def text(self) -> bytes:
+        lines = ["", "ArduCopter V3.1", ""]
+        for name, (kind, characters, columns) in self.kinds.items():
+            size = len(self.body(name, tuple(0 for _ in characters)))
+            lines.append(f"FMT, {kind}, {size}, {name}, {characters}, {columns}")
+        for name, values in self.messages:
+            lines.append(", ".join([name, *(str(one) for one in values)]))
+        return "\n".join(lines).encode() + b"\n"
+
+
+#: When the made-up flight began, and where.
+BEGAN = {2014: datetime(2014, 10, 19, 1, 0, tzinfo=UTC), 2025: datetime(2025, 1, 3, 13, 0, tzinfo=UTC)}
+#: GPS time minus UTC then.
+LEAP_S = {2014: 16, 2025: 18}
+LATITUDE, LONGITUDE, HEIGHT, HOME = 41.7, -8.8, 130.0, 100.0
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A straight flight: where and how at stamps (N,) of the board, and UTC of them."""
+
+    year: int
+    rate: float = 1.0
+    boot_s: float = 20.0
+
+    def utc(self, stamp: Any) -> Any:
+        return BEGAN[self.year].timestamp() + self.rate * (np.asarray(stamp) - self.boot_s)
+
+    def week_ms(self, stamp: float) -> tuple[int, int]:
+        gps = float(self.utc(stamp)) + LEAP_S[self.year] - datetime(1980, 1, 6, tzinfo=UTC).timestamp()
+        week, rest = divmod(gps, 604800.0)
+        return int(week), round(rest * 1e3)
+
+    def latitude(self, stamp: Any) -> Any:
+        return LATITUDE + 1e-4 * (np.asarray(stamp) - self.boot_s)
+
+    def longitude(self, stamp: Any) -> Any:
+        return LONGITUDE - 1e-4 * (np.asarray(stamp) - self.boot_s)
+
+    def height(self, stamp: Any) -> Any:
+        return HEIGHT + 0.5 * (np.asarray(stamp) - self.boot_s)
+
+    def attitude(self, stamp: float) -> tuple[float, float, float]:
+        return 5.0, -2.0, 90.0 + 0.5 * (stamp - self.boot_s)
+
+
+def _run(log: Log, truth: Truth, seconds: float, steps: dict[float, Callable[[float], None]]) -> None:
+    """Call each function at its step, in the order of time, from the board's switch-on on."""
+    calls = [
+        (truth.boot_s + i * step, number, call)
+        for number, (step, call) in enumerate(steps.items())
+        for i in range(int(seconds / step))
+    ]
+    for stamp, _, call in sorted(calls, key=lambda one: one[:2]):
+        call(stamp)
+
+
+def first_generation(truth: Truth, seconds: float = 40.0) -> Log:
+    """TimeMS everywhere; GPS has ms of the week as TimeMS and the stamp as T; CAM has GPS time only."""
+    log = Log()
+    log.define("MSG", "Z", "Message")
+    log.define("ATT", "IccccCC", "TimeMS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw")
+    log.define("IMU", "Iffffff", "TimeMS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    log.define("MAG", "Ihhhhhhhhh", "TimeMS,MagX,MagY,MagZ,OfsX,OfsY,OfsZ,MOfsX,MOfsY,MOfsZ")
+    log.define("GPS", "BIHBcLLeeEefI", "Status,TimeMS,Week,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs,VZ,T")
+    log.define("CAM", "IHLLeccC", "GPSTime,GPSWeek,Lat,Lng,Alt,Roll,Pitch,Yaw")
+    log.add("MSG", "ArduCopter V3.1.3 (92cdd2a3)")
+
+    def fast(t: float) -> None:
+        ms = round(t * 1e3)
+        roll, pitch, yaw = truth.attitude(t)
+        log.add("IMU", ms, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8)
+        log.add("ATT", ms, 0, roll, 0, pitch, 0, yaw)
+        log.add("MAG", ms, 200, -100, 400, 0, 0, 0, 0, 0, 0)
+
+    def slow(t: float) -> None:
+        week, ms = truth.week_ms(t)
+        where = (truth.latitude(t), truth.longitude(t), truth.height(t) - HOME, truth.height(t))
+        log.add("GPS", 3, ms, week, 9, 1.5, *where, 14.0, 315.0, -0.5, round(t * 1e3))
+
+    def photo(t: float) -> None:
+        week, ms = truth.week_ms(t)
+        log.add("CAM", ms, week, truth.latitude(t), truth.longitude(t), 30.0, *truth.attitude(t))
+
+    _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
+    return log
+
+
+def second_generation(truth: Truth, seconds: float = 40.0, origin: bool = True) -> Log:
+    """TimeUS; one message name per sensor; positions by POS or by NKF1 and ORGN."""
+    log = Log()
+    log.define("MSG", "QZ", "TimeUS,Message")
+    log.define("ORGN", "QBLLe", "TimeUS,Type,Lat,Lng,Alt")
+    log.define("ATT", "QccccCCCC", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw")
+    log.define("NKF1", "QccCfffffffccce", "TimeUS,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH")
+    log.define("IMU2", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    log.define("IMU", "Qffffff", "TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
+    log.define("GPS", "QBIHBcLLefffB", "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,U")
+    log.define("GPA", "QCCCCBIH", "TimeUS,VDop,HAcc,VAcc,SAcc,VV,SMS,Delta")
+    log.define("TRIG", "QIHLLeeeccC", "TimeUS,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,Roll,Pitch,Yaw")
+    began = round(truth.boot_s * 1e6)
+    log.add("MSG", began, "ArduPlane V3.8.2-dev (8178ab40)")
+    if origin:
+        log.add("ORGN", began, 1, 0.5, 0.5, 0)
+        log.add("ORGN", began, 0, LATITUDE, LONGITUDE, HOME)
+    # Metres of a degree, as the autopilot takes them.
+    degree = 0.011131884502145034 * 1e7
+
+    def fast(t: float) -> None:
+        us = round(t * 1e6)
+        roll, pitch, yaw = truth.attitude(t)
+        log.add("IMU2", us, 9, 9, 9, 9, 9, 9)
+        log.add("IMU", us, 0.01, 0.02, 0.03, 0.1, 0.2, -9.8)
+        log.add("ATT", us, 0, roll, 0, pitch, 0, yaw, 0, 0)
+        step = truth.latitude(t) - LATITUDE
+        east = (truth.longitude(t) - LONGITUDE) * degree * np.cos(np.radians(LATITUDE + step / 2))
+        velocity = (9.9, -9.9, -0.5)
+        log.add(
+            "NKF1",
+            us,
+            roll,
+            pitch,
+            yaw,
+            *velocity,
+            0,
+            step * degree,
+            east,
+            HOME - truth.height(t),
+            0,
+            0,
+            0,
+            0,
+        )
+
+    def slow(t: float) -> None:
+        us, (week, ms) = round(t * 1e6), truth.week_ms(t)
+        where = (truth.latitude(t), truth.longitude(t), truth.height(t))
+        log.add("GPS", us, 3, ms, week, 11, 0.77, *where, 14.0, 315.0, -0.5, 1)
+        log.add("GPA", us, 1.2, 1.61, 2.41, 0.51, 1, round(t * 1e3), 200)
+
+    def photo(t: float) -> None:
+        us, (week, ms) = round(t * 1e6), truth.week_ms(t)
+        above = (truth.height(t), truth.height(t) - HOME, truth.height(t))
+        log.add("TRIG", us, ms, week, truth.latitude(t), truth.longitude(t), *above, *truth.attitude(t))
+
+    _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
+    return log
+
+
+def third_generation(truth: Truth, seconds: float = 40.0, attitude: bool = True) -> Log:
+    """An instance per sensor, units beside, ACC and GYR apart, a gimbal, images numbered; no fix at first."""
+    log = Log()
+    log.define("UNIT", "QbZ", "TimeUS,Id,Label")
+    log.define("MULT", "Qbd", "TimeUS,Id,Mult")
+    log.define("FMTU", "QBNN", "TimeUS,FmtType,UnitIds,MultIds")
+    log.define("VER", "QBZ", "TimeUS,Maj,FWS")
+    # Its columns stand in another order than any release had them.
+    log.define("ATT", "cQCc", "Pitch,TimeUS,Yaw,Roll")
+    log.define("XKQ", "QBffff", "TimeUS,C,Q1,Q2,Q3,Q4")
+    log.define("XKF1", "QBfff", "TimeUS,C,VN,VE,VD")
+    log.define("POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
+    log.define("ACC", "QBQfff", "TimeUS,I,SampleUS,AccX,AccY,AccZ")
+    log.define("GYR", "QBQfff", "TimeUS,I,SampleUS,GyrX,GyrY,GyrZ")
+    log.define("MAG", "QBhhhBI", "TimeUS,I,MagX,MagY,MagZ,Health,S")
+    log.define("GPS", "QBBIHBcLLeffffB", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw,U")
+    log.define("GPA", "QBCCCCfBIHf", "TimeUS,I,VDop,HAcc,VAcc,SAcc,YAcc,VV,SMS,Delta,Und")
+    log.define("MNT", "QBffffffff", "TimeUS,I,DesRoll,Roll,DesPitch,Pitch,DesYawB,YawB,DesYawE,YawE")
+    log.define("CAM", "QBHIHLLeeefff", "TimeUS,I,Img,GPSTime,GPSWeek,Lat,Lng,Alt,RelAlt,GPSAlt,R,P,Y")
+    began = round(truth.boot_s * 1e6)
+    units = {"-": "", "s": "s", "#": "instance", "G": "Gauss", "d": "deg", "h": "degheading", "k": "deg/s"}
+    for letter, label in units.items():
+        log.add("UNIT", began, ord(letter), label)
+    for letter, value in {"-": 0, "0": 1, "B": 0.01, "C": 0.001, "F": 1e-6}.items():
+        log.add("MULT", began, ord(letter), value)
+    log.add("FMTU", began, log.kinds["MAG"][0], "s#GGG-s", "F-CCC-F")
+    log.add("FMTU", began, log.kinds["ATT"][0], "dshd", "BFBB")
+    # Rates in degrees: no release logs them so, but the format can say it.
+    log.add("FMTU", began, log.kinds["GYR"][0], "s#skkk", "F-F000")
+    log.add("VER", began, 4, "ArduPlane V4.2.3 (55685c43)")
+
+    def fast(t: float) -> None:
+        us = round(t * 1e6)
+        roll, pitch, yaw = truth.attitude(t)
+        if attitude:
+            log.add("ATT", pitch, us, yaw, roll)
+        half = np.radians(yaw) / 2
+        for core in (0, 1):
+            log.add("XKQ", us, core, np.cos(half), 0, 0, np.sin(half))
+            log.add("XKF1", us, core, 9.9 + core, -9.9, -0.5)
+        for sensor in (0, 1):
+            log.add("ACC", us + 900, sensor, us, 0.1 + sensor, 0.2, -9.8)
+            log.add("GYR", us + 1000, sensor, us + 500, *np.degrees([0.01, 0.02, 0.03]))
+        log.add("MAG", us, 0, 200, -100, 400, 1, 0)
+        log.add("MNT", us, 0, 0, 1.0, 0, -60.0, 0, 20.0, 0, 110.0)
+        known = t >= truth.boot_s + 10
+        above = truth.height(t)
+        where = (truth.latitude(t), truth.longitude(t)) if known else (0, 0)
+        log.add("POS", us, *where, above, above - HOME, above - HOME if known else float("nan"))
+
+    def slow(t: float) -> None:
+        us, (week, ms) = round(t * 1e6), truth.week_ms(t)
+        known = t >= truth.boot_s + 10
+        where = (truth.latitude(t), truth.longitude(t), truth.height(t)) if known else (60.9, -97.0, 17836.0)
+        for receiver in (0, 1):
+            status = 3 if known and receiver else 1
+            shown = (6, 1.2) if status == 3 else (0, 99.99)
+            log.add(
+                "GPS", us, receiver, status, ms, week if known else 0, *shown, *where, 14, 315, -0.5, 0, 1
+            )
+            sds = (1.5, 2.5, 0.5) if known else (655.35, 655.35, 655.35)
+            log.add("GPA", us, receiver, 1.2, *sds, 0, 1, round(t * 1e3), 200, -48.5)
+
+    number = iter(range(1, 1000))
+
+    def photo(t: float) -> None:
+        us, (week, ms) = round(t * 1e6), truth.week_ms(t)
+        above = (truth.height(t), truth.height(t) - HOME, truth.height(t))
+        place = (truth.latitude(t), truth.longitude(t))
+        log.add("CAM", us, 0, next(number), ms, week, *place, *above, *truth.attitude(t))
+
+    _run(log, truth, seconds, {0.1: fast, 0.2: slow, 5.0: photo})
+    return log

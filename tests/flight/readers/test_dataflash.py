@@ -1,0 +1,301 @@
+"""DataFlash: messages as pymavlink finds them, whatever stands between them, and files that lie."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink import DFReader
+
+from tests.flight.readers.dataflash_logs import (
+    Log,
+    Truth,
+    first_generation,
+    fmt,
+    second_generation,
+    third_generation,
+)
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import dataflash, dataflash_text
+from wildlab.flight.readers.logs.dataflash_records import read_records
+from wildlab.flight.readers.logs.log import RawLog
+
+GENERATIONS = {2014: first_generation, 2025: third_generation}
+REAL = (
+    "copter_2014_joey/2014-10-18 20-04-24.bin",
+    "plane42_bench_badgps/pilot_0004.BIN",
+    "damaged/pymavlink_test.BIN",
+)
+
+
+def by_pymavlink(path: Path) -> dict[str, list[Any]]:
+    reader = DFReader.DFReader_binary(str(path))
+    found: dict[str, list[Any]] = {}
+    while (message := reader.recv_match()) is not None:
+        found.setdefault(message.get_type(), []).append(message)
+    return found
+
+
+def same(ours: Any, theirs: Any) -> bool:
+    if isinstance(theirs, bytes):
+        # Contents of files within the log: whole bytes there, up to the first 0 here.
+        return str(ours).encode() == theirs.split(b"\0")[0] or not theirs.isascii()
+    if isinstance(theirs, float) and math.isnan(theirs):
+        return math.isnan(ours)
+    return bool(ours == theirs)
+
+
+def compare(path: Path) -> int:
+    """Every field of every message equals pymavlink's; how many there were."""
+    ours, theirs = read_records(path.read_bytes()).tables, by_pymavlink(path)
+    assert {name: len(table) for name, table in ours.items()} == {
+        name: len(messages) for name, messages in theirs.items()
+    }
+    count = 0
+    for name, messages in theirs.items():
+        # The first generation's definition of FMT leaves out its last column.
+        for field in messages[0].fmt.columns:
+            values = ours[name].column(ours[name].fields.index(field)).tolist()
+            theirs_too = [getattr(message, field) for message in messages]
+            differ = [pair for pair in zip(values, theirs_too, strict=True) if not same(*pair)]
+            assert not differ, (name, field, differ[:3])
+            count += len(values)
+    return count
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_every_field_is_as_pymavlink_has_it(shared_data: Callable[..., Path], name: str) -> None:
+    assert compare(shared_data("logs", *name.split("/"))) > 10_000
+
+
+@pytest.mark.parametrize("make", [first_generation, second_generation, third_generation])
+def test_made_up_logs_too(tmp_path: Path, make: Callable[..., Log]) -> None:
+    path = tmp_path / "made.bin"
+    path.write_bytes(make(Truth(2025), 8.0).binary())
+    assert compare(path) > 1000
+
+
+def test_every_format_character(tmp_path: Path) -> None:
+    log = Log()
+    characters = "bBhHiIfdcCeELMqQ"
+    log.define("ALL", characters, ",".join(f"A{i}" for i in range(len(characters))))
+    log.define("TXT", "nNZg", "Name,Long,Text,Half")
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        log.add(
+            "ALL", *rng.integers(0, 100, 6), *rng.normal(size=2), *rng.uniform(0, 90, 5).round(2), 3, 4, 5
+        )
+        log.add("TXT", "abcd", "sixteen letters!", "æ ø", 0.5)
+    path = tmp_path / "all.bin"
+    path.write_bytes(log.binary())
+    compare(path)
+    assert read_records(log.binary()).tables["TXT"].texts("Long")[0] == "sixteen letters!"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.binary(max_size=30).map(lambda one: one.replace(b"\xa3", b"")), min_size=8, max_size=8))
+def test_nothing_between_messages_hides_them(garbage: list[bytes]) -> None:
+    log = Log()
+    log.define("A", "Qf", "TimeUS,V")
+    log.define("B", "QB", "TimeUS,W")
+    for i in range(4):
+        log.add("A", i, i / 2)
+        log.add("B", i, i)
+    pieces = log.pieces()
+    # The definitions come first: what follows is 8 messages with something in front of each.
+    ahead = [one for one in pieces if one[2] == 128]
+    behind = [one for one in pieces if one[2] != 128]
+    data = b"".join(ahead) + b"".join(g + one for g, one in zip(garbage, behind, strict=True))
+    found = read_records(data)
+    assert found.tables["A"].numbers("V").tolist() == [0, 0.5, 1, 1.5]
+    assert found.tables["B"].numbers("W").tolist() == [0, 1, 2, 3]
+    assert found.lost_bytes == sum(map(len, garbage))
+    assert found.places == sum(map(bool, garbage))
+
+
+def test_heads_within_messages_are_not_believed() -> None:
+    log = Log()
+    log.define("A", "QZ", "TimeUS,Text")
+    log.define("B", "QB", "TimeUS,W")
+    for i in range(50):
+        log.add("A", i, "a text")
+        log.add("B", i, i)
+    kind = log.kinds["B"][0]
+    # In each text stands what looks like the head of a B.
+    data = log.binary().replace(b"a text", b"at\xa3\x95" + bytes([kind]) + b"t")
+    found = read_records(data)
+    assert found.lost_bytes == 0
+    assert found.tables["B"].numbers("W").tolist() == list(range(50))
+
+
+def test_a_message_whose_kind_was_damaged_costs_itself() -> None:
+    log = Log()
+    log.define("A", "QZ", "TimeUS,Text")
+    log.define("B", "QB", "TimeUS,W")
+    for i in range(20):
+        log.add("B", i, i)
+    log.add("A", 0, "text")
+    pieces = log.pieces()
+    longer, shorter = log.kinds["A"][0], log.kinds["B"][0]
+    at = next(i for i, one in enumerate(pieces) if one[2] == shorter) + 5
+    pieces[at] = pieces[at][:2] + bytes([longer]) + pieces[at][3:]
+    found = read_records(b"".join(pieces))
+    assert found.tables["B"].numbers("W").tolist() == [i for i in range(20) if i != 5]
+    assert (found.lost_bytes, found.places) == (len(pieces[at]), 1)
+
+
+def test_definitions_that_change_hold_from_there_on() -> None:
+    log = Log()
+    log.define("A", "QB", "TimeUS,W")
+    log.add("A", 1, 7)
+    other = Log()
+    other.define("A", "Qff", "TimeUS,V,W")
+    other.add("A", 2, 0.25, 8)
+    found = read_records(log.binary() + other.binary())
+    assert found.lost_bytes == 0
+    table = found.tables["A"]
+    assert table.numbers("W").tolist() == [7, 8]
+    np.testing.assert_array_equal(table.numbers("V"), [np.nan, 0.25])
+
+
+@pytest.mark.parametrize(
+    "definition",
+    [
+        fmt(7, "BAD", "QB", "TimeUS,W", length=0),
+        fmt(7, "BAD", "QB", "TimeUS,W", length=2),
+        fmt(7, "BAD", "QB", "TimeUS,W", length=255),
+        fmt(7, "BAD", "Q?", "TimeUS,W"),
+        fmt(7, "\x01\x02", "QB", "TimeUS,W"),
+        fmt(128, "FMT", "B", "Type", length=4),
+    ],
+)
+def test_absurd_definitions_are_passed_over(definition: bytes) -> None:
+    data = second_generation(Truth(2025), 3.0).binary()
+    kept = dataflash.read(Path("x.bin"), definition + data)
+    assert "BAD" not in read_records(definition + data).tables
+    assert {name: len(part) for name, part in kept.parts.items()} == {
+        name: len(part) for name, part in dataflash.read(Path("x.bin"), data).parts.items()
+    }
+
+
+def test_filling_at_the_end_is_no_loss_and_a_cut_message_is() -> None:
+    data = second_generation(Truth(2025), 3.0).binary()
+    for filling in (b"\0" * 5000, b"\xff" * 5000):
+        assert dataflash.read(Path("x.bin"), data + filling).lost == ()
+    (said,) = dataflash.read(Path("x.bin"), data[:-1]).lost
+    share = f"of {len(data) - 1} bytes"
+    assert share in said and "in one place belong to no message." in said
+
+
+@pytest.mark.parametrize(
+    ("data", "problem"),
+    [
+        (b"", "holds no message of an ArduPilot log"),
+        (b"\xa3", "holds no message of an ArduPilot log"),
+        (fmt(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"), "holds no message of an ArduPilot log"),
+        (b"\xa3\x95\x80" * 100_000, "holds no message of an ArduPilot log"),
+    ],
+)
+def test_what_holds_nothing_is_refused(data: bytes, problem: str) -> None:
+    for reader in (dataflash, dataflash_text):
+        with pytest.raises(WildlabError, match=problem) as caught:
+            reader.read(Path("flight.bin"), data)
+        assert caught.value.file == "flight.bin"
+
+
+def test_other_logs_with_the_same_heads_are_refused() -> None:
+    log = Log()
+    log.define("PARM", "Nf", "Name,Value")
+    log.add("PARM", "SYSID", 1)
+    with pytest.raises(WildlabError, match="no message of attitude, position, sensors or images"):
+        dataflash.read(Path("flight.bin"), log.binary())
+    log = Log()
+    log.define("ATT", "fffffff", "qw,qx,qy,qz,Roll,Pitch,Yaw")
+    log.add("ATT", 1, 0, 0, 0, 0, 0, 0)
+    for reader, data in ((dataflash, log.binary()), (dataflash_text, log.text())):
+        with pytest.raises(WildlabError, match="sdlog2"):
+            reader.read(Path("flight.bin"), data)
+
+
+def test_a_file_is_known_by_its_content() -> None:
+    log = second_generation(Truth(2025), 3.0)
+    assert dataflash.recognise(log.binary()[:8192], "x")
+    assert dataflash.recognise(b"\0\0lost" + log.binary()[:8192], "x")
+    assert not dataflash.recognise(log.text()[:8192], "x.bin")
+    assert dataflash_text.recognise(log.text()[:8192], "x")
+    assert not dataflash_text.recognise(log.binary()[:8192], "x.log")
+    for other in (b"", b"$GPGGA,1,2,3", b"\xa3\x95\x80 nothing", b"ULog\x01\x12\x35", b"<gpx>"):
+        assert not dataflash.recognise(other, "x.bin")
+        assert not dataflash_text.recognise(other, "x.log")
+
+
+def consistent(log: RawLog) -> None:
+    """What the format promises of rows that are used, whatever the file was."""
+    for name, part in log.parts.items():
+        used = part.used
+        known = log.clock is not None and log.clock.base
+        stamps = part.columns["time_s" if known else "time_log_s"][used]
+        if log.clock is not None:
+            assert np.isfinite(stamps).all() and (np.diff(stamps) > 0).all(), name
+        if name in ("poses", "gnss"):
+            assert np.isfinite(part.columns["latitude_deg"][used]).all()
+            assert (np.abs(part.columns["latitude_deg"][used]) <= 90).all()
+        for turned in {"roll_deg", "pitch_deg", "yaw_deg", "f_x_m_s2", "w_x_rad_s"} & set(part.columns):
+            if name != "triggers":
+                assert np.isfinite(part.columns[turned][used]).all()
+
+
+def damaged(data: bytes, rng: np.random.Generator) -> list[bytes]:
+    cut = [data[: int(at)] for at in rng.integers(0, len(data), 50)]
+    flipped = []
+    for _ in range(20):
+        other = bytearray(data)
+        for at in rng.integers(0, len(data), 100):
+            other[at] ^= int(rng.integers(1, 256))
+        flipped.append(bytes(other))
+    return cut + flipped
+
+
+def read_damaged(data: bytes, text: bool) -> None:
+    reader = dataflash_text if text else dataflash
+    for one in damaged(data, np.random.default_rng(14)):
+        begun = time.monotonic()
+        try:
+            consistent(reader.read(Path("x"), one))
+        except WildlabError as error:
+            assert "\n" not in str(error)
+        assert time.monotonic() - begun < 5
+
+
+@pytest.mark.parametrize("name", [*REAL, "damaged/nan.log"])
+def test_real_logs_damaged(shared_data: Callable[..., Path], name: str) -> None:
+    read_damaged(shared_data("logs", *name.split("/")).read_bytes(), name.endswith(".log"))
+
+
+@pytest.mark.parametrize("make", [first_generation, second_generation, third_generation])
+@pytest.mark.parametrize("text", [False, True])
+def test_made_up_logs_damaged(make: Callable[..., Log], text: bool) -> None:
+    log = make(Truth(2025), 8.0)
+    read_damaged(log.text() if text else log.binary(), text)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.binary(max_size=2000))
+def test_any_bytes(data: bytes) -> None:
+    for reader in (dataflash, dataflash_text):
+        for start in (
+            b"",
+            fmt(1, "ATT", "Qccc", "TimeUS,Roll,Pitch,Yaw"),
+            b"FMT, 1, 2, ATT, QB, TimeUS,Roll\nATT,",
+        ):
+            try:
+                consistent(reader.read(Path("x"), start + data))
+            except WildlabError:
+                continue
