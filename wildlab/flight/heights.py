@@ -1,0 +1,300 @@
+"""What heights count from, and how those of several logs are brought to one reference, never by a guess."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs.log import Stream
+
+Array = NDArray[np.float64]
+
+#: Grids of the geoid's height as PROJ names them, the first that is installed is used; what they are called.
+GRIDS = {
+    "us_nga_egm96_15.tif": "EGM96",
+    "egm96_15.gtx": "EGM96",
+    "us_nga_egm08_25.tif": "EGM2008",
+    "egm08_25.gtx": "EGM2008",
+}
+#: For messages where `undulation` is None.
+NO_GRID = "no grid of it (EGM96) is installed, which `projsync --file us_nga_egm96_15` fetches"
+#: The geoid is nowhere further from the ellipsoid than this, m.
+FARTHEST_M = 110.0
+#: A column of heights is there where so large a share of the rows used has it.
+MOST = 0.9
+
+_COUNTED = {
+    "height_ellipsoid_m": "the ellipsoid",
+    "height_sea_m": "sea level",
+    "height_home_m": "take-off",
+}
+
+
+class HeightUse(NamedTuple):
+    """Which heights of a stream are used: the column, m to add to each, and why, in a clause."""
+
+    column: str
+    add_m: float
+    reason: str
+
+
+class HeightPlan(NamedTuple):
+    """One reference for the heights of a flight.
+
+    Attributes
+    ----------
+    reference
+        What they all count from then.
+    uses
+        By the streams' names.
+    without
+        Names of streams that have places and no heights.
+    """
+
+    reference: Literal["ellipsoid", "sea"]
+    uses: dict[str, HeightUse]
+    without: tuple[str, ...] = ()
+
+
+def undulation(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Array | None:
+    """Height of the geoid above the ellipsoid of WGS84, by PROJ's grid.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg
+        (...) each, of WGS84.
+
+    Returns
+    -------
+    (...) m, NaN where the grid does not reach; None where no grid is installed. Nothing is fetched.
+    """
+    grid = installed_grid()
+    if grid is None:
+        return None
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    steps = "+step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=vgridshift +grids={} +multiplier=1 {}"
+    back = "+step +proj=unitconvert +xy_in=rad +xy_out=deg"
+    latitude, longitude = np.broadcast_arrays(
+        np.asarray(latitude_deg, float), np.asarray(longitude_deg, float)
+    )
+    try:
+        shift = Transformer.from_pipeline("+proj=pipeline " + steps.format(grid, back))
+        _, _, found = shift.transform(longitude, latitude, np.zeros(latitude.shape))
+    except ProjError:  # the file is there and is none
+        return None
+    heights = np.asarray(found, float)
+    if not np.isfinite(heights).any():
+        return None
+    return np.where(np.isfinite(heights) & (np.abs(heights) <= FARTHEST_M), heights, np.nan)
+
+
+def installed_grid() -> str | None:
+    """The file name of the first of `GRIDS` that PROJ finds on this machine, or None."""
+    from pyproj import datadir
+
+    folders = [*datadir.get_data_dir().split(os.pathsep), datadir.get_user_data_dir()]
+    return _found(tuple(folders))
+
+
+@cache
+def _found(folders: tuple[str, ...]) -> str | None:
+    there = (name for name in GRIDS if any((Path(folder) / name).is_file() for folder in folders if folder))
+    return next(there, None)
+
+
+def choose_reference(
+    streams: Mapping[str, Stream],
+    own: Collection[str] = (),
+    geoid_m: float | None = None,
+    home_sea_m: float | None = None,
+) -> HeightPlan:
+    """One reference for heights: the ellipsoid where all streams can get there, else sea level, else refused.
+
+    From sea level to the ellipsoid leads the geoid's height: as stated, else as a receiver of these streams
+    logged it (the stream's own first), else PROJ's grid. From take-off to sea level leads the first used fix
+    of the own flight, or what is stated.
+
+    Parameters
+    ----------
+    streams
+        By a name for messages; those without places and heights are passed over.
+    own
+        Names of the streams of one vehicle: heights above take-off are tied by these alone.
+    geoid_m
+        Height of the geoid above the ellipsoid there, stated, m.
+    home_sea_m
+        Height of the take-off above sea level, stated, m.
+
+    Returns
+    -------
+    HeightPlan
+        No sentence in it says how high the geoid is: that tells of a place.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no one reference for all; it names streams, and what to state.
+    """
+    there = {name: _columns(stream) for name, stream in streams.items()}
+    placed = [name for name, stream in streams.items() if "latitude_deg" in stream.columns]
+    names = [name for name in streams if there[name]]
+    without = tuple(name for name in placed if not there[name])
+    ways: dict[str, dict[str, HeightUse]] = {name: {} for name in names}
+    for name in names:
+        if "height_ellipsoid_m" in there[name]:
+            ways[name]["ellipsoid"] = HeightUse("height_ellipsoid_m", 0.0, "counts from the ellipsoid")
+        if "height_sea_m" in there[name]:
+            ways[name]["sea"] = HeightUse("height_sea_m", 0.0, "counts from sea level")
+    for name in names:
+        if not ways[name]:
+            tied = _tie(name, streams, there, [one for one in own if one in names], home_sea_m)
+            if name in own and tied is not None:
+                ways[name][tied[0]] = tied[1]
+    homeless = [name for name in names if not ways[name]]
+    if homeless:
+        raise WildlabError(
+            f"the heights of {_listed(homeless)} count from take-off, and nothing says how high that was",
+            "state the height of the take-off above sea level",
+            field="heights",
+        )
+    geoid = {name: _geoid(name, streams, geoid_m) for name in names}
+    for name in names:
+        found = geoid[name]
+        if found is None:
+            continue
+        if "ellipsoid" not in ways[name]:
+            use = ways[name]["sea"]
+            ways[name]["ellipsoid"] = use._replace(
+                add_m=use.add_m + found[0], reason=f"{use.reason}, and the geoid's height {found[1]} is added"
+            )
+        elif "sea" not in ways[name]:
+            use = ways[name]["ellipsoid"]
+            ways[name]["sea"] = use._replace(
+                add_m=use.add_m - found[0],
+                reason=f"{use.reason}, and the geoid's height {found[1]} is taken off",
+            )
+    for reference in ("ellipsoid", "sea"):
+        if all(reference in ways[name] for name in names):
+            kept: Literal["ellipsoid", "sea"] = "ellipsoid" if reference == "ellipsoid" else "sea"
+            return HeightPlan(kept, {name: ways[name][reference] for name in names}, without)
+    low = [name for name in names if "ellipsoid" not in ways[name]]
+    high = [name for name in names if "sea" not in ways[name]]
+    raise WildlabError(
+        f"the heights of {_listed(low)} count from sea level and those of {_listed(high)} from the "
+        "ellipsoid, and nothing says how far apart these are there",
+        f"state the geoid's height above the ellipsoid; {NO_GRID}",
+        field="heights",
+    )
+
+
+def _columns(stream: Stream) -> list[str]:
+    """Columns of heights that most of the rows used have, or of all rows where none is used."""
+    rows = stream.used if stream.used.any() else np.ones(len(stream), bool)
+    return [
+        name
+        for name in _COUNTED
+        if name in stream.columns and len(stream) and np.isfinite(_of(stream, name)[rows]).mean() >= MOST
+    ]
+
+
+def _of(stream: Stream, column: str) -> Array:
+    return np.asarray(stream.columns[column], float)
+
+
+def _geoid(name: str, streams: Mapping[str, Stream], stated: float | None) -> tuple[float, str] | None:
+    """The geoid's height for a stream, and where it is from."""
+    if stated is not None:
+        return stated, "as stated"
+    for other in sorted(streams, key=lambda one: one != name):
+        logged = _logged(streams[other])
+        if logged is not None:
+            return logged, f"as {'its own receiver' if other == name else other} has it"
+    stream = streams[name]
+    if {"latitude_deg", "longitude_deg"} <= stream.columns.keys():
+        rows = stream.used
+        latitude, longitude = (_of(stream, f"{axis}_deg")[rows] for axis in ("latitude", "longitude"))
+        good = np.isfinite(latitude) & np.isfinite(longitude)
+        if good.any():
+            grid = undulation(float(np.median(latitude[good])), float(np.median(longitude[good])))
+            if grid is not None and np.isfinite(grid):
+                return float(grid), f"of the grid {GRIDS[installed_grid() or 'egm96_15.gtx']}"
+    return None
+
+
+def _logged(stream: Stream) -> float | None:
+    """The geoid's height as a receiver has it; None where it has none, or a placeholder."""
+    rows, columns = stream.used, stream.columns
+    if "undulation_m" in columns:
+        values = _of(stream, "undulation_m")[rows]
+        values = values[np.isfinite(values) & (np.abs(values) <= FARTHEST_M) & (values != 0)]
+        if len(values):
+            return float(np.median(values))
+    if {"height_ellipsoid_m", "height_sea_m"} <= columns.keys():
+        apart = (_of(stream, "height_ellipsoid_m") - _of(stream, "height_sea_m"))[rows]
+        apart = apart[np.isfinite(apart) & (np.abs(apart) <= FARTHEST_M)]
+        # Two columns of the very same numbers are one reference written down twice.
+        if len(apart) and (apart != 0).any():
+            return float(np.median(apart))
+    return None
+
+
+def _tie(
+    name: str,
+    streams: Mapping[str, Stream],
+    there: Mapping[str, list[str]],
+    own: list[str],
+    stated: float | None,
+) -> tuple[str, HeightUse] | None:
+    """What leads from heights above take-off to another reference."""
+    column = "height_home_m"
+    if stated is not None:
+        use = HeightUse(column, stated, "counts from take-off, whose height above sea level is stated")
+        return "sea", use
+    home = streams[name]
+    for reference in ("sea", "ellipsoid"):
+        fixed = f"height_{reference}_m"
+        # A column that is there in too few rows to be used may still have the first fix.
+        for other in [name, *(one for one in own if one != name)]:
+            if fixed not in streams[other].columns or (other != name and fixed not in there[other]):
+                continue
+            apart = _first_fix(home, streams[other], fixed)
+            if apart is not None:
+                at = "its own first used fix" if other == name else f"the first used fix of {other}"
+                counted = _COUNTED[fixed]
+                return reference, HeightUse(column, apart, f"counts from take-off, tied to {counted} by {at}")
+    return None
+
+
+def _first_fix(home: Stream, fixes: Stream, fixed: str) -> float | None:
+    """Height of the fix minus that above take-off, at the first used fix that both know."""
+    above = np.where(home.used, _of(home, "height_home_m"), np.nan)
+    height = np.where(fixes.used, _of(fixes, fixed), np.nan)
+    if home is fixes:
+        both = np.flatnonzero(np.isfinite(above) & np.isfinite(height))
+        return float(height[both[0]] - above[both[0]]) if len(both) else None
+    for clock in ("time_s", "time_log_s"):
+        if clock not in home.columns or clock not in fixes.columns:
+            continue
+        own, other = _of(home, clock), _of(fixes, clock)
+        known = np.isfinite(own) & np.isfinite(above)
+        if not known.any():
+            continue
+        order = np.argsort(own[known], kind="stable")
+        t, h = own[known][order], above[known][order]
+        good = np.flatnonzero(np.isfinite(other) & np.isfinite(height) & (other >= t[0]) & (other <= t[-1]))
+        if len(good):
+            return float(height[good[0]] - np.interp(other[good[0]], t, h))
+    return None
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
