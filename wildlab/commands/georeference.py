@@ -14,7 +14,7 @@ from wildlab.terminal import shown, stopped
 @click.command(short_help="Where a flight's detections lie on the ground.")
 @click.argument("flight", type=FOLDER)
 @click.option(
-    "--into", type=FILE, required=True, help="The file to write: .csv (metres), or .geojson (places)."
+    "--into", type=FILE, required=True, help="The file to write: .csv (metres); .geojson or .gpkg (places)."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file that is there.")
 @click.option("--source", help="Which poses, where the flight has several (its nav/NAME.parquet).")
@@ -23,13 +23,15 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
     """Put the pixel detections of FLIGHT on the ground, each with its 90 % ellipse.
 
     On its terrain where it has one, else on a level plane at the height of each target. A CSV holds metres
-    north and east of the flight's origin and no coordinates; a GeoJSON holds the places themselves, so send
-    it to nobody who may not know them.
+    north and east of the flight's origin and no coordinates; a GeoJSON and a GeoPackage hold the places
+    themselves, so send them to nobody who may not know them. A GeoPackage has the ellipses as a layer of
+    their own, and opens in QGIS as it is.
 
     \b
     Examples:
       wildlab georeference flights/tuesday --into points.csv
       wildlab georeference flights/tuesday --into points.geojson
+      wildlab georeference flights/tuesday --into points.gpkg
     """
     import numpy as np
 
@@ -49,7 +51,7 @@ def georeference(flight: Path, into: Path, overwrite: bool, source: str | None, 
     name, _ = data.pose_source(source)
     observations = observe(data, name)
     points = to_ground(data, observations, np.random.default_rng(seed))
-    write_points(data, points, into)
+    write_points(data, points, into, name)
     for line in ground_sentences(observations, points):
         click.echo(stopped(line))
     click.echo(shown(into))

@@ -2,8 +2,8 @@
 
 That measure, ArduPilot's, takes off what is slower than 5 Hz, squares what is left, smooths it below 2 Hz
 and takes the root (both first order), for each axis. The autopilot does so at its sensors' own rate, of 1 kHz
-or more; a log at a lower rate shows less of it, or, where nothing was filtered before it was thinned, mirrored
-into lower bands.
+or more; a log at a lower rate shows less of it, or, where nothing was filtered before it was thinned,
+mirrored into lower bands.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What there is to know of a flight whatever it lacks: streams, their pauses, the path, what is wrong on it.
+"""What there is to know of a flight whatever it lacks: its streams, its path, what is wrong on it.
 
 Nothing here needs a certain table: where one lacks, what would come of it is None, or an empty table.
 """
@@ -12,18 +12,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import Pace, pace_of, runs_of
 from wildlab.evaluation.vibration import FINE, Vibration, vibration_of
 from wildlab.flight.checks.check import Use, find, usable_for
-from wildlab.flight.clocks import between, frame_poses, frame_times, gimbal_angles, gnss_times, longest_gap
+from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
 from wildlab.pipeline.image_coverage import Coverage, cover_images, ground_height
+from wildlab.pipeline.overview_lost import POSITION, Recovered, detections_of, lost_data, ordered
 
 Array = NDArray[np.float64]
 
-POSITION = ["north_m", "east_m", "down_m"]
 QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
@@ -34,7 +33,8 @@ PREFERRED = ("logged", "onboard", "autopilot")
 FEW_SATELLITES = 6
 #: A position that is this many times as uncertain as it usually is.
 UNSURE = 3.0
-#: A step between poses that is off by so many usual differences from what their speeds say, and by so much (m).
+#: A step between poses that is off by so many usual differences, and so many metres, from what their speeds
+#: make of it.
 JUMP, JUMP_M = 8.0, 3.0
 #: What may be wrong on a path, worst first.
 TROUBLES = (
@@ -51,7 +51,7 @@ TROUBLES = (
 class Path(NamedTuple):
     """Where a platform, or else a receiver or a target, was: (N,) times in s and (N, 3) m in n.
 
-    ``who`` is what it is of, ``timed`` whether the times are times and do not merely number the images.
+    ``who`` is what it is of, ``timed`` whether the times are times and do not number the images.
     """
 
     who: str
@@ -70,21 +70,6 @@ class Trouble(NamedTuple):
     def seconds(self) -> float:
         """All spells together."""
         return float(np.diff(self.spells, axis=1).sum())
-
-
-class Recovered(NamedTuple):
-    """Data that are lost: ``count`` of ``of``, what they are, and why they are lost."""
-
-    key: str
-    count: int
-    of: int
-    what: str
-    why: str
-
-    @property
-    def share(self) -> float:
-        """Of all."""
-        return self.count / self.of if self.of else 0.0
 
 
 @dataclass(frozen=True)
@@ -190,8 +175,8 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         vibration=vibration,
         coverage=coverage,
         uncovered=uncovered,
-        detections=_detections(flight, source),
-        lost=tuple(sorted(_lost(flight, source, streams), key=lambda one: -one.share)),
+        detections=detections_of(flight, source),
+        lost=tuple(sorted(lost_data(flight, source, streams), key=lambda one: -one.share)),
         uses=tuple(usable_for(flight)),
         problems=findings.count("problem"),
         warnings=findings.count("warning"),
@@ -226,30 +211,21 @@ def paces(flight: Flight) -> dict[str, Pace]:
     return found
 
 
-def _ordered(table: pd.DataFrame, stamps: Array, columns: list[str]) -> tuple[Array, Array]:
-    """Increasing stamps (N,) and values (N, K): what is finite, in order, the first of equal stamps."""
-    values = table[columns].to_numpy(float)
-    known = np.isfinite(stamps) & np.isfinite(values).all(axis=1)
-    t, values = stamps[known], values[known]
-    _, first = np.unique(t, return_index=True)
-    return t[first], values[first]
-
-
 def _path(flight: Flight, source: str | None) -> Path | None:
     timed = flight.manifest.time.kind == "utc"
     if source is not None:
         nav = flight.nav[source]
-        t, place = _ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
         if len(t):
             return Path(f"nav/{source}", t, place, timed)
     if flight.gnss is not None:
-        t, place = _ordered(flight.gnss, gnss_times(flight), POSITION)
+        t, place = ordered(flight.gnss, gnss_times(flight), POSITION)
         if len(t):
             return Path("gnss", t, place, timed)
     truth = flight.truth
     if truth is not None and len(truth):
         first = truth[truth["target_id"] == truth["target_id"].iloc[0]]
-        t, place = _ordered(first, first["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(first, first["time_s"].to_numpy(float), POSITION)
         if len(t) > 1:
             return Path("truth", t + flight.manifest.clocks.truth_offset_s, place, timed)
     return None
@@ -267,10 +243,10 @@ def _troubles(
         gnss, stamps = flight.gnss, gnss_times(flight)
         found["no satellite positions"] = streams["gnss"].gaps
         if "satellites" in gnss:
-            t, count = _ordered(gnss, stamps, ["satellites"])
+            t, count = ordered(gnss, stamps, ["satellites"])
             found[TROUBLES[3]] = runs_of(count[:, 0] < FEW_SATELLITES, t)
         if "sd_horizontal_m" in gnss:
-            t, sd = _ordered(gnss, stamps, ["sd_horizontal_m"])
+            t, sd = ordered(gnss, stamps, ["sd_horizontal_m"])
             if len(t):
                 found[TROUBLES[4]] = runs_of(sd[:, 0] > UNSURE * np.median(sd), t)
     if vibration is not None:
@@ -284,7 +260,7 @@ def _jumps(nav: pd.DataFrame, pace: Pace) -> Array:
     """Steps between poses that the speeds before and after do not explain."""
     if not set(VELOCITY) <= set(nav):
         return np.empty((0, 2))
-    t, values = _ordered(nav, nav["time_s"].to_numpy(float), POSITION + VELOCITY)
+    t, values = ordered(nav, nav["time_s"].to_numpy(float), POSITION + VELOCITY)
     if len(t) < 3:
         return np.empty((0, 2))
     step = np.diff(t)[:, None]
@@ -303,27 +279,27 @@ MOST_STEPS = 3.0
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:
     height, speed, attitude, turning = {}, {}, {}, {}
     for name, nav in flight.nav.items():
-        t, place = _ordered(nav, nav["time_s"].to_numpy(float), POSITION)
+        t, place = ordered(nav, nav["time_s"].to_numpy(float), POSITION)
         if not len(t):
             continue
         height[name] = t, -place[:, 2]
         if set(VELOCITY) <= set(nav) and nav[VELOCITY].notna().any().all():
-            at, v = _ordered(nav, nav["time_s"].to_numpy(float), VELOCITY)
+            at, v = ordered(nav, nav["time_s"].to_numpy(float), VELOCITY)
             speed[name] = at, np.hypot(v[:, 0], v[:, 1])
-        at, q = _ordered(nav, nav["time_s"].to_numpy(float), QUATERNION)
+        at, q = ordered(nav, nav["time_s"].to_numpy(float), QUATERNION)
         good = np.linalg.norm(q, axis=1) > 0
         if good.any():
             attitude[name] = at[good], np.degrees(matrix_to_euler(quaternion_to_matrix(q[good])))
     if flight.gnss is not None:
-        t, place = _ordered(flight.gnss, gnss_times(flight), POSITION)
+        t, place = ordered(flight.gnss, gnss_times(flight), POSITION)
         if len(t):
             height["satellites"] = t, -place[:, 2]
         if set(VELOCITY) <= set(flight.gnss):
-            t, v = _ordered(flight.gnss, gnss_times(flight), VELOCITY)
+            t, v = ordered(flight.gnss, gnss_times(flight), VELOCITY)
             if len(t):
                 speed["satellites"] = t, np.hypot(v[:, 0], v[:, 1])
     if flight.imu is not None:
-        t, w = _ordered(flight.imu, flight.imu["time_s"].to_numpy(float), RATE)
+        t, w = ordered(flight.imu, flight.imu["time_s"].to_numpy(float), RATE)
         if len(t):
             turning["inertial sensor"] = t, np.degrees(w)
     return {"height": height, "speed": speed, "attitude": attitude, "turning": turning}
@@ -342,101 +318,6 @@ def _above(flight: Flight, path: Path | None) -> tuple[Array, str] | None:
 def _vibration(flight: Flight) -> tuple[Vibration, Array] | None:
     if flight.imu is None or flight.manifest.time.kind != "utc":
         return None
-    t, force = _ordered(flight.imu, flight.imu["time_s"].to_numpy(float), FORCE)
+    t, force = ordered(flight.imu, flight.imu["time_s"].to_numpy(float), FORCE)
     found = vibration_of(t, force)
     return None if found is None else (found, t)
-
-
-def _detections(flight: Flight, source: str | None) -> tuple[int, int, int]:
-    detections = flight.detections
-    if detections is None:
-        return 0, 0, 0
-    images = 0 if flight.frames is None else int(flight.frames["frame_id"].isin(detections["frame_id"]).sum())
-    placed, _ = _placed(flight, source)
-    return len(detections), images, int(placed.sum())
-
-
-def _placed(flight: Flight, source: str | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of the pixel detections, which have a place on the ground, and which a pose; nothing without poses."""
-    from wildlab.geometry.georeference import georeference_pixels
-    from wildlab.pipeline.georeference import observe
-
-    none = np.zeros(0, bool)
-    if source is None or flight.manifest.camera is None:
-        return none, none
-    try:
-        seen = observe(flight, source)
-    except WildlabError:
-        return none, none
-    posed = np.isfinite(seen.poses.p_nc).all(axis=-1)
-    points = georeference_pixels(seen.poses, seen.uv, seen.plane_down)
-    return np.isfinite(points).all(axis=1), posed
-
-
-def _lost(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Recovered]:
-    """What is lost, with its denominator: images, detections, seconds."""
-    found = []
-    frames, timed = flight.frames, flight.manifest.time.kind == "utc"
-    if frames is not None and len(frames) and source is not None:
-        try:
-            p, _, _ = frame_poses(flight, source)
-            pan, tilt = gimbal_angles(flight)
-        except WildlabError:
-            p, pan, tilt = np.full((len(frames), 3), np.nan), np.zeros(len(frames)), np.zeros(len(frames))
-        posed = np.isfinite(p).all(axis=1)
-        why = _why_unposed(flight, source, ~posed) if timed and (~posed).any() else ""
-        found.append(Recovered("images_without_pose", int((~posed).sum()), len(frames), "images", why))
-        turned = np.isfinite(pan + tilt)
-        missing = int((posed & ~turned).sum())
-        found.append(Recovered("images_without_gimbal", missing, len(frames), "images", ""))
-        placed, has_pose = _placed(flight, source)
-        away = int((has_pose & ~placed).sum())
-        found.append(Recovered("detections_off_ground", away, len(placed), "detections", ""))
-    for key, name in (("time_without_satellites", "gnss"), ("time_without_inertial", "imu")):
-        pace = streams.get(name)
-        if timed and pace is not None and pace.length_s > 0:
-            found.append(Recovered(key, round(pace.paused_s), max(1, round(pace.length_s)), "seconds", ""))
-    imu = streams.get("imu")
-    if timed and imu is not None and imu.missing:
-        found.append(Recovered("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples", ""))
-    found += _untrue(flight)
-    return [one for one in found if one.count]
-
-
-def _why_unposed(flight: Flight, source: str, unposed: NDArray[np.bool_]) -> str:
-    nav, times = flight.nav[source], frame_times(flight)[unposed]
-    if "frame_id" in nav:
-        return "no pose bears their name"
-    stamps = nav["time_s"].to_numpy(float)
-    outside = int(((times < np.nanmin(stamps)) | (times > np.nanmax(stamps))).sum())
-    within = int(unposed.sum()) - outside
-    said = [
-        *([f"{outside} before the log of the poses begins or after it ends"] if outside else []),
-        *([f"{within} in its pauses"] if within else []),
-    ]
-    return " and ".join(said)
-
-
-def _untrue(flight: Flight) -> list[Recovered]:
-    """Detections that name a target whose truth is not known at the time."""
-    truth, detections, frames = flight.truth, flight.detections, flight.frames
-    if truth is None or detections is None or frames is None or "target_id" not in detections or truth.empty:
-        return []
-    at = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
-    times = np.where(at >= 0, frame_times(flight)[at], np.nan)
-    named = detections["target_id"].fillna("").to_numpy(str)
-    missing = 0
-    for name in np.unique(named[named != ""]):
-        rows = truth[truth["target_id"] == name]
-        own = times[named == name]
-        if rows.empty:
-            missing += len(own)
-            continue
-        stamps = rows["time_s"].to_numpy(float)
-        if np.isnan(stamps).all():
-            continue
-        t, place = _ordered(rows, stamps + flight.manifest.clocks.truth_offset_s, POSITION)
-        if len(t):
-            missing += int(np.isnan(between(t, place, own, "truth")[:, 0]).sum())
-    total = int((named != "").sum())
-    return [Recovered("detections_without_truth", missing, total, "detections that name a target", "")]

@@ -11,7 +11,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from wildlab.pipeline.overview import Overview, Recovered
+from wildlab.pipeline.overview import Overview
+from wildlab.pipeline.overview_lost import Recovered
 
 #: Shares below which a gain is not listed, and from which on it is said to be worth fixing.
 LISTED, WORTH = 0.005, 0.1
@@ -41,7 +42,7 @@ class Gain(NamedTuple):
     Attributes
     ----------
     key
-        ``cause``, ``far_out``, or what is lost: `wildlab.pipeline.overview.Recovered`.
+        ``cause``, ``far_out``, or what is lost: `wildlab.pipeline.overview_lost.Recovered`.
     causes
         Of a constant error, which; else empty.
     value, low, high, unit
@@ -130,7 +131,7 @@ def _known(*values: Any) -> bool:
 def _data(lost: Recovered) -> Gain:
     nan = math.nan
     return Gain(
-        lost.key, (), float(lost.count), nan, nan, "1", float(lost.of), lost.what, lost.share, lost.why
+        lost.key, (), float(lost.lost), nan, nan, "1", float(lost.of), lost.what, lost.share, lost.why
     )
 
 

@@ -184,7 +184,8 @@ def coverage_sentences(coverage: Coverage, detections: tuple[int, int, int]) -> 
     ]
     if placed:
         said.append(
-            f"A place in it is in {coverage.looks:.1f} images in the mean; {percent(coverage.twice, 0)} of it is "
+            f"A place in it is in {coverage.looks:.1f} images in the mean; "
+            f"{percent(coverage.twice, 0)} of it is "
             "in two or more."
         )
     if coverage.images > posed:
@@ -268,4 +269,5 @@ def first_of(gains: Sequence[Gain]) -> str:
     if not gains:
         return "Nothing was measured that would gain metres, or bring back data."
     of = f" of {len(gains)}" if len(gains) > shown else ""
-    return f"{shown}{of}, by the share of the error or of the data that each would gain. Only what was measured is listed."
+    order = "by the share of the error or of the data that each would gain"
+    return f"{shown}{of}, {order}. Only what was measured is listed."

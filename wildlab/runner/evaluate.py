@@ -34,8 +34,8 @@ def evaluate_flight(
 ) -> list[Outcome]:
     """Judge a flight folder by all that it has the data for.
 
-    An overview, with what is most worth fixing, goes to ``<reports>/<name of the flight>-overview/``, whatever
-    the flight lacks; its georeferencing to ``<name>`` (without truth: how far apart sightings of
+    An overview, with what is most worth fixing, goes to ``<reports>/<name of the flight>-overview/``,
+    whatever the flight lacks; its georeferencing to ``<name>`` (without truth: how far apart sightings of
     the same things lie), its navigation (inertial unit and GNSS
     against the attitude found on board) to ``<name>-navigation``.
 

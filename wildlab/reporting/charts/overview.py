@@ -1,4 +1,4 @@
-"""Charts of a whole flight: the path and what is wrong on it, streams, heights, speeds, attitudes, shaking."""
+"""Charts of a whole flight: the path and what is wrong on it, streams, height, speed, attitude, shaking."""
 
 from __future__ import annotations
 
