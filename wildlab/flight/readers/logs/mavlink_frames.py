@@ -161,7 +161,8 @@ class Messages:
         """A field (N,) as float64; NaN where the dialect has none of this name."""
         if name not in self.fields:
             return np.full(len(self), np.nan)
-        return self.fields[name].astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            return self.fields[name].astype(np.float64)
 
     def texts(self, name: str) -> list[str]:
         """A field of characters, as text without what follows its end."""

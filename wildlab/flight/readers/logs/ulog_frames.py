@@ -56,8 +56,8 @@ class Sound(NamedTuple):
 
     `data`: the same log, of sound messages alone. `skipped`: bytes between sound messages, in so many
     `places`. `rest`: bytes at the end that are no whole message. `homeless`: topic (or ``""``, not known) ->
-    data messages whose definition is missing or cannot be true. `dropouts`, `dropout_s`: how often the logger fell
-    behind, and how long. `flags`: incompatible ones that are not known, 0 where all are.
+    data messages whose definition is missing or cannot be true. `dropouts`, `dropout_s`: how often the
+    logger fell behind, and how long. `flags`: incompatible ones that are not known, 0 where all are.
     """
 
     data: bytes

@@ -36,7 +36,8 @@ class Topic(NamedTuple):
         """The first of these fields that it has, (N,) as float64; NaN where it has none."""
         for name in names:
             if name in self.data:
-                return self.data[name].astype(np.float64)
+                with np.errstate(invalid="ignore"):
+                    return self.data[name].astype(np.float64)
         return np.full(len(self), np.nan)
 
     def several(self, name: str, count: int) -> Array:
