@@ -2,58 +2,16 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.flight.readers.logs.log import Stream, make_stream
+from wildlab.flight.readers.logs.log import HEIGHTS, Stream, make_stream
+from wildlab.flight.readers.logs.order import in_order, leaps
+from wildlab.flight.readers.logs.places import placed
 
 Flags = NDArray[np.bool_]
-
-#: Stamps further than this from the middle one are of no flight that the others are of.
-LONGEST_S = 86400.0
-
-
-def longest_increasing(stamps: ArrayLike) -> Flags:
-    """The largest choice of rows whose stamps strictly increase, so that one wrong stamp costs one row.
-
-    Parameters
-    ----------
-    stamps
-        (N,) finite numbers.
-
-    Returns
-    -------
-    (N,) bool
-
-    Examples
-    --------
-    >>> longest_increasing([1, 2, 90, 3, 3, 4]).tolist()
-    [True, True, False, True, False, True]
-    """
-    values = np.asarray(stamps)
-    if len(values) < 2 or (np.diff(values) > 0).all():
-        return np.ones(len(values), bool)
-    # Row that ends the best run of each length, and the row before each row in its run.
-    tails: list[float] = []
-    ends: list[int] = []
-    before: list[int] = []
-    for at, value in enumerate(values.tolist()):
-        place = bisect_left(tails, value)
-        before.append(ends[place - 1] if place else -1)
-        if place == len(tails):
-            tails.append(value)
-            ends.append(at)
-        elif value < tails[place]:
-            tails[place], ends[place] = value, at
-    chosen = np.zeros(len(values), bool)
-    at = ends[-1]
-    while at >= 0:
-        chosen[at] = True
-        at = before[at]
-    return chosen
 
 
 def stamps_that_fail(stamps: ArrayLike) -> dict[str, Flags]:
@@ -71,20 +29,42 @@ def stamps_that_fail(stamps: ArrayLike) -> dict[str, Flags]:
     """
     values = np.asarray(stamps, float)
     finite = np.isfinite(values)
-    far = np.zeros(len(values), bool)
-    if finite.any():
-        with np.errstate(over="ignore"):
-            far[finite] = np.abs(values[finite] - np.median(values[finite])) > LONGEST_S
-    near = finite & ~far
-    runs = np.zeros(len(values), bool)
-    runs[near] = longest_increasing(values[near])
-    repeated = near & ~runs & np.isin(values, values[runs])
+    runs = in_order(values)
+    repeated = finite & ~runs & np.isin(values, values[runs])
     return {
         "no time": ~finite,
-        "a stamp more than a day from the others": far,
         "a repeated stamp": repeated,
-        "a stamp out of order": near & ~runs & ~repeated,
+        "a stamp out of order": finite & ~runs & ~repeated,
     }
+
+
+def places_that_hold(stamps: ArrayLike, columns: Mapping[str, ArrayLike], doubtful: Flags) -> Flags:
+    """Rows (N,) to interpolate between: their stamps run, they are on Earth and can be reached.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s.
+    columns
+        Latitudes, longitudes and heights, named as in a part.
+    doubtful
+        (N,) rows that are not asked.
+
+    Returns
+    -------
+    (N,) bool
+    """
+    good = ~doubtful & placed(columns["latitude_deg"], columns["longitude_deg"])
+    good[good] = in_order(np.asarray(stamps, float)[good])
+    good[good] = ~_far(stamps, columns, np.flatnonzero(good))
+    return good
+
+
+def _far(stamps: ArrayLike, columns: Mapping[str, ArrayLike], rows: NDArray[np.intp]) -> Flags:
+    at = np.asarray(stamps, float)
+    height = next((columns[name] for name in HEIGHTS if name in columns), np.full(len(at), np.nan))
+    place = (columns["latitude_deg"], columns["longitude_deg"], height)
+    return leaps(at[rows], *(np.asarray(one, float)[rows] for one in place))
 
 
 def running_stream(
@@ -94,7 +74,8 @@ def running_stream(
     counted_in: str,
     unusable: Mapping[str, Flags],
 ) -> Stream | None:
-    """As `make_stream`, with rows marked, too, whose stamps do not run among those that are used.
+    """As `make_stream`, with rows marked, too, whose stamps do not run, or whose places nothing could reach,
+    among those that are used.
 
     Looked at is ``time_s``, or ``time_log_s`` where no row has UTC.
 
@@ -112,12 +93,21 @@ def running_stream(
         stamps = np.asarray(columns["time_log_s"], float)
     if not len(stamps):
         return None
-    bad = np.zeros(len(stamps), bool)
-    for holds in unusable.values():
-        bad |= holds
-    wrong = dict(unusable)
-    for reason, holds in stamps_that_fail(stamps[~bad]).items():
-        here = np.zeros(len(stamps), bool)
-        here[np.flatnonzero(~bad)[holds]] = True
-        wrong[reason] = wrong.get(reason, np.zeros(len(stamps), bool)) | here
+    wrong = {reason: np.asarray(holds, bool) for reason, holds in unusable.items()}
+    good = np.flatnonzero(~_any(wrong, len(stamps)))
+    for reason, holds in stamps_that_fail(stamps[good]).items():
+        wrong[reason] = _at(good[holds], len(stamps))
+    if "latitude_deg" in columns and part != "triggers":
+        good = np.flatnonzero(~_any(wrong, len(stamps)))
+        wrong["a place out of reach"] = _at(good[_far(stamps, columns, good)], len(stamps))
     return make_stream(part, columns, rows, counted_in, wrong)
+
+
+def _any(wrong: Mapping[str, Flags], count: int) -> Flags:
+    return np.asarray(np.logical_or.reduce([*wrong.values(), np.zeros(count, bool)]))
+
+
+def _at(rows: NDArray[np.intp], count: int) -> Flags:
+    here = np.zeros(count, bool)
+    here[rows] = True
+    return here

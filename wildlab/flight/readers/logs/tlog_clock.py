@@ -2,7 +2,7 @@
 
 The ground station stamps what it receives, late by up to seconds; the vehicle stamps what it measures, since
 it was switched on. What goes with what is fitted along the lower edge of the receipts
-(`wildlab.flight.time.receipts`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
+(`wildlab.flight.time.fitting`), or, where the vehicle knows UTC, on what it says itself (``SYSTEM_TIME``).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.readers.logs.mavlink_frames import Frames, Messages, messages
 from wildlab.flight.time.fitting import ClockFit
-from wildlab.flight.time.receipts import fit_pairs, fit_receipts
+from wildlab.flight.time.steady import fit_steady
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -80,11 +80,11 @@ def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
     behind = []
     from_vehicle = []
     for a, b in zip(starts, np.r_[starts[1:], len(own)], strict=True):
-        fit = fit_receipts(own[a:b], received[a:b])
+        fit = fit_steady(own[a:b], received[a:b], late=True)
         inside = near & (told.number >= number[a]) & (told.number <= number[b - 1])
         from_vehicle.append(believed and int(inside.sum()) > 2)
         if from_vehicle[-1]:
-            fit = fit_pairs(told["time_boot_ms"][inside] / 1e3, unix[inside])
+            fit = fit_steady(told["time_boot_ms"][inside] / 1e3, unix[inside])
         fits.append(fit)
         behind.append(float(np.median(received[a:b] - fit.to_reference(own[a:b]))))
     main = int(np.argmax(np.diff(np.r_[starts, len(own)])))

@@ -10,7 +10,7 @@ from wildlab.flight.readers.logs.gimbals import device_angles, heading_at, untur
 from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.logs.mavlink_frames import Frames, Messages, messages
 from wildlab.flight.readers.logs.places import ONE_HEIGHT, impossible_places, one_height, placed
-from wildlab.flight.readers.logs.stamps import running_stream, stamps_that_fail
+from wildlab.flight.readers.logs.stamps import places_that_hold, running_stream
 from wildlab.flight.readers.logs.tlog_clock import Boot, Flags, times
 
 Array = NDArray[np.float64]
@@ -84,10 +84,8 @@ def _poses(attitude: Messages, position: Messages, boot: Boot | None, notes: lis
         "v_down_m_s": position["vz"] / 1e2,
     }
     stamps, doubtful = times(position, boot, "time_boot_ms")
-    bad = ~placed(place["latitude_deg"], place["longitude_deg"])
-    for rows in (*doubtful.values(), *stamps_that_fail(stamps["time_s"]).values()):
-        bad |= rows
-    good = ~bad
+    bad = np.logical_or.reduce([*doubtful.values(), np.zeros(len(position), bool)])
+    good = places_that_hold(stamps["time_s"], place, bad)
     values = np.stack(list(place.values()), axis=1)[good]
     found = np.full((len(attitude), len(place)), np.nan)
     finite = np.isfinite(at)

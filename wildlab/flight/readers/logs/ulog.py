@@ -20,7 +20,7 @@ from wildlab.flight.readers.logs.ulog_frames import MAGIC, Sound, sound_part
 from wildlab.flight.readers.logs.ulog_parts import TOPICS, read_parts
 from wildlab.flight.readers.logs.ulog_topics import Topic
 from wildlab.flight.time.fitting import ClockFit
-from wildlab.flight.time.receipts import fit_pairs
+from wildlab.flight.time.steady import fit_steady
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def _utc(topics: dict[str, Topic]) -> ClockFit | None:
         own = (topic.get("timestamp") + np.nan_to_num(topic.get("timestamp_time_relative"))) / 1e6
         good = (topic.get("fix_type") >= _FIX_SPACE) & (utc > _EARLIEST_S) & (utc < _LATEST_S)
         if good.any() and (best is None or good.sum() > best.used.sum()):
-            best = fit_pairs(own[good], utc[good])
+            best = fit_steady(own[good], utc[good])
     return best
 
 

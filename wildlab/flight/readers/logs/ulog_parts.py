@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.gimbals import device_angles, heading_at, unturned, wrapped
 from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.logs.order import in_order
 from wildlab.flight.readers.logs.places import ONE_HEIGHT, impossible_places, one_height, placed
-from wildlab.flight.readers.logs.stamps import running_stream, stamps_that_fail
+from wildlab.flight.readers.logs.stamps import places_that_hold, running_stream
 from wildlab.flight.readers.logs.ulog_topics import Flags, Topic, from_local
 from wildlab.flight.time.fitting import ClockFit
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
@@ -145,16 +146,13 @@ def _local_motion(local: Topic) -> dict[str, Array]:
 def _at(topic: Topic, values: dict[str, Array], times_s: Array) -> dict[str, Array]:
     """Columns of a topic at other times since start, linear, no gap bridged; without those of no value."""
     stamps = topic.taken_s()
-    good = np.ones(len(stamps), bool)
-    for rows in stamps_that_fail(stamps).values():
-        good &= ~rows
+    good = in_order(stamps)
     if "latitude_deg" in values:
-        lost = ~placed(values["latitude_deg"], values["longitude_deg"])
-        values = {name: np.where(lost, np.nan, one) for name, one in values.items()}
+        good = places_that_hold(stamps, values, np.zeros(len(stamps), bool))
         # Longitudes next to the date line are neighbours.
         longitude = values["longitude_deg"].copy()
-        longitude[good & ~lost] = np.unwrap(longitude[good & ~lost], period=360.0)
-        values["longitude_deg"] = longitude
+        longitude[good] = np.unwrap(longitude[good], period=360.0)
+        values = {**values, "longitude_deg": longitude}
     kept = {name: one for name, one in values.items() if not np.isnan(one).all()}
     if "latitude_deg" in values:
         kept |= {name: values[name] for name in ("latitude_deg", "longitude_deg")}

@@ -1,0 +1,66 @@
+"""Clocks of a log against UTC, with another rate than 1 only where the log is long enough to tell it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.flight.time.fitting import RESOLUTION_S, ClockFit, fit_clock
+
+Array = NDArray[np.float64]
+
+#: A rate is another than 1 where it is so many of its standard deviations away.
+TOLD_APART = 4.0
+#: Receipts before the middle one by more than so many robust standard deviations (and 1 s) are wrong.
+EARLY = 5.0
+#: A clock that is further from the other's rate is none.
+SLOWEST, FASTEST = 0.5, 2.0
+
+
+def fit_steady(own: ArrayLike, reference: ArrayLike, late: bool = False) -> ClockFit:
+    """As `fit_clock`, with a rate of 1 where the pairs cannot tell it from 1.
+
+    Parameters
+    ----------
+    own, reference, late
+        Of `fit_clock`.
+
+    Returns
+    -------
+    ClockFit
+
+    Raises
+    ------
+    WildlabError
+        Where there is no pair.
+    """
+    fit = fit_clock(own, reference, late)
+    if abs(fit.rate - 1.0) > TOLD_APART * fit.rate_sd and SLOWEST < fit.rate < FASTEST:
+        return fit
+    x, y = np.asarray(own, float), np.asarray(reference, float)
+    apart = y - x
+    used = fit.used
+    if late:
+        # Among few pairs `fit_clock` believes all.
+        used = used & (apart >= np.nanmedian(apart) - max(EARLY * _spread(apart), 1.0))
+        offset = float(apart[used].min())
+    else:
+        offset = float(np.median(apart[used]))
+    residual = apart - offset
+    middle = float(np.mean(x[used]))
+    return ClockFit(
+        middle,
+        middle + offset,
+        1.0,
+        residual,
+        np.asarray(used),
+        max(_spread(residual[used]), RESOLUTION_S),
+        fit.middle_sd_s,
+        fit.rate_sd,
+        float(x[used].min()),
+        float(x[used].max()),
+    )
+
+
+def _spread(values: Array) -> float:
+    return 1.4826 * float(np.nanmedian(np.abs(values - np.nanmedian(values))))
