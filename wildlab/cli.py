@@ -27,6 +27,7 @@ from wildlab.commands.import_ import import_
 from wildlab.commands.plan import plan
 from wildlab.commands.shared import FOLDER
 from wildlab.commands.terrain import terrain
+from wildlab.commands.track import track
 from wildlab.errors import WildlabError, system_error
 from wildlab.terminal import count, print_json, print_table, sentence, shown, stopped
 
@@ -74,6 +75,7 @@ for _command in (
     import_,
     click_,
     georeference,
+    track,
     camera,
     detect,
     calibrate,

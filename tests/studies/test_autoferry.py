@@ -12,7 +12,8 @@ from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
 from wildlab.pipeline.sensor_tracks import FILTERS, follow_flight, table
-from wildlab.pipeline.sensor_tuning import SensorTuning, tune
+from wildlab.pipeline.sensor_tuning import SensorTuning
+from wildlab.studies.autoferry.boats import BOATS, tune_sensor
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
 
 pytestmark = pytest.mark.slow
@@ -29,13 +30,13 @@ def flights(shared_data: Callable[..., Path], tmp_path_factory: pytest.TempPathF
 
 @pytest.fixture(scope="module")
 def tunings(flights: dict[int, Flight]) -> dict[str, SensorTuning]:
-    return {sensor: tune(flights[2], sensor) for sensor in ("lidar", "radar", "ir", "eo")}
+    return {sensor: tune_sensor(flights[2], sensor) for sensor in ("lidar", "radar", "ir", "eo")}
 
 
 @pytest.fixture(scope="module")
 def tracks(flights: dict[int, Flight], tunings: dict[str, SensorTuning]) -> pd.DataFrame:
     return pd.concat(
-        [table(follow_flight(flight, tunings)).assign(case=number) for number, flight in flights.items()]
+        [table(follow_flight(flight, tunings, BOATS), BOATS.size_m).assign(case=number) for number, flight in flights.items()]
     )
 
 

@@ -52,7 +52,7 @@ def followed() -> list[SensorTrack]:
 
 @pytest.fixture
 def tracks(followed: list[SensorTrack]) -> pd.DataFrame:
-    return table(followed).assign(case="scenario-3")
+    return table(followed, 15.0).assign(case="scenario-3")
 
 
 @pytest.fixture

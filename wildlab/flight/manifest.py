@@ -15,6 +15,7 @@ from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import Strict, check_model, is_safe_name, leaves_folder, parse_toml, read_toml
+from wildlab.flight.following import SensorPart, TargetsPart
 from wildlab.flight.terrain_model import TerrainPart
 from wildlab.flight.toml import dump_toml
 from wildlab.geometry.camera import Camera
@@ -268,6 +269,9 @@ class Manifest(Strict):
     terrain: TerrainPart | None = None
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
+    #: What tracking filters are told, see `wildlab.flight.following`.
+    sensors: dict[str, SensorPart] = Field(default_factory=dict)
+    targets: TargetsPart = TargetsPart()
     twin: TwinPart | None = None
     sources: tuple[SourcePart, ...] = ()
     #: Of the tables by file name, see `wildlab.flight.checksums`. A flight in memory has none.

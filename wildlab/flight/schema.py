@@ -21,7 +21,8 @@ DType = Literal["float", "text"]
 DETECTION_KINDS: dict[str, tuple[str, ...]] = {
     "pixel": ("u_px", "v_px"),
     "bearing": ("azimuth_rad",),
-    "range-bearing": ("azimuth_rad", "elevation_rad", "range_m"),
+    # The elevation where it is measured: a level radar has none.
+    "range-bearing": ("azimuth_rad", "range_m"),
     "position": ("north_m", "east_m", "down_m"),
     # From optical flow, between the image before and this one.
     "velocity": ("v_north_m_s", "v_east_m_s"),

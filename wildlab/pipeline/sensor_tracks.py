@@ -1,27 +1,17 @@
-"""Targets followed by each sensor of a moving platform on its own: a flight in, a table out.
+"""Targets followed by each sensor of a platform on its own: a flight in, a table out.
 
 Every filter of a target gets the same detections: those that the filter with white noise let into its gate,
-nearest first. What differs is what they believe of the errors:
+nearest first. What differs is what they believe of the errors, see `wildlab.pipeline.following.filters`.
 
-``kf`` (positions), ``ekf`` (bearings)
-    Errors are new at every scan, H (3.5), (3.7).
-``coloured``
-    Errors of successive scans are alike, and the filter works on differences, H 7.2.2. Positions only.
-``schmidt``
-    Position, heading and clock are wrong by something that lasts, considered and not estimated, H 7.4.
-``thinned``
-    As the first, on detections so far apart that their errors hardly have to do with each other.
-
-A track starts on the first detection near the target's true position, and nearer to it than to another
-target, since no detection says what it is of; from there on the truth is not looked at. A bearing leaves the
-distance open: it starts at the mean distance of the tuning's flight. A track ends where nothing falls into
-its gate for `PATIENCE_S`.
+Detections that name their target are its own. Where none does, a track starts on the first detection near the
+target's true position, and nearer to it than to another target; from there on the truth is not looked at.
+Without truth all are of one target, whose track starts on the first. A track ends where nothing falls into
+its gate for as long as its patience lasts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,33 +22,25 @@ from wildlab.evaluation.consistency import average, chi_square_interval, positio
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, from_tuning
+from wildlab.pipeline.following.expected import errors_near
+from wildlab.pipeline.following.filters import choose, follow_with
+from wildlab.pipeline.following.starts import start_first, start_near
 from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
-from wildlab.pipeline.sensor_tuning import REACH, SensorTuning, errors_near
-from wildlab.tracking.coloured import run_coloured, thin
-from wildlab.tracking.maritime import bearings_from, positions_from, white_acceleration
-from wildlab.tracking.run import Start, Track, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.pipeline.sensor_tuning import SensorTuning
+from wildlab.tracking.run import Start, Track
 
 Array = NDArray[np.float64]
 
+#: The filters that a study holds against each other, by kind of detection.
 FILTERS = {
     "position": ("kf", "coloured", "schmidt", "thinned"),
     "bearing": ("ekf", "schmidt", "thinned"),
 }
 #: The filter that the others are held against, by kind of detection.
 WHITE = {kind: names[0] for kind, names in FILTERS.items()}
-
-#: A boat at 2.5 m/s may turn by a right angle in 20 s: each axis of its velocity changes by 2.5 m/s, taken
-#: for two standard deviations. m/s per square root of a second.
-ACCELERATION_DENSITY = float(2.5 / 2 / np.sqrt(20.0))
-#: A boat in a harbour keeps below 6 m/s, taken for two standard deviations; nothing is known of its course.
-START_SPEED_M_S = 3.0
-#: Probability with which a target's own detection lies in the gate.
-GATE = 0.99
-PATIENCE_S = 10.0
-#: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next scan of a slow
-#: sensor is no gap, so it is one and a half scans at least.
-LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
+#: What a target is called of which nobody says a name.
+UNNAMED = "target"
 
 
 class SensorTrack(NamedTuple):
@@ -67,7 +49,9 @@ class SensorTrack(NamedTuple):
     Row by row of the scans: ``estimate`` (N, 4) north, east, velocities, NaN without a track; ``error``
     (N, 4) truth minus estimate and ``nees`` (N,) of the position, NaN without truth too; ``innovation``
     (N, m) and ``nis`` (N,) of the detections used, NaN elsewhere. ``known`` (N,): where there is truth.
-    ``near`` (N,): where the sensor saw something within `REACH` of the target's true place.
+    ``near`` (N,): where the sensor saw something within reach of the target's true place, or its label.
+    ``covariance`` (N, 4, 4) of the estimate, ``S`` (N, m, m) of the innovation, ``detection`` (N,) the name
+    of the one that was used, "" none.
     """
 
     sensor: str
@@ -81,10 +65,15 @@ class SensorTrack(NamedTuple):
     nis: Array
     known: NDArray[np.bool_]
     near: NDArray[np.bool_]
+    covariance: Array = np.empty((0, 4, 4))
+    S: Array = np.empty((0, 0, 0))
+    detection: NDArray[np.object_] = np.empty(0, object)
 
 
-def follow_flight(flight: Flight, tunings: Mapping[str, SensorTuning]) -> list[SensorTrack]:
-    """Every target with truth, by every sensor that has a tuning, with every filter.
+def follow_flight(
+    flight: Flight, tunings: Mapping[str, SensorTuning], targets: TargetBeliefs
+) -> list[SensorTrack]:
+    """Every target with truth, by every sensor that has a tuning, with every filter of a study.
 
     A target that a sensor never saw near its true place has no track: all rows are NaN.
 
@@ -99,146 +88,125 @@ def follow_flight(flight: Flight, tunings: Mapping[str, SensorTuning]) -> list[S
         truths = truths_at(flight, scans.times)
         for truth in truths:
             others = [one for one in truths if one.target != truth.target]
-            found += follow(scans, truth, tuning, others)
+            found += follow(scans, truth, from_tuning(tuning), targets, FILTERS[scans.kind], others)
     return found
 
 
 def follow(
-    scans: Scans, truth: Truth, tuning: SensorTuning, others: Sequence[Truth] = ()
+    scans: Scans,
+    truth: Truth,
+    beliefs: Beliefs,
+    targets: TargetBeliefs,
+    filters: Sequence[str],
+    others: Sequence[Truth] = (),
 ) -> list[SensorTrack]:
-    """One target by one sensor, with every filter of its kind; ``others`` are targets not to start on."""
-    begin = start_near(scans, truth, tuning, others)
-    if begin is None:
-        return [_nothing(scans, truth, name) for name in FILTERS[scans.kind]]
+    """One target by one sensor, with each of the filters.
+
+    Parameters
+    ----------
+    truth
+        Of the target; its positions may all be NaN, where it is not known.
+    others
+        Targets not to start on.
+
+    Raises
+    ------
+    WildlabError
+        Where the detections cannot go through one of the filters.
+    """
     usable = np.asarray(np.isfinite(scans.platform).all(axis=1))
     seen = np.where(usable[:, None, None], scans.detections, np.nan)
-    at, m = np.nan_to_num(scans.platform), seen.shape[-1]
-    sensor = positions_from if scans.kind == "position" else bearings_from
-    motion = partial(white_acceleration, density=ACCELERATION_DENSITY)
-    white = np.eye(m) * tuning.sd**2
-    own_drift = np.zeros_like(at)
-    first = run_filter(scans.times, seen, white, sensor(at, own_drift), motion, begin, gate_probability=GATE)
+    begin = begin_of(scans, seen, truth, beliefs, targets, others)
+    if begin is None:
+        return [_nothing(scans, truth, name, targets) for name in filters]
+    if scans.labelled:
+        seen = np.where((scans.labels == truth.target)[..., None], seen, np.nan)
+    first = choose(scans, seen, beliefs, targets, begin)
     # From here on one detection a scan: the same for all.
-    own = np.where(first.used[:, None], seen[np.arange(len(seen)), np.maximum(first.chosen, 0)], np.nan)
-    rest: dict[str, Callable[[], Track]] = {
-        "coloured": lambda: _coloured(scans.times, own, tuning, motion, begin),
-        "schmidt": lambda: run_filter(
-            scans.times,
-            own,
-            np.eye(m) * tuning.white_sd**2,
-            # An error of the clock moves the target by what the filter with white noise says it moves.
-            sensor(at, np.nan_to_num(first.x[:, 2:] - scans.platform_velocity)),
-            motion,
-            begin,
-            pose=PoseUncertainty(
-                np.tile(tuning.pose_covariance, (len(own), 1, 1)), tuning.correlation_time_s
-            ),
-        ),
-        "thinned": lambda: run_filter(
-            scans.times,
-            np.where(thin(scans.times, tuning.thinning_s, first.used)[:, None], own, np.nan),
-            white,
-            sensor(at, np.zeros_like(at)),
-            motion,
-            begin,
-        ),
-    }
-    last = _last_row(scans.times, first.used, begin.time)
+    rows = np.arange(len(seen))
+    chosen = first.chosen.copy()
+    if begin.row >= 0:
+        chosen[begin.row] = int(np.argmax(np.isfinite(seen[begin.row]).all(axis=-1)))
+    own = np.where(first.used[:, None], seen[rows, np.maximum(chosen, 0)], np.nan)
+    ids = np.where(first.used, scans.ids[rows, np.maximum(chosen, 0)], "")
+    last = _last_row(scans.times, first.used, begin.time, targets.patience_s)
     begun = scans.times > begin.time
-    names = FILTERS[scans.kind]
-    tracks = {names[0]: first} | {name: rest[name]() for name in names[1:]}
-    return [_score(scans, truth, name, track, begun, last) for name, track in tracks.items()]
+    found = []
+    for name in filters:
+        track = follow_with("ekf" if name == "kf" else name, scans, own, first, beliefs, targets, begin)
+        found.append(_score(scans, truth, name, track, begun, last, targets, ids))
+    return found
 
 
-def start_near(
-    scans: Scans, truth: Truth, tuning: SensorTuning, others: Sequence[Truth] = ()
+def begin_of(
+    scans: Scans,
+    seen: Array,
+    truth: Truth,
+    beliefs: Beliefs,
+    targets: TargetBeliefs,
+    others: Sequence[Truth],
 ) -> Start | None:
-    """Where a track starts: at the first detection within reach of the target's true place, at rest.
-
-    One that lies nearer to one of the ``others`` is not taken. The detection itself is not used up: the start
-    is as uncertain as the search was wide, and the detection is the first that the filter is given.
-    """
-    error, nearest = errors_near(scans, truth)
-    taken = nearest >= 0
-    for other in others:
-        beside, its = errors_near(scans, other)
-        rival = (its == nearest) & (np.linalg.norm(beside, axis=1) < np.linalg.norm(error, axis=1))
-        taken &= ~rival
-    rows = np.flatnonzero(taken & np.isfinite(scans.platform).all(axis=1))
-    if not len(rows):
-        return None
-    row = int(rows[0])
-    z = scans.detections[row, nearest[row]]
-    x, P = np.zeros(4), np.diag([0.0, 0.0, START_SPEED_M_S**2, START_SPEED_M_S**2])
-    if scans.kind == "position":
-        x[:2] = z
-        P[:2, :2] = np.eye(2) * REACH["position"] ** 2
-    else:
-        ahead = np.array([np.cos(z[0]), np.sin(z[0])])
-        right = np.array([-ahead[1], ahead[0]])
-        x[:2] = scans.platform[row] + tuning.range_m * ahead
-        P[:2, :2] = tuning.range_sd_m**2 * np.outer(ahead, ahead)
-        P[:2, :2] += (tuning.range_m * REACH["bearing"]) ** 2 * np.outer(right, right)
-    return Start(float(scans.times[row]), x, P)
+    """Where the track of a target starts, see the module."""
+    rows = np.arange(len(seen))
+    if scans.labelled or not np.isfinite(truth.position).any():
+        mine = np.isfinite(seen).all(axis=-1)
+        if scans.labelled:
+            mine &= scans.labels == truth.target
+        own = np.where(mine.any(axis=1)[:, None], seen[rows, np.argmax(mine, axis=1)], np.nan)
+        return start_first(scans, own, beliefs, targets)
+    return start_near(scans, truth, beliefs, targets, others)
 
 
-def _coloured(
-    times: Array,
-    own: Array,
-    tuning: SensorTuning,
-    motion: Callable[[float], tuple[Array, Array]],
-    begin: Start,
-) -> Track:
-    gap = max(LONGEST_GAP_S, LONGEST_GAP_LOOKS * tuning.interval_s)
-    used = np.flatnonzero(np.isfinite(own[:, 0]))
-    # Behind a gap the measurement itself is used, and its error is the whole one.
-    whole = np.ones(len(times), bool)
-    whole[used[1:]] = np.diff(times[used]) > gap
-    sd = np.where(whole, tuning.sd, tuning.driving_sd)
-    R_w = sd[:, None, None] ** 2 * np.eye(2)
-    return run_coloured(times, own, R_w, motion, begin, F_c=np.eye(2) * tuning.fading, longest_gap=gap)
-
-
-def _last_row(times: Array, used: NDArray[np.bool_], start: float) -> int:
+def _last_row(times: Array, used: NDArray[np.bool_], start: float, patience: float) -> int:
     """The first row that has a track no more."""
     hits = np.concatenate([[start], times[used]])
-    pauses = np.flatnonzero(np.diff(hits) > PATIENCE_S)
+    pauses = np.flatnonzero(np.diff(hits) > patience)
     end = hits[pauses[0]] if len(pauses) else hits[-1]
-    return int(np.searchsorted(times, end + PATIENCE_S, side="right"))
+    return int(np.searchsorted(times, end + patience, side="right"))
 
 
 def _score(
-    scans: Scans, truth: Truth, name: str, track: Track, begun: NDArray[np.bool_], last: int
+    scans: Scans,
+    truth: Truth,
+    name: str,
+    track: Track,
+    begun: NDArray[np.bool_],
+    last: int,
+    targets: TargetBeliefs,
+    ids: NDArray[np.object_],
 ) -> SensorTrack:
     x, innovation, nis = track.x.copy(), track.innovation.copy(), track.nis.copy()
-    x[last:] = np.nan
+    P, S = track.P.copy(), track.S.copy()
+    x[last:], P[last:] = np.nan, np.nan
     # The first detection is where the track was put: it surprises nobody.
     off = ~(track.used & begun)
     off[last:] = True
-    innovation[off], nis[off] = np.nan, np.nan
+    innovation[off], nis[off], S[off] = np.nan, np.nan, np.nan
     where = np.column_stack([truth.position, truth.velocity])
     error = np.where(np.isfinite(x), where - x, np.nan)
     nees = position_nees(error[:, :2], track.P[:, :2, :2], truth.covariance)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    near = errors_near(scans, truth)[1] >= 0
+    near = errors_near(scans, truth, targets.reach(scans.kind))[1] >= 0
+    names = np.where(track.used, ids, "")
+    names[last:] = ""
     return SensorTrack(
-        scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known, near
-    )
+        scans.sensor, truth.target, name, scans.times, x, error, nees, innovation, nis, known, near, P, S,
+        names,
+    )  # fmt: skip
 
 
-def _nothing(scans: Scans, truth: Truth, name: str) -> SensorTrack:
+def _nothing(scans: Scans, truth: Truth, name: str, targets: TargetBeliefs) -> SensorTrack:
     n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))
-    nan, near = np.full(n, np.nan), errors_near(scans, truth)[1] >= 0
+    nan, near = np.full(n, np.nan), errors_near(scans, truth, targets.reach(scans.kind))[1] >= 0
     unused = np.full((n, m), np.nan)
     return SensorTrack(
-        scans.sensor, truth.target, name, scans.times, empty, empty, nan, unused, nan, known, near
-    )
+        scans.sensor, truth.target, name, scans.times, empty, empty, nan, unused, nan, known, near,
+        np.full((n, 4, 4), np.nan), np.full((n, m, m), np.nan), np.full(n, "", object),
+    )  # fmt: skip
 
 
-#: A track whose error (m) is below this is with its target: about the length of the ferry's smaller boats.
-WITH_ITS_TARGET_M = 15.0
 #: Numbers of a row of `table`, with their units.
 COLUMNS = {
     "rmse": "m",
@@ -254,7 +222,7 @@ COLUMNS = {
 }
 
 
-def table(followed: list[SensorTrack]) -> pd.DataFrame:
+def table(followed: Sequence[SensorTrack], size_m: float = float("nan")) -> pd.DataFrame:
     """One row for each track, its columns those of `COLUMNS` and:
 
     ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``compared``, scans with a track and
@@ -263,19 +231,19 @@ def table(followed: list[SensorTrack]) -> pd.DataFrame:
     position, 2 is right; ``anis`` is of the detections that were let in, 2 or 1 is right, by the elements of
     a measurement. ``share_followed``: of the scans with truth, those that have a track. ``seen``: scans in
     which the sensor saw something near the target's true place, and ``share_with_target``: in how many of
-    them a track is within `WITH_ITS_TARGET_M` of it.
+    them a track is nearer to it than ``size_m``; NaN where that is.
     """
-    return pd.DataFrame([_row(one) for one in followed])
+    return pd.DataFrame([_row(one, size_m) for one in followed])
 
 
-def _row(one: SensorTrack) -> dict[str, object]:
+def _row(one: SensorTrack, size_m: float) -> dict[str, object]:
     summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
     m = one.innovation.shape[1]
     used = one.innovation[np.isfinite(one.nis)]
     lag1 = [_lag1(column) for column in used.T]
     nees, nis = average(one.nees, 2, _worth(one.nees)), average(one.nis, m, _worth(one.nis))
     on = np.isfinite(one.error[:, 0])
-    there = np.hypot(*one.error[:, :2].T) < WITH_ITS_TARGET_M  # NaN, where there is no track, is not there
+    there = np.hypot(*one.error[:, :2].T) < size_m  # NaN, where there is no track, is not there
     return {
         "sensor": one.sensor,
         "kind": "position" if m == 2 else "bearing",
@@ -297,7 +265,7 @@ def _row(one: SensorTrack) -> dict[str, object]:
         "fraction_nees_inside": share_inside(one.nees, chi_square_interval(2)),
         "share_followed": float(on.sum() / one.known.sum()) if one.known.any() else np.nan,
         "seen": int(one.near.sum()),
-        "share_with_target": float(there[one.near].mean()) if one.near.any() else np.nan,
+        "share_with_target": float(there[one.near].mean()) if one.near.any() and size_m > 0 else np.nan,
     }
 
 

@@ -1,11 +1,12 @@
 """What one flight with truth says of a sensor: how late its clock is, how large its errors are and how long
 they last. Meant for one flight, to be used unchanged on others.
 
-No detection says what it is of: the one nearest to a target, within `REACH`, is taken for its own.
+Where no detection says what it is of, the one nearest to a target, within reach, is taken for its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,15 +16,11 @@ from scipy.optimize import curve_fit, nnls
 from wildlab.errors import WildlabError
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.expected import SLOTS, across, errors_near, predict_scan
 from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
-from wildlab.tracking.maritime import CLOCK, EAST, NORTH, YAW, predict_bearing, predict_position
-from wildlab.tracking.measurement import Prediction, difference
 
 Array = NDArray[np.float64]
 
-#: Detections further from a target than this (m, rad) are not its own. A ship of 30 m is seen up to 15 m from
-#: its antenna and a few metres wrong; from 200 m, the mean distance and more, that is five degrees.
-REACH = {"position": 20.0, "bearing": np.radians(5.0)}
 #: Offsets tried, s: the largest known delays are three.
 OFFSETS_S = np.arange(-5.0, 2.001, 0.05)
 #: Longest lag at which errors are compared, s; a flight of two minutes has only few pairs further apart.
@@ -32,6 +29,8 @@ LONGEST_LAG_S = 30.0
 FEWEST = 20
 #: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
 DROP = 1.92
+#: Errors that last are put down to these together, each group with one standard deviation.
+GROUPS = (("platform_north", "platform_east"), ("clock",), ("heading",), ("range",), ("roll", "pitch"))
 
 
 class SensorTuning(NamedTuple):
@@ -55,6 +54,10 @@ class SensorTuning(NamedTuple):
         Usual time between scans.
     n
         Errors it is from.
+    own_sds
+        Of each element, where they are of several units; ``sd`` is then in metres across the line of sight.
+    range_bias_sd_m, roll_pitch_sd_rad
+        As ``yaw_sd_rad``, for sensors that measure ranges, and for cameras.
     """
 
     sensor: str
@@ -72,14 +75,21 @@ class SensorTuning(NamedTuple):
     range_sd_m: float
     interval_s: float
     n: int
+    own_sds: tuple[float, ...] = ()
+    range_bias_sd_m: float = 0.0
+    roll_pitch_sd_rad: float = 0.0
 
     @property
-    def pose_covariance(self) -> Array:
-        """(6, 6) of the considered errors, as `wildlab.tracking.maritime` orders them."""
-        variance = np.zeros(6)
-        variance[[NORTH, EAST]] = self.position_sd_m**2
-        variance[CLOCK], variance[YAW] = self.clock_sd_s**2, self.yaw_sd_rad**2
-        return np.diag(variance)
+    def sds(self) -> Array:
+        """(m,) standard deviation of the error of each element, standing part included."""
+        return np.array(self.own_sds or (self.sd,) * (1 if self.kind == "bearing" else 2))
+
+    @property
+    def considered(self) -> dict[str, float]:
+        """Standard deviations of errors that last, by name, m, s or rad; those that are zero too."""
+        sds = (self.position_sd_m, self.clock_sd_s, self.yaw_sd_rad, self.range_bias_sd_m,
+               self.roll_pitch_sd_rad)  # fmt: skip
+        return {name: sd for group, sd in zip(GROUPS, sds, strict=True) for name in group}
 
     @property
     def next_correlation(self) -> float:
@@ -109,27 +119,45 @@ class SensorTuning(NamedTuple):
 
 
 class _Errors(NamedTuple):
-    """Nearest detections of one target: errors (N, m), NaN where there is none within reach."""
+    """Detections of one target: errors (N, m), NaN where there is none, and the same in one unit."""
 
     times: Array
     error: Array
+    sized: Array
     truth: Truth
     scans: Scans
 
 
-def tune(flight: Flight, sensor: str) -> SensorTuning:
+def tune(
+    flight: Flight, sensor: str, reach_of: Callable[[str], float], source: str | None = None
+) -> SensorTuning:
     """Estimate everything of a sensor from one flight with truth.
+
+    Parameters
+    ----------
+    reach_of
+        By kind: detections further from a target than this (m, or rad of bearings and pixels) are not its
+        own, where they do not say what they are of.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
 
     Raises
     ------
     WildlabError
         Where fewer than `FEWEST` detections lie near a target.
     """
-    costs = np.array([_cost(_errors_of(flight, scans_of(flight, sensor, float(o)))) for o in OFFSETS_S])
+    reach = reach_of(scans_of(flight, sensor, 0.0, source).kind)
+    # Poses that belong to frames stay with them, whatever the clock says.
+    offsets = np.zeros(1) if "frame_id" in flight.pose_source(source)[1] else OFFSETS_S
+
+    def errors_at(offset: float) -> list[_Errors]:
+        return _errors_of(flight, scans_of(flight, sensor, offset, source), reach)
+
+    costs = np.array([_cost(errors_at(float(o)), reach) for o in offsets])
     best = int(np.argmin(costs))
-    offset = float(OFFSETS_S[best])
-    scans = scans_of(flight, sensor, offset)
-    errors = _errors_of(flight, scans)
+    offset = float(offsets[best])
+    errors = errors_at(offset)
+    scans = errors[0].scans if errors else scans_of(flight, sensor, offset, source)
     known = np.concatenate([one.error[np.isfinite(one.error[:, 0])] for one in errors])
     n = len(known)
     if n < FEWEST:
@@ -139,12 +167,15 @@ def tune(flight: Flight, sensor: str) -> SensorTuning:
             file=flight.folder,
             field="detections",
         )
-    sd = float(np.sqrt(np.mean(known**2)))
+    sized = np.concatenate([one.sized[np.isfinite(one.error[:, 0])] for one in errors])
+    sd = float(np.sqrt(np.mean(sized**2)))
+    own = tuple(np.sqrt(np.mean(known**2, axis=0)).tolist()) if len(set(UNITS_OF[scans.kind])) > 1 else ()
+    sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
     worth = sum(_worth(one.error) for one in errors)
-    near = OFFSETS_S[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
-    share, correlation_time = _autocorrelation(errors, scans.interval_s)
-    considered = _considered(errors, sd, share * np.exp(-scans.interval_s / correlation_time))
+    near = offsets[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
+    share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
+    considered = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
     distance = np.concatenate(
         [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
     )
@@ -154,58 +185,48 @@ def tune(flight: Flight, sensor: str) -> SensorTuning:
         offset,
         float(near.min()),
         float(near.max()),
-        sd,
+        float(sds[0]) if not own else sd,
         share,
         correlation_time,
-        *considered,
+        *considered[:3],
         float(distance.mean()),
         float(distance.std()),
         scans.interval_s,
         n,
+        own,
+        *considered[3:],
     )
 
 
-def predict_scan(scans: Scans, position: Array, velocity: Array) -> Prediction:
-    """What every scan should have seen of a target at (N, 2) moving with (N, 2)."""
-    predict = predict_position if scans.kind == "position" else predict_bearing
-    return predict(position, scans.platform, velocity - scans.platform_velocity)
+#: Units of the elements of a measurement, by kind.
+UNITS_OF = {
+    "position": ("m",), "bearing": ("rad",), "range-bearing": ("m", "rad"), "pixel": ("px",),
+    "velocity": ("m/s",),
+}  # fmt: skip
 
 
-def errors_near(scans: Scans, truth: Truth) -> tuple[Array, NDArray[np.intp]]:
-    """Error (N, m) of the detection nearest to a target at every scan, within `REACH`, and which it is.
-
-    Measured minus expected; NaN and -1 where there is none.
-    """
-    expected = predict_scan(scans, truth.position, truth.velocity).z
-    error = difference(scans.detections, expected[:, None], (scans.kind == "bearing",) * expected.shape[-1])
-    size = np.linalg.norm(error, axis=-1)
-    size = np.where(np.isfinite(size), size, np.inf)
-    best = np.argmin(size, axis=1)
-    rows = np.arange(len(best))
-    near = size[rows, best] < REACH[scans.kind]
-    return np.where(near[:, None], error[rows, best], np.nan), np.where(near, best, -1)
+def _errors_of(flight: Flight, scans: Scans, reach: float) -> list[_Errors]:
+    found = []
+    for truth in truths_at(flight, scans.times):
+        error = errors_near(scans, truth, reach)[0]
+        expected = predict_scan(scans, truth.position, truth.velocity).z
+        found.append(_Errors(scans.times, error, across(scans, error[:, None], expected)[:, 0], truth, scans))
+    return found
 
 
-def _errors_of(flight: Flight, scans: Scans) -> list[_Errors]:
-    return [
-        _Errors(scans.times, errors_near(scans, truth)[0], truth, scans)
-        for truth in truths_at(flight, scans.times)
-    ]
-
-
-def _cost(errors: list[_Errors]) -> float:
+def _cost(errors: list[_Errors], reach: float) -> float:
     """Sum of squared errors, as if every scan had a truth beside it.
 
     A scan at a target that has no detection within reach costs as much as one at its edge, and one that an
     offset takes out of the truth's time as much as the mean of the others: no offset gains by losing scans.
+    Detections that say what they are of are not lost by being far off.
     """
-    squares = [
-        np.where(np.isfinite(one.error[:, 0]), np.sum(one.error**2, axis=1), REACH[one.scans.kind] ** 2)[
-            np.isfinite(one.truth.position[:, 0])
-        ]
-        for one in errors
-    ]
-    known = np.concatenate(squares)
+    squares = []
+    for one in errors:
+        missing = np.nan if one.scans.labelled else reach**2
+        size = np.where(np.isfinite(one.error[:, 0]), np.sum(one.sized**2, axis=1), missing)
+        squares.append(size[np.isfinite(one.truth.position[:, 0]) & np.isfinite(size)])
+    known = np.concatenate(squares) if squares else np.empty(0)
     return float(known.mean() * sum(len(one.times) for one in errors)) if len(known) else float("inf")
 
 
@@ -216,7 +237,7 @@ def _worth(error: Array) -> float:
     return max([1.0, *(effective_sample_size(column, len(known) - 1) for column in known.T)])
 
 
-def _autocorrelation(errors: list[_Errors], interval: float) -> tuple[float, float]:
+def _autocorrelation(errors: list[_Errors], sds: Array, interval: float) -> tuple[float, float]:
     """Share and time of ``share * exp(-lag / time)``, by weighted least squares over the lags.
 
     Means are left in: a standing error is the most correlated there is.
@@ -226,7 +247,7 @@ def _autocorrelation(errors: list[_Errors], interval: float) -> tuple[float, flo
     products, squares, pairs = np.zeros(len(lags)), np.zeros(len(lags)), np.zeros(len(lags))
     for one in errors:
         known = np.isfinite(one.error[:, 0])
-        t, e = one.times[known], one.error[known]
+        t, e = one.times[known], one.error[known] / sds
         lag = np.rint((t[None, :] - t[:, None]) / step).astype(int)
         dot, size = e @ e.T, np.sum(e**2, axis=1)
         mean = (size[None, :] + size[:, None]) / 2
@@ -254,32 +275,33 @@ def _autocorrelation(errors: list[_Errors], interval: float) -> tuple[float, flo
     return float(found[0]), float(found[1])
 
 
-def _considered(errors: list[_Errors], sd: float, share: float) -> tuple[float, float, float]:
-    """Position (m), clock (s) and yaw (rad) standard deviations that the correlated variance is put down to.
+def _considered(errors: Sequence[_Errors], sds: Array, share: float) -> list[float]:
+    """Standard deviations (m, s, rad) that the correlated variance is put down to, for each of `GROUPS`.
 
     Non-negative least squares of the errors' products, less the part that is white, on what a unit of each
-    would bring about at every scan.
+    would bring about at every scan; all elements in units of their own standard deviation.
     """
+    slots, kind = SLOTS[errors[0].scans.kind], errors[0].scans.kind
+    groups = [[slots.index(name) for name in group if name in slots] for group in GROUPS]
+    groups = [[] if name == ("range",) and kind != "range-bearing" else group
+              for name, group in zip(GROUPS, groups, strict=True)]  # fmt: skip
+    used = [group for group in groups if group]
     columns: list[Array] = []
     wanted: list[Array] = []
     for one in errors:
         known = np.isfinite(one.error[:, 0])
-        H = predict_scan(one.scans, one.truth.position, one.truth.velocity).H_pose[known]
+        H = predict_scan(one.scans, one.truth.position, one.truth.velocity).H_pose[known] / sds[:, None]
         known_H = np.isfinite(H).all(axis=(1, 2))
-        H, e = H[known_H], one.error[known][known_H]
-        groups = [[NORTH, EAST], [CLOCK], [YAW]]
+        H, e = H[known_H], one.error[known][known_H] / sds
         columns.append(
-            np.stack(
-                [(H[..., g] @ np.swapaxes(H[..., g], 1, 2)).reshape(len(H), -1) for g in groups], axis=-1
-            )
+            np.stack([(H[..., g] @ np.swapaxes(H[..., g], 1, 2)).reshape(len(H), -1) for g in used], axis=-1)
         )
-        white = (1 - share) * sd**2 * np.eye(e.shape[1])
+        white = (1 - share) * np.eye(e.shape[1])
         wanted.append((e[:, :, None] * e[:, None, :] - white).reshape(len(e), -1))
-    A = np.concatenate([one.reshape(-1, 3) for one in columns])
+    A = np.concatenate([one.reshape(-1, len(used)) for one in columns])
     b = np.concatenate([one.ravel() for one in wanted])
     # In units in which each brings about the same, or radians would weigh nothing.
     scale = np.sqrt(np.mean(A**2, axis=0))
     scale[scale == 0] = 1.0
-    variance = nnls(A / scale, b)[0] / scale
-    position, clock, yaw = np.sqrt(variance)
-    return float(position), float(clock), float(yaw)
+    variances = iter(nnls(A / scale, b)[0] / scale)
+    return [float(np.sqrt(next(variances))) if group else 0.0 for group in groups]

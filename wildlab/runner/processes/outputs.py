@@ -23,7 +23,15 @@ from wildlab.runner.processes.job import Failure, Job
 
 #: What a run may leave in a report's folder, besides ``figures/``. Anything else there is not ours, and
 #: stays.
-FILES = ("report.html", "metrics.json", "provenance.json", "notebook.ipynb", "replay.rrd")
+FILES = (
+    "report.html",
+    "metrics.json",
+    "provenance.json",
+    "notebook.ipynb",
+    "replay.rrd",
+    "estimates.parquet",
+    "estimates.csv",
+)
 _PART = re.compile(r"\.(?P<name>.+)\.(?P<pid>\d+)\.part")
 
 
@@ -40,7 +48,7 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
             step = step or step_of(notebook, cell)
         except WildlabError:
             executed.unlink()
-    for name in ("metrics.json", "replay.rrd"):
+    for name in ("metrics.json", "replay.rrd", "estimates.parquet", "estimates.csv"):
         (folder / name).unlink(missing_ok=True)
     clear_folder(folder / "figures")
     beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import ACCELERATION_DENSITY, PATIENCE_S, WITH_ITS_TARGET_M
-from wildlab.pipeline.sensor_tuning import REACH
+from wildlab.studies.autoferry.boats import BOATS
 from wildlab.studies.autoferry.comparison import (
     IDEAL,
     MOSTLY,
@@ -42,7 +41,7 @@ OUTCOME_WORDS = {
 #: Elements of a measurement, by kind: what its mean NIS should be.
 ELEMENTS = {"position": 2, "bearing": 1}
 RULE = (
-    f"A track stays with its boat where it is within {WITH_ITS_TARGET_M:g} m of it in at least "
+    f"A track stays with its boat where it is within {BOATS.size_m:g} m of it in at least "
     f"{100 * MOSTLY:.0f} % of the "
     "scans in which the sensor saw something near the boat's true place; else it is lost."
 )
@@ -312,13 +311,13 @@ def method_text(first: str) -> str:
     """How it was computed; ``first`` is the flight everything was tuned on."""
     return rf"""
 Each boat is followed by each sensor on its own: constant velocity with white acceleration
-(${ACCELERATION_DENSITY:.2f}$ m/s per root second: a boat at 2.5 m/s may turn by a right angle in 20 s), the
-nearest detection in a 99 % gate, a track dropped after {PATIENCE_S:g} s without one. Positions go through the
+(${BOATS.density:.2f}$ m/s per root second: a boat at 2.5 m/s may turn by a right angle in 20 s), the
+nearest detection in a {100 * BOATS.gate_probability:.0f} % gate, a track dropped after {BOATS.patience_s:g} s without one. Positions go through the
 linear filter, bearings through the extended one, started at the mean distance that {first} shows. All filters
 of a track get the same detections, those that the filter with white noise let in.
 
-Tuning, on {first} alone: the detection nearest to a boat within {REACH["position"]:g} m or
-{np.degrees(REACH["bearing"]):g}° is taken for its own. The clock offset is the one with the least sum of
+Tuning, on {first} alone: the detection nearest to a boat within {BOATS.reach_m:g} m or
+{np.degrees(BOATS.reach_rad):g}° is taken for its own. The clock offset is the one with the least sum of
 squared errors. $\sigma$ is their root mean square, standing part included; their autocorrelation is fitted by
 $c\, e^{{-t/\tau}}$. Differencing takes $F_c = e^{{-T/\tau}}$ and the variance that $e_2 - F_c e_1$ then has
 (H (7.5)-(7.12)); after more than a second, or one and a half scans, the position itself is used. The Schmidt

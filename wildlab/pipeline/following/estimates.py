@@ -1,0 +1,70 @@
+"""Estimates as a table: one row for each look, target and filter, with covariances and innovations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from wildlab.pipeline.scans import Scans
+from wildlab.pipeline.sensor_tracks import SensorTrack
+
+STATE = ("north_m", "east_m", "v_north_m_s", "v_east_m_s")
+#: Units of the elements of a measurement, as names of columns have them.
+UNITS = {
+    "north": "m", "east": "m", "range": "m", "azimuth": "rad", "elevation": "rad", "u": "px", "v": "px",
+    "v_north": "m_s", "v_east": "m_s",
+}  # fmt: skip
+
+
+def estimates_table(tracks: Sequence[SensorTrack], scans: dict[str, Scans]) -> pd.DataFrame:
+    """Every look at which a track was under way.
+
+    Parameters
+    ----------
+    tracks
+        From `wildlab.pipeline.following.follow.follow_targets`.
+    scans
+        Likewise, by sensor.
+
+    Returns
+    -------
+    DataFrame
+        ``sensor``, ``target``, ``filter``, ``time_s``; the state, metres and m/s in n; ``p_ij`` its
+        covariance, the upper triangle; ``detection`` that was used, "" none; ``innovation_...`` in the unit
+        of each element, ``s_ij`` their covariance, in the order of the elements; ``nis``; and ``error_north_m``,
+        ``error_east_m`` (truth minus estimate) and ``nees`` where the truth is known.
+    """
+    return pd.concat([_of(one, scans[one.sensor].elements) for one in tracks], ignore_index=True)
+
+
+def _of(one: SensorTrack, elements: tuple[str, ...]) -> pd.DataFrame:
+    rows = np.isfinite(one.estimate).all(axis=1)
+    n = int(rows.sum())
+    columns: dict[str, object] = {
+        "sensor": np.full(n, one.sensor, object),
+        "target": np.full(n, one.target, object),
+        "filter": np.full(n, one.filter, object),
+        "time_s": one.times[rows],
+    }
+    columns |= dict(zip(STATE, one.estimate[rows].T, strict=True))
+    for i in range(4):
+        columns |= {f"p_{i}{j}": one.covariance[rows, i, j] for j in range(i, 4)}
+    columns["detection"] = one.detection[rows]
+    names = ("north", "east") if one.filter == "coloured" else elements
+    for i, name in enumerate(names):
+        columns[f"innovation_{name}_{UNITS[name]}"] = one.innovation[rows, i]
+    for i in range(len(names)):
+        columns |= {f"s_{i}{j}": one.S[rows, i, j] for j in range(i, len(names))}
+    columns["nis"] = one.nis[rows]
+    columns |= dict(zip(("error_north_m", "error_east_m"), one.error[rows, :2].T, strict=True))
+    columns["nees"] = one.nees[rows]
+    return pd.DataFrame(columns)
+
+
+def write_estimates(table: pd.DataFrame, folder: Path) -> None:
+    """Write ``estimates.parquet`` and ``estimates.csv`` into a folder; metres, no place on Earth."""
+    table.to_parquet(folder / "estimates.parquet", index=False)
+    table.to_csv(folder / "estimates.csv", index=False, float_format="%.9g")

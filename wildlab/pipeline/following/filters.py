@@ -1,0 +1,166 @@
+"""The filters that follow one target by one sensor: the same detections to each, other beliefs of errors.
+
+``ekf`` (``kf`` where positions are measured)
+    Errors are new at every look, H (3.5), (3.7).
+``ukf``, ``imm``
+    The same by sigma points; and with two motions, a calm one and a lively one, H 3.2.3.
+``coloured``
+    Errors of successive looks are alike, and the filter works on differences of positions, H 7.2.2.
+``schmidt``
+    Platform, clock or range are wrong by something that lasts, considered and not estimated, H 7.4.
+``thinned``
+    As the first, on detections so far apart that their errors hardly have to do with each other.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.considering import covariances_of
+from wildlab.pipeline.following.expected import predict_scan, sensor_of
+from wildlab.pipeline.following.starts import place_of
+from wildlab.pipeline.scans import Scans
+from wildlab.tracking.coloured import run_coloured, thin
+from wildlab.tracking.imm import run_imm
+from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.unscented import run_unscented
+
+NAMES = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
+#: The two motions of ``imm``: as lively as the target is believed to be, and a third of it; each lasts so long.
+CALM, STAY_S = 1 / 3, 30.0
+
+
+def motion_of(targets: TargetBeliefs, share: float = 1.0) -> Motion:
+    """Constant velocity with white acceleration."""
+    return partial(white_acceleration, density=share * targets.density)
+
+
+def possible(scans: Scans, beliefs: Beliefs) -> dict[str, str]:
+    """Filters that a sensor's detections can go through: ``""``, or why they cannot."""
+    considered = covariances_of(scans, beliefs) is not None
+    placed = "range" in scans.elements or scans.kind in ("position", "pixel")
+    return {
+        **dict.fromkeys(("ekf", "ukf", "imm"), ""),
+        "coloured": "" if placed else f"a {scans.kind} is no position, and only those are differenced",
+        "schmidt": "" if considered else "nothing is said of errors that last, and poses have no covariance",
+        "thinned": ""
+        if np.isfinite(beliefs.thinning_s)
+        else "nothing is said of how long errors last (thinning_s)",
+    }
+
+
+def white_noise(scans: Scans, sds: Array) -> Array:
+    """(N, m, m) of one detection a look, or (m, m): its own where it has one."""
+    return np.diag(np.asarray(sds, float) ** 2)
+
+
+def choose(scans: Scans, seen: Array, beliefs: Beliefs, targets: TargetBeliefs, begin: Start) -> Track:
+    """The filter with white noise, which chooses the nearest in its gate of ``seen`` (N, K, m)."""
+    sensor = sensor_of(scans, np.zeros_like(scans.platform))
+    return run_filter(
+        scans.times, seen, white_noise(scans, beliefs.white), sensor, motion_of(targets), begin,
+        gate_probability=targets.gate_probability,
+    )  # fmt: skip
+
+
+def follow_with(
+    name: str,
+    scans: Scans,
+    own: Array,
+    first: Track,
+    beliefs: Beliefs,
+    targets: TargetBeliefs,
+    begin: Start,
+) -> Track:
+    """One filter on the detections (N, m) that the white one, ``first``, chose.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such filter, or the detections cannot go through it.
+    """
+    why = possible(scans, beliefs).get(name, "there is no such filter")
+    if why:
+        able = ", ".join(one for one, reason in possible(scans, beliefs).items() if not reason)
+        raise WildlabError(
+            f"the filter {name!r} cannot follow by the sensor {scans.sensor!r}: {why}",
+            f"use one of {able}",
+            field="--filter",
+        )
+    if name == "ekf":
+        return first
+    sensor, motion = sensor_of(scans, np.zeros_like(scans.platform)), motion_of(targets)
+    white = white_noise(scans, beliefs.white)
+    if name == "ukf":
+        return run_unscented(scans.times, own, white, sensor, motion, begin)
+    if name == "imm":
+        both = [motion_of(targets, CALM), motion]
+        return run_imm(scans.times, own, white, sensor, both, (STAY_S, STAY_S), begin).track
+    if name == "thinned":
+        kept = thin(scans.times, beliefs.thinning_s, first.used)[:, None]
+        return run_filter(scans.times, np.where(kept, own, np.nan), white, sensor, motion, begin)
+    if name == "coloured":
+        return _coloured(scans, own, beliefs, motion, begin)
+    covariance = covariances_of(scans, beliefs)
+    if covariance is None:
+        raise AssertionError("what can be considered was asked for above")
+    times = [one.correlation_time_s for one in beliefs.considered]
+    # An error of the clock moves the target by what the filter with white noise says it moves.
+    drift = np.nan_to_num(first.x[:, 2:4] - scans.platform_velocity)
+    pose = PoseUncertainty(covariance, min(times, default=np.inf))
+    noise = white_noise(scans, beliefs.noise)
+    return run_filter(scans.times, own, noise, sensor_of(scans, drift), motion, begin, pose=pose)
+
+
+def _coloured(scans: Scans, own: Array, beliefs: Beliefs, motion: Motion, begin: Start) -> Track:
+    positions, R = _positions(scans, own, beliefs)
+    gap, F_c = beliefs.longest_gap_s, beliefs.fading
+    used = np.flatnonzero(np.isfinite(positions[:, 0]))
+    # Behind a gap the measurement itself is used, and its error is the whole one.
+    whole = np.ones(len(scans.times), bool)
+    whole[used[1:]] = np.diff(scans.times[used]) > gap
+    if beliefs.lasting is None:
+        lasting = _lasting(scans, positions, beliefs)
+        total = R + lasting
+        driving = (1 + F_c**2) * total - 2 * F_c * lasting
+    else:
+        total, driving = R, (1 + F_c**2 - 2 * F_c * beliefs.lasting) * R
+    R_w = np.where(whole[:, None, None], total, driving)
+    return run_coloured(scans.times, positions, R_w, motion, begin, F_c=np.eye(2) * F_c, longest_gap=gap)
+
+
+def _positions(scans: Scans, own: Array, beliefs: Beliefs) -> tuple[Array, Array]:
+    """North and east (N, 2) of measurements (N, m), and the covariances (N, 2, 2) that white noise gives."""
+    n = len(own)
+    if scans.kind == "position":
+        return own, np.tile(np.diag(beliefs.white**2), (n, 1, 1))
+    places, R = np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan)
+    bare = beliefs._replace(considered=())
+    alone = scans if scans.poses is None else scans._replace(
+        poses=type(scans.poses)(scans.poses.camera, scans.poses.mount, scans.poses.p_nb, scans.poses.R_nb,
+                                scans.poses.pan, scans.poses.tilt)
+    )  # fmt: skip
+    for row in np.flatnonzero(np.isfinite(own).all(axis=1)):
+        found = place_of(alone, int(row), own[row], bare)
+        if found is not None:
+            places[row], R[row] = found
+    return places, R
+
+
+def _lasting(scans: Scans, positions: Array, beliefs: Beliefs) -> Array:
+    """(N, 2, 2) what considered errors do to positions."""
+    pose = covariances_of(scans, beliefs)
+    if pose is None:
+        return np.zeros((len(positions), 2, 2))
+    expected = predict_scan(scans, positions, np.zeros_like(positions))
+    inverse = np.linalg.pinv(np.nan_to_num(expected.H_position[..., :2]))
+    J = inverse @ np.nan_to_num(expected.H_pose)
+    return np.asarray(J @ np.nan_to_num(pose) @ np.swapaxes(J, 1, 2))

@@ -1,0 +1,264 @@
+"""Targets of a flight followed by all of its sensors: what `wildlab track` does, as one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wildlab.errors import WildlabError
+from wildlab.flight.following import Settings
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import Beliefs, Said, TargetBeliefs, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.filters import NAMES, possible
+from wildlab.pipeline.following.tuned import Tuned
+from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of, truths_at
+from wildlab.pipeline.sensor_tracks import UNNAMED, SensorTrack, follow
+
+#: The filter without anything but white noise, which the others are held against.
+WHITE = "ekf"
+
+
+class Followed(NamedTuple):
+    """Targets followed through a flight.
+
+    Attributes
+    ----------
+    tracks
+        One for each sensor, target and filter, in this order.
+    scans, beliefs
+        By sensor.
+    said
+        What filters were told, and who says so.
+    notes
+        What was done to the measurements, in sentences.
+    truth
+        Whether any target's true place is known.
+    """
+
+    tracks: list[SensorTrack]
+    scans: dict[str, Scans]
+    beliefs: dict[str, Beliefs]
+    targets: TargetBeliefs
+    said: list[Said]
+    notes: list[str]
+    truth: bool
+
+
+def follow_targets(
+    flight: Flight,
+    *,
+    settings: Settings | None = None,
+    tuned: Tuned | None = None,
+    filters: Sequence[str] = (),
+    targets: Sequence[str] = (),
+    sensors: Sequence[str] = (),
+    source: str | None = None,
+    smooth: bool = False,
+) -> Followed:
+    """Follow targets by each sensor.
+
+    Parameters
+    ----------
+    settings
+        What is told of sensors and targets besides ``flight.toml``.
+    tuned
+        What another flight says of the sensors.
+    filters
+        Of `wildlab.pipeline.following.filters.NAMES`; left out: the one with white noise, and the Schmidt
+        filter beside it where there are errors to consider.
+    targets, sensors
+        Names; left out: all of them.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows.
+    """
+    if flight.manifest.time.kind != "utc":
+        raise WildlabError(
+            "the photos carry no time, and a track is over time",
+            "import the flight with times",
+            file=flight.folder,
+            field="time.kind",
+        )
+    told = of_flight(flight, settings)
+    believed, said = of_targets(told.targets)
+    if tuned is not None and tuned.density is not None and told.targets.acceleration_m_s_sqrt_s is None:
+        believed = believed._replace(density=tuned.density)
+        said = [one for one in said if not one.what.startswith("acceleration")]
+        said.insert(0, tuned.said_of_density())
+    wanted = sensors_with_detections(flight, sensors)
+    notes: list[str] = []
+    scans: dict[str, Scans] = {}
+    beliefs: dict[str, Beliefs] = {}
+    tracks: list[SensorTrack] = []
+    known: set[str] = set()
+    any_truth = False
+    for sensor in wanted:
+        there = None if tuned is None else tuned.sensors.get(sensor)
+        looks = scans_of(flight, sensor, 0.0, source)
+        belief, more = of_sensor(flight, looks, told, there, "" if tuned is None else tuned.flight)
+        if belief.offset_s:
+            looks = scans_of(flight, sensor, belief.offset_s, source)
+        looks = identified(looks, believed)
+        said += more
+        notes += order_notes(looks)
+        scans[sensor], beliefs[sensor] = looks, belief
+        truths = targets_of(flight, looks)
+        known |= {one.target for one in truths}
+        any_truth |= any(np.isfinite(one.position).any() for one in truths)
+        names = chosen_filters(looks, belief, filters)
+        for truth in truths:
+            if targets and truth.target not in targets:
+                continue
+            others = [one for one in truths if one.target != truth.target]
+            tracks += follow(looks, truth, belief, believed, names, others)
+    _refuse_unknown(targets, known, flight)
+    return Followed(tracks, scans, beliefs, believed, said, notes, any_truth)
+
+
+def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[str]:
+    """The sensors that are named, or all that detected something.
+
+    Raises
+    ------
+    WildlabError
+        Where nothing was detected, or there is no such sensor.
+    """
+    seen = flight.detections
+    if seen is None or not len(seen):
+        raise WildlabError(
+            "there are no detections, so there is nothing to follow",
+            "add detections: wildlab import takes them, wildlab detect finds them in images",
+            file=flight.folder,
+            field="detections",
+        )
+    known = sensors_of(flight)
+    for name in wanted:
+        if name not in known:
+            raise WildlabError(
+                f"there is no sensor {name!r}",
+                f"use one of {', '.join(known)}",
+                file=flight.folder,
+                field="--sensor",
+            )
+    saw = set(seen["source"])
+    found = list(dict.fromkeys(wanted)) or [name for name in known if name in saw]
+    if not found:
+        raise WildlabError(
+            "no detection is by a sensor that the frames name",
+            f"give the detections one of these as their source: {', '.join(known)}",
+            file=flight.folder,
+            field="detections.source",
+        )
+    return found
+
+
+def identified(scans: Scans, targets: TargetBeliefs) -> Scans:
+    """The scans with labels as far as they are to be believed."""
+    if targets.identified in ("gate", "one"):
+        return scans._replace(labels=np.full(scans.labels.shape, "", object))
+    if targets.identified == "label" and not scans.labelled:
+        raise WildlabError(
+            f"no detection of the sensor {scans.sensor!r} names its target",
+            'set identified = "gate" in [targets], or leave it out',
+            field="targets.identified",
+        )
+    return scans
+
+
+def targets_of(flight: Flight, scans: Scans) -> list[Truth]:
+    """The targets that a sensor may follow, with their true places as far as they are known."""
+    truths = [] if flight.truth is None or not len(flight.truth) else truths_at(flight, scans.times)
+    if not scans.labelled:
+        return truths or [_unknown(UNNAMED, scans)]
+    by_name = {one.target: one for one in truths}
+    names = dict.fromkeys(str(one) for one in scans.labels.ravel() if one)
+    return [by_name.get(name) or _unknown(name, scans) for name in names]
+
+
+def _unknown(name: str, scans: Scans) -> Truth:
+    nowhere = np.full((len(scans.times), 2), np.nan)
+    return Truth(name, nowhere, nowhere, 0.0)
+
+
+def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> list[str]:
+    """The filters for a sensor: those wanted, always with the white one first; or what there is data for.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such filter.
+    """
+    names = ["ekf" if name == "kf" else name for name in wanted]
+    for name in names:
+        if name not in NAMES:
+            raise WildlabError(
+                f"there is no filter {name!r}", f"use one of {', '.join(NAMES)}", field="--filter"
+            )
+    able = possible(scans, beliefs)
+    if not names:
+        names = [name for name in ("schmidt", "coloured") if not able[name] and not able["schmidt"]]
+    return list(dict.fromkeys([WHITE, *names]))
+
+
+def order_notes(scans: Scans) -> list[str]:
+    """What was done about looks that were logged late, or at one time."""
+    found = []
+    if scans.late:
+        looks = "1 look" if scans.late == 1 else f"{scans.late} looks"
+        found.append(
+            f"{looks} of {scans.sensor} of {len(scans.times)} came after one with a later stamp, and "
+            f"{'was' if scans.late == 1 else 'were'} put in order."
+        )
+    if scans.same_time:
+        found.append(f"{scans.same_time} of {scans.sensor} have the stamp of the look before: both count.")
+    return found
+
+
+def _refuse_unknown(targets: Sequence[str], known: set[str], flight: Flight) -> None:
+    for name in targets:
+        if name not in known:
+            fix = f"use one of {', '.join(sorted(known))}"
+            if known == {UNNAMED}:
+                fix = "leave --target out: no detection names one, and there is no truth"
+            raise WildlabError(f"there is no target {name!r}", fix, file=flight.folder, field="--target")
+
+
+def refuse_unusable(
+    flight: Flight,
+    settings: Settings | None,
+    filters: Sequence[str],
+    targets: Sequence[str],
+    sensors: Sequence[str],
+    source: str | None,
+) -> None:
+    """Refuse what `follow_targets` would refuse, as far as that shows without following anything.
+
+    Raises
+    ------
+    WildlabError
+        As `follow_targets`.
+    """
+    if flight.manifest.time.kind != "utc":
+        raise WildlabError(
+            "the photos carry no time, and a track is over time",
+            "import the flight with times",
+            file=flight.folder,
+            field="time.kind",
+        )
+    believed, _ = of_targets(of_flight(flight, settings).targets)
+    for name in filters:
+        if name not in (*NAMES, "kf"):
+            raise WildlabError(
+                f"there is no filter {name!r}", f"use one of {', '.join(NAMES)}", field="--filter"
+            )
+    known: set[str] = set()
+    for sensor in sensors_with_detections(flight, sensors):
+        looks = identified(scans_of(flight, sensor, 0.0, source), believed)
+        known |= {one.target for one in targets_of(flight, looks)}
+    _refuse_unknown(targets, known, flight)

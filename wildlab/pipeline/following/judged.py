@@ -1,0 +1,171 @@
+"""How far to believe tracks: errors and NEES beside the truth, NIS and whiteness, sensors beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.consistency import (
+    Average,
+    average,
+    chi_square_interval,
+    nees,
+    share_inside,
+    whiten,
+)
+from wildlab.evaluation.runs import share_interval
+from wildlab.evaluation.track_errors import summarise_track, track_errors
+from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.sensor_tracks import SensorTrack
+
+#: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
+FEW_INDEPENDENT = 30.0
+CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "too cautious", "not judged"
+
+
+def verdict(mean: Average) -> str:
+    """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS."""
+    if not mean.n:
+        return UNKNOWN
+    return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
+
+
+def worth(values: Array) -> float:
+    """How many independent values a series with NaN is worth."""
+    known = values[np.isfinite(values)]
+    return effective_sample_size(known, len(known) - 1) if len(known) > 3 else float(len(known))
+
+
+def mean_of(values: Array, dof: int) -> Average:
+    """The mean with the band for as many independent values as there are."""
+    return average(values, dof, worth(values))
+
+
+def judged(followed: Followed) -> pd.DataFrame:
+    """One row for each track.
+
+    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``rmse``, ``mae`` and ``rmse_speed``
+    beside the truth, of ``compared`` looks; ``nees`` with ``nees_low``, ``nees_high`` and ``nees_worth``
+    independent values, its ``verdict``; ``inside``, the share of looks in the band of single values, with
+    ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and ``nis_verdict``;
+    ``lag1``: the largest autocorrelation of an element of the whitened innovations from one detection to the
+    next, with ``lag1_bound``, what white noise stays below; ``followed``: the share of looks with truth that
+    have a track.
+    """
+    return pd.DataFrame([_row(one, followed.scans[one.sensor].kind) for one in followed.tracks])
+
+
+def _row(one: SensorTrack, kind: str) -> dict[str, object]:
+    summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
+    m = one.innovation.shape[1]
+    of_nees, of_nis = mean_of(one.nees, 2), mean_of(one.nis, m)
+    inside = share_inside(one.nees, chi_square_interval(2))
+    band = (np.nan, np.nan)
+    if of_nees.n and of_nees.worth >= 1:
+        band = share_interval(inside * of_nees.worth, of_nees.worth)[1:]
+    white = whitened(one)
+    lags = [float(autocorrelation(column, 1)[1]) for column in white.T] if len(white) > 3 else []
+    return {
+        "sensor": one.sensor,
+        "kind": kind,
+        "target": one.target,
+        "filter": one.filter,
+        "detections": int(np.isfinite(one.nis).sum()),
+        "compared": of_nees.n,
+        "rmse": summary.rmse,
+        "mae": summary.mae,
+        "rmse_speed": summary.rmse_speed,
+        "nees": of_nees.mean,
+        "nees_low": of_nees.low,
+        "nees_high": of_nees.high,
+        "nees_worth": of_nees.worth,
+        "verdict": verdict(of_nees),
+        "inside": inside,
+        "inside_low": band[0],
+        "inside_high": band[1],
+        "nis": of_nis.mean,
+        "nis_low": of_nis.low,
+        "nis_high": of_nis.high,
+        "nis_worth": of_nis.worth,
+        "nis_verdict": verdict(of_nis),
+        "dof": m,
+        "lag1": max(lags, key=abs, default=np.nan),
+        "lag1_bound": white_bound(len(white)) if len(white) else np.nan,
+        "followed": float(np.isfinite(one.error[:, 0]).sum() / one.known.sum())
+        if one.known.any()
+        else np.nan,
+    }
+
+
+def whitened(one: SensorTrack) -> Array:
+    """(K, m) innovations of the detections used, each in units of its own standard deviation."""
+    used = np.isfinite(one.nis)
+    return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
+
+
+class Apart(NamedTuple):
+    """Two sensors' tracks of one target by one filter: how far apart, and how far they say they may be.
+
+    ``rms`` m over ``n`` looks; ``squares``: the mean of the squared distance in units of both covariances,
+    two where both are right and their errors have nothing to do with each other.
+    """
+
+    target: str
+    filter: str
+    one: str
+    other: str
+    rms: float
+    n: int
+    squares: Average
+
+
+def apart(followed: Followed) -> list[Apart]:
+    """Every two sensors that follow the same target by the same filter, at the looks of the first."""
+    found = []
+    groups: dict[tuple[str, str], list[SensorTrack]] = {}
+    for track in followed.tracks:
+        groups.setdefault((track.target, track.filter), []).append(track)
+    for (target, name), tracks in groups.items():
+        for a, b in combinations(tracks, 2):
+            x, P = _between(b, a.times)
+            gap = a.estimate[:, :2] - x
+            both = np.isfinite(gap).all(axis=1)
+            if not both.any():
+                continue
+            squares = np.full(len(gap), np.nan)
+            squares[both] = nees(gap[both], (a.covariance[:, :2, :2] + P)[both])
+            rms = float(np.sqrt(np.mean(np.sum(gap[both] ** 2, axis=1))))
+            found.append(Apart(target, name, a.sensor, b.sensor, rms, int(both.sum()), mean_of(squares, 2)))
+    return found
+
+
+def _between(one: SensorTrack, times: Array) -> tuple[Array, Array]:
+    """Position (N, 2) and its covariance at other times: carried on from the look before."""
+    row = np.searchsorted(one.times, times, side="right") - 1
+    there = row >= 0
+    row = np.maximum(row, 0)
+    dt = (times - one.times[row])[:, None]
+    x = one.estimate[row, :2] + dt * one.estimate[row, 2:4]
+    F = np.tile(np.eye(2, 4), (len(times), 1, 1))
+    F[:, 0, 2] = F[:, 1, 3] = dt[:, 0]
+    P = F @ one.covariance[row] @ np.swapaxes(F, 1, 2)
+    ended = ~there | (times > one.times[-1])
+    x[ended] = np.nan
+    return x, P
+
+
+def best_of(rows: pd.DataFrame, filters: Sequence[str]) -> str:
+    """The filter whose tracks are most often consistent; of equals the one with the smaller error."""
+    score = []
+    for name in filters:
+        mine = rows[rows["filter"] == name]
+        share = float((mine["verdict"] == CONSISTENT).mean()) if len(mine) else 0.0
+        off = float(np.abs(np.log(mine["nees"] / 2)).mean()) if len(mine) else np.inf
+        score.append((-share, off if np.isfinite(off) else np.inf, name))
+    return min(score)[2]

@@ -1,0 +1,112 @@
+"""Where a track of one sensor starts: at rest, on a detection, as uncertain as that leaves it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wildlab.geometry.frames import Array
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.considering import covariances_of
+from wildlab.pipeline.following.expected import errors_near, predict_scan
+from wildlab.pipeline.scans import Scans, Truth
+from wildlab.tracking.run import Start
+
+
+def start_near(
+    scans: Scans, truth: Truth, beliefs: Beliefs, targets: TargetBeliefs, others: Sequence[Truth] = ()
+) -> Start | None:
+    """A start at the first detection within reach of the target's true place; None where there is none.
+
+    One that lies nearer to one of the ``others`` is not taken. The detection itself is not used up: the start
+    is as uncertain as the search was wide, and the detection is the first that the filter is given.
+    """
+    reach = targets.reach(scans.kind)
+    error, nearest = errors_near(scans, truth, reach)
+    taken = nearest >= 0
+    for other in others:
+        beside, its = errors_near(scans, other, reach)
+        rival = (its == nearest) & (np.linalg.norm(beside, axis=1) < np.linalg.norm(error, axis=1))
+        taken &= ~rival
+    rows = np.flatnonzero(taken & np.isfinite(scans.platform).all(axis=1))
+    for row in rows:
+        z = scans.detections[row, nearest[row]]
+        place = place_of(scans, int(row), z, beliefs)
+        if place is None:
+            continue
+        x, P = place
+        if scans.kind == "position":
+            P = np.eye(2) * reach**2
+        elif scans.kind == "bearing" and len(z) == 1:
+            ahead = np.array([np.cos(z[0]), np.sin(z[0])])
+            right = np.array([-ahead[1], ahead[0]])
+            P = beliefs.range_sd_m**2 * np.outer(ahead, ahead)
+            P += (beliefs.range_m * reach) ** 2 * np.outer(right, right)
+        return at_rest(float(scans.times[row]), x, P, targets)
+    return None
+
+
+def start_first(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
+    """A start on the first usable row of ``own`` (N, m), which is used up; None where there is none."""
+    for row in np.flatnonzero(np.isfinite(own).all(axis=1) & np.isfinite(scans.platform).all(axis=1)):
+        place = place_of(scans, int(row), own[row], beliefs)
+        if place is not None:
+            return at_rest(float(scans.times[row]), *place, targets, int(row))
+    return None
+
+
+def at_rest(time: float, place: Array, P: Array, targets: TargetBeliefs, row: int = -1) -> Start:
+    """A start at rest, with the covariance (2, 2) of the place."""
+    both = np.zeros((4, 4))
+    both[:2, :2], both[2:, 2:] = P, np.eye(2) * targets.start_speed_m_s**2
+    return Start(time, np.concatenate([place, np.zeros(2)]), both, row)
+
+
+def place_of(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> tuple[Array, Array] | None:
+    """North and east that a measurement (m,) says, with what noise and considered errors leave uncertain.
+
+    None where it does not say: a velocity, a ray that meets no ground, a bearing whose distance nobody knows.
+    """
+    place = _place(scans, row, z, beliefs)
+    if place is None or not np.isfinite(place).all():
+        return None
+    R = np.diag(beliefs.white**2)
+    if scans.kind == "bearing" and len(z) == 1:
+        ahead = np.array([np.cos(z[0]), np.sin(z[0])])
+        right = np.array([-ahead[1], ahead[0]])
+        across = beliefs.range_m * float(beliefs.white[0])
+        P = beliefs.range_sd_m**2 * np.outer(ahead, ahead) + across**2 * np.outer(right, right)
+        return place, P
+    n = len(scans.times)
+    expected = predict_scan(scans, np.tile(place, (n, 1)), np.zeros((n, 2)))
+    H, G = expected.H_position[row, :, :2], expected.H_pose[row]
+    pose = covariances_of(scans, beliefs)
+    if pose is not None and np.isfinite(pose[row]).all():
+        R = R + G @ pose[row] @ G.T
+    if not np.isfinite(H).all():
+        return None
+    inverse = np.linalg.pinv(H)
+    return place, np.asarray(inverse @ R @ inverse.T)
+
+
+def _place(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> Array | None:
+    if scans.kind == "position":
+        return np.asarray(z[:2])
+    if scans.kind == "pixel" and scans.poses is not None:
+        ground = georeference_pixels(scans.poses.take(np.array([row])), z[None], scans.plane_down[[row]])
+        return np.asarray(ground[0, :2])
+    if scans.kind == "velocity":
+        return None
+    elements = dict(zip(scans.elements, z, strict=True))
+    drop = float(np.nan_to_num(scans.drop[row]))
+    if "range" in elements:
+        r = float(np.sqrt(max(elements["range"] ** 2 - drop**2, 0.0)))
+    elif "elevation" in elements:
+        below = np.tan(-elements["elevation"])
+        r = drop / below if below * drop > 0 else np.nan
+    else:
+        r = beliefs.range_m
+    azimuth = elements["azimuth"]
+    return scans.platform[row] + r * np.array([np.cos(azimuth), np.sin(azimuth)])

@@ -1,0 +1,109 @@
+"""What one flight teaches about sensors and targets, for another one to be judged by."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+from wildlab.errors import WildlabError
+from wildlab.flight.checksums import checksums_of
+from wildlab.flight.following import Settings
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import Said, TargetBeliefs, of_flight, of_targets
+from wildlab.pipeline.sensor_tuning import SensorTuning, tune
+
+Against = Literal["truth", "innovations"]
+
+
+class Tuned(NamedTuple):
+    """What a flight says of its sensors.
+
+    ``flight`` is its name, ``against`` what its detections were held against. ``density`` (m/s per root
+    second) of the targets, where it was found too.
+    """
+
+    flight: str
+    against: Against
+    sensors: dict[str, SensorTuning]
+    density: float | None = None
+
+    def said_of_density(self) -> Said:
+        """For the table of what filters were told."""
+        words = "acceleration, SD of the velocity that grows in a second"
+        return Said("targets", words, f"{self.density or 0.0:.3g} m/s", f"tuned on {self.flight}")
+
+
+def tuned_text(tuned: Tuned) -> str:
+    """As text, which a notebook is given."""
+    sensors = {name: one._asdict() for name, one in tuned.sensors.items()}
+    return json.dumps(
+        {"flight": tuned.flight, "against": tuned.against, "sensors": sensors, "density": tuned.density}
+    )
+
+
+def read_tuned(text: str) -> Tuned | None:
+    """What `tuned_text` wrote; None of an empty text."""
+    if not text:
+        return None
+    data: Mapping[str, Any] = json.loads(text)
+    sensors = {
+        name: SensorTuning(**{**one, "own_sds": tuple(one["own_sds"])})
+        for name, one in data["sensors"].items()
+    }
+    return Tuned(data["flight"], data["against"], sensors, data["density"])
+
+
+def tune_flight(
+    flight: Flight,
+    sensors: Sequence[str],
+    settings: Settings | None = None,
+    against: Against | None = None,
+    source: str | None = None,
+) -> Tuned:
+    """Tune sensors on a flight: against truth where it has any, else by the likelihood of innovations.
+
+    Raises
+    ------
+    WildlabError
+        Where truth is asked for and not there, or the flight shows too little of a sensor.
+    """
+    has_truth = flight.truth is not None and len(flight.truth) > 0
+    if against == "truth" and not has_truth:
+        raise WildlabError(
+            f"the flight {flight.name!r} has no truth to tune against",
+            "tune by its innovations (--against innovations), or on another flight",
+            file=flight.folder,
+            field="--against",
+        )
+    if against == "innovations" or not has_truth:
+        from wildlab.pipeline.following.likelihood import tune_by_innovations
+
+        found, density = tune_by_innovations(flight, sensors, settings, source)
+        return Tuned(flight.name, "innovations", found, density)
+    targets: TargetBeliefs = of_targets(of_flight(flight, settings).targets)[0]
+    found = {sensor: tune(flight, sensor, targets.reach, source) for sensor in sensors}
+    return Tuned(flight.name, "truth", found)
+
+
+def refuse_same(flight: Flight, other: Flight) -> None:
+    """Refuse to tune on the flight that is judged: one whose detections are the same, whatever its name.
+
+    Raises
+    ------
+    WildlabError
+        Where it is.
+    """
+    same = False
+    if flight.folder is not None and other.folder is not None:
+        mine, its = checksums_of(flight.folder), checksums_of(other.folder)
+        same = "detections.parquet" in mine and mine["detections.parquet"] == its.get("detections.parquet")
+    same = same or (flight.detections is not None and flight.detections.equals(other.detections))
+    if same:
+        raise WildlabError(
+            "this is the flight that is judged: its detections are the same, and nothing is tuned where it "
+            "is judged",
+            "tune on another flight",
+            file=other.folder,
+            field="--tune",
+        )

@@ -1,0 +1,285 @@
+"""What the report on a flight's tracks says: all of it follows from the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.judged import (
+    CAUTIOUS,
+    CONSISTENT,
+    FEW_INDEPENDENT,
+    OVERCONFIDENT,
+    UNKNOWN,
+    Apart,
+    verdict,
+)
+from wildlab.pipeline.following.tuned import Tuned
+from wildlab.reporting.report import Report
+
+#: Errors nearer to what is stated than by this factor are "about as large".
+ALIKE = 1.2
+WORDS = {
+    "ekf": "white noise (EKF)",
+    "ukf": "white noise (UKF)",
+    "imm": "two motions (IMM)",
+    "coloured": "coloured noise",
+    "schmidt": "considered errors (Schmidt)",
+    "thinned": "thinned detections",
+}
+
+
+def filter_words(name: str) -> str:
+    """A filter's name in words; a smoothed one says so."""
+    return WORDS.get(name.removesuffix("-smoothed"), name) + (
+        ", smoothed" if name.endswith("-smoothed") else ""
+    )
+
+
+def length(metres: float) -> str:
+    """Metres with sensible digits.
+
+    Examples
+    --------
+    >>> length(0.234), length(12.3), length(3.46)
+    ('0.23 m', '12 m', '3.5 m')
+    """
+    return f"{metres:.2f} m" if metres < 1 else f"{metres:.1f} m" if metres < 10 else f"{metres:.0f} m"
+
+
+def size_words(nees: float) -> str:
+    """Errors beside what a filter states, of a mean NEES of two degrees of freedom.
+
+    Examples
+    --------
+    >>> size_words(18.0), size_words(2.1), size_words(0.5)
+    ('3.0 times as large as stated', 'about as large as stated', '0.50 of what is stated')
+    """
+    factor = float(np.sqrt(nees / 2))
+    if factor > ALIKE:
+        return f"{factor:.1f} times as large as stated"
+    if factor < 1 / ALIKE:
+        return f"{factor:.2f} of what is stated"
+    return "about as large as stated"
+
+
+def verdict_words(row: pd.Series, what: str = "nees") -> str:
+    """The verdict with its band, and whether it stands on few independent values."""
+    said = str(row["verdict" if what == "nees" else "nis_verdict"])
+    few = row[f"{what}_worth"] < FEW_INDEPENDENT and said not in (CONSISTENT, UNKNOWN)
+    return said + (", on few independent values" if few else "")
+
+
+def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> tuple[list[str], str]:
+    """The first sentences of the page, and its level."""
+    if not (rows["detections"] > 0).any():
+        return (
+            ["No track was started: no detection gives a place to start from near a target."],
+            "bad",
+        )
+    known = rows[rows["compared"] > 0]
+    said, level = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
+    lost = rows[(rows["detections"] == 0)].drop_duplicates(["sensor", "target"])
+    if len(lost):
+        names = ", ".join(f"{one.target} by {one.sensor}" for one in lost.itertuples())
+        said.append(f"Never followed: {names}.")
+    if tuned is not None:
+        how = "its truth" if tuned.against == "truth" else "the likelihood of its innovations"
+        said.append(f"Tuned on the flight {tuned.flight} by {how}, judged on this one.")
+    return said, level
+
+
+def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
+    filters = list(dict.fromkeys(rows["filter"]))
+    said = []
+    by_name = {name: rows[rows["filter"] == name] for name in filters}
+    white = by_name.get("ekf")
+    best = _most_consistent(by_name)
+    mine = by_name[best]
+    what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
+    are = "is" if len(mine) == 1 else "are"
+    said.append(
+        f"{what} of the filter with {filter_words(best)} {are} off by {length(_root(mine['rmse']))} (root mean "
+        f"square), and the errors are {size_words(float(mine['nees'].mean()))}: {_counts(mine)}."
+    )
+    if white is not None and best != "ekf":
+        gain = _root(mine["rmse"]) / _root(white["rmse"])
+        said.append(
+            f"With {filter_words('ekf')} the errors are {size_words(float(white['nees'].mean()))}: "
+            f"{_counts(white)}; {_error_change(gain)}."
+        )
+    good = (mine["verdict"] == CONSISTENT).all()
+    none = not (mine["verdict"] == CONSISTENT).any()
+    return said, "good" if good else "bad" if none and (mine["verdict"] == OVERCONFIDENT).all() else "warn"
+
+
+def _most_consistent(by_name: dict[str, pd.DataFrame]) -> str:
+    def score(name: str) -> tuple[float, float]:
+        mine = by_name[name]
+        return -float((mine["verdict"] == CONSISTENT).mean()), float(np.abs(np.log(mine["nees"] / 2)).mean())
+
+    return min(by_name, key=score)
+
+
+def _root(values: pd.Series) -> float:
+    return float(np.sqrt(np.mean(np.square(values.to_numpy(float)))))
+
+
+def _error_change(gain: float) -> str:
+    if gain < 1 / 1.05:
+        return f"its errors are {1 / gain:.2f} times as large as the other's"
+    if gain > 1.05:
+        return f"its errors are {1 / gain:.2f} of the other's"
+    return "its errors are about the other's"
+
+
+def _counts(rows: pd.DataFrame, column: str = "verdict") -> str:
+    order = (CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN)
+    counts = {name: int((rows[column] == name).sum()) for name in order}
+    if len(rows) == 1:
+        return next(name for name, count in counts.items() if count)
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+
+
+def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str], str]:
+    filters = list(dict.fromkeys(rows["filter"]))
+    by_name = {name: rows[rows["filter"] == name] for name in filters}
+    name = min(filters, key=lambda one: -float((by_name[one]["nis_verdict"] == CONSISTENT).mean()))
+    mine = by_name[name]
+    factor = float(np.sqrt((mine["nis"] / mine["dof"]).mean()))
+    said = [
+        f"Detections fall {_off(factor)} from where the filter with {filter_words(name)} expects them as it "
+        f"states: {_counts(mine, 'nis_verdict')}.",
+        "How far off the tracks are cannot be said without the targets' true places.",
+    ]
+    used = [one for one in pairs if one.filter == name]
+    for one in used[:2]:
+        said.append(apart_sentence(one))
+    agree = all(verdict(one.squares) == CONSISTENT for one in used)
+    good = (mine["nis_verdict"] == CONSISTENT).all() and agree
+    return said, "neutral" if good else "warn"
+
+
+def _off(factor: float) -> str:
+    if factor > ALIKE:
+        return f"{factor:.1f} times as far"
+    if factor < 1 / ALIKE:
+        return f"{factor:.2f} times as far"
+    return "about as far"
+
+
+def apart_sentence(one: Apart) -> str:
+    """How far two sensors put one target apart, beside what their tracks state."""
+    return (
+        f"{one.one} and {one.other} put {one.target} {length(one.rms)} apart (root mean square), "
+        f"{_off(float(np.sqrt(one.squares.mean / 2)))} as their tracks state."
+    )
+
+
+def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
+    """A row for each track: errors, NEES, NIS, autocorrelation, each beside what it should be."""
+    truth = bool((rows["compared"] > 0).any())
+
+    def band(row: pd.Series, what: str) -> str:
+        if not np.isfinite(row[what]):
+            return "–"
+        return f"{row[what]:.2f} ({row[f'{what}_low']:.2f} to {row[f'{what}_high']:.2f})"
+
+    shown = []
+    for _, row in rows.iterrows():
+        one = {
+            "sensor": row["sensor"],
+            "target": row["target"],
+            "filter": filter_words(row["filter"]),
+            "detections": int(row["detections"]),
+        }
+        if truth:
+            inside = "–"
+            if np.isfinite(row["inside"]):
+                low, high = 100 * row["inside_low"], 100 * row["inside_high"]
+                inside = f"{100 * row['inside']:.0f} % ({low:.0f} to {high:.0f})"
+            one |= {
+                "rmse": row["rmse"],
+                "nees": band(row, "nees"),
+                "inside": inside,
+                "verdict": verdict_words(row),
+            }
+        one |= {"nis": band(row, "nis"), "lag1": row["lag1"]}
+        if not truth:
+            one["verdict"] = verdict_words(row, "nis")
+        shown.append(one)
+    return pd.DataFrame(shown)
+
+
+HEADINGS = {
+    "sensor": "sensor",
+    "target": "target",
+    "filter": "filter",
+    "detections": "detections",
+    "rmse": "RMS error (m)",
+    "nees": "mean NEES (95 % band)",
+    "inside": "inside the band",
+    "nis": "mean NIS (95 % band)",
+    "lag1": "autocorrelation",
+    "verdict": "verdict",
+}
+
+
+def columns_of(table: pd.DataFrame) -> dict[str, str]:
+    """Headings of the columns that are there."""
+    return {name: words for name, words in HEADINGS.items() if name in table}
+
+
+def said_table(said: Sequence[Said]) -> pd.DataFrame:
+    """What filters were told, assumed values first."""
+    ordered = sorted(said, key=lambda one: not one.source.startswith("assumed"))
+    return pd.DataFrame(
+        [{"of": one.subject, "what": one.what, "value": one.value, "source": one.source} for one in ordered]
+    )
+
+
+def assumed_sentence(said: Sequence[Said]) -> str:
+    """How much of what filters were told is assumed; nothing where none is."""
+    assumed = sum(one.source.startswith("assumed") for one in said)
+    if not assumed:
+        return "All that the filters were told is stated or was tuned on another flight."
+    return (
+        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in flight.toml "
+        "or with --settings, or tune them on another flight (--tune)."
+    )
+
+
+def record(report: Report, rows: pd.DataFrame) -> None:
+    """The numbers of every track, for ``metrics.json``."""
+    for _, row in rows.iterrows():
+        subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
+        for name, unit, low, high, n in (
+            ("rmse", "m", None, None, "compared"),
+            ("nees", "1", "nees_low", "nees_high", "compared"),
+            ("nis", "1", "nis_low", "nis_high", "detections"),
+            ("fraction_nees_inside", "1", "inside_low", "inside_high", "compared"),
+            ("lag1_autocorrelation", "1", None, None, "detections"),
+            ("share_followed", "1", None, None, None),
+        ):
+            column = {"fraction_nees_inside": "inside", "lag1_autocorrelation": "lag1",
+                      "share_followed": "followed"}.get(name, name)  # fmt: skip
+            if not np.isfinite(row[column]):
+                continue
+            report.metric(
+                name,
+                subject,
+                float(row[column]),
+                unit,
+                n=None if n is None else int(row[n]),
+                low=None if low is None or name in ("nees", "nis") else float(row[low]),
+                high=None if high is None or name in ("nees", "nis") else float(row[high]),
+            )
+
+
+def notes_of(followed: Followed) -> list[str]:
+    """What was done to the measurements."""
+    return list(followed.notes)
