@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
 from wildlab.flight.card.blocks import has_utc, stream_of
-from wildlab.flight.card.heights import Heights, heights_of
+from wildlab.flight.card.heights import Heights, Key, heights_of
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.logs.log import Stream
@@ -82,9 +82,9 @@ def _comment(text: str) -> str:
 class Sources:
     """The logs' tables that a recipe asks for, each named once."""
 
-    def __init__(self, wishes: Wishes, streams: dict[tuple[str, str], Stream]) -> None:
+    def __init__(self, wishes: Wishes, streams: dict[Key, Stream], own: Collection[Key]) -> None:
         self.wishes, self.streams = wishes, streams
-        self.heights: Heights = heights_of(streams, wishes.geoid_m)
+        self.heights: Heights = heights_of(streams, own, wishes.geoid_m)
         self.logs: dict[str, dict[str, Any]] = {}
 
     def table(self, choice: Choice, part: str, name: str) -> str:

@@ -51,7 +51,8 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
             "name the log of the flight, or say with --role which file it is",
         )
     streams = _streams(own, camera, receiver, images, by_role)
-    sources = Sources(wishes, streams)
+    aboard = {one.found.name for one in (own, camera, receiver, images) if one is not None}
+    sources = Sources(wishes, streams, [key for key in streams if key[0] in aboard])
     proposal.said += sources.heights.said
     vehicle = own.found.log.vehicle if own is not None and own.found.log is not None else ""
     data = proposal.data
