@@ -33,6 +33,7 @@ ANYTHING = click.Path(path_type=Path)
 @click.option("--zone", help="Of wall clocks that state none: Europe/Oslo, or +02:00.")
 @click.option("--camera-offset", type=float, metavar="SECONDS", help="To add to the stamps of the images.")
 @click.option("--geoid", type=float, metavar="METRES", help="How far the geoid is above the ellipsoid there.")
+@click.option("--take-off", type=float, metavar="METRES", help="Height of the take-off above sea level.")
 @click.option("--start", help="When the clock of a log without UTC stood at zero: 2026-05-01T06:00:00Z.")
 @click.option("--source", type=FOLDER, help="Of a recipe: folder of the raw files.  [default: the recipe's]")
 @click.option("--calibration", type=FILE, help="What `wildlab calibrate` learnt, to be kept with the flight.")
@@ -74,7 +75,7 @@ def import_(
       wildlab import recipe.toml --source logs --into flights/mine
     """
     options = {name: stated.pop(name) for name in ("roles", "name", "camera", "zone", "camera_offset")}
-    options |= {name: stated.pop(name) for name in ("geoid", "start")}
+    options |= {name: stated.pop(name) for name in ("geoid", "take_off", "start")}
     terrain = says_of(map_, stated, "--terrain-")
     recipe = len(raw) == 1 and raw[0].suffix.lower() == ".toml"
     if into is None and not dry_run:
@@ -178,6 +179,7 @@ def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -
         camera=None if options["camera"] is None else read_camera(options["camera"]).camera,
         camera_offset_s=options["camera_offset"],
         geoid_m=options["geoid"],
+        take_off_m=options["take_off"],
         start=start,
         zone=options["zone"],
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+from wildlab.errors import WildlabError
 from wildlab.flight.card.blocks import has_utc, stream_of
 from wildlab.flight.card.heights import Heights, Key, heights_of
 from wildlab.flight.card.roles import Choice
@@ -38,6 +39,8 @@ class Wishes:
         What to add to the stamps of the images, None for an estimate.
     geoid_m
         How far the geoid is above the ellipsoid there.
+    take_off_m
+        Height of the take-off above sea level.
     start
         When the clock of a log that does not know UTC stood at zero.
     zone
@@ -50,6 +53,7 @@ class Wishes:
     camera: CameraPart | None = None
     camera_offset_s: float | None = None
     geoid_m: float | None = None
+    take_off_m: float | None = None
     start: datetime | None = None
     zone: str | None = None
     sensitivity: str = "withheld"
@@ -84,7 +88,7 @@ class Sources:
 
     def __init__(self, wishes: Wishes, streams: dict[Key, Stream], own: Collection[Key]) -> None:
         self.wishes, self.streams = wishes, streams
-        self.heights: Heights = heights_of(streams, own, wishes.geoid_m)
+        self.heights: Heights = heights_of(streams, own, wishes.geoid_m, wishes.take_off_m)
         self.logs: dict[str, dict[str, Any]] = {}
 
     def table(self, choice: Choice, part: str, name: str) -> str:
@@ -97,7 +101,22 @@ class Sources:
         if chosen is not None:
             block |= {"height": chosen.kind} | ({"add_m": chosen.add_m} if chosen.add_m else {})
         stream = stream_of(choice, part)
-        if not has_utc(stream) and self.wishes.start is not None:
+        # Images have ways of their own to their time; points and pixels have none.
+        if part not in ("photos", "marks", "clicks") and not has_utc(stream):
+            if self.wishes.start is None:
+                raise _no_utc(choice)
             block["offset_s"] = self.wishes.start.timestamp()
         self.logs[name] = block
         return name
+
+
+def _no_utc(choice: Choice) -> WildlabError:
+    """What to state of a log that does not know UTC."""
+    clock = choice.found.log.clock if choice.found.log is not None else None
+    if clock is not None and "zone" in clock.base:
+        problem = f"the clock of {choice.found.shown} is local time, and nothing says its zone"
+        return WildlabError(problem, "state it, as --zone Europe/Oslo or --zone +02:00", field="--zone")
+    problem = f"the clock of {choice.found.shown} does not know UTC"
+    return WildlabError(
+        problem, "state when it stood at zero, as --start 2026-05-01T06:00:00Z", field="--start"
+    )

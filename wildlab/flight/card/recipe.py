@@ -46,6 +46,12 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     proposal = Proposal({"name": wishes.name})
     placed = _placed(images)
     if own is None and camera is None and receiver is None and not placed:
+        if any("without a zone" in one.why for one in choices):
+            raise WildlabError(
+                "the only clock is local time, and nothing says its zone",
+                "state it, as --zone Europe/Oslo or --zone +02:00",
+                field="--zone",
+            )
         raise WildlabError(
             "nothing here says where a camera was",
             "name the log of the flight, or say with --role which file it is",

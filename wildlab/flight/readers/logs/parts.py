@@ -57,7 +57,9 @@ def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
     use, why = columns["use"].copy(), columns["why"].copy()
     if "time_s" in columns or "time_log_s" in columns:
         known = columns.get("time_s", np.full(len(stream), np.nan))
-        if not np.isfinite(known).any() and "time_log_s" in columns:
+        # The log's own stamps, where the recipe says what they count from; those of images may stand alone.
+        stated = wanted.offset_s or wanted.part == "photos"
+        if stated and not np.isfinite(known).any() and "time_log_s" in columns:
             known = columns["time_log_s"]
         columns["time_s"] = known + wanted.offset_s
     if wanted.height is not None:
