@@ -165,6 +165,15 @@ def test_definitions_that_change_hold_from_there_on() -> None:
     np.testing.assert_array_equal(table.numbers("V"), [np.nan, 0.25])
 
 
+def test_definitions_that_change_without_end_are_not_followed() -> None:
+    message = b"\xa3\x95\x01" + bytes(9)
+    data = b"".join(fmt(1, "ATT", "QB", f"TimeUS,W{i}") + message for i in range(20_000))
+    begun = time.monotonic()
+    found = read_records(data)
+    assert len(found.tables["ATT"]) == 8 and found.lost_bytes == len(message) * (20_000 - 8)
+    assert time.monotonic() - begun < 5
+
+
 @pytest.mark.parametrize(
     "definition",
     [

@@ -105,6 +105,18 @@ class Table:
         return _LABELS[unit][label] * by if by > 0 and math.isfinite(by) else usual
 
 
+def percent(count: int, total: int) -> str:
+    """A share in percent, as it stands in sentences.
+
+    Examples
+    --------
+    >>> percent(1, 30000), percent(299, 300)
+    ('0.0033 %', '99.7 %')
+    """
+    value = 100 * count / total
+    return f"{value:.2g} %" if value < 1 else f"{value:.1f} %"
+
+
 def merge(tables: Sequence[Table]) -> Table:
     """Messages of one name whose columns differ, as one table: NaN or "" where one has no such field."""
     if len(tables) == 1:

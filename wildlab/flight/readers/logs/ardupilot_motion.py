@@ -72,7 +72,7 @@ def stream(
     both = {"time_s": times.utc(stamps) if utc is None else utc, "time_log_s": stamps}
     judged = both["time_s"] if np.isfinite(both["time_s"]).any() else stamps
     wanted = ~np.logical_or.reduce([*unusable.values(), np.zeros(len(stamps), bool)])
-    kept = in_order(judged, wanted) if np.isfinite(judged).any() else np.ones(len(stamps), bool)
+    kept = in_order(judged, wanted) if times.clock is not None else np.ones(len(stamps), bool)
     same = np.zeros(len(stamps), bool)
     same[1:] = judged[1:] == judged[:-1]
     marks = {**unusable, "no stamp": ~np.isfinite(judged) & ~kept}

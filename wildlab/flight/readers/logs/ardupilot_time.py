@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from wildlab.flight.readers.logs.ardupilot_messages import Table
+from wildlab.flight.readers.logs.ardupilot_messages import Table, percent
 from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.readers.logs.order import in_order
 from wildlab.flight.time.fitting import fit_clock
@@ -173,7 +173,7 @@ def longest_run(tables: dict[str, Table]) -> tuple[dict[str, Table], str]:
     left_out = int(counts.sum() - counts[best])
     said = (
         f"The board was switched on again within the log: of {len(counts)} stretches the longest is used, "
-        f"{left_out} of {counts.sum()} messages ({100 * left_out / counts.sum():.2g} %) are not."
+        f"{left_out} of {counts.sum()} messages ({percent(left_out, int(counts.sum()))}) are not."
     )
     return {name: table for name, table in kept.items() if len(table)}, said
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs import ardupilot, dataflash_records
+from wildlab.flight.readers.logs.ardupilot_messages import percent
 from wildlab.flight.readers.logs.log import RawLog
 
 
@@ -57,9 +58,8 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
         raise WildlabError(problem, "copy it from the card again", file=path)
     lost: tuple[str, ...] = ()
     if records.lost_bytes:
-        share = 100 * records.lost_bytes / len(data)
         where = "one place" if records.places == 1 else f"{records.places} places"
-        lost = (
-            f"{records.lost_bytes} of {len(data)} bytes ({share:.2g} %) in {where} belong to no message.",
-        )
+        share = percent(records.lost_bytes, len(data))
+        what = f"{records.lost_bytes} of {len(data)} bytes ({share}) in {where}"
+        lost = (f"{what} belong to no message.",)
     return ardupilot.raw_log(path, "dataflash", records.tables, lost, "message")

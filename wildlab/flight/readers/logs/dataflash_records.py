@@ -22,6 +22,8 @@ Index = NDArray[np.int64]
 HEAD = b"\xa3\x95"
 #: Kind and length of messages that define the others.
 FMT_KIND, FMT_BYTES = 128, 89
+#: Definitions of one name that are believed: a log that changes them more often is damaged.
+MOST_LAYOUTS = 8
 #: numpy's type of each format character.
 TYPES: dict[str, str | tuple[str, int]] = {
     **{"a": ("<i2", 32), "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4"},
@@ -105,6 +107,7 @@ def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition
     since: dict[int, list[tuple[int, int]]] = {FMT_KIND: [(0, 0)]}
     numbered: dict[Definition, int] = {own: 0}
     seen: dict[bytes, Definition | None] = {}
+    of_name: dict[str, int] = {}
     for head in heads[raw[heads + 2] == FMT_KIND].tolist():
         body = data[head + 3 : head + FMT_BYTES]
         if len(body) < FMT_BYTES - 3:
@@ -115,8 +118,10 @@ def _definitions(data: bytes, raw: Bytes, heads: Index) -> tuple[list[Definition
         if found is None or found.kind == FMT_KIND:
             continue
         if found not in numbered:
-            numbered[found] = len(known)
-            known.append(found)
+            of_name[found.name] = of_name.get(found.name, 0) + 1
+            believed = of_name[found.name] <= MOST_LAYOUTS
+            numbered[found] = len(known) if believed else -1
+            known += [found] if believed else []
         of_kind = since.setdefault(found.kind, [])
         if not of_kind or of_kind[-1][1] != numbered[found]:
             of_kind.append((head, numbered[found]))

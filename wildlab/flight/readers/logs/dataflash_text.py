@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs import ardupilot
-from wildlab.flight.readers.logs.ardupilot_messages import TEXT_CHARACTERS, Table, with_units
+from wildlab.flight.readers.logs.ardupilot_messages import TEXT_CHARACTERS, Table, percent, with_units
 from wildlab.flight.readers.logs.log import RawLog
 
 _FMT = re.compile(rb"^\s*FMT\s*,\s*\d+\s*,\s*\d+\s*,\s*\w+\s*,\s*\w*\s*,", re.MULTILINE)
@@ -146,7 +146,7 @@ def _table(lines: list[str], one: _Definition, at: list[int]) -> tuple[Table, in
 
 
 def _of(count: int, lines: list[str]) -> str:
-    return f"{count} of {len(lines)} lines ({100 * count / len(lines):.2g} %)"
+    return f"{count} of {len(lines)} lines ({percent(count, len(lines))})"
 
 
 def _number(word: str) -> float:
