@@ -1,0 +1,471 @@
+"""Telemetry logs: values against pymavlink's own decoding, clocks against the truth, damage of all kinds."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega
+
+from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
+from tests.flight.readers.tracks import check, damaged
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import tlog
+from wildlab.flight.readers.logs.formats import recognise
+from wildlab.flight.readers.logs.mavlink_frames import messages, walk
+
+PATH = Path("flight.tlog")
+
+
+def read(data: bytes) -> Any:
+    return tlog.read(PATH, data)
+
+
+def decoded(data: bytes) -> list[tuple[float, Any]]:
+    """(receipt, message) of a sound log, by pymavlink."""
+    library = ardupilotmega.MAVLink(None)
+    at, found = 0, []
+    while at < len(data):
+        size = data[at + 9] + (8 if data[at + 8] == 0xFE else 12)
+        message = library.decode(bytearray(data[at + 8 : at + 8 + size]))
+        found.append((int.from_bytes(data[at : at + 8], "big") / 1e6, message))
+        at += 8 + size
+    return found
+
+
+def same_as_pymavlink(data: bytes) -> int:
+    frames, compared = walk(data), 0
+    truth: dict[str, list[tuple[float, Any]]] = {}
+    for received, message in decoded(data):
+        truth.setdefault(message.get_type(), []).append((received, message))
+    for name, rows in truth.items():
+        found = messages(frames, name)
+        assert len(found) == len(rows)
+        assert (found.received_s == [received for received, _ in rows]).all()
+        assert (found.system == [message.get_srcSystem() for _, message in rows]).all()
+        for field in rows[0][1].fieldnames:
+            values = [getattr(message, field) for _, message in rows]
+            if isinstance(values[0], str):
+                assert found.texts(field) == [one.strip() for one in values]
+            else:
+                ours = found.fields[field].astype(float).tolist()
+                assert np.array_equal(ours, values, equal_nan=True)
+            compared += len(values)
+    return compared
+
+
+def test_every_field_of_the_sample_is_pymavlinks(shared_data: Any) -> None:
+    data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
+    assert same_as_pymavlink(data) > 150_000
+
+
+def test_sample(shared_data: Any) -> None:
+    path = shared_data("logs", "cuav2018_sar", "flight.tlog")
+    data = path.read_bytes()
+    assert recognise(data[:8192], "unnamed") == "tlog"
+    log = tlog.read(path, data)
+    check(log)
+    assert {name: len(part) for name, part in log.parts.items()} == {
+        "poses": 604,
+        "gnss": 732,
+        "imu": 771,
+        "magnetometer": 771,
+    }
+    assert log.lost == ()
+    assert log.clock is not None
+    assert log.clock.base == "times of receipt"
+    assert any("year 2908" in note for note in log.notes)
+    assert any("system 255" in note for note in log.notes)
+    # Receipts are never early, and were up to 0.9 s late.
+    receipts = {m.time_boot_ms: at for at, m in decoded(data) if m.get_type() == "ATTITUDE"}
+    poses = log.parts["poses"].columns
+    late = np.array([receipts[round(ms * 1e3)] for ms in poses["time_log_s"]]) - poses["time_s"]
+    assert -0.005 < late.min() < 0.01
+    assert 0.8 < late.max() < 1.0
+    force = log.parts["imu"].columns
+    assert np.median(force["f_z_m_s2"]) == pytest.approx(-9.8, abs=2.0)
+
+
+@pytest.mark.parametrize("version_1", [False, True])
+def test_straight_flight(version_1: bool) -> None:
+    log = read(joined(telemetry(version_1=version_1)))
+    check(log)
+    poses = log.parts["poses"].columns
+    used = log.parts["poses"].used
+    # Before the first place there is none.
+    assert used.sum() == len(used) - 1
+    at = poses["time_log_s"][used] - BOOT_S
+    assert np.allclose(poses["time_s"][used], START_S + at, atol=0.01)
+    north = (poses["latitude_deg"][used] - ORIGIN[0]) * 111_412
+    assert np.allclose(north, 10 * at, atol=0.02)
+    assert np.allclose(poses["height_sea_m"][used], 150)
+    assert np.allclose(poses["height_home_m"][used], 50)
+    assert np.allclose(poses["roll_deg"], np.degrees(0.1), atol=1e-5)
+    assert np.allclose(poses["v_north_m_s"][used], 10)
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    offset=st.floats(0.05, 5.0),
+    ppm=st.floats(-200.0, 200.0),
+    jitter=st.floats(0.0, 0.85),
+    seed=st.integers(0, 1000),
+)
+def test_clock_along_the_earliest_receipts(offset: float, ppm: float, jitter: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows = []
+    for own in BOOT_S + np.arange(1500) * 0.2:
+        received = START_S + offset + own * (1 + ppm * 1e-6) + rng.uniform(0, jitter)
+        rows.append((received, frame(made("ATTITUDE", time_boot_ms=round(own * 1e3)), received)))
+    clock = read(joined(rows)).clock
+    assert clock is not None
+    ends = np.array([BOOT_S, BOOT_S + 300])
+    wanted = START_S + offset + ends * (1 + ppm * 1e-6)
+    assert np.abs(clock.offset_s + clock.rate * ends - wanted).max() < 0.01
+    assert abs(clock.rate - 1 - ppm * 1e-6) < 1e-4
+
+
+def test_vehicles_own_utc_is_taken_where_it_is_near_the_receipts() -> None:
+    flight = telemetry()
+    told = []
+    for row in range(30):
+        unix = START_S + row + 3.0
+        text = made("SYSTEM_TIME", time_boot_ms=round((BOOT_S + row) * 1e3), time_unix_usec=round(unix * 1e6))
+        told.append((START_S + row + 0.2, frame(text, START_S + row + 0.2)))
+    log = read(joined(flight, told))
+    assert log.clock is not None
+    assert log.clock.base == "UTC of the messages SYSTEM_TIME"
+    poses = log.parts["poses"].columns
+    assert np.allclose(poses["time_s"], START_S + 3 + poses["time_log_s"] - BOOT_S, atol=1e-3)
+    assert any("the ground station received -2.8" in note for note in log.notes)
+
+
+def test_restart_has_a_clock_of_its_own() -> None:
+    log = read(joined(telemetry(300), telemetry(100, boot_s=5.0, start_s=START_S + 100, heartbeat=False)))
+    check(log)
+    assert any("switched on 2 times" in note for note in log.notes)
+    poses = log.parts["poses"].columns
+    later = poses["time_log_s"] < BOOT_S
+    assert later.sum() == 100
+    wanted = START_S + 100 + poses["time_log_s"][later] - 5.0
+    assert np.allclose(poses["time_s"][later], wanted, atol=0.02)
+    # No place is made up between the two.
+    assert log.parts["poses"].used.sum() == 398
+
+
+def test_busiest_vehicle_is_read_and_the_others_are_named() -> None:
+    station = [(START_S, frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255, 190))]
+    log = read(joined(telemetry(50, system=3), telemetry(80, system=7), station))
+    assert len(log.parts["poses"]) == 80
+    assert "it holds several vehicles: system 7 is read, not 3" in log.notes
+    assert "left out as no vehicles: system 255" in log.notes
+
+
+def test_a_forwarding_station_is_no_vehicle() -> None:
+    station = [(at, frame(made("HEARTBEAT", type=6, autopilot=8), at, 255, 190)) for at in (START_S,)]
+    station += telemetry(500, system=255, heartbeat=False)
+    whose = [(at, one) for at, one in station]
+    log = read(joined(telemetry(20, system=3), whose))
+    # Its component 1 never said what it is; the autopilot of system 3 did.
+    assert len(log.parts["poses"]) == 20
+
+
+def test_gaps_in_places_are_not_bridged() -> None:
+    flight = telemetry()
+    cut = [
+        item
+        for item in flight
+        if not (START_S + 10 < item[0] < START_S + 14 and b"\x21\x00\x00" in item[1][:20])
+    ]
+    assert len(cut) < len(flight)
+    log = read(joined(cut))
+    poses = log.parts["poses"]
+    inside = (poses.columns["time_s"] > START_S + 10.5) & (poses.columns["time_s"] < START_S + 13.5)
+    assert inside.sum() > 10
+    assert not poses.used[inside].any()
+    assert set(poses.columns["why"][inside]) == {"no position within reach"}
+
+
+def gnss(**fields: Any) -> Any:
+    log_rows = []
+    for row in range(20):
+        at = START_S + row * 0.2 + 0.01
+        given = {"lat": round(ORIGIN[0] * 1e7) + row, "lon": round(ORIGIN[1] * 1e7), "alt": 100_000}
+        given |= {"fix_type": 3, "eph": 80, "vel": 500, "cog": 9000, "satellites_visible": 12}
+        given["time_usec"] = round((BOOT_S + row * 0.2) * 1e6)
+        given |= {name: value(row) if callable(value) else value for name, value in fields.items()}
+        log_rows.append((at, frame(made("GPS_RAW_INT", **given), at)))
+    return read(joined(telemetry(40, jitter_s=0.0), log_rows)).parts["gnss"]
+
+
+def test_gnss_values() -> None:
+    part = gnss(h_acc=900, v_acc=1500, vel_acc=200, alt_ellipsoid=141_000)
+    assert part.used.all()
+    columns = part.columns
+    assert np.allclose(columns["v_north_m_s"], 0, atol=1e-9)
+    assert np.allclose(columns["v_east_m_s"], 5)
+    assert (columns["height_sea_m"] == 100).all()
+    assert (columns["height_ellipsoid_m"] == 141).all()
+    assert (columns["sd_horizontal_m"] == 0.9).all()
+    assert (columns["sd_vertical_m"] == 1.5).all()
+    assert (columns["sd_velocity_m_s"] == 0.2).all()
+    assert (columns["hdop"] == 0.8).all()
+    assert np.allclose(columns["time_s"], START_S + np.arange(20) * 0.2, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"fix_type": 1}, "no fix"),
+        ({"fix_type": 2}, "a fix without height"),
+        ({"lat": 0, "lon": 0}, "no position"),
+        ({"lat": 910_000_000}, "no position"),
+        ({"alt": -2_000_000_000}, "an impossible height"),
+        ({"time_usec": round(BOOT_S * 1e6)}, "a repeated stamp"),
+        ({"time_usec": round(5 * BOOT_S * 1e6)}, "a stamp that its receipt contradicts"),
+    ],
+)
+def test_gnss_rows_that_cannot_be_true(fields: dict[str, int], reason: str) -> None:
+    usual = {"fix_type": 3, "lat": round(ORIGIN[0] * 1e7), "lon": round(ORIGIN[1] * 1e7), "alt": 100_000}
+    spoilt = {
+        name: (lambda row, name=name, value=value: value if row == 7 else gnss_usual(name, row, usual))
+        for name, value in fields.items()
+    }
+    part = gnss(**spoilt)
+    assert part.columns["why"][7] == reason
+    assert part.used.sum() == 19
+
+
+def gnss_usual(name: str, row: int, usual: dict[str, int]) -> int:
+    return round((BOOT_S + row * 0.2) * 1e6) if name == "time_usec" else usual[name]
+
+
+def test_gnss_stamps_in_utc_and_none_that_is_known() -> None:
+    part = gnss(time_usec=lambda row: round((START_S + 0.2 * row + 40) * 1e6))
+    assert np.allclose(part.columns["time_s"], START_S + np.arange(20) * 0.2 + 40)
+    part = gnss(time_usec=0)
+    assert part.used.all()
+    assert np.allclose(part.columns["time_s"], START_S + np.arange(20) * 0.2 + 0.01)
+    assert np.isnan(part.columns["time_log_s"]).all()
+
+
+def test_unknown_quality_is_no_number() -> None:
+    columns = gnss(eph=65535, vel=65535, satellites_visible=255).columns
+    assert not {"hdop", "v_north_m_s", "satellites", "sd_horizontal_m", "height_ellipsoid_m"} & set(columns)
+
+
+def test_one_number_for_both_heights() -> None:
+    rows = []
+    for row in range(10):
+        text = made("GPS_RAW_INT", lat=634_000_000, lon=104_000_000, alt=9000, alt_ellipsoid=9000, fix_type=3)
+        rows.append((START_S + row, frame(text, START_S + row)))
+    log = read(joined(telemetry(20), rows))
+    assert "height_ellipsoid_m" not in log.parts["gnss"].columns
+    assert any("one and the same number" in note for note in log.notes)
+
+
+def with_messages(make: Any, count: int = 50, component: int = 1) -> Any:
+    rows = [
+        (
+            START_S + row * 0.2 + 0.02,
+            frame(make(row, round((BOOT_S + row * 0.2) * 1e3)), START_S + row * 0.2 + 0.02, 1, component),
+        )
+        for row in range(count)
+    ]
+    return read(joined(telemetry(60, jitter_s=0.0), rows))
+
+
+@pytest.mark.parametrize("name", ["SCALED_IMU", "RAW_IMU", "HIGHRES_IMU"])
+def test_inertial_units(name: str) -> None:
+    si = name == "HIGHRES_IMU"
+
+    def make(row: int, ms: int) -> Any:
+        stamp = {"time_boot_ms": ms} if name == "SCALED_IMU" else {"time_usec": ms * 1000}
+        acc = 9.80665 if si else 1000
+        rate, field = (0.5, 0.4) if si else (500, 400)
+        return made(name, **stamp, zacc=-acc, xgyro=rate, ymag=field)
+
+    log = with_messages(make)
+    check(log)
+    assert np.allclose(log.parts["imu"].columns["f_z_m_s2"], -9.80665, atol=1e-5)
+    assert np.allclose(log.parts["imu"].columns["w_x_rad_s"], 0.5)
+    assert np.allclose(log.parts["magnetometer"].columns["field_y_ut"], 40, atol=1e-4)
+    assert np.allclose(log.parts["imu"].columns["time_s"], START_S + np.arange(50) * 0.2, atol=2e-3)
+
+
+def test_raw_counts_are_no_inertial_units() -> None:
+    log = with_messages(lambda row, ms: made("RAW_IMU", time_usec=ms * 1000, zacc=-16384))
+    assert "imu" not in log.parts
+    assert any("RAW_IMU is left out: it feels 16.4 g" in note for note in log.notes)
+
+
+def test_camera_feedback() -> None:
+    def make(row: int, ms: int) -> Any:
+        where = {"lat": 634_000_000, "lng": 104_000_000} if row else {}
+        return made(
+            "CAMERA_FEEDBACK",
+            time_usec=round((START_S + row * 0.2) * 1e6),
+            img_idx=row,
+            alt_msl=120.0,
+            alt_rel=20.0,
+            yaw=90.0,
+            **where,
+        )
+
+    part = with_messages(make).parts["triggers"]
+    assert part.used.all()
+    assert (part.columns["number"] == np.arange(50)).all()
+    assert np.allclose(part.columns["time_s"], START_S + np.arange(50) * 0.2)
+    assert np.isnan(part.columns["latitude_deg"][0])
+    assert np.allclose(part.columns["latitude_deg"][1:], 63.4)
+    assert (part.columns["height_home_m"][1:] == 20).all()
+
+
+def test_camera_trigger_since_start() -> None:
+    part = with_messages(lambda row, ms: made("CAMERA_TRIGGER", time_usec=ms * 1000, seq=row)).parts[
+        "triggers"
+    ]
+    assert np.allclose(part.columns["time_s"], START_S + np.arange(50) * 0.2, atol=2e-3)
+
+
+def yaw_of_vehicle(count: int) -> Any:
+    return np.arange(count) % 90
+
+
+@pytest.mark.parametrize(
+    ("flags", "turned"), [(0, True), (32, True), (64, False), (16, False), (16 | 32, True)]
+)
+def test_gimbal_device(flags: int, turned: bool) -> None:
+    q = [np.cos(np.pi / 4), 0.0, -np.sin(np.pi / 4) * 0.9, 0.0]
+    q = [one / np.linalg.norm(q) for one in q]
+    pitch = -2 * np.degrees(np.arccos(q[0]))
+    log = with_messages(
+        lambda row, ms: made("GIMBAL_DEVICE_ATTITUDE_STATUS", time_boot_ms=ms, q=q, flags=flags),
+        component=154,
+    )
+    part = log.parts["gimbal"]
+    used = part.used
+    assert used.sum() >= 48
+    assert np.allclose(part.columns["pitch_world_deg"][used], pitch, atol=1e-3)
+    wanted = yaw_of_vehicle(50)[used] if turned else 0.0
+    assert np.allclose(part.columns["yaw_world_deg"][used], wanted, atol=0.05)
+
+
+@pytest.mark.parametrize("absolute", [True, False])
+def test_mount_orientation(absolute: bool) -> None:
+    def make(row: int, ms: int) -> Any:
+        more = {"yaw_absolute": 33.0} if absolute else {}
+        return made("MOUNT_ORIENTATION", time_boot_ms=ms, roll=1.0, pitch=-90.0, yaw=20.0, **more)
+
+    part = with_messages(make).parts["gimbal"]
+    used = part.used
+    assert (part.columns["pitch_world_deg"] == -90).all()
+    wanted = 33.0 if absolute else yaw_of_vehicle(50)[used] + 20
+    assert np.allclose(part.columns["yaw_world_deg"][used], wanted, atol=0.05)
+
+
+def test_mount_status_says_what_it_leaves_open() -> None:
+    log = with_messages(lambda row, ms: made("MOUNT_STATUS", pointing_a=-4500, pointing_b=100))
+    part = log.parts["gimbal"]
+    assert (part.columns["pitch_world_deg"] == -45).all()
+    assert (part.columns["roll_world_deg"] == 1).all()
+    assert any("MOUNT_STATUS, which has no stamps" in note for note in log.notes)
+
+
+def test_vehicle_by_its_own_words_or_its_heartbeat() -> None:
+    flight = telemetry(20)
+    assert read(joined(flight)).vehicle == "ardupilotmega (fixed wing)"
+    text = frame(made("STATUSTEXT", text=b"ArduPlane V4.1.2 (\x1b[2J)"), START_S)
+    assert read(joined(flight, [(START_S, text)])).vehicle == repr("ArduPlane V4.1.2 (\x1b[2J)")
+
+
+def test_fields_that_old_senders_leave_away_and_new_ones_append() -> None:
+    sender = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+    text = made("GPS_RAW_INT", fix_type=3)
+    old = text.unpacker.pack(1, 5, *([0] * 14))[:30]
+    plain = frame(text, START_S)[:8] + text._pack(sender, text.crc_extra, old, force_mavlink1=True)
+    assert messages(walk(plain), "GPS_RAW_INT")["h_acc"].tolist() == [0]
+    text = made("ATTITUDE", time_boot_ms=1000, yawspeed=2.0)
+    body = text.unpacker.pack(1000, 0, 0, 0, 0, 0, 2.0) + b"\x07" * 9
+    longer = text._pack(sender, text.crc_extra, body)
+    found = messages(walk(plain[:8] + longer), "ATTITUDE")
+    assert found["yawspeed"].tolist() == [2.0]
+
+
+def test_signed_frames_and_unknown_messages_are_passed() -> None:
+    sender = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
+    sender.signing.secret_key = bytes(32)
+    sender.signing.sign_outgoing = True
+    sender.signing.link_id = 1
+    sender.signing.timestamp = 1
+    stamp = plain = frame(made("ATTITUDE", time_boot_ms=4000), START_S)
+    signed = stamp[:8] + made("ATTITUDE", time_boot_ms=3000).pack(sender)
+    unknown = bytearray(plain)
+    unknown[15:18] = (3_000_000).to_bytes(3, "little")
+    frames = walk(signed + bytes(unknown) + plain)
+    assert messages(frames, "ATTITUDE")["time_boot_ms"].tolist() == [3000, 4000]
+    assert frames.unknown == {3_000_000: 1}
+    assert frames.number.tolist() == [1, 3]
+    log = read(joined(telemetry(20)) + bytes(unknown) + plain)
+    assert any("1 messages of kinds that are not known (numbers 3000000)" in one for one in log.lost)
+
+
+def test_what_is_no_log_is_refused() -> None:
+    for data in (b"", b"\x00" * 500, b"\xfe" * 500, b"$GPGGA,1\n" * 100):
+        assert not tlog.recognise(data[:8192], "a.tlog")
+        with pytest.raises(WildlabError, match="holds no sound MAVLink frame behind a time of receipt"):
+            read(data)
+    beat = frame(made("HEARTBEAT", type=6, autopilot=8), START_S, 255)
+    with pytest.raises(WildlabError, match="holds 5 messages, and none of attitude or position"):
+        read(beat * 5)
+    assert tlog.recognise(beat, "a.tlog")
+    assert not tlog.recognise(beat, "a.bin")
+
+
+def test_losses_are_counted() -> None:
+    sent = telemetry(50)
+    data = joined(sent)
+    spoilt = bytearray(data)
+    spoilt[len(sent[0][1]) + 8 + 10 + 5] ^= 1  # within the payload of the second frame
+    log = read(bytes(spoilt[:-5]))
+    assert any(one.startswith("1 frames with a wrong checksum are left out, ") for one in log.lost)
+    assert any("it ends within a frame: the last" in one for one in log.lost)
+    log = read(data[:2000] + b"garbage" * 10 + data[2000:])
+    assert any("bytes in" in one and "are no frames" in one for one in log.lost)
+
+
+def test_damage_anywhere() -> None:
+    data = joined(telemetry(60), [(START_S, frame(made("SYSTEM_TIME", time_boot_ms=5), START_S))])
+    for spoilt in damaged(data):
+        try:
+            check(read(spoilt))
+        except WildlabError as error:
+            assert "flight.tlog" in str(error)
+
+
+def test_damage_to_the_sample(shared_data: Any) -> None:
+    data = shared_data("logs", "cuav2018_sar", "flight.tlog").read_bytes()
+    rng = np.random.default_rng(14)
+    for at in rng.integers(10_000, len(data), 6):
+        log = read(data[:at])
+        check(log)
+        assert len(log.parts["imu"]) == pytest.approx(771 * at / len(data), rel=0.05, abs=5)
+    for _ in range(4):
+        spoilt = bytearray(data)
+        for at in rng.integers(0, len(data), 100):
+            spoilt[at] ^= int(rng.integers(1, 256))
+        log = read(bytes(spoilt))
+        check(log)
+        assert len(log.parts["imu"]) > 750
+        assert log.lost
+
+
+@pytest.mark.parametrize("unit", [b"\x00\x06" * 4 + b"\xfe", b"\x00" * 7 + b"\xfd\xff", b"\xfe", b"\x00"])
+def test_no_input_takes_long(unit: bytes) -> None:
+    start = joined(telemetry(5))
+    began = time.monotonic()
+    read(start + unit * (300_000 // len(unit)))
+    assert time.monotonic() - began < 5.0
