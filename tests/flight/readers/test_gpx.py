@@ -84,6 +84,15 @@ def test_order_repetition_and_jumps():
     }
 
 
+@pytest.mark.parametrize(("some", "used"), [(6, 6), (4, 10)])
+def test_heights_of_some_points(some, used):
+    body = "".join(point(k) if k < some else point(k).replace("ele>", "x>") for k in range(10))
+    log = gpx.read(Path("x.gpx"), document(body))
+    check(log)
+    assert log.parts["gnss"].used.sum() == used
+    assert (log.notes == ("only 4 rows of 10 have a height: heights are left out",)) == (some == 4)
+
+
 def test_segments_newest_first():
     late, early = "".join(map(point, range(50, 60))), "".join(map(point, range(10)))
     log = gpx.read(Path("x.gpx"), document(late, early))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.judging import Mask, decode, gaps, judge, number, plural
+from wildlab.flight.readers.logs.judging import Mask, decode, drop_rare_heights, gaps, judge, number, plural
 from wildlab.flight.readers.logs.log import Array, Clock, RawLog, Stream, make_stream
 from wildlab.flight.time.zones import wall_to_utc
 
@@ -92,6 +92,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     _turn(place, np.array([block.unnamed for block in blocks]), notes)
     times, clock, reasons = _times(blocks, zone, notes)
     columns = {**times, **_filled(_NAMES, place)}
+    notes += drop_rare_heights(columns)
     if any(block.vague for block in blocks):
         notes.append("altitude is taken as height above take-off, which the file does not say")
     wrong = judge(columns, reasons)

@@ -16,7 +16,7 @@ import gpxpy.gpx
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.judging import decode, gaps, judge, plural
+from wildlab.flight.readers.logs.judging import decode, drop_rare_heights, gaps, judge, plural
 from wildlab.flight.readers.logs.log import Array, Clock, RawLog, make_stream
 
 #: GPX has a depth of five; extensions add a few.
@@ -84,9 +84,10 @@ def _log(segments: Sequence[Sequence[Point]], lost: tuple[str, ...]) -> RawLog:
     points = [point for k in order for point in segments[k]]
     rows = np.concatenate([np.arange(counts[k], counts[k + 1]) for k in order]) + 1
     columns = _columns(points)
+    notes = drop_rare_heights(columns)
     stream = make_stream("gnss", columns, rows, "point", judge(columns, {"no fix": columns["fix"] == 0.0}))
     time = columns["time_s"]
-    notes = gaps(time, stream.used)
+    notes += gaps(time, stream.used)
     if order != sorted(order):
         notes.append("segments are not in order of time in the file; they were put in order")
     timed = bool(np.isfinite(time).any())

@@ -154,6 +154,21 @@ def _reachable(time: Array, latitude: Array, longitude: Array) -> Mask:
     return kept
 
 
+def drop_rare_heights(columns: dict[str, Array]) -> list[str]:
+    """Takes heights out of `columns` that fewer than half of the rows have; a sentence where it did.
+
+    Rows without a height would be of no use beside rows with one, and most would be lost.
+    """
+    names = [name for name in (*_HEIGHTS, "undulation_m") if name in columns]
+    heights = [columns[name] for name in names if name != "undulation_m"]
+    known = np.logical_or.reduce([np.isfinite(one) for one in heights]) if heights else np.zeros(0, bool)
+    if not known.any() or known.mean() >= 0.5:
+        return []
+    for name in names:
+        del columns[name]
+    return [f"only {plural(int(known.sum()), 'row')} of {len(known)} have a height: heights are left out"]
+
+
 def judge(
     columns: Mapping[str, ArrayLike], unusable: Mapping[str, ArrayLike] | None = None
 ) -> dict[str, Mask]:
@@ -170,34 +185,33 @@ def judge(
     -------
     dict
         Reason -> (N,) bool for `make_stream`. Rows without any reason have a place, a time (if any row has
-        one), a height (if most rows have one) and strictly increasing times.
+        one), a height (if any has one) and strictly increasing times.
     """
     have = {name: np.asarray(values, float) for name, values in columns.items() if name not in ("file",)}
     latitude, longitude, time = have["latitude_deg"], have["longitude_deg"], have["time_s"]
     found = {reason: np.asarray(mask, bool) for reason, mask in (unusable or {}).items()}
     placed = np.isfinite(latitude) & np.isfinite(longitude)
-    found["no position"] = ~placed
-    found["impossible position"] = placed & ((np.abs(latitude) > 90) | (np.abs(longitude) > 360))
-    found["position is a placeholder"] = (np.abs(latitude) < _NOWHERE_DEG) & (
-        np.abs(longitude) < _NOWHERE_DEG
-    )
+    nowhere = (np.abs(latitude) < _NOWHERE_DEG) & (np.abs(longitude) < _NOWHERE_DEG)
     heights = [have[name] for name in _HEIGHTS if name in have]
-    found["impossible height"] = np.zeros(len(time), bool)
-    for height in heights:
-        found["impossible height"] |= ~_between(-height, DOWN)
-    found["impossible speed"] = np.zeros(len(time), bool)
-    for name in ("v_north_m_s", "v_east_m_s", "v_down_m_s"):
-        if name in have:
-            found["impossible speed"] |= ~_between(have[name], SPEED)
-    if "hdop" in have:
-        found["no dilution of precision"] = have["hdop"] >= NO_DILUTION
+    velocities = [have[name] for name in ("v_north_m_s", "v_east_m_s", "v_down_m_s") if name in have]
+    never = np.zeros(len(time), bool)
+    ours = {
+        "no position": ~placed,
+        "impossible position": placed & ((np.abs(latitude) > 90) | (np.abs(longitude) > 360)),
+        "position is a placeholder": nowhere,
+        "impossible height": np.logical_or.reduce([never, *(~_between(-one, DOWN) for one in heights)]),
+        "impossible speed": np.logical_or.reduce([never, *(~_between(one, SPEED) for one in velocities)]),
+        "no dilution of precision": have.get("hdop", np.full(len(time), np.nan)) >= NO_DILUTION,
+    }
     if np.isfinite(time).any():
-        found["no time"] = np.isnan(time)
-        found["impossible time"] = (time < GPS_START_S) | (time > LATEST_S)
+        ours["no time"] = np.isnan(time)
+        ours["impossible time"] = (time < GPS_START_S) | (time > LATEST_S)
+    for reason, mask in ours.items():
+        found[reason] = found.get(reason, never) | mask
     bad = np.logical_or.reduce(list(found.values()))
     if heights:
         without = np.logical_and.reduce([np.isnan(height) for height in heights])
-        if without[~bad].mean() < 0.5 if (~bad).any() else False:
+        if not without[~bad].all():
             found["no height"] = without
             bad |= without
     _judge_order(time, latitude, longitude, bad, found)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs.judging import gaps, judge, plural
+from wildlab.flight.readers.logs.judging import drop_rare_heights, gaps, judge, plural
 from wildlab.flight.readers.logs.log import Array, Clock, RawLog, Stream, make_stream
 from wildlab.flight.readers.logs.nmea_epochs import POSITIONS, epochs
 
@@ -91,6 +91,7 @@ def tracks(found: Sentences) -> RawLog | None:
     columns, lines, unusable, notes = epochs(found.talker, found.kind, found.fields, found.line)
     if not len(lines):
         return None
+    notes += drop_rare_heights(columns)
     stream: Stream = make_stream("gnss", columns, lines, "line", judge(columns, unusable))
     notes += gaps(columns["time_s"], stream.used)
     if found.unread:

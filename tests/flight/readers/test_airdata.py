@@ -1,0 +1,198 @@
+"""AirData tables: values as pandas has them, fractions of seconds, pauses, units, damage."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.flight.readers.tracks import check, survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import airdata
+
+START = datetime(2026, 6, 1, 10, tzinfo=UTC)
+METRIC = (
+    *("time(millisecond)", "datetime(utc)", "latitude", "longitude", "height_above_takeoff(meters)"),
+    *("altitude_above_seaLevel(meters)", "satellites", " xSpeed(m/s)", " ySpeed(m/s)", " zSpeed(m/s)"),
+    *(" compass_heading(degrees)", " pitch(degrees)", " roll(degrees)", "isPhoto", "gimbal_heading(degrees)"),
+    *("gimbal_pitch(degrees)", "message"),
+)
+
+
+def rows(count: int = 300, begin: float = 0.37, pause: float = 0.0) -> list[dict[str, object]]:
+    """10 Hz; UTC of a row is START + begin + its counter, and `pause` more from the middle on."""
+    made = []
+    for k in range(count):
+        at = START + timedelta(seconds=begin + 0.1 * k + pause * (k >= count // 2))
+        cells = (
+            *(100 * k, f"{at:%Y-%m-%d %H:%M:%S}", f"{63.4 + 1e-6 * k:.7f}", f"{10.4 - 1e-6 * k:.7f}"),
+            *(30.5, 120.25, 17, 3.0, -4.0, 0.5, 350.0, " -1.5", " 2.5", int(k % 50 in (10, 11)), k % 360),
+            *(-89.5, '"<b>=1+1</b>, hello"' if k == 7 else ""),
+        )
+        made.append(dict(zip(METRIC, cells, strict=True)))
+    return made
+
+
+def table(made: list[dict[str, object]], names: tuple[str, ...] = METRIC) -> str:
+    lines = [",".join(names), *(",".join(str(row[name]) for name in names) for row in made)]
+    return "\n".join(lines) + "\n"
+
+
+def test_equals_pandas(shared_data):
+    path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
+    data = path.read_bytes()
+    assert airdata.recognise(data[:8192], path.name)
+    log = airdata.read(path, data)
+    check(log)
+    said = pd.read_csv(path, skipinitialspace=True)
+    said.columns = said.columns.str.strip()
+    assert set(log.parts) == {"gnss", "poses", "gimbal"}
+    for part, ours, theirs in (
+        ("gnss", "latitude_deg", "latitude"),
+        ("gnss", "longitude_deg", "longitude"),
+        ("gnss", "satellites", "satellites"),
+        ("gnss", "height_home_m", "height_above_takeoff(meters)"),
+        ("poses", "height_sea_m", "altitude_above_seaLevel(meters)"),
+        ("poses", "v_north_m_s", "xSpeed(m/s)"),
+        ("poses", "v_east_m_s", "ySpeed(m/s)"),
+        ("poses", "v_down_m_s", "zSpeed(m/s)"),
+        ("poses", "roll_deg", "roll(degrees)"),
+        ("poses", "pitch_deg", "pitch(degrees)"),
+        ("poses", "yaw_deg", "compass_heading(degrees)"),
+        ("gimbal", "pitch_world_deg", "gimbal_pitch(degrees)"),
+        ("gimbal", "yaw_world_deg", "gimbal_heading(degrees)"),
+    ):
+        np.testing.assert_array_equal(log.parts[part].columns[ours], said[theirs])
+    time = log.parts["gnss"].columns["time_s"]
+    stamps = pd.to_datetime(said["datetime(utc)"], utc=True)
+    whole = (stamps - pd.Timestamp(0, tz="UTC")).dt.total_seconds().to_numpy()
+    # A whole second was cut from each, but for the jitter of the rows.
+    assert ((time - whole > -0.25) & (time - whole < 1.25)).all()
+    assert log.parts["gnss"].used.all()
+
+
+def test_axes_of_velocity(shared_data):
+    """The way between rows is what the speeds say: north, east, down."""
+    path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
+    columns = airdata.read(path, path.read_bytes()).parts["poses"].columns
+    own = columns["time_log_s"]
+    ways = {
+        "v_north_m_s": columns["latitude_deg"] * 111e3,
+        "v_east_m_s": columns["longitude_deg"] * 111e3 * np.cos(np.radians(32.8)),
+        "v_down_m_s": -columns["height_home_m"],
+    }
+    for name, way in ways.items():
+        moved = (way[20:] - way[:-20]) / (own[20:] - own[:-20])
+        assert np.corrcoef(moved, columns[name][10:-10])[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.37, 0.95])
+@pytest.mark.parametrize("pause", [0.0, 73.9])
+def test_fraction_of_a_second(begin, pause):
+    log = airdata.read(Path("x.csv"), table(rows(600, begin, pause)).encode())
+    check(log)
+    expected = START.timestamp() + begin + 0.1 * np.arange(600) + pause * (np.arange(600) >= 300)
+    # Rows are 0.1 s apart, so that a second begins up to 0.05 s from the middle between two.
+    np.testing.assert_allclose(log.parts["gnss"].columns["time_s"], expected, rtol=0, atol=0.06)
+    assert ("stood still 1 time, 73" in " ".join(log.notes)) == (pause > 0)
+    assert log.clock is not None
+    assert log.clock.spread_s < 0.1
+
+
+def test_parts():
+    log = airdata.read(Path("x.csv"), table(rows()).encode("utf-8-sig").replace(b"\n", b"\r\n"))
+    check(log)
+    assert set(log.parts) == {"gnss", "poses", "gimbal", "triggers"}
+    triggers = log.parts["triggers"]
+    assert triggers.columns["number"].tolist() == [1, 2, 3, 4, 5, 6]
+    assert triggers.rows.tolist() == [12 + 50 * k for k in range(6)]
+    assert triggers.columns["roll_deg"].tolist() == [2.5] * 6
+    assert log.parts["poses"].columns["pitch_deg"].tolist() == [-1.5] * 300
+    assert log.notes == ()
+
+
+def test_feet_and_miles_renamed_and_reordered():
+    names = {
+        "height_above_takeoff(meters)": "Height_Above_Takeoff (feet)",
+        "altitude_above_seaLevel(meters)": "altitude_above_seaLevel(feet)",
+        " xSpeed(m/s)": "xSpeed(mph)",
+        " ySpeed(m/s)": "ySpeed(mph)",
+        " zSpeed(m/s)": "zSpeed(mph)",
+    }
+    made = [{names.get(name, name): value for name, value in row.items()} for row in rows()]
+    order = tuple(sorted(made[0]))
+    log = airdata.read(Path("x.csv"), table(made, order).encode())
+    columns = log.parts["poses"].columns
+    np.testing.assert_allclose(columns["height_home_m"], 30.5 * 0.3048)
+    np.testing.assert_allclose(columns["height_sea_m"], 120.25 * 0.3048)
+    np.testing.assert_allclose(columns["v_east_m_s"], -4.0 * 0.44704)
+
+
+def test_missing_columns():
+    log = airdata.read(Path("x.csv"), table(rows(), METRIC[:4]).encode())
+    check(log)
+    assert set(log.parts) == {"gnss"}
+    assert log.parts["gnss"].used.all()
+    seconds = airdata.read(Path("x.csv"), table(rows(), METRIC[1:5]).encode()).parts["gnss"]
+    assert seconds.used.sum() == 31
+    assert set(seconds.columns["why"]) == {"", "repeated stamp"}
+
+
+def test_local_time():
+    names = tuple(name.replace("(utc)", "(local)") for name in METRIC)
+    made = [{name.replace("(utc)", "(local)"): value for name, value in row.items()} for row in rows()]
+    data = table(made, names).encode()
+    log = airdata.read(Path("x.csv"), data)
+    assert set(log.parts["gnss"].columns["why"]) == {"local time without a zone"}
+    log = airdata.read(Path("x.csv"), data, "+02:00")
+    assert log.parts["gnss"].used.all()
+    assert log.parts["gnss"].columns["time_s"][0] == pytest.approx(START.timestamp() - 7200 + 0.37, abs=0.06)
+
+
+def test_text_in_columns_of_numbers_and_placeholders():
+    made = rows()
+    made[3]["latitude"] = "Available with any HD 360 subscription"
+    made[4]["latitude"] = made[4]["longitude"] = 0
+    made[5][" roll(degrees)"] = "nan"
+    made[6][" xSpeed(m/s)"] = "1e9"
+    log = airdata.read(Path("x.csv"), table(made).encode())
+    check(log)
+    why = ["", "no position", "position is a placeholder", "no attitude", "impossible speed", ""]
+    assert log.parts["poses"].columns["why"][2:8].tolist() == why
+
+
+def test_gimbal_heading_that_stands():
+    made = rows()
+    for k, row in enumerate(made):
+        row["gimbal_heading(degrees)"], row[" compass_heading(degrees)"] = (
+            359.9 + 0.2 * (k % 2) - 360,
+            k % 360,
+        )
+    log = airdata.read(Path("x.csv"), table(made).encode())
+    assert log.notes == (
+        "the gimbal's heading stays within 0.2 deg while the aircraft turns by 299 deg: it hardly counts from north",
+    )
+
+
+def test_messages():
+    with pytest.raises(WildlabError, match=r"has no column 'latitude' and 'datetime\(utc\)'"):
+        airdata.read(Path("x.csv"), b"time(millisecond),longitude\n1,2\n")
+    with pytest.raises(WildlabError, match="has no row under its header"):
+        airdata.read(Path("x.csv"), table([]).encode())
+    with pytest.raises(WildlabError, match="has the unit 'cubits', which is not known"):
+        airdata.read(Path("x.csv"), table(rows()).replace("takeoff(meters)", "takeoff(cubits)").encode())
+    assert not airdata.recognise(b"time,x,y\n1,2,3\n", "x.csv")
+
+
+def test_a_quotation_mark_costs_one_line():
+    text = table(rows()).replace("63.4000009", '"63.4000009')
+    log = airdata.read(Path("x.csv"), text.encode())
+    assert log.lost == ("1 line of 300 cut off",)
+    assert len(log.parts["gnss"]) == 299
+
+
+def test_damage(shared_data):
+    assert survives(airdata.read, table(rows(120)).encode()) > 130
+    path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
+    assert survives(airdata.read, path.read_bytes()[:200000], every=5) > 25

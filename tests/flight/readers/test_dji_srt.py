@@ -1,0 +1,176 @@
+"""DJI subtitles: each family as its aircraft writes it, clocks with and without a zone, damage."""
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.flight.readers.tracks import check, survives
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import dji_srt
+
+#: Sample -> subtitles, rows with a place, first latitude, longitude, height, first stamp (local), satellites.
+SAMPLES = {
+    "air2s.srt": (17, 17, 41.424724, 2.234156, 117.0, "2022-08-07T13:40:40.774808", None),
+    "broken_incomplete.SRT": (19, 19, -34.7383, -58.4563, 20.1, "2017-07-03T10:15:03", 19),
+    "matrice_300.srt": (381, 381, 36.6146, -6.1120, 0.3, "2022-06-21T16:06:17", None),
+    "mavic_air2.srt": (25, 25, 41.420684, 2.162162, 27.3, "2022-05-01T15:01:58.531716", None),
+    "mavic_mini.SRT": (117, 117, 48.0771, -121.7458, 200.7, None, 17),
+    "mavic_pro_buggy.SRT": (546, 530, 42.4668, -1.2218, 0.0, "2018-08-19T08:00:36", 11),
+    "mix_p4rtk_mavic2pro.srt": (12, 12, -34.650200, -59.409424, 17.39, None, 16),
+    "p4_rtk.SRT": (55, 55, -34.237922, -58.851745, 85.80, None, 15),
+}
+
+
+def seconds(text: str) -> float:
+    return datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+
+
+def subtitles(*bodies: str) -> str:
+    stamps = [f"00:00:{k:02d},000 --> 00:00:{k + 1:02d},000" for k in range(len(bodies))]
+    return "".join(
+        f"{k + 1}\n{t}\n{body}\n\n" for k, (t, body) in enumerate(zip(stamps, bodies, strict=True))
+    )
+
+
+def new(k: int, **other: object) -> str:
+    """As aircraft of these years write them."""
+    stamp = other.get("stamp", f"2026-06-01 12:00:{k:02d}.123")
+    names = other.get("names", ("latitude", "longitude"))
+    return (
+        f'<font size="28">FrameCnt: {k}, DiffTime: 33ms\n{stamp}\n[iso: 100] [shutter: 1/320.0] '
+        f"[{names[0]}: {63.4 + 1e-5 * k:.6f}] [{names[1]}: {10.4:.6f}] "
+        f"[rel_alt: {20 + k}.300 abs_alt: {140 + k}.500] [ct: 5500] "
+        f"[gb_yaw: 77.4 gb_pitch: -90.0 gb_roll: 0.5] </font>"
+    )
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_samples(name, shared_data):
+    path = shared_data("logs", "dji_srt", name)
+    data = path.read_bytes()
+    blocks, places, latitude, longitude, height, stamp, satellites = SAMPLES[name]
+    assert dji_srt.recognise(data[:8192], name)
+    for zone, ahead in ((None, 0), ("+02:00", 7200), ("Europe/Madrid", 7200)):
+        log = dji_srt.read(path, data, zone)
+        check(log)
+        columns = log.parts["gnss"].columns
+        assert len(columns["use"]) == blocks
+        assert np.isfinite(columns["latitude_deg"]).sum() == places
+        assert columns["latitude_deg"][0] == latitude
+        assert columns["longitude_deg"][0] == longitude
+        assert columns["height_home_m"][0] == height
+        if satellites is not None:
+            assert columns["satellites"][0] == satellites
+        if stamp is not None:
+            assert columns["time_log_s"][0] == pytest.approx(seconds(stamp), abs=1e-6)
+            if zone is None:
+                assert np.isnan(columns["time_s"]).all()
+                assert columns["why"][0] == "local time without a zone"
+            else:
+                assert columns["time_s"][0] == pytest.approx(seconds(stamp) - ahead, abs=1e-6)
+                assert columns["use"][0] == 1
+        elif name != "mix_p4rtk_mavic2pro.srt":
+            assert log.clock is None
+            assert "no clock in it" in log.notes[0]
+            assert (columns["use"] == 1).all()
+
+
+def test_angles_of_the_phantom(shared_data):
+    """Every angle as it stands in the text: pitch, roll, yaw."""
+    path = shared_data("logs", "dji_srt", "p4_rtk.SRT")
+    text = path.read_text("utf-8")
+    log = dji_srt.read(path, path.read_bytes())
+    for part, word, suffix in (("poses", r"F\.PRY", ""), ("gimbal", r"G\.PRY", "_world")):
+        said = re.findall(word + r" \((\S+?)°, (\S+?)°, (\S+?)°\)", text)
+        for name, values in zip(("pitch", "roll", "yaw"), zip(*said, strict=True), strict=True):
+            np.testing.assert_array_equal(
+                log.parts[part].columns[f"{name}{suffix}_deg"], list(map(float, values))
+            )
+    # It flies to its left, so that it leans to its left.
+    columns = log.parts["poses"].columns
+    north = np.diff(columns["latitude_deg"][[0, -1]])[0]
+    east = np.diff(columns["longitude_deg"][[0, -1]])[0] * np.cos(np.radians(34.2))
+    side = np.degrees(np.arctan2(east, north)) - columns["yaw_deg"].mean()
+    assert side == pytest.approx(-90, abs=10)
+    assert np.median(columns["roll_deg"]) < -10
+
+
+def test_two_families_in_one_file(shared_data):
+    path = shared_data("logs", "dji_srt", "mix_p4rtk_mavic2pro.srt")
+    log = dji_srt.read(path, path.read_bytes(), "-03:00")
+    columns = log.parts["gnss"].columns
+    assert columns["why"].tolist() == ["no time"] * 6 + [""] * 6
+    assert columns["longitude_deg"][-1] == -59.409483
+    assert columns["height_home_m"][-1] == 120.140999
+
+
+def test_heights_and_gimbal_of_new_aircraft():
+    data = subtitles(*map(new, range(5))).encode()
+    log = dji_srt.read(Path("x.SRT"), data, "Europe/Oslo")
+    check(log)
+    columns = log.parts["gnss"].columns
+    np.testing.assert_allclose(columns["height_home_m"], 20.3 + np.arange(5))
+    np.testing.assert_allclose(columns["height_sea_m"], 140.5 + np.arange(5))
+    np.testing.assert_allclose(
+        columns["time_s"], seconds("2026-06-01T10:00:00.123") + np.arange(5), atol=1e-6
+    )
+    gimbal = log.parts["gimbal"].columns
+    assert [gimbal[f"{name}_world_deg"][0] for name in ("yaw", "pitch", "roll")] == [77.4, -90.0, 0.5]
+    assert "poses" not in log.parts
+    assert log.notes == ()
+
+
+def test_names_and_order():
+    misspelt = subtitles(*(new(k, names=("latitude ", "longtitude ")) for k in range(3)))
+    reordered = subtitles(*(re.sub(r"(\[lat.*?\]) (\[lon.*?\])", r"\2 \1", new(k)) for k in range(3)))
+    for text in (misspelt, reordered):
+        columns = dji_srt.read(Path("x"), text.encode(), "UTC").parts["gnss"].columns
+        np.testing.assert_allclose(columns["longitude_deg"], 10.4)
+        np.testing.assert_allclose(columns["latitude_deg"], 63.4 + 1e-5 * np.arange(3))
+    # Longitude first by habit, and here it can only be the other way.
+    turned = subtitles("GPS (-34.5, -121.7, 17), H 20.00m", "GPS (-34.5, -121.8, 17), H 20.00m")
+    log = dji_srt.read(Path("x"), turned.encode())
+    assert log.parts["gnss"].columns["latitude_deg"].tolist() == [-34.5, -34.5]
+    usual = subtitles("GPS (-121.7, -34.5, 17), H -2.50m, H.S 1.00m/s")
+    columns = dji_srt.read(Path("x"), usual.encode()).parts["gnss"].columns
+    assert (columns["latitude_deg"][0], columns["height_home_m"][0]) == (-34.5, -2.5)
+
+
+@pytest.mark.parametrize("codec", ["utf-8-sig", "utf-16", "latin-1"])
+def test_encodings_and_line_ends(codec):
+    text = subtitles("GPS (10.4, 63.4, 17), H 20.00m, F.PRY (1.0°, 2.0°, 3.0°), <b>=1+1</b>")
+    log = dji_srt.read(Path("x"), text.replace("\n", "\r\n").encode(codec))
+    assert [log.parts["poses"].columns[f"{n}_deg"][0] for n in ("roll", "pitch", "yaw")] == [2.0, 1.0, 3.0]
+
+
+def test_rows_that_cannot_be_true():
+    bodies = [new(k) for k in range(6)]
+    bodies[1] = new(0)
+    bodies[2] = bodies[2].replace("63.400020", "0.000000").replace("10.400000", "0.000000")
+    bodies[3] = bodies[3].replace("2026", "2908")
+    bodies[4] = bodies[4].replace("63.400040", "193.4")
+    log = dji_srt.read(Path("x"), subtitles(*bodies).encode(), "UTC")
+    check(log)
+    why = ["", "repeated stamp", "position is a placeholder", "impossible time", "impossible position", ""]
+    assert log.parts["gnss"].columns["why"].tolist() == why
+
+
+def test_messages():
+    with pytest.raises(WildlabError, match="2 subtitles, and none with a place"):
+        dji_srt.read(Path("x"), subtitles("hello", "GPS(n/a, n/a, 0)").encode())
+    with pytest.raises(WildlabError, match="'Mars' is not a time zone"):
+        dji_srt.read(Path("x"), subtitles(new(1)).encode(), "Mars")
+    assert not dji_srt.recognise(subtitles("Hello there").encode(), "film.srt")
+    log = dji_srt.read(Path("x"), subtitles(new(1), "hello").encode(), "UTC")
+    assert log.lost == ("1 subtitle of 2 without a place",)
+
+
+def test_damage(shared_data):
+    assert survives(dji_srt.read, subtitles(*map(new, range(30))).encode()) > 140
+    data = shared_data("logs", "dji_srt", "p4_rtk.SRT").read_bytes()
+    assert survives(dji_srt.read, data) > 140
+    zoned = lambda path, data, zone: dji_srt.read(path, data, "UTC")  # noqa: E731
+    assert survives(zoned, subtitles(*map(new, range(30))).encode()) > 140
