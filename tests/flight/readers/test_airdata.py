@@ -165,13 +165,12 @@ def test_text_in_columns_of_numbers_and_placeholders():
 def test_gimbal_heading_that_stands():
     made = rows()
     for k, row in enumerate(made):
-        row["gimbal_heading(degrees)"], row[" compass_heading(degrees)"] = (
-            359.9 + 0.2 * (k % 2) - 360,
-            k % 360,
-        )
+        row["gimbal_heading(degrees)"] = -0.1 + 0.2 * (k % 2)
+        row[" compass_heading(degrees)"] = k % 360
     log = airdata.read(Path("x.csv"), table(made).encode())
     assert log.notes == (
-        "the gimbal's heading stays within 0.2 deg while the aircraft turns by 299 deg: it hardly counts from north",
+        "the gimbal's heading stays within 0.2 deg while the aircraft turns by 299 deg: "
+        "it hardly counts from north",
     )
 
 
@@ -186,7 +185,7 @@ def test_messages():
 
 
 def test_a_quotation_mark_costs_one_line():
-    text = table(rows()).replace("63.4000009", '"63.4000009')
+    text = table(rows()).replace("63.4000090", '"63.4000090')
     log = airdata.read(Path("x.csv"), text.encode())
     assert log.lost == ("1 line of 300 cut off",)
     assert len(log.parts["gnss"]) == 299
@@ -195,4 +194,4 @@ def test_a_quotation_mark_costs_one_line():
 def test_damage(shared_data):
     assert survives(airdata.read, table(rows(120)).encode()) > 130
     path = shared_data("logs", "dji_airdata_p4rtk", "Jul-7th-2022-11-10AM-Flight-Airdata.csv")
-    assert survives(airdata.read, path.read_bytes()[:200000], every=5) > 25
+    assert survives(airdata.read, path.read_bytes()[:200000], every=10) > 12

@@ -156,8 +156,8 @@ def _parts(
 def _angles(angles: dict[str, Array]) -> dict[str, Mask]:
     table = np.column_stack(list(angles.values()))
     return {
-        "no attitude": np.isnan(table).any(axis=1),
-        "impossible attitude": (np.abs(table) > 360.0).any(axis=1),
+        "no attitude": np.asarray(np.isnan(table).any(axis=1)),
+        "impossible attitude": np.asarray((np.abs(table) > 360.0).any(axis=1)),
     }
 
 

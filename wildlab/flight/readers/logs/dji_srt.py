@@ -206,7 +206,8 @@ def _wall(found: re.Match[str] | None) -> float:
     if found is None:
         return np.nan
     try:
-        at = datetime(*map(int, found.groups()[:6]), tzinfo=UTC).timestamp()
+        year, month, day, hour, minute, second = map(int, found.groups()[:6])
+        at = datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
     except (ValueError, OverflowError):
         return np.nan
     digits = (found[7] or "0").ljust(3, "0") + (found[8] or "0").rjust(3, "0")
@@ -217,7 +218,7 @@ def _turn(place: Array, unnamed: Mask, notes: list[str]) -> None:
     """Puts latitude and longitude of the unnamed in order where they can only stand the other way."""
     found = place[unnamed]
     if len(found) and (np.abs(found[:, 0]) > 90).mean() > 0.5 and (np.abs(found[:, 1]) <= 90).mean() > 0.5:
-        place[np.ix_(unnamed, [0, 1])] = found[:, [1, 0]]
+        place[unnamed, :2] = found[:, [1, 0]]
         notes.append("the numbers behind GPS can only be latitude and longitude, in this order")
 
 

@@ -95,7 +95,8 @@ def _log(segments: Sequence[Sequence[Point]], lost: tuple[str, ...]) -> RawLog:
         notes.append("no point carries a time that can be true: as a track over time it is of no use")
     elif not timed:
         notes.append("no point carries a time: as a track over time it is of no use")
-    clock = Clock("UTC of the log", pairs=int(np.isfinite(time).sum())) if timed else None
+    known = int(np.isfinite(time[stream.used]).sum())
+    clock = Clock("UTC of the log", pairs=known) if known else None
     return RawLog("gpx", {"gnss": stream}, clock=clock, lost=lost, notes=tuple(notes))
 
 

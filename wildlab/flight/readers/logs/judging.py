@@ -68,9 +68,10 @@ def numbers(texts: Iterable[str | bytes | None]) -> Array:
     """(N,) plain decimal numbers, NaN where a text is none."""
     texts = list(texts)
     try:
-        words = [text or "nan" for text in texts if not isinstance(text, bytes)]
-        if len(words) == len(texts) and not _STRANGE.search("".join(text for text in texts if text)):
-            values = np.array(list(map(float, words)))
+        words = [text for text in texts if isinstance(text, str) and text]
+        plain = all(isinstance(text, str) or text is None for text in texts)
+        if plain and not _STRANGE.search("".join(words)):
+            values = np.array([float(text) if text else np.nan for text in texts])
             return np.where(np.isfinite(values), values, np.nan)
     except ValueError:
         pass
@@ -137,7 +138,7 @@ def _reachable(time: Array, latitude: Array, longitude: Array) -> Mask:
         """Rows from begin to end that can be reached from one."""
         rows = np.arange(begin, end)
         away = _metres(latitude, longitude, np.full(len(rows), one), rows)
-        return rows[away <= _NOISE_M + SPEED[1] * np.abs(time[rows] - time[one])]
+        return np.asarray(rows[away <= _NOISE_M + SPEED[1] * np.abs(time[rows] - time[one])])
 
     last = int(ends[longest]) - 1
     for k in range(longest + 1, len(starts)):

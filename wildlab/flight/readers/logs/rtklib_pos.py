@@ -180,7 +180,8 @@ def _time(tokens: list[str], days: dict[str, float]) -> float | None:
     if tokens[0] not in days:
         date = _CALENDAR.fullmatch(tokens[0])
         try:
-            days[tokens[0]] = datetime(*map(int, date.groups()), tzinfo=UTC).timestamp() if date else np.nan
+            year, month, day = map(int, date.groups()) if date else (0, 0, 0)
+            days[tokens[0]] = datetime(year, month, day, tzinfo=UTC).timestamp()
         except (ValueError, OverflowError):
             days[tokens[0]] = np.nan
     clock = _CLOCK.fullmatch(tokens[1])
@@ -204,7 +205,7 @@ def _columns(layout: Layout, found: list[_Row]) -> dict[str, Array]:
         return values.get(name, np.full(len(found), np.nan))
 
     if "x-ecef" in values:
-        columns |= _from_ecef(*(of(f"{axis}-ecef") for axis in "xyz"), of)
+        columns |= _from_ecef(of("x-ecef"), of("y-ecef"), of("z-ecef"), of)
     else:
         for name in ("latitude", "longitude"):
             whole = of(name)
