@@ -1,0 +1,446 @@
+"""Folders of images: what their headers say, whatever the maker, and what is said where they say nothing."""
+
+from __future__ import annotations
+
+import math
+import struct
+import warnings
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import ExifTags, Image
+from scipy.spatial.transform import Rotation
+
+from tests.flight.readers import made_up_photos as made
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import photo_tags
+from wildlab.flight.readers.logs import photo_values as values
+from wildlab.flight.readers.logs.log import RawLog
+from wildlab.flight.readers.logs.photo_values import from_nadir
+from wildlab.flight.readers.logs.photos import camera_of, is_photos, read_photos
+
+NOON = datetime(2024, 6, 12, 11, 30, tzinfo=UTC).timestamp()
+
+
+def column(log: RawLog, name: str) -> list[Any]:
+    return list(log.parts["photos"].columns[name])
+
+
+def said(log: RawLog) -> str:
+    return "; ".join((*log.lost, *log.notes))
+
+
+def test_what_a_dji_says(tmp_path: Path) -> None:
+    for number in (10, 9, 1):
+        made.write(tmp_path, f"DJI_{number}.JPG", **made.dji(number))
+    assert is_photos(tmp_path)
+    log = read_photos(tmp_path)
+    assert column(log, "file") == ["DJI_1.JPG", "DJI_9.JPG", "DJI_10.JPG"]
+    expected = {
+        "latitude_deg": 61.5,
+        "longitude_deg": -15.25,
+        "height_sea_m": 345.5,
+        "height_home_m": 80.0,
+        "roll_deg": -1.2,
+        "pitch_deg": 3.4,
+        "yaw_deg": 139.1,
+        "roll_world_deg": 0.0,
+        "pitch_world_deg": -89.9,
+        "yaw_world_deg": 140.7,
+        "focal_mm": 4.5,
+        "focal_35mm": 24.0,
+        "width_px": 40.0,
+        "height_px": 30.0,
+    }
+    for name, value in expected.items():
+        assert column(log, name) == pytest.approx([value] * 3, abs=1e-9), name
+    assert "height_ellipsoid_m" not in log.parts["photos"].columns
+    assert column(log, "time_log_s") == [NOON + 1, NOON + 9, NOON + 10]
+    assert column(log, "camera") == ["DJI FC6310"] * 3
+    assert log.parts["photos"].used.all()
+    assert "absolute altitude without RTK" in said(log)
+
+
+def test_local_time_without_a_zone_costs_no_place(tmp_path: Path) -> None:
+    made.write(tmp_path, "a.jpg", **made.dji(1))
+    log = read_photos(tmp_path)
+    assert log.clock is not None
+    assert log.clock.base == "local time without a zone"
+    assert np.isnan(column(log, "time_s")).all()
+    assert column(log, "use") == [1.0]
+    assert "no image says its zone" in said(log)
+    in_oslo = read_photos(tmp_path, "Europe/Oslo")
+    assert column(in_oslo, "time_s") == [NOON + 1 - 7200]
+    with pytest.raises(WildlabError, match="is not a time zone"):
+        read_photos(tmp_path, "Middle/Earth")
+
+
+def test_rtk_has_its_height_above_the_ellipsoid_its_spread_and_fix(tmp_path: Path) -> None:
+    given_ = {"RtkFlag": 50, "RtkStdLat": 0.03, "RtkStdLon": 0.04, "RtkStdHgt": 0.05}
+    more = {"GpsLatitude": "61.123456789", "GpsLongtitude": "-15.987654321"}
+    made.write(tmp_path, "a.jpg", **made.dji(1, CalibratedFocalLength="3666.67", **given_, **more))
+    log = read_photos(tmp_path)
+    assert column(log, "height_ellipsoid_m") == [345.5]
+    assert column(log, "fix") == [6.0]
+    assert column(log, "sd_horizontal_m") == pytest.approx([math.sqrt((0.03**2 + 0.04**2) / 2)])
+    assert column(log, "sd_vertical_m") == [0.05]
+    # The maker's own digits, its misspelt tag too, are more than those of EXIF.
+    assert (column(log, "latitude_deg"), column(log, "longitude_deg")) == ([61.123456789], [-15.987654321])
+    camera = camera_of(log)
+    assert camera is not None
+    assert (camera["focal_px"], camera["how"]) == (3666.67, "calibrated by the maker")
+    assert "taken to count from the ellipsoid" in said(log)
+    assert "contradict each other on the focal length: 3667 px" in said(log)
+
+
+@given(
+    st.floats(-89, 89),
+    st.floats(-179, 179),
+    st.sampled_from([(0, 1, "sea"), (1, -1, "sea"), (2, 1, "ellipsoid")]),
+)
+def test_hemispheres_and_sides_of_heights(
+    latitude: float, longitude: float, side: tuple[int, int, str]
+) -> None:
+    gps = made.gps_of(latitude, longitude, 12.5, ref=side[0])
+    tags = photo_tags.Tags(exif={ExifTags.GPSTAGS[number]: value for number, value in gps.items()})
+    found = values.place_of(tags)
+    if abs(latitude) + abs(longitude) > 1e-6:
+        assert found[:2] == pytest.approx((latitude, longitude), abs=1e-9)
+    heights = dict(zip(("ellipsoid", "sea", "home"), values.heights_of(tags), strict=True))
+    assert heights[side[2]] == 12.5 * side[1]
+    assert sum(map(math.isfinite, heights.values())) == 1
+
+
+def test_a_position_without_its_hemisphere_is_none(tmp_path: Path) -> None:
+    gps = made.gps_of(-33.5, 18.25, 40.0)
+    del gps[3]
+    made.write(tmp_path, "a.jpg", exif=made.exif_of(gps=gps))
+    log = read_photos(tmp_path)
+    assert column(log, "why") == ["position without its hemisphere, or none"]
+
+
+@pytest.mark.parametrize(
+    ("gps", "why"),
+    [
+        (made.gps_of(0.0, 0.0, 10.0), "placeholder of a position"),
+        (made.gps_of(61.0, 15.0), "no height"),
+        (made.gps_of(61.0, 15.0, 10.0) | {9: "V"}, "no fix"),
+        (made.gps_of(61.0, 15.0, 10.0) | {2: (200.0, 0.0, 0.0)}, "position without its hemisphere, or none"),
+        ({}, "no position"),
+    ],
+)
+def test_places_that_cannot_be_used(tmp_path: Path, gps: dict[int, Any], why: str) -> None:
+    made.write(tmp_path, "a.jpg", exif=made.exif_of({0x010F: "Some"}, gps=gps))
+    log = read_photos(tmp_path)
+    assert (column(log, "why"), column(log, "use")) == ([why], [0.0])
+    assert f"1 image: {why}" in log.notes
+
+
+def test_zones_parts_of_seconds_and_gps_time(tmp_path: Path) -> None:
+    own = {0x9003: "2024:06:12 11:30:05", 0x9291: "25", 0x9011: "+02:00"}
+    made.write(tmp_path, "a.jpg", exif=made.exif_of(own=own, gps=made.gps_of(61, 15, 9)))
+    log = read_photos(tmp_path)
+    assert column(log, "time_s") == pytest.approx([NOON + 5.25 - 7200], abs=1e-6)
+    assert log.clock is not None
+    assert log.clock.base == "zones that the images state"
+    # A camera three seconds and two hours off, with parts of seconds; GPS cuts them off.
+    folder = tmp_path / "gps"
+    folder.mkdir()
+    for number in range(6):
+        wall = NOON + 3.4 + 2.5 * number
+        whole = datetime.fromtimestamp(int(wall), UTC)
+        sky = datetime.fromtimestamp(int(wall - 7203), UTC)
+        own = {0x9003: f"{whole:%Y:%m:%d %H:%M:%S}", 0x9291: f"{wall % 1:.3f}"[2:]}
+        gps = made.gps_of(
+            61, 15, 9, date=f"{sky:%Y:%m:%d}", clock=(float(sky.hour), float(sky.minute), float(sky.second))
+        )
+        made.write(folder, f"{number}.jpg", exif=made.exif_of(own=own, gps=gps))
+    log = read_photos(folder)
+    time = np.array(column(log, "time_s"))
+    assert np.diff(time) == pytest.approx([2.5] * 5, abs=1e-6)
+    assert np.abs(time - (NOON + 3.4 + 2.5 * np.arange(6) - 7203)).max() <= 1.0
+    assert log.clock is not None
+    assert log.clock.base == "GPS time of the images"
+    assert log.clock.pairs == 6
+
+
+def test_the_makers_own_utc_goes_before_a_stamp_of_gps(tmp_path: Path) -> None:
+    made.write(tmp_path, "a.jpg", **made.dji(1, UTCAtExposure="2024-06-12T09:30:01.123456"))
+    assert column(read_photos(tmp_path), "time_s") == pytest.approx([NOON - 7200 + 1.123456], abs=1e-5)
+
+
+def test_a_clock_far_from_gps_is_told(tmp_path: Path) -> None:
+    own = {0x9003: "2024:06:12 11:30:05", 0x9011: "+00:00"}
+    gps = made.gps_of(61, 15, 9, date="2024:06:12", clock=(11.0, 29.0, 0.0))
+    made.write(tmp_path, "a.jpg", exif=made.exif_of(own=own, gps=gps))
+    assert "is 65 s ahead of the GPS time" in said(read_photos(tmp_path))
+
+
+def test_parrots_and_pix4ds_tags(tmp_path: Path) -> None:
+    tags = {"Camera:Yaw": "45", "Camera:Pitch": "60", "Camera:Roll": "0", "Camera:GPSXYAccuracy": "3/2"}
+    tags |= {"Camera:GPSZAccuracy": "2.5"}
+    exif = made.exif_of({0x010F: "Parrot", 0x0110: "Sequoia"}, gps=made.gps_of(47.0, 8.5, 500.0))
+    made.write(tmp_path, "a.jpg", exif=exif, xmp=made.xmp_of(made.PIX4D, tags))
+    anafi = {
+        f"drone-parrot:Camera{one}Degree": value for one, value in (("Roll", 0), ("Pitch", -30), ("Yaw", 45))
+    }
+    anafi |= {
+        f"drone-parrot:Drone{one}Degree": value for one, value in (("Roll", 1), ("Pitch", 2), ("Yaw", 3))
+    }
+    exif = made.exif_of({0x010F: "Parrot", 0x0110: "Anafi"}, gps=made.gps_of(47.0, 8.5, 500.0))
+    made.write(tmp_path, "b.jpg", exif=exif, xmp=made.xmp_of(made.PARROT, anafi))
+    log = read_photos(tmp_path)
+    for name, value in (("roll", 0.0), ("pitch", -30.0), ("yaw", 45.0)):
+        assert column(log, f"{name}_world_deg") == pytest.approx([value] * 2, abs=1e-9)
+    assert column(log, "roll_deg")[1] == 1.0
+    assert column(log, "sd_horizontal_m")[0] == 1.5
+    assert "count from looking straight down" in said(log)
+    assert "there are 2 cameras: " in said(log)
+    with pytest.raises(WildlabError, match="of 2 cameras: Parrot Anafi, Parrot Sequoia"):
+        camera_of(log)
+
+
+@given(st.floats(-180, 180), st.floats(-89, 89), st.floats(-180, 180))
+def test_angles_from_nadir_are_the_same_rotation(roll: float, pitch: float, yaw: float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of angles that are not unique
+        down = Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True).as_matrix()
+        ahead = Rotation.from_euler("ZYX", from_nadir(roll, pitch, yaw)[::-1], degrees=True).as_matrix()
+    # The optical axis, right and down in the image, in both ways to say them.
+    assert ahead[:, 0] == pytest.approx(down[:, 2], abs=1e-6)
+    assert ahead[:, 1] == pytest.approx(down[:, 1], abs=1e-6)
+    assert ahead[:, 2] == pytest.approx(-down[:, 0], abs=1e-6)
+
+
+def test_flirs_autopilot_and_tags_as_elements(tmp_path: Path) -> None:
+    inside = "".join(
+        f"<FLIR:MAV{one}>{value}</FLIR:MAV{one}>" for one, value in (("Yaw", 10), ("Pitch", "-5/2"))
+    )
+    inside += "<FLIR:MAVRoll><rdf:Seq><rdf:li>4</rdf:li></rdf:Seq></FLIR:MAVRoll>"
+    made.write(tmp_path, "a.jpg", xmp=made.xmp_of(made.FLIR, {}, inside))
+    log = read_photos(tmp_path)
+    assert [column(log, f"{one}_deg") for one in ("roll", "pitch", "yaw")] == [[4.0], [-2.5], [10.0]]
+
+
+def test_focal_length_by_the_equivalent_over_the_diagonal(tmp_path: Path) -> None:
+    exif = made.exif_of(own={0x920A: 9.1, 0xA405: 40})
+    for name in ("DJI_1_T.JPG", "DJI_2_T.JPG"):
+        made.write(tmp_path, name, size=(640, 512), exif=exif)
+    camera = camera_of(read_photos(tmp_path))
+    assert camera is not None
+    # 9.1 mm with pixels of 12 um, which no tag says.
+    assert camera["focal_px"] == pytest.approx(9.1 / 0.012, rel=0.01)
+    assert "rounded to within 1 %" in camera["how"]
+
+
+def test_pixel_pitch_is_never_guessed(tmp_path: Path) -> None:
+    made.write(tmp_path, "a.jpg", exif=made.exif_of({0x010F: "DJI", 0x0110: "XT2"}, {0x920A: 13.0}))
+    assert camera_of(read_photos(tmp_path)) is None
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "unit", "focal", "note"),
+    [
+        (100.0, 100.0, 4, 1300.0, ""),  # 10 um, by the standard
+        (2540.0, 2540.0, 2, 1300.0, ""),  # in inches
+        (10.88, 8.704, 4, 764.706, "hold the size of the sensor"),
+        (10.0, 3.0, 4, math.nan, ""),  # neither square pixels nor a sensor of this form
+    ],
+)
+def test_focal_length_by_the_sensor(
+    tmp_path: Path, x: float, y: float, unit: int, focal: float, note: str
+) -> None:
+    own = {0x920A: 13.0, 0xA20E: x, 0xA20F: y, 0xA210: unit}
+    made.write(tmp_path, "a.jpg", size=(640, 512), exif=made.exif_of(own=own))
+    log = read_photos(tmp_path)
+    assert column(log, "focal_px") == pytest.approx([focal], rel=1e-5, nan_ok=True)
+    assert note in said(log)
+
+
+def test_a_zoom_and_two_sizes_are_no_one_camera(tmp_path: Path) -> None:
+    for folder, sizes, film in (("zoom", (40, 40), (24, 48)), ("sizes", (40, 60), (24, 24))):
+        (tmp_path / folder).mkdir()
+        for number in range(2):
+            exif = made.exif_of({0x0110: "One"}, {0xA405: film[number]})
+            made.write(tmp_path / folder, f"{number}.jpg", size=(sizes[number], 30), exif=exif)
+    with pytest.raises(WildlabError, match="the lens zooms"):
+        camera_of(read_photos(tmp_path / "zoom"))
+    with pytest.raises(WildlabError, match="of 2 cameras: One, 40 x 30, One, 60 x 30"):
+        camera_of(read_photos(tmp_path / "sizes"))
+
+
+def test_cameras_beside_each_other_are_told_apart_by_their_names(tmp_path: Path) -> None:
+    for ending in "TWZV":
+        made.write(tmp_path, f"DJI_20240612_0001_{ending}.JPG", **made.dji(1))
+    made.write(tmp_path, "x.JPG", **made.dji(1, ImageSource="InfraredCamera"))
+    names = column(read_photos(tmp_path), "camera")
+    assert [name.rpartition(", ")[2] for name in names] == ["thermal", "visual", "wide", "zoom", "thermal"]
+
+
+def test_images_without_any_tag(tmp_path: Path) -> None:
+    Image.new("L", (12, 8)).save(tmp_path / "a.png")
+    Image.new("I;16", (7, 5)).save(tmp_path / "b.tiff")
+    made.write(tmp_path, "c.jpg")
+    (tmp_path / "d.dng").write_bytes(b"II*\0")
+    log = read_photos(tmp_path)
+    assert column(log, "file") == ["a.png", "b.tiff", "c.jpg"]
+    assert list(zip(column(log, "width_px"), column(log, "height_px"), strict=True)) == [
+        (12, 8),
+        (7, 5),
+        (40, 30),
+    ]
+    assert column(log, "why") == ["no position"] * 3
+    assert log.clock is None
+    assert "no image carries a time" in log.notes
+    assert log.lost == ("1 image .dng: this kind is not read",)
+
+
+def test_tags_in_png_and_tiff(tmp_path: Path) -> None:
+    exif = made.exif_of({0x010F: "Cam"}, {0x9003: "2024:06:12 11:30:05"}, made.gps_of(-12.25, 34.5, 56.0))
+    Image.new("L", (12, 8)).save(tmp_path / "a.png", exif=exif)
+    (tmp_path / "b.tif").write_bytes(made.tiff(exif))
+    log = read_photos(tmp_path)
+    assert column(log, "latitude_deg") == pytest.approx([-12.25] * 2)
+    assert column(log, "time_log_s") == [NOON + 5] * 2
+    assert column(log, "height_sea_m") == [56.0] * 2
+
+
+def test_no_image(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("x", encoding="utf-8")
+    assert not is_photos(tmp_path)
+    assert not is_photos(tmp_path / "none")
+    with pytest.raises(WildlabError, match="there are no images in this folder"):
+        read_photos(tmp_path)
+    with pytest.raises(WildlabError, match="cannot be read"):
+        read_photos(tmp_path / "none")
+
+
+# -- hostile files
+
+
+@pytest.mark.parametrize(
+    ("packet", "problem"),
+    [
+        (b'<!DOCTYPE x [<!ENTITY a "b">]><x:xmpmeta>&a;</x:xmpmeta>', "declares a document type"),
+        (b"<x>" * 200 + b"</x>" * 200, "nested too deeply"),
+    ],
+)
+def test_xmp_that_is_refused(tmp_path: Path, packet: bytes, problem: str) -> None:
+    made.write(tmp_path, "a.jpg", xmp=packet)
+    assert problem in said(read_photos(tmp_path))
+
+
+def test_xmp_that_is_no_xml_any_more_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    whole = made.dji(1)["xmp"]
+    cut = whole[: whole.find(b"drone-dji:FlightRollDegree")]
+    undeclared = whole.replace(made.DJI.encode(), b"")
+    for number, packet in enumerate((cut + b">", undeclared)):
+        made.write(tmp_path, f"{number}.jpg", xmp=packet)
+    log = read_photos(tmp_path)
+    assert column(log, "pitch_world_deg") == [-89.9] * 2
+
+
+def test_a_claim_of_ten_gigabytes_is_not_believed(tmp_path: Path) -> None:
+    # A tag of EXIF that claims as much, a TIFF with such a tag, and a PNG of as many pixels.
+    entry = struct.pack("<HHII", 0x010F, 2, 0xFFFFFFF0, 26)
+    tiff = b"II*\0" + struct.pack("<IH", 8, 1) + entry + struct.pack("<I", 0) + b"abc"
+    (tmp_path / "a.jpg").write_bytes(made.jpeg(more=made.segment(0xE1, b"Exif\0\0" + tiff)))
+    (tmp_path / "b.tif").write_bytes(tiff)
+    head = b"IHDR" + struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
+    (tmp_path / "c.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + b"\0\0\0\0")
+    (tmp_path / "d.jpg").write_bytes(b"\xff\xd8\xff\xe1\xff\xff" + b"Exif\0\0" + tiff)
+    (tmp_path / "e.jpg").write_bytes(b"")
+    log = read_photos(tmp_path)
+    assert column(log, "use") == [0.0] * 5
+    assert column(log, "width_px")[2] == 100_000
+    assert "1 image: is empty" in log.lost
+
+
+def test_a_large_file_is_not_read_beyond_its_headers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made.write(tmp_path, "a.jpg", **made.dji(1))
+    with (tmp_path / "a.jpg").open("ab") as stream:
+        stream.truncate(20 << 30)  # a hole
+    taken = []
+    plain = Path.open
+
+    class Counting:
+        def __init__(self, stream: Any) -> None:
+            self.stream = stream
+
+        def __enter__(self) -> Counting:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            self.stream.close()
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.stream, name)
+
+        def read(self, size: int) -> bytes:
+            taken.append(size)
+            return bytes(self.stream.read(size))
+
+    monkeypatch.setattr(Path, "open", lambda self, mode: Counting(plain(self, mode)))
+    assert column(read_photos(tmp_path), "use") == [1.0]
+    assert sum(taken) < 100_000
+
+
+def test_names_stay_names(tmp_path: Path) -> None:
+    names = ["<img src=x onerror=alert(1)>.jpg", "=cmd|'x'!A1.jpg", "a\udcff.jpg"]
+    for name in names:
+        made.write(tmp_path, name, exif=made.exif_of({0x010F: "<b>\x1b[31mMake", 0x0110: "=1+1"}))
+    log = read_photos(tmp_path)
+    assert set(column(log, "file")) == {*names[:2], "a\\udcff.jpg"}
+    assert all(name.isprintable() for name in column(log, "camera"))
+
+
+def test_cut_and_spoilt_images_end_in_no_traceback(tmp_path: Path) -> None:
+    whole = made.jpeg(**made.dji(1, RtkFlag=50, UTCAtExposure="2024-06-12T09:30:01.123456"))
+    random = np.random.default_rng(14)
+    for number, data in enumerate((whole, made.tiff(made.dji(1)["exif"]))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        ending = ("jpg", "tif")[number]
+        head = len(data) if number else data.find(b"\xff\xda")
+        for place in random.integers(0, head, 50):
+            (folder / f"cut{place}.{ending}").write_bytes(data[:place])
+        for at in range(50):
+            spoilt = np.frombuffer(data, np.uint8).copy()
+            spoilt[random.integers(0, head, 100 if at % 2 else 3)] = random.integers(0, 256, 1)
+            (folder / f"flip{at}.{ending}").write_bytes(spoilt.tobytes())
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            log = read_photos(folder)
+        part = log.parts["photos"]
+        for name in ("latitude_deg", "longitude_deg"):
+            assert np.isfinite(part.columns[name][part.used]).all()
+        assert log.lost
+
+
+# -- images of real cameras
+
+
+def test_an_xt2_by_what_is_known_of_it(shared_data: Any) -> None:
+    log = read_photos(shared_data("imagery", "deervision_rjpeg"))
+    camera = camera_of(log)
+    assert camera is not None
+    assert (camera["width_px"], camera["height_px"]) == (640, 512)
+    assert camera["focal_px"] == pytest.approx(764.7, abs=0.05)
+    assert "contradict each other on the lens: 13 mm in EXIF, 19 mm" in said(log)
+    assert all(-78 < one < -77 for one in column(log, "longitude_deg"))
+    assert column(log, "height_home_m") == pytest.approx([100.0] * 4, abs=0.2)
+    assert column(log, "pitch_world_deg") == pytest.approx([-89.9] * 4, abs=1e-4)
+
+
+def test_raw_images_of_another_size_than_the_picture(shared_data: Any) -> None:
+    log = read_photos(shared_data("imagery", "rjpeg_samples"))
+    assert column(log, "width_px") == [640, 240, 80]
+    assert "1 image of 640 x 480 px hold a raw thermal image of 80 x 60 px" in said(log)
+    duo = read_photos(shared_data("imagery", "flirpy"))
+    assert column(duo, "longitude_deg")[0] == pytest.approx(-2.8122695)
+    assert column(duo, "width_px") == [640, 640]
