@@ -14,12 +14,14 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
 - `consider`, `considering`: errors of poses, clocks, lenses and sensors that a filter keeps in mind.
 - `motion`, `measurement`, `platforms`, `noise`, `maritime`: what the filters are told of target, sensor and
   errors.
+- `start_from_measurement`, `start_from_rays`: where it begins. `merge`: several sensors into one track.
 - `kalman`, `schmidt`, `association`: the single steps.
 """
 
 from wildlab.tracking.association import distances, nearest_within
 from wildlab.tracking.batch import BatchTracks, View, run_batch
 from wildlab.tracking.coloured import run_coloured, thin
+from wildlab.tracking.combined import Merged, Seen, combined, merge
 from wildlab.tracking.considered import Considered, consider, consider_all
 from wildlab.tracking.considering import considering, renamed
 from wildlab.tracking.following import FILTERS, follow
@@ -45,24 +47,30 @@ from wildlab.tracking.motion import (
 )
 from wildlab.tracking.noise import constant_noise, noise_by_altitude, noise_by_direction
 from wildlab.tracking.platforms import measured_from, polar
+from wildlab.tracking.rays import Crossing, intersect_rays
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first
 from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.smoothing import run_smoothed, smooth
+from wildlab.tracking.starts import start_from_measurement, start_from_position, start_from_rays
 from wildlab.tracking.unscented import run_unscented
 
 __all__ = [
     "FILTERS",
     "BatchTracks",
     "Considered",
+    "Crossing",
+    "Merged",
     "ModeTrack",
     "Motion",
     "PoseUncertainty",
+    "Seen",
     "Sensor",
     "Start",
     "Track",
     "View",
     "azimuths_elevations",
     "bearings",
+    "combined",
     "consider",
     "consider_all",
     "considering",
@@ -73,7 +81,9 @@ __all__ = [
     "filter_at_rest",
     "follow",
     "in_steps",
+    "intersect_rays",
     "measured_from",
+    "merge",
     "nearest_within",
     "noise_by_altitude",
     "noise_by_direction",
@@ -94,5 +104,8 @@ __all__ = [
     "singer",
     "smooth",
     "start_from_first",
+    "start_from_measurement",
+    "start_from_position",
+    "start_from_rays",
     "thin",
 ]

@@ -2,8 +2,8 @@
 
 Of the errors that `wildlab.tracking.considered` knows, a level platform has `NORTH` and `EAST` of its
 position (and of the part of the hull that is seen), and `YAW`, its heading. Down moves nothing on a level
-sea; its place among the six of a pose is taken by `CLOCK`, the error of the stamp in seconds. `CONSIDERED` has
-their names.
+sea; its place among the six of a pose is taken by `CLOCK`, the error of the stamp in seconds. `CONSIDERED`
+has their names.
 """
 
 from __future__ import annotations

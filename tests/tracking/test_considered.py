@@ -1,0 +1,339 @@
+"""Named errors: derivatives against finite differences, and the filters that consider them."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from tests.tracking.poses import CAMERA, PIXEL, POSE, disturbed, overflight, posed
+from tests.tracking.test_schmidt import growing, joint
+from wildlab.errors import WildlabError
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import rotation_vector_to_matrix
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.tracking import measurement as m
+from wildlab.tracking import predictions as p
+from wildlab.tracking.considered import Considered, consider, consider_all, errors_of
+from wildlab.tracking.considering import considering, renamed
+from wildlab.tracking.following import FILTERS, follow
+from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.platforms import bearings, measured_from, polar, ranges_bearings
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.schmidt import PoseUncertainty
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+START = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 9.0, 9.0]))
+SPEED = st.floats(-20, 20)
+PLACE = st.tuples(st.floats(20, 500), st.floats(-np.pi, np.pi))
+
+
+def differences(function, k, step=1e-5):
+    """(m, k) central differences at zero."""
+    columns = [(function(step * e) - function(-step * e)) / (2 * step) for e in np.eye(k)]
+    return np.stack(columns, axis=-1)
+
+
+@given(POSE, PLACE, st.floats(-0.5, 0.5))
+def test_polar_derivatives(pose, place, plane):
+    poses = posed(pose)
+    position = poses.p_nb[:2] + place[0] * np.array([np.cos(place[1]), np.sin(place[1])])
+    seen = p.predict_polar(position, poses.p_nb, poses.R_nb, plane)
+
+    def moved(error):
+        wrong = disturbed(poses, error)
+        return p.predict_polar(position, wrong.p_nb, wrong.R_nb, plane).z
+
+    def target(step):
+        return p.predict_polar(position + step, poses.p_nb, poses.R_nb, plane).z
+
+    steps = 1e-5 * np.eye(6)
+    by_pose = np.stack(
+        [m.difference(moved(e), moved(-e), (False, True, False)) / 2e-5 for e in steps], axis=-1
+    )
+    by_target = np.stack(
+        [m.difference(target(e), target(-e), (False, True, False)) / 2e-5 for e in steps[:2, :2]], axis=-1
+    )
+    np.testing.assert_allclose(seen.H_pose, by_pose, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(seen.H_position, by_target, rtol=1e-4, atol=1e-5)
+    offset = poses.R_nb @ (seen.z[0] * np.array([
+        np.cos(seen.z[2]) * np.cos(seen.z[1]), np.cos(seen.z[2]) * np.sin(seen.z[1]), -np.sin(seen.z[2])
+    ]))  # fmt: skip
+    np.testing.assert_allclose(poses.p_nb + offset, [*position, plane], atol=1e-8)
+
+
+@given(PLACE, st.tuples(*(SPEED,) * 4), st.floats(-np.pi, np.pi), st.floats(-1, 1), st.booleans())
+def test_clock_and_biases_of_ranges_and_bearings(place, speeds, yaw, rate, own):
+    """What is measured at the true instant, by a platform that has moved and turned on since the stamp."""
+    position = place[0] * np.array([np.cos(place[1]), np.sin(place[1])])
+    v, w = np.array(speeds[:2]), np.array(speeds[2:])
+    names = ("clock", "bearing_bias", "heading", "range_bias", "platform_east")
+    moves = np.array([*w, 0.0, 0.0, 0.0, rate])
+    sensor = considering(ranges_bearings(np.zeros(2), yaw), names, moves=moves, velocity=v if own else None)
+    seen = sensor.predict(0, np.array([*position, *v])[: sensor.states])
+    assert sensor.states == (2 if own else 4)
+
+    def measured(error):
+        clock, bearing_bias, heading, range_bias, east = error
+        platform = w * clock + np.array([0.0, east])
+        z = p.predict_range_bearing(position + v * clock, platform, yaw + rate * clock + heading).z
+        return m.difference(z + np.array([range_bias, bearing_bias]), seen.z, (False, True))
+
+    np.testing.assert_allclose(seen.H_pose, differences(measured, 5), rtol=1e-4, atol=1e-4)
+
+
+@given(POSE, PIXEL, st.tuples(*(SPEED,) * 5), st.tuples(*(st.floats(-0.5, 0.5),) * 3))
+def test_clock_and_focal_length_of_pixels(pose, share, speeds, rates):
+    poses = posed(pose)
+    uv = np.array(share) * [CAMERA.width, CAMERA.height]
+    ground = georeference_pixels(poses, uv[None], 0.0)[0, :2]
+    if not np.isfinite(ground).all() or np.linalg.norm(ground - poses.p_nb[:2]) > 2000:
+        return
+    v, moves = np.array(speeds[:2]), np.array([*speeds[2:], *rates])
+    sensor = considering(
+        m.pixels(poses, 0.0), ("attitude", "focal", "clock", "v_bias"), moves=moves, velocity=v, camera=CAMERA
+    )
+    seen = sensor.predict(0, ground)
+
+    def measured(error):
+        clock = error[4]
+        there = disturbed(poses, np.array([*(moves[:3] * clock), 0.0, 0.0, 0.0]))
+        turn = rotation_vector_to_matrix(moves[3:] * clock + error[:3])
+        f = 1 + error[3]
+        camera = Camera(640, 512, CAMERA.fx * f, CAMERA.fy * f, CAMERA.cx, CAMERA.cy)
+        wrong = CameraPoses(camera, there.mount, there.p_nb, there.R_nb @ turn)
+        return p.predict_pixel(ground + v * clock, wrong, 0.0).z + np.array([0.0, error[5]])
+
+    np.testing.assert_allclose(seen.H_pose, differences(measured, 6, 1e-6), rtol=1e-3, atol=5e-2)
+
+
+@given(POSE, PIXEL)
+def test_focal_length_of_elevations(pose, share):
+    """Angles taken out of pixels with a focal length that is wrong."""
+    poses = posed(pose)
+    uv = np.array(share) * [CAMERA.width, CAMERA.height]
+    if np.hypot(*(uv - [CAMERA.cx, CAMERA.cy])) < 5:
+        return
+    ground = georeference_pixels(poses, uv[None], 0.0)[0, :2]
+    if not np.isfinite(ground).all():
+        return
+    seen = considering(m.azimuths_elevations(poses, 0.0), ["focal"]).predict(0, ground)
+    square = Camera(640, 512, 1000.0, 1000.0, 318.0, 250.0)
+    azimuth, elevation = seen.z
+    ray = np.array([np.cos(azimuth), np.sin(azimuth), np.tan(elevation)])
+
+    def measured(error):
+        true = 1000.0 * (1 + error[0])
+        pixel = np.array([318.0, 250.0]) + true * ray[:2] / ray[2]
+        return m.azimuth_elevation_of_pixel(square, pixel)
+
+    np.testing.assert_allclose(seen.H_pose, differences(measured, 1), atol=1e-6)
+
+
+def test_the_six_of_a_pose_by_name_are_the_six():
+    times, uv, poses, _ = overflight(50)
+    sensor, P = m.pixels(poses, 0.0), growing(50)
+    old = run_filter(times, uv, 4 * np.eye(2), sensor, CV, START, pose=PoseUncertainty(P, 8.0, "navigated"))
+    named = Considered(p.POSE, P, 8.0, "navigated")
+    for ours, theirs in zip(
+        run_filter(times, uv, 4 * np.eye(2), sensor, CV, START, pose=named), old, strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+    # In another order, from a sensor that has more.
+    order = [5, 0, 3, 1, 2, 4]
+    more = considering(sensor, (*p.POSE[::-1], "clock"), velocity=np.zeros(2))
+    mixed = Considered(tuple(p.POSE[i] for i in order), P[:, order][:, :, order], 8.0, "navigated")
+    again = run_filter(times, uv, 4 * np.eye(2), more, CV, START, pose=mixed)
+    np.testing.assert_allclose(again.x, old.x, rtol=1e-8, atol=1e-8)
+    np.testing.assert_allclose(again.P, old.P, rtol=1e-7, atol=1e-8)
+
+
+def test_each_has_its_own_correlation_time():
+    """Against the full filter of target and errors, with the gain of the errors put to zero."""
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.1, 1, 40))
+    platform = np.column_stack([30 * np.sin(times / 5), 10 * times]) - 200
+    z = np.column_stack([rng.normal(300, 20, 40), rng.normal(0.7, 0.1, 40)])
+    sensor = considering(
+        ranges_bearings(platform, 0.2), ("heading", "clock", "range_bias"), moves=np.array([1.0, 2.0])
+    )
+    pose = consider(
+        {"heading": 0.02, "range_bias": 3.0, "clock": 0.4},
+        correlation_time={"heading": 5.0, "clock": 0.0},
+    )
+    R = np.diag([4.0, 1e-4])
+    track = run_filter(times, z, R, sensor, CV, START, pose=pose)
+    x, P, then = np.zeros(7), joint(START.P, np.zeros((4, 3)), pose.covariance), 0.0
+    for row, t in enumerate(times):
+        F, Q = np.eye(7), np.zeros((7, 7))
+        F[:4, :4], Q[:4, :4] = CV(t - then)
+        F[4:, 4:] = np.diag([np.exp(-(t - then) / 5.0), 1.0, 0.0])
+        Q[4:, 4:] = pose.covariance - F[4:, 4:] @ pose.covariance @ F[4:, 4:].T
+        x, P, then = F @ x, F @ P @ F.T + Q, t
+        seen = sensor.predict(row, x[:4])
+        H = np.hstack([m.on_state(seen.H_position, 4), seen.H_pose[:, [0, 2, 1]]])
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+        K[4:] = 0
+        x = x + K @ m.difference(z[row], seen.z, sensor.angles)
+        P = (np.eye(7) - K @ H) @ P @ (np.eye(7) - K @ H).T + K @ R @ K.T
+        np.testing.assert_allclose(track.x[row], x[:4], rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(track.P[row], P[:4, :4], rtol=1e-8, atol=1e-10)
+
+
+@given(st.integers(0, 2**31))
+def test_correlated_errors_of_different_times_stay_a_covariance(seed):
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, 3 + int(rng.integers(2)))) * np.array([[1.0], [0.01], [5.0]])
+    P = A @ A.T
+    times = tuple(rng.choice([0.0, 0.5, 20.0, np.inf], 3))
+    sensor = considering(ranges_bearings([0.0, 0.0], 0.0), ("range_bias", "heading", "platform_east"))
+    errors = errors_of(Considered(sensor.considers, P, times), sensor, 3)
+    left = errors.transition(1, 0.7)
+    grown = P - left @ P @ left.T
+    sd = np.sqrt(np.diag(P))
+    assert np.linalg.eigvalsh(grown / np.outer(sd, sd))[0] > -1e-9
+    alone = errors_of(Considered(sensor.considers, np.diag(np.diag(P)), times), sensor, 3).transition(1, 0.7)
+    expected = [1.0 if np.isinf(t) else 0.0 if t == 0 else np.exp(-0.7 / t) for t in times]
+    np.testing.assert_allclose(alone, np.diag(expected), atol=1e-12)
+
+
+def patrol(rng, heading_sd, range_sd, n=60):
+    """A robot goes by a moving target, with a heading and a range that are off: a run, and the states."""
+    t = np.arange(n, dtype=float)
+    motion = partial(white_acceleration, density=0.05)
+    x = np.array([0.0, 0.0, 1.0, -0.5]) + rng.normal(size=4) * [5, 5, 1, 1]
+    states = [x]
+    for _ in range(n - 1):
+        F, Q = motion(1.0)
+        states.append(F @ states[-1] + rng.multivariate_normal(np.zeros(4), Q))
+    states = np.array(states)
+    platform = np.column_stack([-400 + 3 * t, 200 * np.sin(t / 10)])
+    offset = states[:, :2] - platform
+    error = rng.normal(size=2) * [heading_sd, range_sd]
+    z = np.column_stack([np.hypot(*offset.T) + error[1], np.arctan2(offset[:, 1], offset[:, 0]) - error[0]])
+    z += rng.normal(size=(n, 2)) * [1.0, 0.005]
+    sensor = considering(ranges_bearings(platform, 0.0), ("heading", "range_bias"))
+    start = Start(0.0, np.array([0.0, 0.0, 1.0, -0.5]), np.diag([25.0, 25.0, 1.0, 1.0]))
+    return t, z, np.diag([1.0, 0.005**2]), sensor, motion, start, states
+
+
+def mean_nees(track, states, rows):
+    e = (states - track.x)[rows]
+    return float(np.einsum("ni,nij,nj->n", e, np.linalg.inv(track.P[rows]), e).mean())
+
+
+def test_a_considered_heading_is_consistent_where_it_is_not_known_of():
+    rng, pose = np.random.default_rng(5), consider({"heading": np.radians(2.0), "range_bias": 2.0})
+    last = {"ekf": [], "schmidt": []}
+    for _ in range(150):
+        *run, states = patrol(rng, np.radians(2.0), 2.0)
+        for name, found in last.items():
+            track = follow(name, *run, pose=pose)
+            found.append(mean_nees(track, states, slice(-1, None)))
+    low, high = chi2.ppf([0.025, 0.975], 4 * 150) / 150
+    assert low < np.mean(last["schmidt"]) < high
+    assert np.mean(last["ekf"]) > 5 * high
+
+
+@pytest.mark.parametrize("name", ["ukf", "imm", "coloured"])
+def test_filters_that_widen_their_noise_are_those_that_forget(name):
+    """H (7.40)-(7.41): a Schmidt filter whose errors are new at every measurement."""
+    times, uv, poses, _ = overflight(40)
+    sensor = considering(m.pixels(poses, 0.0), ("attitude", "platform_position"))
+    pose = consider({"attitude": 0.01, "platform_position": 1.0}, correlation_time=0.0)
+    forgets = run_filter(times, uv, 4 * np.eye(2), sensor, CV, START, pose=pose)
+    more = {"imm": {"mean_stay": [9.0, 9.0]}, "coloured": {"longest_gap": 0.0}}.get(name, {})
+    motion = [CV, CV] if name == "imm" else CV
+    track = follow(name, times, uv, 4 * np.eye(2), sensor, motion, START, pose=pose, **more)
+    tolerance = 5e-2 if name == "ukf" else 1e-7
+    np.testing.assert_allclose(track.x, forgets.x, atol=tolerance, rtol=tolerance)
+    np.testing.assert_allclose(track.P, forgets.P, atol=tolerance, rtol=tolerance)
+
+
+def test_what_is_left_of_a_bias_in_differences():
+    """Positions that share an error which stays: nothing is left. One that is new each time: all, twice."""
+    times, z = np.arange(12.0), np.cumsum(np.ones((12, 2)), axis=0)
+    start = Start(0.0, np.ones(4), np.eye(4), row=0)
+    sensor, R = measured_from([0.0, -50.0]), 0.1 * np.eye(2)
+
+    def with_errors(time):
+        pose = consider({"platform_north": 3.0, "platform_east": 3.0}, correlation_time=time)
+        return follow("coloured", times, z, R, sensor, CV, start, pose=pose)
+
+    plain = follow("coloured", times, z, R, sensor, CV, start)
+    twice = follow("coloured", times, z, R + 18 * np.eye(2), sensor, CV, start)
+    np.testing.assert_allclose(with_errors(np.inf).P, plain.P, atol=1e-12)
+    np.testing.assert_allclose(with_errors(0.0).P, twice.P, atol=1e-12)
+
+
+def test_coloured_on_bearings_and_ranges_is_the_extended_filter_of_the_differences():
+    """With white noise in place of coloured (F_c = 0) a difference is a measurement."""
+    *run, _ = patrol(np.random.default_rng(1), 0.0, 0.0)
+    white = follow("ekf", *run)
+    coloured = follow("coloured", *run, F_c=np.zeros((2, 2)), longest_gap=5.0)
+    np.testing.assert_allclose(coloured.x, white.x, atol=1e-6)
+    np.testing.assert_allclose(coloured.P, white.P, rtol=1e-6, atol=1e-9)
+
+
+def test_sets_of_errors_join_and_split():
+    pose = PoseUncertainty(np.tile(np.diag(np.arange(1.0, 7)), (5, 1, 1)), 4.0, "navigated")
+    both = consider_all(pose, consider({"clock": 0.1, "u_bias": np.ones(5)}, shared=["clock"]))
+    assert both.names == (*p.POSE, "clock", "u_bias")
+    assert both.covariance.shape == (5, 8, 8) and both.change == "navigated"
+    assert both.correlation_time == (4.0,) * 6 + (np.inf,) * 2
+    assert both.shared == (True,) * 7 + (False,)
+    np.testing.assert_allclose(np.diag(both.covariance[3]), [1, 2, 3, 4, 5, 6, 0.01, 1])
+    assert renamed(bearings([0.0, 0.0], 0.0), {"heading": "mast"}).considers[-1] == "mast"
+
+
+@pytest.mark.parametrize(
+    ("act", "words"),
+    [
+        (lambda: consider({"heading": -1.0}), "a standard deviation of -1.0 for heading"),
+        (lambda: consider({"heading": np.ones((2, 2))}), "some rows for heading"),
+        (lambda: consider({"a": np.ones(2), "b": np.ones(3)}), r"rows \[2, 3\]|\[2, 3\] rows"),
+        (lambda: consider({"a": 1.0}, correlation_time={"b": 1.0}), "b has a correlation time and no"),
+        (lambda: consider_all(consider({"a": 1.0}), consider({"a": 1.0})), "a twice"),
+        (lambda: consider_all(), "0 sets"),
+        (lambda: considering(bearings([0, 0], 0.0), ["focal"]), "a sensor of bearing has no focal"),
+        (
+            lambda: considering(bearings(np.zeros((3, 2)), 0.0), ["clock"], moves=np.zeros((4, 2))),
+            "4 rows for a sensor of 3",
+        ),
+        (
+            lambda: errors_of(consider({"clock": 1.0}), bearings([0, 0], 0.0), 3),
+            "no derivative for clock",
+        ),
+        (
+            lambda: errors_of(consider({"heading": 1.0}, correlation_time=-1.0), bearings([0, 0], 0.0), 3),
+            "correlation times",
+        ),
+        (
+            lambda: errors_of(Considered(("heading",), -np.eye(1)), bearings([0, 0], 0.0), 3),
+            "variance -1",
+        ),
+        (lambda: polar([0, 0, 0], np.eye(3), 0.0, ("elevation", "range")), "the elements"),
+        (lambda: polar(np.zeros((2, 3)), np.zeros((3, 3, 3)), 0.0), "3 rows beside 2"),
+    ],
+)
+def test_refusals(act, words):
+    with pytest.raises(WildlabError, match=words):
+        act()
+
+
+def test_follow_refuses_in_a_sentence():
+    *run, _ = patrol(np.random.default_rng(1), 0.0, 0.0, 5)
+    with pytest.raises(WildlabError, match="there is no filter 'magic'"):
+        follow("magic", *run)
+    with pytest.raises(WildlabError, match="no errors to consider"):
+        follow("schmidt", *run)
+    with pytest.raises(WildlabError, match="how long a motion lasts"):
+        follow("imm", *run)
+    run[4] = [CV, CV]
+    with pytest.raises(WildlabError, match="2 motion models for ekf"):
+        follow("ekf", *run)
+    assert set(FILTERS) == {"ekf", "schmidt", "ukf", "imm", "coloured", "smoothed"}
