@@ -1,0 +1,224 @@
+"""The smoother: exactly what it says of itself in linear cases, never worse than the filter in others."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.tracking.poses import overflight
+from tests.tracking.test_considered import mean_nees, patrol
+from wildlab.errors import WildlabError
+from wildlab.tracking import measurement as m
+from wildlab.tracking.considered import consider
+from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.motion import constant_velocity, rest
+from wildlab.tracking.platforms import measured_from
+from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.smoothing import run_smoothed, smooth
+from wildlab.tracking.unscented import run_unscented
+
+CV = partial(constant_velocity, sd_acceleration=0.2)
+WA = partial(white_acceleration, density=0.3)
+START = Start(0.0, np.zeros(4), np.diag([25.0, 25.0, 9.0, 9.0]))
+SEEDS = st.integers(0, 2**31)
+
+
+def linear_run(seed, n=25):
+    """Positions with uneven times, gaps, one instant twice."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0, 2, n))
+    times[7] = times[6]
+    z = rng.normal(0, 5, (n, 2))
+    z[rng.random(n) < 0.2] = np.nan
+    return times, z, np.array([np.diag(rng.uniform(0.5, 4, 2)) for _ in range(n)])
+
+
+def everything_at_once(times, z, R, motion, start, by_errors=None):
+    """Means and covariances of all states given all measurements, as one Gaussian: no recursion at all."""
+    n, N = len(start.x), len(times)
+    mean, P = start.x, start.P
+    means, covariance = [], np.zeros((n * N, n * N))
+    then = start.time
+    for k, t in enumerate(times):
+        F, Q = motion(t - then)
+        mean, P = F @ mean, F @ P @ F.T + Q
+        means.append(mean)
+        own = slice(n * k, n * k + n)
+        if k:
+            covariance[own, : n * k] = F @ covariance[n * (k - 1) : n * k, : n * k]
+            covariance[: n * k, own] = covariance[own, : n * k].T
+        covariance[own, own] = P
+        then = t
+    seen = [k for k in range(N) if np.isfinite(z[k]).all()]
+    H = np.zeros((2 * len(seen), n * N))
+    noise = np.zeros((2 * len(seen),) * 2)
+    for i, k in enumerate(seen):
+        H[2 * i : 2 * i + 2, n * k : n * k + 2] = np.eye(2)
+        noise[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = R[k]
+    S = H @ covariance @ H.T + noise
+    gain = covariance @ H.T @ np.linalg.inv(S)
+    x = np.concatenate(means) + gain @ (z[seen].ravel() - H @ np.concatenate(means))
+    P_all = covariance - gain @ H @ covariance
+    return x.reshape(N, n), np.array([P_all[n * k : n * k + n, n * k : n * k + n] for k in range(N)])
+
+
+@pytest.mark.parametrize("motion", [CV, WA])
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_the_mean_given_all_measurements(motion, seed):
+    times, z, R = linear_run(seed)
+    x, P = everything_at_once(times, z, R, motion, START)
+    track = run_filter(times, z, R, m.positions(), motion, START)
+    for found in (
+        smooth(track, motion),
+        run_smoothed(times, z, R, m.positions(), motion, START),
+        # With nothing that could be wrong the joint smoother is the same.
+        run_smoothed(times, z, R, measured_from([0, 0]), motion, START, pose=consider({"heading": 0.0})),
+    ):
+        np.testing.assert_allclose(found.x, x, atol=1e-6)
+        np.testing.assert_allclose(found.P, P, atol=1e-6)
+
+
+@given(SEEDS)
+def test_covariances_are_never_above_the_filters(seed):
+    times, z, R = linear_run(seed)
+    for pose in (None, consider({"platform_north": 3.0, "heading": 0.02}, correlation_time={"heading": 4.0})):
+        sensor = measured_from([-100.0, 30.0])
+        filtered = run_filter(times, z, R, sensor, WA, START, pose=pose)
+        smoothed = run_smoothed(times, z, R, sensor, WA, START, pose=pose)
+        sd = np.sqrt(np.diagonal(filtered.P, axis1=1, axis2=2))
+        gained = (filtered.P - smoothed.P) / (sd[:, :, None] * sd[:, None, :])
+        assert np.linalg.eigvalsh(gained)[:, 0].min() > -1e-8
+        assert np.linalg.eigvalsh(smoothed.P)[:, 0].min() > 0
+        np.testing.assert_allclose(smoothed.x[-1], filtered.x[-1])
+        np.testing.assert_array_equal(smoothed.nis, filtered.nis)
+
+
+@pytest.mark.parametrize("time", [0.0, 5.0, np.inf])
+def test_its_covariance_is_its_errors_with_considered_ones(time):
+    """The smoother is linear in what is random: its true covariance, one source of randomness at a time."""
+    N, bias = 12, 2.0
+    times = np.arange(1.0, N + 1)
+    pose = consider({"platform_north": bias, "platform_east": bias}, correlation_time=time)
+    sensor, R = measured_from([0.0, 0.0]), np.eye(2)
+    start = Start(0.0, np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0]))
+    F, Q = WA(1.0)
+    left = float(np.exp(-1 / time)) if time else 0.0
+    sources = [("start", i) for i in range(4)] + [("bias", i) for i in range(2)]
+    sources += [
+        (kind, k, i) for k in range(N) for kind, size in (("q", 4), ("r", 2), ("o", 2)) for i in range(size)
+    ]
+    root = np.linalg.cholesky(Q)
+    covariance = np.zeros((N, 4, 4))
+    for source in sources:
+        x, o = np.zeros(4), np.zeros(2)
+        if source[0] == "start":
+            x[source[1]] = np.sqrt(start.P[source[1], source[1]])
+        if source[0] == "bias":
+            o[source[1]] = bias
+        truth, z = [], []
+        for k in range(N):
+            x, o = F @ x, o * (left if k else 1.0)
+            if source[0] == "q" and source[1] == k:
+                x = x + root[:, source[2]]
+            if source[0] == "o" and source[1] == k and k:
+                o = o + bias * np.sqrt(1 - left**2) * np.eye(2)[source[2]]
+            truth.append(x)
+            z.append(x[:2] - o + (np.eye(2)[source[2]] if source[0] == "r" and source[1] == k else 0.0))
+        found = run_smoothed(times, np.array(z), R, sensor, WA, start, pose=pose)
+        e = np.array(truth) - found.x
+        covariance += e[:, :, None] * e[:, None, :]
+    np.testing.assert_allclose(found.P, covariance, atol=1e-8)
+
+
+def test_never_worse_than_the_filter_over_a_hundred_twins():
+    rng, pose = np.random.default_rng(11), consider({"heading": np.radians(2.0), "range_bias": 2.0})
+    middle = slice(10, 50)
+    found = {
+        name: [] for name in ("filter", "smoothed", "schmidt", "schmidt smoothed", "ukf", "ukf smoothed")
+    }
+    nees = {name: [] for name in found}
+    for twin in range(100):
+        wrong = twin % 2  # half of them with a heading and a range that are off
+        *run, states = patrol(rng, np.radians(2.0) * wrong, 2.0 * wrong)
+        if wrong:
+            tracks = {
+                "schmidt": run_filter(*run, pose=pose),
+                "schmidt smoothed": run_smoothed(*run, pose=pose),
+            }
+        else:
+            unscented = run_unscented(*run)
+            tracks = {
+                "filter": run_filter(*run), "smoothed": run_smoothed(*run),
+                "ukf": unscented, "ukf smoothed": smooth(unscented, run[4]),
+            }  # fmt: skip
+        for name, track in tracks.items():
+            found[name].append(np.mean(np.sum((states - track.x)[middle, :2] ** 2, axis=1)))
+            nees[name].append(mean_nees(track, states, middle))
+    rmse = {name: float(np.sqrt(np.mean(values))) for name, values in found.items()}
+    for name in ("filter", "schmidt", "ukf"):
+        after = "smoothed" if name == "filter" else f"{name} smoothed"
+        assert rmse[after] < rmse[name]
+        assert 3.0 < np.mean(nees[after]) < 5.2 and 3.0 < np.mean(nees[name]) < 5.2  # four states
+
+
+def test_between_rows_before_and_behind():
+    times, z, R = linear_run(3)
+    asked = np.sort(np.concatenate([[times[0] - 5, times[-1] + 3], times, times[:-1] + 0.4 * np.diff(times)]))
+    for pose in (None, consider({"heading": 0.0})):
+        sensor = measured_from([0.0, 0.0])
+        given = (R, sensor, WA, START)
+        rows = np.sort(np.concatenate([times, asked]))
+        filled = np.full((len(rows), 2), np.nan)
+        noise = np.tile(np.eye(2), (len(rows), 1, 1))
+        place = np.searchsorted(rows, times)
+        for i, k in enumerate(place):
+            k = k + (1 if i and place[i - 1] == place[i] else 0)
+            filled[k], noise[k] = z[i], R[i]
+        found = run_smoothed(times, z, *given, pose=pose, output_times=asked)
+        # A model that is continuous in time does not mind rows in between at which nothing is seen.
+        every = run_smoothed(rows, filled, noise, *given[1:], pose=pose, output_times=asked)
+        np.testing.assert_allclose(found.x, every.x, atol=1e-6)
+        np.testing.assert_allclose(found.P, every.P, atol=1e-6)
+        before = asked < 0
+        assert np.isnan(found.x[before]).all()
+
+
+def test_a_start_without_variance_and_one_row():
+    start = Start(0.0, np.zeros(2), np.zeros((2, 2)))
+    track = run_filter([1.0, 2.0], np.ones((2, 2)), np.eye(2), m.positions(), rest, start)
+    np.testing.assert_array_equal(smooth(track, rest).x, 0.0)
+    alone = Start(0.0, np.zeros(2), np.eye(2))
+    found = run_smoothed(
+        [1.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, alone, output_times=[0.0, 1.0]
+    )
+    np.testing.assert_allclose(found.x, 0.5)
+    begun = Start(0.0, np.zeros(2), np.eye(2), row=0)
+    found = run_smoothed([0.0], np.ones((1, 2)), np.eye(2), m.positions(), rest, begun)
+    np.testing.assert_allclose(found.x, 0.0)
+
+
+def test_rows_whose_pose_is_not_known():
+    times, uv, poses, truth = overflight(40)
+    P = np.tile(np.diag([1.0, 1, 1, 1e-4, 1e-4, 1e-4]), (40, 1, 1))
+    P[[0, 1, 20, 21]] = np.nan
+    pose = m_pose(P)
+    filtered = run_filter(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
+    smoothed = run_smoothed(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
+    assert not filtered.used[[0, 1, 20, 21]].any() and filtered.used.sum() == 36
+    off = [np.sqrt(np.mean((track.x - truth)[:, :2] ** 2)) for track in (filtered, smoothed)]
+    assert np.isfinite(smoothed.P).all() and off[1] < off[0]
+
+
+def m_pose(P):
+    from wildlab.tracking.schmidt import PoseUncertainty
+
+    return PoseUncertainty(P, 30.0)
+
+
+def test_a_track_at_other_times_is_refused():
+    times, z, R = linear_run(0)
+    track = run_filter(times, z, R, m.positions(), CV, START, output_times=times[::2])
+    with pytest.raises(WildlabError, match="estimates at 13 times of 25 measurements"):
+        smooth(track, CV)
