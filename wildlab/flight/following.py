@@ -17,7 +17,7 @@ from wildlab.flight.files import Strict, check_model, parse_toml, read_toml
 #: of the part of a target that is seen), its attitude, the clock of the sensor, and a range that is too long.
 CONSIDERED: dict[str, str] = {
     "platform_north": "m", "platform_east": "m", "platform_down": "m",
-    "roll": "deg", "pitch": "deg", "heading": "deg", "clock": "s", "range": "m",
+    "roll": "deg", "pitch": "deg", "heading": "deg", "clock": "s", "range_bias": "m",
 }  # fmt: skip
 
 Above = Annotated[float, Field(gt=0, le=1e6)]

@@ -114,13 +114,9 @@ def follow(
     WildlabError
         Where the detections cannot go through one of the filters.
     """
-    usable = np.asarray(np.isfinite(scans.platform).all(axis=1))
-    seen = np.where(usable[:, None, None], scans.detections, np.nan)
-    begin = begin_of(scans, seen, truth, beliefs, targets, others)
+    seen, begin = begin_of_target(scans, truth, beliefs, targets, others)
     if begin is None:
         return [_nothing(scans, truth, name, targets) for name in filters]
-    if scans.labelled:
-        seen = np.where((scans.labels == truth.target)[..., None], seen, np.nan)
     first = choose(scans, seen, beliefs, targets, begin)
     # From here on one detection a scan: the same for all.
     rows = np.arange(len(seen))
@@ -138,23 +134,23 @@ def follow(
     return found
 
 
-def begin_of(
+def begin_of_target(
     scans: Scans,
-    seen: Array,
     truth: Truth,
     beliefs: Beliefs,
     targets: TargetBeliefs,
-    others: Sequence[Truth],
-) -> Start | None:
-    """Where the track of a target starts, see the module."""
-    rows = np.arange(len(seen))
-    if scans.labelled or not np.isfinite(truth.position).any():
-        mine = np.isfinite(seen).all(axis=-1)
-        if scans.labelled:
-            mine &= scans.labels == truth.target
-        own = np.where(mine.any(axis=1)[:, None], seen[rows, np.argmax(mine, axis=1)], np.nan)
-        return start_first(scans, own, beliefs, targets)
-    return start_near(scans, truth, beliefs, targets, others)
+    others: Sequence[Truth] = (),
+) -> tuple[Array, Start | None]:
+    """Detections (N, K, m) that may be of a target, and where its track starts, see the module."""
+    usable = np.asarray(np.isfinite(scans.platform).all(axis=1))
+    seen = np.where(usable[:, None, None], scans.detections, np.nan)
+    if not scans.labelled and np.isfinite(truth.position).any():
+        return seen, start_near(scans, truth, beliefs, targets, others)
+    if scans.labelled:
+        seen = np.where((scans.labels == truth.target)[..., None], seen, np.nan)
+    mine = np.isfinite(seen).all(axis=-1)
+    own = np.where(mine.any(axis=1)[:, None], seen[np.arange(len(seen)), np.argmax(mine, axis=1)], np.nan)
+    return seen, start_first(scans, own, beliefs, targets)
 
 
 def _last_row(times: Array, used: NDArray[np.bool_], start: float, patience: float) -> int:

@@ -30,7 +30,7 @@ FEWEST = 20
 #: Half of chi-square's 95 % point with one degree of freedom: how far a log-likelihood may lie below its top.
 DROP = 1.92
 #: Errors that last are put down to these together, each group with one standard deviation.
-GROUPS = (("platform_north", "platform_east"), ("clock",), ("heading",), ("range",), ("roll", "pitch"))
+GROUPS = (("platform_north", "platform_east"), ("clock",), ("heading",), ("range_bias",), ("roll", "pitch"))
 
 
 class SensorTuning(NamedTuple):
@@ -281,10 +281,8 @@ def _considered(errors: Sequence[_Errors], sds: Array, share: float) -> list[flo
     Non-negative least squares of the errors' products, less the part that is white, on what a unit of each
     would bring about at every scan; all elements in units of their own standard deviation.
     """
-    slots, kind = SLOTS[errors[0].scans.kind], errors[0].scans.kind
+    slots = SLOTS[errors[0].scans.kind]
     groups = [[slots.index(name) for name in group if name in slots] for group in GROUPS]
-    groups = [[] if name == ("range",) and kind != "range-bearing" else group
-              for name, group in zip(GROUPS, groups, strict=True)]  # fmt: skip
     used = [group for group in groups if group]
     columns: list[Array] = []
     wanted: list[Array] = []

@@ -23,6 +23,8 @@ from wildlab.reporting.report import Report
 
 #: Errors nearer to what is stated than by this factor are "about as large".
 ALIKE = 1.2
+#: A mean outside of its band by less than this factor may be so by chance, where few values are independent.
+NEAR_THE_BAND = 1.5
 WORDS = {
     "ekf": "white noise (EKF)",
     "ukf": "white noise (UKF)",
@@ -70,7 +72,9 @@ def size_words(nees: float) -> str:
 def verdict_words(row: pd.Series, what: str = "nees") -> str:
     """The verdict with its band, and whether it stands on few independent values."""
     said = str(row["verdict" if what == "nees" else "nis_verdict"])
-    few = row[f"{what}_worth"] < FEW_INDEPENDENT and said not in (CONSISTENT, UNKNOWN)
+    outside = max(row[what] / row[f"{what}_high"], row[f"{what}_low"] / row[what]) if row[what] > 0 else 1.0
+    # The band is too narrow where its width is a guess; what is far outside is outside all the same.
+    few = row[f"{what}_worth"] < FEW_INDEPENDENT and 1 < outside < NEAR_THE_BAND
     return said + (", on few independent values" if few else "")
 
 

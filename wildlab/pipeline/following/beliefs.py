@@ -30,7 +30,11 @@ NOISE_OF = {
 }  # fmt: skip
 #: Parts of [uncertainty] that say how wrong a platform may be.
 _OF_PLATFORM = {
-    "platform_north": "position_horizontal_m", "platform_east": "position_horizontal_m",
+    "platform_north": "position_horizontal_m",
+    "platform_east": "position_horizontal_m",
+    "platform_down": "position_vertical_m",
+    "roll": "roll_deg",
+    "pitch": "pitch_deg",
     "heading": "yaw_deg",
 }  # fmt: skip
 #: H 7.2.2: measurements further apart than this (s) are taken for independent; but the next look of a slow
@@ -309,12 +313,14 @@ def _considered(
             time = np.inf if one.correlation_time_s is None else one.correlation_time_s
             stated.append(Considered(name, float(sd), float(time), one.shared))
         return tuple(stated), STATED
-    if found is not None:
+    if found is not None and found.considered:
         return found.considered, by_tuning
-    if scans.kind in ("pixel", "velocity"):
+    if scans.poses is not None and scans.poses.covariance is not None:
         return (), ""
     errors = []
     for name, key in _OF_PLATFORM.items():
+        if name not in SLOTS[scans.kind]:
+            continue
         assumed = getattr(flight.manifest.uncertainty, key)
         if assumed is not None:
             sd = float(np.radians(assumed)) if key.endswith("deg") else float(assumed)

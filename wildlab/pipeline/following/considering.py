@@ -1,4 +1,4 @@
-"""Errors that last, as the Schmidt filter takes them: a covariance for each look."""
+"""Errors that last, as the filters take them: by name, with a covariance."""
 
 from __future__ import annotations
 
@@ -8,16 +8,46 @@ from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.following.expected import SLOTS
 from wildlab.pipeline.scans import Scans
+from wildlab.tracking.considered import Considered
+from wildlab.tracking.predictions import POSE
 
 
-def covariances_of(scans: Scans, beliefs: Beliefs) -> Array | None:
-    """(N, 6, 6) of the errors of `SLOTS`: those considered, else the poses' own; None where there is none."""
-    if beliefs.considered:
-        variance = np.zeros(6)
-        for one in beliefs.considered:
-            variance[SLOTS[scans.kind].index(one.name)] = one.sd**2
-        return np.tile(np.diag(variance), (len(scans.times), 1, 1))
-    if scans.poses is not None and scans.poses.covariance is not None:
-        P = np.asarray(scans.poses.covariance, float)
-        return P if np.isfinite(P).any() else None
-    return None
+def errors_of(scans: Scans, beliefs: Beliefs) -> Considered | None:
+    """Those considered; of poses that have a covariance, that and what is considered beside it."""
+    names, blocks, times, shared = [], [], [], []
+    P = None if scans.poses is None else scans.poses.covariance
+    own = P is not None and bool(np.isfinite(P).any())
+    n = len(scans.times)
+    if own:
+        names += list(POSE)
+        blocks.append(np.array(P, float))
+        times += [np.inf] * len(POSE)
+        shared += [True] * len(POSE)
+    for one in beliefs.considered:
+        if own and one.name in POSE:
+            # What is stated comes on top of what the poses say of themselves.
+            i = POSE.index(one.name)
+            blocks[0][:, i, i] += one.sd**2
+            continue
+        names.append(one.name)
+        blocks.append(np.full((n, 1, 1), one.sd**2))
+        times.append(one.correlation_time_s)
+        shared.append(one.shared)
+    if not names:
+        return None
+    covariance = np.zeros((n, len(names), len(names)))
+    first = 0
+    for block in blocks:
+        last = first + block.shape[-1]
+        covariance[:, first:last, first:last] = block
+        first = last
+    return Considered(tuple(names), covariance, tuple(times), "bias", tuple(shared))
+
+
+def spread_of(scans: Scans, beliefs: Beliefs, H_pose: Array) -> Array | None:
+    """(N, m, m) what the errors add to measurements with derivatives (N, m, k); None where there are none."""
+    errors = errors_of(scans, beliefs)
+    if errors is None:
+        return None
+    H = H_pose[..., [SLOTS[scans.kind].index(name) for name in errors.names]]
+    return np.asarray(H @ errors.covariance @ np.swapaxes(H, -1, -2))

@@ -1,8 +1,4 @@
-"""What each look of a sensor should see of a target, and what errors that last do to it.
-
-Six errors stand beside a measurement, in the order of `SLOTS` for its kind. On a level platform the third and
-fourth of a pose move nothing; the errors of clock and range have their places.
-"""
+"""What each look of a sensor should see of a target, and what errors that last do to it."""
 
 from __future__ import annotations
 
@@ -11,26 +7,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.scans import Scans, Truth
-from wildlab.tracking.maritime import (
-    CLOCK,
-    YAW,
-    bearings_from,
-    positions_from,
-    predict_bearing,
-    predict_position,
-)
 from wildlab.tracking.measurement import Prediction, Sensor, difference, predict_pixel, predict_range_bearing
+from wildlab.tracking.predictions import POSE, predict_position
 
-#: The place of the error of a range that is too long.
-RANGE = 3
-_LEVEL = ("platform_north", "platform_east", "clock", "range", "", "heading")
-#: Which errors the six columns of ``H_pose`` are of, "" none.
+_LEVEL = ("platform_north", "platform_east", "heading", "clock")
+#: Errors that may be considered, by kind of detection: the columns of ``H_pose``, in this order.
 SLOTS: dict[str, tuple[str, ...]] = {
     "position": _LEVEL,
-    "range-bearing": _LEVEL,
+    "range-bearing": (*_LEVEL, "range_bias"),
     "bearing": _LEVEL,
-    "velocity": _LEVEL,
-    "pixel": ("platform_north", "platform_east", "platform_down", "roll", "pitch", "heading"),
+    "velocity": (),
+    "pixel": (*POSE, "clock"),
 }
 
 
@@ -41,58 +28,75 @@ def predict_scan(scans: Scans, position: ArrayLike, velocity: ArrayLike) -> Pred
 
 
 def sensor_of(scans: Scans, drift: ArrayLike) -> Sensor:
-    """The sensor for the readable filters, with the target's (N, 2) drift relative to the platform."""
+    """The sensor for the filters, with the target's (N, 2) drift relative to the platform, m/s."""
     moves = np.asarray(drift, float)
-    at = np.nan_to_num(scans.platform)
-    if scans.kind == "position":
-        return positions_from(at, moves)
-    if scans.kind == "bearing" and "elevation" not in scans.elements:
-        return bearings_from(at, moves)
 
     def predict(row: int, state: Array) -> Prediction:
         return _predict(scans, row, state[..., :2], state[..., 2:4], moves[row])
 
-    return Sensor(predict, scans.angles, len(scans.times), states=4 if scans.kind == "velocity" else 2)
+    return Sensor(
+        predict,
+        scans.angles,
+        len(scans.times),
+        4 if scans.kind == "velocity" else 2,
+        scans.elements,
+        SLOTS[scans.kind],
+    )
 
 
 def _predict(scans: Scans, rows: int | slice, p: Array, v: Array, drift: Array) -> Prediction:
     """Of the rows, at (..., 2) with the velocity and the drift (..., 2)."""
-    if scans.kind == "position":
-        return predict_position(p, scans.platform[rows], drift)
     if scans.kind == "velocity":
         H = np.broadcast_to(np.eye(2, 4, 2), (*v.shape, 4))
-        return Prediction(v, H, np.zeros((*v.shape, 6)))
+        return Prediction(v, H, np.zeros((*v.shape, 0)))
     if scans.kind == "pixel":
         if scans.poses is None:
             raise AssertionError("pixels have poses")
         taken = scans.poses.take(rows) if isinstance(rows, int) else scans.poses
-        return predict_pixel(p, taken, scans.plane_down[rows])
-    if scans.elements == ("azimuth",):
-        return predict_bearing(p, scans.platform[rows], drift)
-    return _along(predict_range_bearing(p, scans.platform[rows], 0.0), scans, rows, drift)
+        seen = predict_pixel(p, taken, scans.plane_down[rows])
+        return _with(seen, seen.H_pose, seen.z, seen.H_position, drift)
+    platform = scans.platform[rows]
+    if scans.kind == "position":
+        seen = predict_position(p, platform)
+        return _with(seen, seen.H_pose[..., _OF_LEVEL], seen.z, seen.H_position, drift)
+    seen = predict_range_bearing(p, platform, 0.0)
+    return _along(seen, scans, rows, drift)
+
+
+#: The errors of a level platform among those of a pose.
+_OF_LEVEL = [POSE.index(name) for name in _LEVEL[:3]]
+
+
+def _with(seen: Prediction, pose: Array, z: Array, H: Array, drift: Array) -> Prediction:
+    """Derivatives for the clock behind those for the pose."""
+    clock = np.einsum("...ij,...j->...i", H, drift)[..., None]
+    both = np.broadcast_to(pose, (*clock.shape[:-1], pose.shape[-1]))
+    return Prediction(z, H, np.concatenate([both, clock], axis=-1))
 
 
 def _along(level: Prediction, scans: Scans, rows: int | slice, drift: Array) -> Prediction:
-    """Range along the line of sight, bearing and elevation, of which ``level`` has level range and bearing."""
+    """Range along the line of sight, bearing and elevation; ``level`` has level range and bearing."""
     r, drop = level.z[..., 0], scans.drop[rows]
+    pose = level.H_pose[..., _OF_LEVEL]
     # A height that is not known is none: the range is then taken for level.
     drop = np.where(np.isfinite(drop), drop, 0.0) + 0.0 * r
     slant = np.hypot(r, drop)
-    z, H, pose = level.z.copy(), level.H_position.copy(), level.H_pose.copy()
-    by_range = level.H_position[..., 0, :], level.H_pose[..., 0, :]
-    kept = {"azimuth": (z[..., 1], H[..., 1, :], pose[..., 1, :])}
-    share = (r / slant)[..., None]
-    along = by_range[1] * share
-    along[..., RANGE] = 1.0
-    kept["range"] = (slant, by_range[0] * share, along)
-    # Down is below the horizon; elevation counts upwards.
-    turn = (drop / slant**2)[..., None]
-    kept["elevation"] = (-np.arctan2(drop, r), by_range[0] * turn, by_range[1] * turn)
-    z, H, pose = (np.stack([kept[name][i] for name in scans.elements], axis=-1 if i == 0 else -2)
-                  for i in range(3))  # fmt: skip
-    pose = pose.copy()
-    pose[..., CLOCK] = np.einsum("...ij,...j->...i", H, drift)
-    return Prediction(z, H, pose)
+    share, turn = (r / slant)[..., None], (drop / slant**2)[..., None]
+    H_range, H_bearing = level.H_position[..., 0, :], level.H_position[..., 1, :]
+    kept = {
+        "azimuth": (level.z[..., 1], H_bearing, pose[..., 1, :]),
+        "range": (slant, H_range * share, pose[..., 0, :] * share),
+        # Down is below the horizon; elevation counts upwards.
+        "elevation": (-np.arctan2(drop, r), H_range * turn, pose[..., 0, :] * turn),
+    }
+    z = np.stack([kept[name][0] for name in scans.elements], axis=-1)
+    H, by_pose = (np.stack([kept[name][i] for name in scans.elements], axis=-2) for i in (1, 2))
+    seen = _with(level, by_pose, z, H, drift)
+    if "range" not in scans.elements:
+        return seen
+    bias = np.zeros((*seen.H_pose.shape[:-1], 1))
+    bias[..., scans.elements.index("range"), 0] = 1.0
+    return seen._replace(H_pose=np.concatenate([seen.H_pose, bias], axis=-1))
 
 
 def errors_near(scans: Scans, truth: Truth, reach: float) -> tuple[Array, NDArray[np.intp]]:
@@ -125,6 +129,3 @@ def across(scans: Scans, error: Array, expected: Array) -> Array:
     metres = np.ones((len(expected), 2))
     metres[:, scans.elements.index("azimuth")] = expected[:, scans.elements.index("range")]
     return error * metres[:, None]
-
-
-assert _LEVEL.index("heading") == YAW and _LEVEL.index("clock") == CLOCK

@@ -21,7 +21,7 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
-from wildlab.pipeline.following.considering import covariances_of
+from wildlab.pipeline.following.considering import errors_of, spread_of
 from wildlab.pipeline.following.expected import predict_scan, sensor_of
 from wildlab.pipeline.following.starts import place_of
 from wildlab.pipeline.scans import Scans
@@ -30,11 +30,15 @@ from wildlab.tracking.imm import run_imm
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.run import Start, Track, run_filter
-from wildlab.tracking.schmidt import PoseUncertainty
+from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
 
+#: What the name of a filter ends with whose estimates know later detections too, and those that can.
+SMOOTHED = "-smoothed"
+SMOOTHABLE = tuple(f"{name}{SMOOTHED}" for name in ("ekf", "schmidt", "ukf", "thinned"))
 NAMES = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
-#: The two motions of ``imm``: as lively as the target is believed to be, and a third of it; each lasts so long.
+#: The two motions of ``imm``: as lively as the target is believed to be, and a third of it; each lasts so
+#: long, s.
 CALM, STAY_S = 1 / 3, 30.0
 
 
@@ -45,7 +49,7 @@ def motion_of(targets: TargetBeliefs, share: float = 1.0) -> Motion:
 
 def possible(scans: Scans, beliefs: Beliefs) -> dict[str, str]:
     """Filters that a sensor's detections can go through: ``""``, or why they cannot."""
-    considered = covariances_of(scans, beliefs) is not None
+    considered = errors_of(scans, beliefs) is not None
     placed = "range" in scans.elements or scans.kind in ("position", "pixel")
     return {
         **dict.fromkeys(("ekf", "ukf", "imm"), ""),
@@ -87,7 +91,8 @@ def follow_with(
     WildlabError
         Where there is no such filter, or the detections cannot go through it.
     """
-    why = possible(scans, beliefs).get(name, "there is no such filter")
+    base = name.removesuffix(SMOOTHED)
+    why = possible(scans, beliefs).get(base, "there is no such filter")
     if why:
         able = ", ".join(one for one, reason in possible(scans, beliefs).items() if not reason)
         raise WildlabError(
@@ -95,29 +100,38 @@ def follow_with(
             f"use one of {able}",
             field="--filter",
         )
-    if name == "ekf":
-        return first
-    sensor, motion = sensor_of(scans, np.zeros_like(scans.platform)), motion_of(targets)
+    motion, smoothed = motion_of(targets), name != base
+    sensor = sensor_of(scans, np.zeros_like(scans.platform))
     white = white_noise(scans, beliefs.white)
-    if name == "ukf":
-        return run_unscented(scans.times, own, white, sensor, motion, begin)
-    if name == "imm":
+    if base == "ekf":
+        return _without_innovations(smooth(first, motion)) if smoothed else first
+    if base == "ukf":
+        track = run_unscented(scans.times, own, white, sensor, motion, begin)
+        return _without_innovations(smooth(track, motion)) if smoothed else track
+    if base == "imm":
         both = [motion_of(targets, CALM), motion]
         return run_imm(scans.times, own, white, sensor, both, (STAY_S, STAY_S), begin).track
-    if name == "thinned":
-        kept = thin(scans.times, beliefs.thinning_s, first.used)[:, None]
-        return run_filter(scans.times, np.where(kept, own, np.nan), white, sensor, motion, begin)
-    if name == "coloured":
+    if base == "coloured":
         return _coloured(scans, own, beliefs, motion, begin)
-    covariance = covariances_of(scans, beliefs)
-    if covariance is None:
-        raise AssertionError("what can be considered was asked for above")
-    times = [one.correlation_time_s for one in beliefs.considered]
-    # An error of the clock moves the target by what the filter with white noise says it moves.
-    drift = np.nan_to_num(first.x[:, 2:4] - scans.platform_velocity)
-    pose = PoseUncertainty(covariance, min(times, default=np.inf))
-    noise = white_noise(scans, beliefs.noise)
-    return run_filter(scans.times, own, noise, sensor_of(scans, drift), motion, begin, pose=pose)
+    run = run_smoothed if smoothed else run_filter
+    if base == "thinned":
+        kept = thin(scans.times, beliefs.thinning_s, first.used)[:, None]
+        track = run(scans.times, np.where(kept, own, np.nan), white, sensor, motion, begin)
+    else:
+        errors = errors_of(scans, beliefs)
+        # An error of the clock moves the target by what the filter with white noise says it moves.
+        drift = np.nan_to_num(first.x[:, 2:4] - scans.platform_velocity)
+        noise = white_noise(scans, beliefs.noise)
+        track = run(scans.times, own, noise, sensor_of(scans, drift), motion, begin, pose=errors)
+    return _without_innovations(track) if smoothed else track
+
+
+def _without_innovations(track: Track) -> Track:
+    """A smoothed track: its innovations are the filter's, and not counted twice."""
+    nothing = np.full_like(track.nis, np.nan)
+    return track._replace(
+        innovation=np.full_like(track.innovation, np.nan), S=np.full_like(track.S, np.nan), nis=nothing
+    )
 
 
 def _coloured(scans: Scans, own: Array, beliefs: Beliefs, motion: Motion, begin: Start) -> Track:
@@ -157,10 +171,9 @@ def _positions(scans: Scans, own: Array, beliefs: Beliefs) -> tuple[Array, Array
 
 def _lasting(scans: Scans, positions: Array, beliefs: Beliefs) -> Array:
     """(N, 2, 2) what considered errors do to positions."""
-    pose = covariances_of(scans, beliefs)
-    if pose is None:
-        return np.zeros((len(positions), 2, 2))
     expected = predict_scan(scans, positions, np.zeros_like(positions))
     inverse = np.linalg.pinv(np.nan_to_num(expected.H_position[..., :2]))
-    J = inverse @ np.nan_to_num(expected.H_pose)
-    return np.asarray(J @ np.nan_to_num(pose) @ np.swapaxes(J, 1, 2))
+    spread = spread_of(scans, beliefs, np.nan_to_num(expected.H_pose))
+    if spread is None:
+        return np.zeros((len(positions), 2, 2))
+    return np.asarray(inverse @ np.nan_to_num(spread) @ np.swapaxes(inverse, 1, 2))

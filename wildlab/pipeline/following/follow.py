@@ -11,7 +11,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Beliefs, Said, TargetBeliefs, of_flight, of_sensor, of_targets
-from wildlab.pipeline.following.filters import NAMES, possible
+from wildlab.pipeline.following.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.pipeline.sensor_tracks import UNNAMED, SensorTrack, follow
@@ -112,6 +112,8 @@ def follow_targets(
         known |= {one.target for one in truths}
         any_truth |= any(np.isfinite(one.position).any() for one in truths)
         names = chosen_filters(looks, belief, filters)
+        if smooth:
+            names = [one for name in names for one in (name, f"{name}{SMOOTHED}") if one in (name, *SMOOTHABLE)]
         for truth in truths:
             if targets and truth.target not in targets:
                 continue

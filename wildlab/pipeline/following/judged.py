@@ -1,4 +1,4 @@
-"""How far to believe tracks: errors and NEES beside the truth, NIS and whiteness, sensors beside each other."""
+"""How far to believe tracks: errors and NEES by the truth, NIS and whiteness, two sensors side by side."""
 
 from __future__ import annotations
 
@@ -47,6 +47,26 @@ def mean_of(values: Array, dof: int) -> Average:
     return average(values, dof, worth(values))
 
 
+def worth_of_errors(errors: Array, covariances: Array) -> float:
+    """How many independent errors (N, 2) with their covariances there are.
+
+    Of errors in units of their own standard deviation, about zero and not about their mean: an error that is
+    the same throughout is one, however steady its square is.
+    """
+    white = np.asarray(whiten(errors, covariances))
+    white = white[np.isfinite(white).all(axis=1)]
+    n = len(white)
+    if n < 4:
+        return float(n)
+    padded = np.fft.rfft(white, 2 * n, axis=0)
+    products = np.fft.irfft(np.abs(padded) ** 2, axis=0)[:n].sum(axis=1)
+    r = products[1:] / products[0] * n / (n - np.arange(1, n))
+    stop = np.flatnonzero(r[: n // 2] <= 0)
+    r = r[: stop[0]] if len(stop) else r[: n // 2]
+    # Of squares, whose correlation is the square of that of the errors.
+    return float(max(1.0, n / (1 + 2 * float(np.sum(r**2)))))
+
+
 def judged(followed: Followed) -> pd.DataFrame:
     """One row for each track.
 
@@ -65,6 +85,9 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
     summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
     m = one.innovation.shape[1]
     of_nees, of_nis = mean_of(one.nees, 2), mean_of(one.nis, m)
+    if of_nees.n:
+        independent = worth_of_errors(one.error[:, :2], one.covariance[:, :2, :2])
+        of_nees = average(one.nees, 2, min(of_nees.worth, independent))
     inside = share_inside(one.nees, chi_square_interval(2))
     band = (np.nan, np.nan)
     if of_nees.n and of_nees.worth >= 1:

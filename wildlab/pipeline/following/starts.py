@@ -9,7 +9,7 @@ import numpy as np
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
-from wildlab.pipeline.following.considering import covariances_of
+from wildlab.pipeline.following.considering import spread_of
 from wildlab.pipeline.following.expected import errors_near, predict_scan
 from wildlab.pipeline.scans import Scans, Truth
 from wildlab.tracking.run import Start
@@ -81,10 +81,10 @@ def place_of(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> tuple[Array,
         return place, P
     n = len(scans.times)
     expected = predict_scan(scans, np.tile(place, (n, 1)), np.zeros((n, 2)))
-    H, G = expected.H_position[row, :, :2], expected.H_pose[row]
-    pose = covariances_of(scans, beliefs)
-    if pose is not None and np.isfinite(pose[row]).all():
-        R = R + G @ pose[row] @ G.T
+    H = expected.H_position[row, :, :2]
+    lasting = spread_of(scans, beliefs, expected.H_pose)
+    if lasting is not None and np.isfinite(lasting[row]).all():
+        R = R + lasting[row]
     if not np.isfinite(H).all():
         return None
     inverse = np.linalg.pinv(H)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
 from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.filters import SMOOTHED
 from wildlab.pipeline.following.follow import Followed
 from wildlab.pipeline.following.judged import whitened
 from wildlab.pipeline.sensor_tracks import SensorTrack
@@ -109,10 +110,11 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
         if not there.any():
             continue
         keep = thinned(int(there.sum()))
-        look = {"color": colour(one.filter), "label": filter_words(one.filter)}
+        look = {"color": colour(one.filter.removesuffix(SMOOTHED)), "label": filter_words(one.filter)}
+        dashes = "--" if one.filter.endswith(SMOOTHED) else "-"
         t, y = one.times[there][keep], np.maximum(values[there][keep], 1e-4)
         if what == "nees":
-            ax.plot(t, y, lw=1.4, **look)
+            ax.plot(t, y, lw=1.4, ls=dashes, **look)
         else:
             ax.plot(t, y, ".", ms=3.5, alpha=0.6, mec="none", **look)
         highest, lowest = max(highest, float(y.max())), min(lowest, float(y.min()))
@@ -152,9 +154,9 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
             continue
         keep = thinned(int(there.sum()))
         stated = np.sqrt(np.trace(one.covariance[:, :2, :2], axis1=1, axis2=2))
-        ax.plot(one.times[there][keep], away[there][keep], color=colour(one.filter), lw=1.5,
+        ax.plot(one.times[there][keep], away[there][keep], color=colour(one.filter.removesuffix(SMOOTHED)), lw=1.5,
                 label=filter_words(one.filter))  # fmt: skip
-        ax.plot(one.times[there][keep], stated[there][keep], color=colour(one.filter), lw=1.0, ls=":")
+        ax.plot(one.times[there][keep], stated[there][keep], color=colour(one.filter.removesuffix(SMOOTHED)), lw=1.0, ls=":")
         said.append(f"{filter_words(one.filter)} {mine.loc[one.filter, 'rmse']:.3g} m")
     ax.plot([], [], color=INK, lw=1.0, ls=":", label="what each states of it")
     ax.set_ylim(bottom=0)

@@ -1,0 +1,98 @@
+"""Made-up flights: a boat followed from a robot by ranges and bearings, bearings, positions or velocities."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wildlab.flight.manifest import make_manifest
+from wildlab.flight.store import Flight
+
+
+def boat(t: np.ndarray) -> np.ndarray:
+    """North and east of a boat that turns a little."""
+    return np.column_stack([80 + 0.8 * t, 40 + 25 * np.sin(t / 25)])
+
+
+def robot(t: np.ndarray) -> np.ndarray:
+    """North and east of the robot."""
+    return np.column_stack([0.3 * t, 10 * np.sin(t / 40)])
+
+
+def robot_flight(
+    seed: int = 0,
+    *,
+    kind: str = "range-bearing",
+    heading_off_deg: float = 0.0,
+    heading_sd_deg: float | None = None,
+    range_sd: float = 0.5,
+    bearing_sd_deg: float = 0.3,
+    position_sd: float = 1.0,
+    seconds: float = 120.0,
+    rate_hz: float = 2.0,
+    labelled: bool = True,
+    truth: bool = True,
+    fixed: bool = False,
+    name: str = "robot",
+    sensor: str = "radar",
+    clutter: int = 0,
+    manifest: dict[str, Any] | None = None,
+) -> Flight:
+    """A flight whose every number is known; the robot takes its heading for right and it is off.
+
+    What it measures relative to its bow it turns by the heading it believes in: bearings from north are too
+    large by how far that is.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(1.0, seconds, 1 / rate_hz)
+    at = np.zeros((len(t), 2)) if fixed else robot(t)
+    where = boat(t)
+    off = where - at
+    distance = np.hypot(*off.T)
+    azimuth = np.arctan2(off[:, 1], off[:, 0]) + np.radians(heading_off_deg)
+    rows = []
+    for k in range(len(t)):
+        seen = [(distance[k] + rng.normal(0, range_sd), azimuth[k] + rng.normal(0, np.radians(bearing_sd_deg)), "boat")]
+        seen += [(rng.uniform(20, 200), rng.uniform(-np.pi, np.pi), "") for _ in range(clutter)]
+        for i, (r, a, target) in enumerate(seen):
+            row: dict[str, Any] = {
+                "detection_id": f"{sensor}-{k}-{i}",
+                "frame_id": f"{sensor}-{k}",
+                "source": sensor,
+                "kind": kind,
+                "target_id": target if labelled else "",
+            }
+            if kind == "range-bearing":
+                row |= {"range_m": r, "azimuth_rad": a}
+            elif kind == "bearing":
+                row |= {"azimuth_rad": a}
+            elif kind == "position":
+                turn = r * np.array([np.cos(a), np.sin(a)])
+                north, east = at[k] + turn + rng.normal(0, position_sd, 2)
+                row |= {"north_m": north, "east_m": east, "down_m": 0.0}
+            elif kind == "velocity":
+                v = (boat(t[k : k + 1] + 0.5) - boat(t[k : k + 1] - 0.5))[0] + rng.normal(0, 0.2, 2)
+                row |= {"v_north_m_s": v[0], "v_east_m_s": v[1]}
+            rows.append(row)
+    stamps = np.zeros(1) if fixed else np.arange(0.0, seconds + 2, 0.2)
+    nav = pd.DataFrame({"time_s": stamps, "down_m": 0.0, "q_w": 1.0, "q_x": 0.0, "q_y": 0.0, "q_z": 0.0})
+    nav[["north_m", "east_m"]] = np.zeros((1, 2)) if fixed else robot(stamps)
+    fine = np.arange(0.0, seconds + 2, 0.2)
+    way = pd.DataFrame({"target_id": "boat", "time_s": fine, "down_m": 0.0, "sd_horizontal_m": 0.05})
+    way[["north_m", "east_m"]] = boat(fine)
+    parts: dict[str, Any] = {
+        "name": name,
+        "kind": "logged",
+        "origin": {"latitude_deg": 63.0, "longitude_deg": 10.0, "height_m": 0.0},
+        "platform": {"name": "robot"},
+        "time": {"kind": "utc", "epoch": "2024-05-04T12:00:00Z"},
+    }
+    if heading_sd_deg is not None:
+        parts["uncertainty"] = {"yaw_deg": heading_sd_deg}
+    frames = pd.DataFrame({"frame_id": [f"{sensor}-{k}" for k in range(len(t))], "time_s": t, "sensor": sensor})
+    tables = {"frames": frames, "detections": pd.DataFrame(rows)}
+    if truth:
+        tables["truth"] = way
+    return Flight(make_manifest(parts | (manifest or {})), {"own": nav}, tables)

@@ -1,0 +1,136 @@
+"""Noise and liveliness under which a flight's own innovations are likeliest: a tuning without any truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize
+
+from wildlab.errors import WildlabError
+from wildlab.flight.following import Settings
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.expected import sensor_of
+from wildlab.pipeline.following.filters import choose, motion_of, white_noise
+from wildlab.pipeline.following.follow import identified, targets_of
+from wildlab.pipeline.scans import Scans, scans_of
+from wildlab.pipeline.sensor_tracks import begin_of_target
+from wildlab.pipeline.sensor_tuning import FEWEST, SensorTuning
+from wildlab.tracking.run import Start, run_filter
+
+#: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.
+MOST_LOOKS = 1500
+#: How far, as a factor, noise and liveliness may be from what was believed before.
+FARTHEST = 100.0
+EVALUATIONS = 120
+
+
+class _Case(NamedTuple):
+    """One target by one sensor: what it is measured by, row by row, and where it starts."""
+
+    sensor: str
+    scans: Scans
+    own: Array
+    beliefs: Beliefs
+    begin: Start
+
+
+def tune_by_innovations(
+    flight: Flight, sensors: Sequence[str], settings: Settings | None = None, source: str | None = None
+) -> tuple[dict[str, SensorTuning], float]:
+    """For each sensor a factor on its noise, and the liveliness of the targets, together.
+
+    Detections are those that the filter lets in with what it believes before. Errors that last are in all
+    detections alike; innovations do not show them, and nothing is said of them.
+
+    Returns
+    -------
+    Tunings by sensor, their clocks as they are; and the acceleration density, m/s per root second.
+
+    Raises
+    ------
+    WildlabError
+        Where fewer than `FEWEST` detections of a sensor can be followed.
+    """
+    told = of_flight(flight, settings)
+    targets, _ = of_targets(told.targets)
+    cases: list[_Case] = []
+    for sensor in sensors:
+        mine = _cases(flight, sensor, told, targets, source)
+        used = sum(int(np.isfinite(one.own[:, 0]).sum()) for one in mine)
+        if used < FEWEST:
+            raise WildlabError(
+                f"only {used} detections of {sensor!r} can be followed",
+                "tune on a flight on which the sensor saw a target for longer",
+                file=flight.folder,
+                field="detections",
+            )
+        cases += mine
+    names = list(dict.fromkeys(one.sensor for one in cases))
+
+    def cost(logs: Array) -> float:
+        if np.abs(logs).max() > np.log(FARTHEST):
+            return float("inf")
+        lively = targets._replace(density=targets.density * float(np.exp(logs[0])))
+        factor = dict(zip(names, np.exp(logs[1:]), strict=True))
+        return -sum(_log_likelihood(one, lively, float(factor[one.sensor])) for one in cases)
+
+    first = np.zeros(1 + len(names))
+    simplex = np.vstack([first, 0.7 * np.eye(len(first))])
+    found = minimize(
+        cost, first, method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": EVALUATIONS, "xatol": 0.01, "fatol": 0.05},
+    )  # fmt: skip
+    factors = np.exp(found.x)
+    tunings = {}
+    for name, factor in zip(names, factors[1:], strict=True):
+        mine = [one for one in cases if one.sensor == name]
+        sds = mine[0].beliefs.noise * factor
+        n = sum(int(np.isfinite(one.own[:, 0]).sum()) for one in mine)
+        kind, interval = mine[0].scans.kind, mine[0].scans.interval_s
+        tunings[name] = SensorTuning(
+            name, kind, mine[0].beliefs.offset_s, 0.0, 0.0, float(sds[0]), 0.0, max(interval, 1e-3), 0.0, 0.0,
+            0.0, mine[0].beliefs.range_m, mine[0].beliefs.range_sd_m, interval, n, tuple(sds.tolist()),
+        )  # fmt: skip
+    return tunings, float(targets.density * factors[0])
+
+
+def _cases(
+    flight: Flight, sensor: str, told: Settings, targets: TargetBeliefs, source: str | None
+) -> list[_Case]:
+    looks = identified(scans_of(flight, sensor, 0.0, source), targets)
+    beliefs, _ = of_sensor(flight, looks, told)
+    found = []
+    truths = targets_of(flight, looks)
+    for truth in truths:
+        others = [one for one in truths if one.target != truth.target]
+        seen, begin = begin_of_target(looks, truth, beliefs, targets, others)
+        if begin is None:
+            continue
+        first = choose(looks, seen, beliefs, targets, begin)
+        rows = np.arange(len(seen))
+        own = np.where(first.used[:, None], seen[rows, np.maximum(first.chosen, 0)], np.nan)
+        own[MOST_LOOKS:] = np.nan
+        found.append(_Case(sensor, looks, own, beliefs, begin))
+    return found
+
+
+def _log_likelihood(case: _Case, targets: TargetBeliefs, factor: float) -> float:
+    last = int(np.flatnonzero(np.isfinite(case.own[:, 0]))[-1]) + 1 if np.isfinite(case.own).any() else 0
+    rows = slice(0, max(last, case.begin.row + 1))
+    n = len(case.scans.times)
+    sensor = sensor_of(case.scans, np.zeros((n, 2)))._replace(rows=None)
+    track = run_filter(
+        case.scans.times[rows],
+        case.own[rows],
+        white_noise(case.scans, case.beliefs.noise * factor),
+        sensor,
+        motion_of(targets),
+        case.begin,
+    )
+    used = np.isfinite(track.nis)
+    log_det = np.linalg.slogdet(track.S[used])[1]
+    return float(-(track.nis[used] + log_det).sum() / 2)
