@@ -18,14 +18,14 @@ Array = NDArray[np.float64]
 ERROR_CONVENTION = "truth minus estimate"
 
 
-def chi_square_interval(dof: int, probability: float = 0.95, runs: float = 1) -> tuple[float, float]:
+def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) -> tuple[float, float]:
     """Two-sided interval in which NEES or NIS lies with ``probability`` if the filter is consistent (H
     example 3.1).
 
     Parameters
     ----------
     dof
-        Number of states (NEES) or of elements of a measurement (NIS).
+        Number of states (NEES) or of elements of a measurement (NIS); their mean where they vary.
     probability
         Of the whole interval; half of the rest lies on either side.
     runs
@@ -207,7 +207,7 @@ class Average(NamedTuple):
         return bool(self.low <= self.mean <= self.high)
 
 
-def average(values: ArrayLike, dof: int, worth: float | None = None) -> Average:
+def average(values: ArrayLike, dof: float, worth: float | None = None) -> Average:
     """Mean over the known values, and the interval in which that of a consistent filter lies.
 
     Parameters

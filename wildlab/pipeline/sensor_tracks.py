@@ -51,7 +51,8 @@ class SensorTrack(NamedTuple):
     (N, m) and ``nis`` (N,) of the detections used, NaN elsewhere. ``known`` (N,): where there is truth.
     ``near`` (N,): where the sensor saw something within reach of the target's true place, or its label.
     ``covariance`` (N, 4, 4) of the estimate, ``S`` (N, m, m) of the innovation, ``detection`` (N,) the name
-    of the one that was used, "" none.
+    of the one that was used, "" none. ``sizes`` (N,) how many elements its detection has, where looks are of
+    several sensors.
     """
 
     sensor: str
@@ -68,6 +69,14 @@ class SensorTrack(NamedTuple):
     covariance: Array = np.empty((0, 4, 4))
     S: Array = np.empty((0, 0, 0))
     detection: NDArray[np.object_] = np.empty(0, object)
+    sizes: NDArray[np.int64] = np.empty(0, np.int64)
+
+    @property
+    def dof(self) -> float:
+        """Elements of a detection used, on average: what the mean NIS should be."""
+        m = self.innovation.shape[1]
+        used = np.isfinite(self.nis)
+        return float(self.sizes[used].mean()) if len(self.sizes) and used.any() else float(m)
 
 
 def follow_flight(
@@ -116,8 +125,9 @@ def follow(
     """
     seen, begin = begin_of_target(scans, truth, beliefs, targets, others)
     if begin is None:
-        return [_nothing(scans, truth, name, targets) for name in filters]
-    first = choose(scans, seen, beliefs, targets, begin)
+        return [no_track(scans, truth, name, targets) for name in filters]
+    # What names its target needs no gate to be told apart.
+    first = choose(scans, seen, beliefs, targets, begin, gate=not scans.labelled)
     # From here on one detection a scan: the same for all.
     rows = np.arange(len(seen))
     chosen = first.chosen.copy()
@@ -125,12 +135,12 @@ def follow(
         chosen[begin.row] = int(np.argmax(np.isfinite(seen[begin.row]).all(axis=-1)))
     own = np.where(first.used[:, None], seen[rows, np.maximum(chosen, 0)], np.nan)
     ids = np.where(first.used, scans.ids[rows, np.maximum(chosen, 0)], "")
-    last = _last_row(scans.times, first.used, begin.time, targets.patience_s)
+    last = last_row(scans.times, first.used, begin.time, targets.patience_s)
     begun = scans.times > begin.time
     found = []
     for name in filters:
         track = follow_with("ekf" if name == "kf" else name, scans, own, first, beliefs, targets, begin)
-        found.append(_score(scans, truth, name, track, begun, last, targets, ids))
+        found.append(scored(scans, truth, name, track, begun, last, targets, ids))
     return found
 
 
@@ -153,7 +163,7 @@ def begin_of_target(
     return seen, start_first(scans, own, beliefs, targets)
 
 
-def _last_row(times: Array, used: NDArray[np.bool_], start: float, patience: float) -> int:
+def last_row(times: Array, used: NDArray[np.bool_], start: float, patience: float) -> int:
     """The first row that has a track no more."""
     hits = np.concatenate([[start], times[used]])
     pauses = np.flatnonzero(np.diff(hits) > patience)
@@ -161,7 +171,7 @@ def _last_row(times: Array, used: NDArray[np.bool_], start: float, patience: flo
     return int(np.searchsorted(times, end + patience, side="right"))
 
 
-def _score(
+def scored(
     scans: Scans,
     truth: Truth,
     name: str,
@@ -171,6 +181,7 @@ def _score(
     targets: TargetBeliefs,
     ids: NDArray[np.object_],
 ) -> SensorTrack:
+    """A filter's track as far as it goes, beside the truth; ``begun`` (N,) and before ``last``."""
     x, innovation, nis = track.x.copy(), track.innovation.copy(), track.nis.copy()
     P, S = track.P.copy(), track.S.copy()
     x[last:], P[last:] = np.nan, np.nan
@@ -191,7 +202,8 @@ def _score(
     )  # fmt: skip
 
 
-def _nothing(scans: Scans, truth: Truth, name: str, targets: TargetBeliefs) -> SensorTrack:
+def no_track(scans: Scans, truth: Truth, name: str, targets: TargetBeliefs) -> SensorTrack:
+    """Of a target that was never found."""
     n, m = len(scans.times), scans.detections.shape[-1]
     empty = np.full((n, 4), np.nan)
     known = np.asarray(np.isfinite(truth.position).all(axis=1))

@@ -34,13 +34,13 @@ def estimates_table(tracks: Sequence[SensorTrack], scans: dict[str, Scans]) -> p
     DataFrame
         ``sensor``, ``target``, ``filter``, ``time_s``; the state, metres and m/s in n; ``p_ij`` its
         covariance, the upper triangle; ``detection`` that was used, "" none; ``innovation_...`` in the unit
-        of each element, ``s_ij`` their covariance, in the order of the elements; ``nis``; and ``error_north_m``,
-        ``error_east_m`` (truth minus estimate) and ``nees`` where the truth is known.
+        of each element, ``s_ij`` their covariance, in the order of the elements; ``nis``; and
+        ``error_north_m``, ``error_east_m`` (truth minus estimate) and ``nees`` where the truth is known.
     """
-    return pd.concat([_of(one, scans[one.sensor].elements) for one in tracks], ignore_index=True)
+    return pd.concat([_of(one, scans) for one in tracks], ignore_index=True)
 
 
-def _of(one: SensorTrack, elements: tuple[str, ...]) -> pd.DataFrame:
+def _of(one: SensorTrack, scans: dict[str, Scans]) -> pd.DataFrame:
     rows = np.isfinite(one.estimate).all(axis=1)
     n = int(rows.sum())
     columns: dict[str, object] = {
@@ -53,9 +53,13 @@ def _of(one: SensorTrack, elements: tuple[str, ...]) -> pd.DataFrame:
     for i in range(4):
         columns |= {f"p_{i}{j}": one.covariance[rows, i, j] for j in range(i, 4)}
     columns["detection"] = one.detection[rows]
-    names = ("north", "east") if one.filter == "coloured" else elements
-    for i, name in enumerate(names):
-        columns[f"innovation_{name}_{UNITS[name]}"] = one.innovation[rows, i]
+    if one.sensor not in scans:  # of several sensors: each look has the elements of its own
+        names = tuple(str(i) for i in range(one.innovation.shape[1]))
+        columns |= {f"innovation_{name}": one.innovation[rows, i] for i, name in enumerate(names)}
+    else:
+        names = ("north", "east") if one.filter == "coloured" else scans[one.sensor].elements
+        for i, name in enumerate(names):
+            columns[f"innovation_{name}_{UNITS[name]}"] = one.innovation[rows, i]
     for i in range(len(names)):
         columns |= {f"s_{i}{j}": one.S[rows, i, j] for j in range(i, len(names))}
     columns["nis"] = one.nis[rows]

@@ -34,6 +34,10 @@ def sensor_of(scans: Scans, drift: ArrayLike) -> Sensor:
     def predict(row: int, state: Array) -> Prediction:
         return _predict(scans, row, state[..., :2], state[..., 2:4], moves[row])
 
+    def ray(row: int, z: Array) -> tuple[Array, Array]:
+        azimuth = z[scans.elements.index("azimuth")]
+        return np.append(scans.platform[row], 0.0), np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+
     return Sensor(
         predict,
         scans.angles,
@@ -41,6 +45,7 @@ def sensor_of(scans: Scans, drift: ArrayLike) -> Sensor:
         4 if scans.kind == "velocity" else 2,
         scans.elements,
         SLOTS[scans.kind],
+        ray if "azimuth" in scans.elements else None,
     )
 
 
@@ -105,6 +110,8 @@ def errors_near(scans: Scans, truth: Truth, reach: float) -> tuple[Array, NDArra
     The one that names it, where detections do; else the nearest within ``reach`` (m, or rad where there is no
     more than angles). Measured minus expected; NaN and -1 where there is none.
     """
+    if scans.kind not in SLOTS:
+        return np.full(scans.detections[:, 0].shape, np.nan), np.full(len(scans.times), -1)
     expected = predict_scan(scans, truth.position, truth.velocity).z
     error = difference(scans.detections, expected[:, None], scans.angles)
     if scans.labelled:

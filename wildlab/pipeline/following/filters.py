@@ -66,12 +66,14 @@ def white_noise(scans: Scans, sds: Array) -> Array:
     return np.diag(np.asarray(sds, float) ** 2)
 
 
-def choose(scans: Scans, seen: Array, beliefs: Beliefs, targets: TargetBeliefs, begin: Start) -> Track:
-    """The filter with white noise, which chooses the nearest in its gate of ``seen`` (N, K, m)."""
+def choose(
+    scans: Scans, seen: Array, beliefs: Beliefs, targets: TargetBeliefs, begin: Start, *, gate: bool = True
+) -> Track:
+    """The filter with white noise, which chooses the nearest of ``seen`` (N, K, m), in its gate or of all."""
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     return run_filter(
         scans.times, seen, white_noise(scans, beliefs.white), sensor, motion_of(targets), begin,
-        gate_probability=targets.gate_probability,
+        gate_probability=targets.gate_probability if gate else 1.0,
     )  # fmt: skip
 
 
@@ -104,10 +106,10 @@ def follow_with(
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     white = white_noise(scans, beliefs.white)
     if base == "ekf":
-        return _without_innovations(smooth(first, motion)) if smoothed else first
+        return without_innovations(smooth(first, motion)) if smoothed else first
     if base == "ukf":
         track = run_unscented(scans.times, own, white, sensor, motion, begin)
-        return _without_innovations(smooth(track, motion)) if smoothed else track
+        return without_innovations(smooth(track, motion)) if smoothed else track
     if base == "imm":
         both = [motion_of(targets, CALM), motion]
         return run_imm(scans.times, own, white, sensor, both, (STAY_S, STAY_S), begin).track
@@ -123,10 +125,10 @@ def follow_with(
         drift = np.nan_to_num(first.x[:, 2:4] - scans.platform_velocity)
         noise = white_noise(scans, beliefs.noise)
         track = run(scans.times, own, noise, sensor_of(scans, drift), motion, begin, pose=errors)
-    return _without_innovations(track) if smoothed else track
+    return without_innovations(track) if smoothed else track
 
 
-def _without_innovations(track: Track) -> Track:
+def without_innovations(track: Track) -> Track:
     """A smoothed track: its innovations are the filter's, and not counted twice."""
     nothing = np.full_like(track.nis, np.nan)
     return track._replace(

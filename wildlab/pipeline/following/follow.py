@@ -12,12 +12,15 @@ from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Beliefs, Said, TargetBeliefs, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
+from wildlab.pipeline.following.together import ABLE, follow_together
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of, truths_at
 from wildlab.pipeline.sensor_tracks import UNNAMED, SensorTrack, follow
 
 #: The filter without anything but white noise, which the others are held against.
 WHITE = "ekf"
+#: What all sensors at once are called.
+TOGETHER = "together"
 
 
 class Followed(NamedTuple):
@@ -98,6 +101,7 @@ def follow_targets(
     tracks: list[SensorTrack] = []
     known: set[str] = set()
     any_truth = False
+    looked: dict[str, list[Truth]] = {}
     for sensor in wanted:
         there = None if tuned is None else tuned.sensors.get(sensor)
         looks = scans_of(flight, sensor, 0.0, source)
@@ -109,6 +113,7 @@ def follow_targets(
         notes += order_notes(looks)
         scans[sensor], beliefs[sensor] = looks, belief
         truths = targets_of(flight, looks)
+        looked[sensor] = truths
         known |= {one.target for one in truths}
         any_truth |= any(np.isfinite(one.position).any() for one in truths)
         names = chosen_filters(looks, belief, filters)
@@ -120,6 +125,15 @@ def follow_targets(
             others = [one for one in truths if one.target != truth.target]
             tracks += follow(looks, truth, belief, believed, names, others)
     _refuse_unknown(targets, known, flight)
+    if len(wanted) > 1:
+        names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
+        if smooth:
+            names = [one for name in names for one in (name, f"{name}{SMOOTHED}") if one in (name, *SMOOTHABLE)]
+        for target in sorted(known):
+            if targets and target not in targets:
+                continue
+            parts = {name: (scans[name], beliefs[name], looked[name]) for name in wanted}
+            tracks += follow_together(flight, parts, target, believed, list(dict.fromkeys([WHITE, *names])))
     return Followed(tracks, scans, beliefs, believed, said, notes, any_truth)
 
 

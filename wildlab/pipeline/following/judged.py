@@ -21,7 +21,7 @@ from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.follow import TOGETHER, Followed
 from wildlab.pipeline.sensor_tracks import SensorTrack
 
 #: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
@@ -42,7 +42,7 @@ def worth(values: Array) -> float:
     return effective_sample_size(known, len(known) - 1) if len(known) > 3 else float(len(known))
 
 
-def mean_of(values: Array, dof: int) -> Average:
+def mean_of(values: Array, dof: float) -> Average:
     """The mean with the band for as many independent values as there are."""
     return average(values, dof, worth(values))
 
@@ -78,12 +78,17 @@ def judged(followed: Followed) -> pd.DataFrame:
     next, with ``lag1_bound``, what white noise stays below; ``followed``: the share of looks with truth that
     have a track.
     """
-    return pd.DataFrame([_row(one, followed.scans[one.sensor].kind) for one in followed.tracks])
+    return pd.DataFrame([_row(one, kind_of(followed, one.sensor)) for one in followed.tracks])
+
+
+def kind_of(followed: Followed, sensor: str) -> str:
+    """What a sensor detects; several at once are ``together``."""
+    return followed.scans[sensor].kind if sensor in followed.scans else TOGETHER
 
 
 def _row(one: SensorTrack, kind: str) -> dict[str, object]:
     summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
-    m = one.innovation.shape[1]
+    m = one.dof
     of_nees, of_nis = mean_of(one.nees, 2), mean_of(one.nis, m)
     if of_nees.n:
         independent = worth_of_errors(one.error[:, :2], one.covariance[:, :2, :2])
@@ -129,6 +134,8 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
 def whitened(one: SensorTrack) -> Array:
     """(K, m) innovations of the detections used, each in units of its own standard deviation."""
     used = np.isfinite(one.nis)
+    if len(one.sizes):
+        return np.empty((0, 0))  # looks of several sensors have no elements in common
     return np.asarray(whiten(one.innovation[used], one.S[used])) if used.any() else one.innovation[used]
 
 
@@ -155,7 +162,8 @@ def apart(followed: Followed) -> list[Apart]:
     for track in followed.tracks:
         groups.setdefault((track.target, track.filter), []).append(track)
     for (target, name), tracks in groups.items():
-        for a, b in combinations(tracks, 2):
+        apart_from = [one for one in tracks if one.sensor in followed.scans]
+        for a, b in combinations(apart_from, 2):
             x, P = _between(b, a.times)
             gap = a.estimate[:, :2] - x
             both = np.isfinite(gap).all(axis=1)

@@ -22,10 +22,10 @@ from wildlab.pipeline.sensor_tuning import FEWEST, SensorTuning
 from wildlab.tracking.run import Start, run_filter
 
 #: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.
-MOST_LOOKS = 1500
+MOST_LOOKS = 600
 #: How far, as a factor, noise and liveliness may be from what was believed before.
 FARTHEST = 100.0
-EVALUATIONS = 120
+EVALUATIONS = 80
 
 
 class _Case(NamedTuple):
@@ -110,7 +110,7 @@ def _cases(
         seen, begin = begin_of_target(looks, truth, beliefs, targets, others)
         if begin is None:
             continue
-        first = choose(looks, seen, beliefs, targets, begin)
+        first = choose(looks, seen, beliefs, targets, begin, gate=not looks.labelled)
         rows = np.arange(len(seen))
         own = np.where(first.used[:, None], seen[rows, np.maximum(first.chosen, 0)], np.nan)
         own[MOST_LOOKS:] = np.nan

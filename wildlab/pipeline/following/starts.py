@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
 from wildlab.pipeline.following.considering import spread_of
-from wildlab.pipeline.following.expected import errors_near, predict_scan
+from wildlab.pipeline.following.expected import errors_near, predict_scan, sensor_of
 from wildlab.pipeline.scans import Scans, Truth
-from wildlab.tracking.run import Start
+from wildlab.tracking.records import Start
+from wildlab.tracking.starts import start_from_rays
 
 
 def start_near(
@@ -49,12 +51,28 @@ def start_near(
 
 
 def start_first(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
-    """A start on the first usable row of ``own`` (N, m), which is used up; None where there is none."""
+    """A start on the first usable row of ``own`` (N, m), which is used up; None where there is none.
+
+    Bearings whose distance nobody knows start where the first of them meet that cross.
+    """
+    if scans.elements == ("azimuth",) and not np.isfinite(beliefs.range_m):
+        return _start_from_rays(scans, own, beliefs, targets)
     for row in np.flatnonzero(np.isfinite(own).all(axis=1) & np.isfinite(scans.platform).all(axis=1)):
         place = place_of(scans, int(row), own[row], beliefs)
         if place is not None:
             return at_rest(float(scans.times[row]), *place, targets, int(row))
     return None
+
+
+def _start_from_rays(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
+    usable = np.where(np.isfinite(scans.platform).all(axis=1)[:, None], own, np.nan)
+    sensor = sensor_of(scans, np.zeros_like(scans.platform))
+    try:
+        return start_from_rays(
+            scans.times, usable, np.diag(beliefs.white**2), sensor, sd_velocity=targets.start_speed_m_s
+        )
+    except WildlabError:
+        return None  # all near parallel, or they settle on no place
 
 
 def at_rest(time: float, place: Array, P: Array, targets: TargetBeliefs, row: int = -1) -> Start:
