@@ -78,6 +78,8 @@ def test_a_simulation_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pyt
 
 def studies(folder: Path) -> Path:
     write(folder, "georeferencing.ipynb", notebook(OPEN, SHOW, more='source = ""'))
+    own = OPEN.replace("3.0", "4.0")
+    write(folder, "overview.ipynb", notebook(own, SHOW, more='beside = []\nlacking = []\nsource = ""'))
     text = '[s]\ntitle = "S"\nnotebook = "georeferencing.ipynb"\n'
     text += 'dataset = "openathena"\nrecipe = "openathena.toml"\n'
     (folder / "studies.toml").write_text(text)
@@ -101,8 +103,9 @@ def test_any_flight_folder_can_be_evaluated(tmp_path: Path, make_flight: Callabl
     folder = tmp_path / "tuesday"
     save_flight(make_flight(), folder)
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    (outcome,) = evaluate_flight(folder, **where)
-    assert outcome.state == "done", outcome.reason
+    overview, outcome = evaluate_flight(folder, **where)
+    assert overview.state == outcome.state == "done", (overview.reason, outcome.reason)
+    assert overview.folder == (tmp_path / "reports" / "small-flight-overview").resolve()
     assert outcome.folder == (tmp_path / "reports" / "small-flight").resolve()
     content = json.loads((outcome.folder / "metrics.json").read_text())
     assert content["metrics"][0]["value"] == 3
@@ -160,21 +163,27 @@ def test_which_poses_are_meant_is_asked_before_anything_runs(
     assert not (tmp_path / "reports").exists()
 
 
-def test_a_flight_of_which_nothing_can_be_judged_is_refused(
+@pytest.mark.slow
+def test_a_flight_of_which_nothing_can_be_judged_has_its_overview(
     tmp_path: Path, make_flight: Callable[..., Flight]
 ) -> None:
-    """With what it lacks for each report, before anything runs."""
+    """With what it lacks for each other report; a calibration, which has no use then, is refused."""
     flight = make_flight()
     del flight.tables["detections"], flight.tables["truth"]
     save_flight(flight, tmp_path / "flight")
     where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
-    with pytest.raises(WildlabError, match="nothing of this flight can be judged") as caught:
-        evaluate_flight(tmp_path / "flight", **where)
-    assert "Georeferencing: it lacks detections of kind pixel and truth" in caught.value.problem
-    assert "Navigation: it lacks inertial measurements (imu)" in caught.value.problem
-    with pytest.raises(WildlabError, match="poses are named, and the georeferencing cannot be judged"):
-        evaluate_flight(tmp_path / "flight", source="logged", **where)
+    with pytest.raises(WildlabError, match="a calibration is named, and the georeferencing cannot be judged"):
+        evaluate_flight(tmp_path / "flight", calibration=tmp_path / "c.toml", **where)
+    with pytest.raises(WildlabError, match="no nav source 'mekf'"):
+        evaluate_flight(tmp_path / "flight", source="mekf", **where)
     assert not (tmp_path / "reports").exists()
+    (outcome,) = evaluate_flight(tmp_path / "flight", **where)
+    assert outcome.state == "done" and outcome.name == "small-flight-overview"
+    said = json.loads((tmp_path / "reports" / outcome.name / "provenance.json").read_text())["parameters"]
+    assert said["beside"] == []
+    first, second = said["lacking"]
+    assert first.startswith("georeferencing (it lacks detections of kind pixel and truth")
+    assert second.startswith("navigation (it lacks inertial measurements (imu)")
 
 
 def lacking(flight: Flight) -> str:
@@ -218,7 +227,7 @@ def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
     again = make_flight(clocks={"camera_offset_s": 0.1})
     again.tables["frames"]["time_s"] += 0.5
     save_flight(again, tmp_path / "monday", overwrite=True)
-    (outcome,) = evaluate_flight(tmp_path / "monday", **where)
+    _, outcome = evaluate_flight(tmp_path / "monday", **where)
     assert outcome.state == "done"
 
     other = make_flight()
@@ -228,7 +237,7 @@ def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
     save_flight(other, tmp_path / "tuesday")
     with pytest.raises(WildlabError, match="a report of another flight named 'small-flight'"):
         evaluate_flight(tmp_path / "tuesday", **where)
-    (outcome,) = evaluate_flight(tmp_path / "tuesday", **where | {"reports": tmp_path / "elsewhere"})
+    _, outcome = evaluate_flight(tmp_path / "tuesday", **where | {"reports": tmp_path / "elsewhere"})
     assert outcome.state == "done"
 
 

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 def page(flight, folder, **more):
     save_flight(flight, folder / "flight")
-    (outcome,) = evaluate_flight(folder / "flight", reports=folder / "reports", **more)
+    _, outcome = evaluate_flight(folder / "flight", reports=folder / "reports", **more)
     assert outcome.state == "done", outcome.reason
     return (outcome.folder / "report.html").read_text(encoding="utf-8")
 

@@ -269,7 +269,7 @@ def test_a_flight_with_labelled_markers_is_evaluated(
 ) -> None:
     raw = shared_data("georeferencing", "openathena-f1")
     import_flight(DATA / "recipes" / "openathena-f1.toml", raw, tmp_path / "flight")
-    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
+    _, outcome = evaluate_flight(tmp_path / "flight", reports=reports)
     found = values(outcome.folder)
     assert found["horizontal_error_mean", "logged-pose"]["value"] <= 3.0
     assert found["horizontal_error_mean", "logged-pose"]["n"] == 103
@@ -287,7 +287,7 @@ def test_a_flight_without_a_camera_is_evaluated_by_its_navigation(
 ) -> None:
     raw = shared_data("logs", "umn_thor75")
     import_flight(DATA / "recipes" / "umn-thor75.toml", raw, tmp_path / "flight")
-    (outcome,) = evaluate_flight(tmp_path / "flight", reports=reports)
+    _, outcome = evaluate_flight(tmp_path / "flight", reports=reports)
     assert outcome.name == "umn-thor75-navigation"
     found = values(outcome.folder)
     # In the air, which nobody had to point out: rotations about the axes of the body, in degrees.

@@ -12,7 +12,7 @@ from wildlab.pipeline.worth_fixing import Numbers
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.report import Report
-from wildlab.reporting.text import percent
+from wildlab.reporting.text import number, percent
 
 
 def tiles(overview: Overview) -> list[tuple[str, str]]:
@@ -35,7 +35,7 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
     if overview.detections[0]:
         found.append((f"{overview.detections[2]} / {overview.detections[0]}", "detections on the ground"))
     if overview.vibration is not None:
-        found.append((f"{overview.vibration[0].worst.max():.1f} m/s²", "strongest shaking above 5 Hz"))
+        found.append((f"{number(overview.vibration[0].worst.max())} m/s²", "strongest shaking above 5 Hz"))
     return found or [("none", "numbers: there are no stamps and no poses")]
 
 
@@ -201,8 +201,11 @@ def satellites_section(report: Report, overview: Overview, clock: charts.Clock) 
         said.append(apart)
     report.points(said)
     if (satellites or sd) and overview.series:
+        title = "Stated SD of the positions"
+        if satellites is not None:
+            title = f"{np.nanmin(satellites[1]):.0f} satellites or more"
         report.figure(
-            charts.satellites_chart(satellites, sd, clock, said[0].rstrip(".")),
+            charts.satellites_chart(satellites, sd, clock, title),
             name="satellites",
             alt=f"Satellites and stated standard deviations over time. {said[0]}",
             caption="What the receiver states of its positions.",

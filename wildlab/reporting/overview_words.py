@@ -207,10 +207,10 @@ def streams_title(overview: Overview) -> str:
     """How many pauses, and the longest."""
     gaps = [(gap[1] - gap[0], name) for name, pace in overview.streams.items() for gap in pace.gaps]
     if not gaps:
-        return "No stream pauses for longer than its rate explains"
+        return "No stream pauses"
     longest, name = max(gaps)
     count = "One pause" if len(gaps) == 1 else f"{len(gaps)} pauses"
-    return f"{count}; the longest is of {name}, {longest:.1f} s"
+    return f"{count}; the longest, of {name}, {longest:.1f} s"
 
 
 def streams_table(overview: Overview) -> pd.DataFrame:
@@ -238,7 +238,8 @@ def shaking_sentence(found: Vibration) -> str:
     """How much it shakes, against the limits."""
     worst = found.worst
     usual, most = float(np.median(worst)), float(worst.max())
-    said = f"It shakes by {usual:.1f} m/s² in the median and {most:.1f} m/s² at most"
+    digits = 1 if most >= 1 else 2
+    said = f"It shakes by {usual:.{digits}f} m/s² in the median and {most:.{digits}f} m/s² at most"
     above = found.share_above(FINE)
     if above:
         harmful = found.share_above(HARMFUL)

@@ -132,6 +132,9 @@ def coverage_chart(coverage: Coverage, path: Path | None, title: str) -> Figure:
     if path is not None:
         keep = thinned(len(path.place))
         ax.plot(path.place[keep, 1], path.place[keep, 0], color=INK, lw=0.7, alpha=0.8)
+    # What was seen, not the whole way there.
+    ax.set_xlim(extent[0], extent[1])
+    ax.set_ylim(extent[2], extent[3])
     bar = fig.colorbar(picture, ax=ax, shrink=0.8, ticks=LOOKS)
     bar.ax.set_yticklabels([f"{low}" if low < LOOKS[-1] else f"{low} +" for low in LOOKS])
     bar.set_label("images that show a place")
@@ -183,7 +186,7 @@ def lines_chart(
     ax.set_ylabel(label)
     ax.set_title(title)
     if len(ax.lines) > 1:
-        fig.legend(loc="outside lower left", ncols=3)
+        fig.legend(loc="outside lower left", ncols=2)
     return fig
 
 
@@ -200,7 +203,7 @@ def attitude_chart(series: Mapping[str, tuple[Array, Array]], clock: Clock, titl
     axes[0].set_title(title)
     axes[-1].set_xlabel(clock.label)
     if len(series) > 1:
-        fig.legend(loc="outside lower left", ncols=3)
+        fig.legend(loc="outside lower left", ncols=2)
     return fig
 
 
