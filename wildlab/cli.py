@@ -21,6 +21,7 @@ from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
 from wildlab.commands.click import click_
+from wildlab.commands.compare import compare
 from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
 from wildlab.commands.import_ import import_
@@ -64,6 +65,7 @@ def wildlab() -> None:
     Examples:
       wildlab run --all             every study whose data are here
       wildlab evaluate FLIGHT       how accurate is a flight of your own
+      wildlab compare FLIGHT...     several of them on one page
     """
 
 
@@ -72,6 +74,7 @@ for _command in (
     studies.run,
     studies.vary,
     studies.evaluate,
+    compare,
     import_,
     click_,
     georeference,

@@ -19,6 +19,7 @@ from wildlab.evaluation.printed import (
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.reporting.cases import Case
 from wildlab.reporting.ledger_tables import claims_table, flights_of, numbers_table
+from wildlab.reporting.own_flights import PAGE
 from wildlab.reporting.page import TAGS, first_look_notice, page
 from wildlab.reporting.published import CALCULATED
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
@@ -95,7 +96,8 @@ def ledger_page(
             + "</li>"
             for folder, flight in flights
         ]
-        body.append(f"<h2>Flights evaluated here</h2><ul>{''.join(items)}</ul>")
+        more = f'<p><a href="{PAGE}">All of them, with their verdicts</a></p>'
+        body.append(f"<h2>Flights evaluated here</h2><ul>{''.join(items)}</ul>{more}")
     links = [f'<li><a href="{escape(page)}">{escape(title)}</a></li>' for title, page in learn]
     if links:
         body.append(f"<h2>Learn</h2><ul>{''.join(links)}</ul>")

@@ -1,4 +1,4 @@
-"""Writing ``reports/index.html``, the ledger, from what runs have left behind; and what it links besides."""
+"""Writing ``reports/index.html``, the ledger, from what runs have left behind, and ``flights.html``."""
 
 from __future__ import annotations
 
@@ -13,19 +13,30 @@ from wildlab.reporting.cases import load_cases
 from wildlab.reporting.ledger import ledger_page
 from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.notebook_file import read_notebook
+from wildlab.reporting.own_flights import PAGE, flights_page
 from wildlab.reporting.text import escape
 from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import git_state
 from wildlab.runner.record.status import study_status
 
+#: The folder of the comparison of flights, among the reports.
+COMPARISON = "comparison"
+
 
 def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
-    """Write ``index.html`` and return its path. Works whichever of the studies have been run."""
+    """Write ``index.html`` and return its path. Works whichever of the studies have been run.
+
+    The page of all flights that somebody evaluated, ``flights.html``, is written with it.
+    """
     statuses = [study_status(study, reports) for study in studies.values()]
     git = git_state()
     code = f"commit <code>{git['commit'][:10]}</code>" if git["commit"] else escape(git["note"])
     path = reports / "index.html"
     reports.mkdir(parents=True, exist_ok=True)
+    compared = f"{COMPARISON}/report.html"
+    own = own_flights(reports, studies)
+    write_atomic(reports / PAGE, flights_page(own, compared if (reports / compared).is_file() else ""))
     learn = [*tutorial_links(reports), *_reference_link(reports)]
     others = _other_reports(reports, studies)
     write_atomic(path, ledger_page(statuses, others, learn=learn, code=code, cases=load_cases()))

@@ -1,0 +1,169 @@
+"""``reports/flights.html``: the flights that somebody evaluated here, apart from the theses' studies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+from wildlab.pipeline.worth_fixing import FIX, MEND, SOUND, UNJUDGED, verdict_of
+from wildlab.reporting.overview_words import duration_words
+from wildlab.reporting.page import TAGS, page
+from wildlab.reporting.text import NOTHING, escape
+
+#: The page, beside the ledger.
+PAGE = "flights.html"
+_PILLS = {MEND: "no", FIX: "part", SOUND: "yes", UNJUDGED: ""}
+
+
+class OwnReport(NamedTuple):
+    """One report on a flight.
+
+    Attributes
+    ----------
+    folder
+        Its name.
+    about
+        ``overview``, ``georeferencing``, ``navigation``, ``tracking``, or the folder's name.
+    state
+        ``done``, ``failed`` or ``broken off``.
+    finished
+        When, as ISO 8601; "" where that is not known.
+    numbers
+        By name and subject; empty where it is not done.
+    lacking
+        Of an overview: which others could not be made, and why.
+    """
+
+    folder: str
+    about: str
+    state: str
+    finished: str
+    numbers: Mapping[tuple[str, str], Mapping[str, Any]]
+    lacking: tuple[str, ...]
+
+
+class OwnFlight(NamedTuple):
+    """A flight with its reports, the overview first; ``kind`` is ``logged`` or ``twin``."""
+
+    name: str
+    kind: str
+    reports: tuple[OwnReport, ...]
+
+    def report(self, about: str) -> OwnReport | None:
+        """The report on something, where there is one."""
+        return next((one for one in self.reports if one.about == about), None)
+
+    def number(self, name: str, subject: str) -> Mapping[str, Any] | None:
+        """A number of the first report that has it; None where it is in none, or could not be computed."""
+        for one in self.reports:
+            entry = one.numbers.get((name, subject))
+            if entry is not None and entry["value"] is not None:
+                return entry
+        return None
+
+    def value(self, name: str, subject: str) -> float | None:
+        """Its value alone."""
+        entry = self.number(name, subject)
+        return None if entry is None else float(entry["value"])
+
+    @property
+    def verdict(self) -> str | None:
+        """What it comes to; None without an overview that is done."""
+        counts = [self.value(name, "flight") for name in ("problems", "worth_fixing", "reports_beside")]
+        if any(count is None for count in counts):
+            return None
+        problems, worth, judged = (int(count or 0) for count in counts)
+        return verdict_of(problems, worth, judged)
+
+    @property
+    def finished(self) -> str:
+        """When the last of its reports was, as ``2026-11-22 10:15 UTC``; "" where that is not known."""
+        latest = max((one.finished for one in self.reports), default="")
+        return f"{latest[:16].replace('T', ' ')} UTC" if len(latest) >= 16 else ""
+
+    @property
+    def length_s(self) -> float:
+        """How long it was, s; NaN where that is not known."""
+        found = self.value("duration", "flight")
+        return float("nan") if found is None else found
+
+
+def verdict_pill(flight: OwnFlight) -> str:
+    """The verdict as HTML."""
+    word = flight.verdict
+    if word is None:
+        return '<span class="pill">no overview</span>'
+    return f'<span class="pill {_PILLS[word]}">{escape(word)}</span>'
+
+
+def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    flights
+        By name.
+    comparison
+        Address of the comparison of some of them, where there is one.
+
+    Returns
+    -------
+    str
+        HTML. It names flights and reports, and no place.
+    """
+    rows = "".join(_row(flight) for flight in flights)
+    head = "".join(
+        f'<th scope="col" class="text">{title}</th>'
+        for title in ("flight", "verdict", "kind", "length", "reports", "evaluated")
+    )
+    judged = sum(flight.verdict not in (None, UNJUDGED) for flight in flights)
+    parts = [
+        "<header><h1>Flights evaluated here</h1>",
+        f'<p class="sub">{len(flights)} flights, {judged} of them judged. '
+        '<a href="index.html">The ledger of the theses</a> is another page.</p></header>',
+    ]
+    if flights:
+        parts.append(
+            '<div class="scroll" role="region" tabindex="0" aria-label="Flights"><table>'
+            f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+        )
+    else:
+        parts.append("<p>None yet: <code>wildlab evaluate</code> makes the reports of a flight.</p>")
+    if comparison:
+        parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
+    parts.append(
+        f"<p class='note'><b>{MEND}</b>: something in its tables cannot be used or contradicts "
+        f"itself. <b>{FIX}</b>: "
+        f"a gain was measured that is worth it. <b>{SOUND}</b>: it was judged, and none was. "
+        f"<b>{UNJUDGED}</b>: "
+        "no other report could be made of it.</p>"
+    )
+    made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return page(
+        title="Flights evaluated here",
+        body="\n".join(parts),
+        kicker='<a href="index.html">wildlab ledger</a> › flights',
+        footer=f"<p>Put together {made}.</p>",
+    )
+
+
+def _row(flight: OwnFlight) -> str:
+    links = ", ".join(
+        f'<a href="{escape(one.folder)}/report.html">{escape(one.about)}</a>'
+        + ("" if one.state == "done" else f" ({escape(one.state)})")
+        for one in flight.reports
+    )
+    length = duration_words(flight.length_s) if flight.length_s == flight.length_s else NOTHING
+    cells = (
+        verdict_pill(flight),
+        escape(TAGS.get(flight.kind, flight.kind)),
+        escape(length),
+        links,
+        escape(flight.finished or NOTHING),
+    )
+    return (
+        f'<tr><th scope="row" class="text">{escape(flight.name)}</th>'
+        + "".join(f'<td class="text">{cell}</td>' for cell in cells)
+        + "</tr>"
+    )

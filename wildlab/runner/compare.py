@@ -1,0 +1,102 @@
+"""Several flights on one page: those without reports of their files as they are, are evaluated first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from wildlab.errors import WildlabError
+from wildlab.files import write_atomic
+from wildlab.flight.manifest import FILE_NAME, read_manifest
+from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.reporting.comparison import comparison_page, flights_table
+from wildlab.reporting.own_flights import OwnFlight
+from wildlab.runner.catalogue import load_studies
+from wildlab.runner.evaluate import evaluate_flight
+from wildlab.runner.record.beside import finished_metrics
+from wildlab.runner.record.front_page import COMPARISON, build_ledger
+from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+
+
+def compare_flights(
+    folders: Sequence[Path],
+    *,
+    into: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Path:
+    """Write one page, and one table with a row for each flight.
+
+    Parameters
+    ----------
+    folders
+        Two or more, of flights or of reports on them. A flight whose overview is not that of its files as
+        they are is evaluated first.
+    into
+        The folder to write to; left out, ``<reports>/comparison``.
+    reports
+        Where reports are, and go.
+    console
+        Where progress is shown.
+
+    Returns
+    -------
+    Path
+        Of the page.
+
+    Raises
+    ------
+    WildlabError
+        Where there are fewer than two flights, one is named twice, a folder is neither a flight nor a report,
+        or a flight cannot be evaluated.
+    """
+    if len(folders) < 2:
+        raise WildlabError("there is nothing to compare: one flight was named", "name two flights or more")
+    studies = load_studies(notebooks / "studies.toml")
+    for folder in folders:
+        if not (folder / FILE_NAME).is_file() and not (folder / "status.json").is_file():
+            raise WildlabError(
+                "this is neither a flight nor a report on one",
+                "name folders with a flight.toml, or of reports",
+                file=folder,
+            )
+    chosen: list[OwnFlight] = []
+    for folder in folders:
+        if (folder / FILE_NAME).is_file():
+            name, where = read_manifest(folder / FILE_NAME).name, reports
+            if not _is_current(folder, reports / f"{name}-overview"):
+                evaluate_flight(folder, reports=reports, notebooks=notebooks, console=console)
+        else:
+            where = folder.resolve().parent
+            flight = read_provenance(folder).get("flight")
+            name = str(flight.get("name")) if isinstance(flight, dict) else ""
+        found = next((one for one in own_flights(where, studies) if one.name == name), None)
+        if found is None:
+            raise WildlabError(
+                "there is no report of a flight in this folder", "evaluate it: wildlab evaluate", file=folder
+            )
+        if found.name in [one.name for one in chosen]:
+            raise WildlabError(
+                f"the flight {found.name!r} is named twice", "name each flight once", file=folder
+            )
+        chosen.append(found)
+    target = reports / COMPARISON if into is None else into
+    target.mkdir(parents=True, exist_ok=True)
+    near = target.resolve().parent == reports.resolve()
+    page = comparison_page(chosen, links="../" if near else "", index="../flights.html" if near else "")
+    write_atomic(target / "flights.csv", flights_table(chosen).to_csv(index=False))
+    write_atomic(target / "report.html", page)
+    build_ledger(reports, studies)
+    return target / "report.html"
+
+
+def _is_current(folder: Path, overview: Path) -> bool:
+    """Whether an overview is done, and of the flight's files as they are."""
+    theirs = read_provenance(overview).get("flight")
+    if finished_metrics(overview) is None or not isinstance(theirs, dict):
+        return False
+    return bool(theirs.get("files") == provenance_of_flight(folder)["files"])
