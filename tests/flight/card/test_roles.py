@@ -22,11 +22,17 @@ def log(
     seconds: int = 100,
     attitude: bool = False,
     part: str | None = None,
+    up: float = 0.0,
 ) -> Found:
     """A log that moves east at 1 m/s, so far north, from so many seconds on."""
     t = np.arange(seconds, dtype=float)
     lat, lon, _ = pymap3d.ned2geodetic(north + 0 * t, begin + t, 0 * t, 59.0, 10.0, 0.0)
-    columns = {"time_s": START + begin + t, "latitude_deg": lat, "longitude_deg": lon, "height_sea_m": 0 * t}
+    columns = {
+        "time_s": START + begin + t,
+        "latitude_deg": lat,
+        "longitude_deg": lon,
+        "height_sea_m": up + 0 * t,
+    }
     parts = {"gnss": make_stream("gnss", columns)}
     if attitude:
         zeros = {f"{axis}_deg": 0 * t for axis in ("roll", "pitch", "yaw")}
@@ -48,6 +54,12 @@ def test_the_log_with_an_attitude_is_the_vehicles_own():
 
 def test_a_receiver_that_stays_beside_it_is_on_board():
     assert roles(log("rtk", north=2.0), log("drone", attitude=True))["rtk"] == "receiver"
+
+
+def test_a_boat_right_below_is_a_target():
+    found = choose_roles([log("boat", north=3.0), log("drone", attitude=True, up=60.0)], {})
+    assert found[0].role == "target"
+    assert "3 m beside and 60 m below the vehicle" in found[0].why
 
 
 def test_a_second_attitude_on_board_rides_on_the_camera():

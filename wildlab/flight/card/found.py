@@ -70,9 +70,9 @@ class Found:
         return FORMATS[self.format][1] if self.format else "not known"
 
     def part(self, name: str) -> Stream | None:
-        """One part of the log, where it has one with a row that can be used."""
+        """One part of the log, where it has one with a row that can be used; images count without a place."""
         stream = None if self.log is None else self.log.parts.get(name)
-        return stream if stream is not None and stream.used.any() else None
+        return stream if stream is not None and (name == "photos" or stream.used.any()) else None
 
 
 def source_folder(paths: Sequence[Path]) -> Path:

@@ -113,7 +113,7 @@ def clock_of_images(
     photos = images.part("photos")
     if photos is None:
         return ImageClock("sequence", 0.0, "No image can be used.")
-    utc, wall = (_known(photos.columns.get(name), photos.used) for name in ("time_s", "time_log_s"))
+    utc, wall = (_known(photos.columns.get(name)) for name in ("time_s", "time_log_s"))
     offset = 0.0 if stated_offset_s is None else stated_offset_s
     if triggers is not None and stated_offset_s is None and (len(wall) or len(utc)):
         clock = _by_triggers(photos, *triggers)
@@ -175,10 +175,10 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
     )
 
 
-def _known(column: NDArray[Any] | None, used: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:
     if column is None:
         return np.empty(0)
-    values = np.asarray(column[used], float)
+    values = np.asarray(column, float)
     return np.asarray(values[np.isfinite(values)])
 
 

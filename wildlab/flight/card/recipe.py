@@ -120,7 +120,7 @@ def _most_images(several: Sequence[Choice]) -> Choice | None:
 def _placed(images: Choice | None) -> bool:
     """Whether the images say where the camera was and how it was turned."""
     photos = None if images is None else images.found.part("photos")
-    if photos is None or "latitude_deg" not in photos.columns:
+    if photos is None or "latitude_deg" not in photos.columns or not photos.used.any():
         return False
     return angles(photos) is not None
 
@@ -141,7 +141,7 @@ def _streams(
     found = {}
     for one, part in wanted:
         stream = one.found.part(part)
-        if stream is not None and "latitude_deg" in stream.columns:
+        if stream is not None and "latitude_deg" in stream.columns and stream.used.any():
             found[one.found.name, part] = stream
     return found
 

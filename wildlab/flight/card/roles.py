@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,8 +30,8 @@ ROLES: dict[str, str] = {
     "clicks": "pixels of things in the images",
     "nothing": "not used",
 }
-#: A receiver on board is within this of the vehicle's own log half of the time, m: five times the standard
-#: deviation of a single-frequency receiver. A target under the camera is not, but for one that is carried.
+#: A receiver on board is within this of the vehicle's own log half of the time, m, level and in height: five
+#: times the standard deviation of a single-frequency receiver. A target under the camera is below that.
 ON_BOARD_M = 15.0
 #: Two logs meet where they share this time, s.
 SHARED_S = 1.0
@@ -46,11 +47,13 @@ class Choice:
     target: str = ""
 
 
-class Path4(NamedTuple):
-    """Where a log says that it was: times (N,) s since 1970, and place (N, 3) in radians and m."""
+class Way(NamedTuple):
+    """Where a log says that it was: times (N,) s since 1970, latitude and longitude (N, 2) in radians, and by
+    what they count from heights (N,) in m."""
 
     times: Array
     place: Array
+    heights: dict[str, Array]
 
 
 def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choice]:
@@ -165,14 +168,14 @@ def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, st
 
 def _has_place(images: Found) -> bool:
     photos = images.part("photos")
-    return photos is not None and "latitude_deg" in photos.columns
+    return photos is not None and "latitude_deg" in photos.columns and bool(photos.used.any())
 
 
 def _other(one: Found, own: Found | None) -> Choice:
     """A log that is not the vehicle's own."""
     if own is None:
         return Choice(one, "target", "the images say where the camera was, and this is another's track")
-    mine, theirs = path_of(own), path_of(one)
+    mine, theirs = way_of(own), way_of(one)
     if theirs is None or not np.isfinite(theirs.times).any():
         return Choice(one, "nothing", "its positions have no times")
     if mine is None:
@@ -183,43 +186,52 @@ def _other(one: Found, own: Found | None) -> Choice:
         return Choice(
             one, "nothing", f"it is of another time: {_lasting(apart)} lie between it and the flight"
         )
-    distance = _distance(mine, theirs)
-    if distance < ON_BOARD_M:
+    distance, above = _distance(mine, theirs)
+    height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
+    if distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M:
         near = f"half of the time it is within {distance:.1f} m of the vehicle's own log"
         return Choice(one, "camera" if one.part("poses") is not None else "receiver", near)
     return Choice(
         one,
         "target",
-        f"it is {distance:.0f} m (median) from the vehicle, for {_lasting(shared)} of its flight",
+        f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight",
     )
 
 
-def path_of(one: Found) -> Path4 | None:
+def way_of(one: Found) -> Way | None:
     """Where a log says that it was, rows that can be used; None where it does not say."""
     for name in ("gnss", "poses"):
         stream = one.part(name)
         if stream is None or "latitude_deg" not in stream.columns or "time_s" not in stream.columns:
             continue
         c = stream.columns
-        heights = next((c[key] for key in c if key.startswith("height_")), np.zeros(len(stream)))
-        place = np.column_stack([np.radians(c["latitude_deg"]), np.radians(c["longitude_deg"]), heights])
-        good = stream.used & np.isfinite(place[:, :2]).all(axis=1) & np.isfinite(c["time_s"])
+        place = np.radians(np.column_stack([c["latitude_deg"], c["longitude_deg"]]))
+        good = stream.used & np.isfinite(place).all(axis=1) & np.isfinite(c["time_s"])
         if good.any():
-            return Path4(c["time_s"][good], place[good])
+            # Above take-off, a boat and an aircraft have nothing in common.
+            heights = {key: c[key][good] for key in ("height_ellipsoid_m", "height_sea_m") if key in c}
+            return Way(c["time_s"][good], place[good], heights)
     return None
 
 
-def _distance(mine: Path4, theirs: Path4) -> float:
-    """Median level distance at their times, m."""
-    origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
-    a = geodetic_to_ned(mine.place[:, 0], mine.place[:, 1], np.zeros(len(mine.place)), origin)
-    b = geodetic_to_ned(theirs.place[:, 0], theirs.place[:, 1], np.zeros(len(theirs.place)), origin)
+def _distance(mine: Way, theirs: Way) -> tuple[float, float]:
+    """Median level distance at their times, and median height of mine above them, m; NaN: not comparable."""
+    order = np.argsort(mine.times)
     both = (theirs.times >= mine.times[0]) & (theirs.times <= mine.times[-1])
     if not both.any():
-        return float("inf")
-    order = np.argsort(mine.times)
-    at = np.column_stack([np.interp(theirs.times[both], mine.times[order], a[order, i]) for i in (0, 1)])
-    return float(np.median(np.hypot(*(b[both, :2] - at).T)))
+        return math.inf, math.nan
+    origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
+    a, b = (geodetic_to_ned(*one.place.T, np.zeros(len(one.place)), origin) for one in (mine, theirs))
+    at = np.column_stack(
+        [np.interp(theirs.times[both], mine.times[order], a[order, axis]) for axis in (0, 1)]
+    )
+    level = float(np.median(np.hypot(*(b[both, :2] - at).T)))
+    for kind in mine.heights.keys() & theirs.heights.keys():
+        above = np.interp(theirs.times[both], mine.times[order], mine.heights[kind][order])
+        gap = (above - theirs.heights[kind][both])[np.isfinite(above - theirs.heights[kind][both])]
+        if len(gap):
+            return level, float(np.median(gap))
+    return level, math.nan
 
 
 def span_of(one: Found, part: str | None = None) -> tuple[float, float] | None:
@@ -227,7 +239,8 @@ def span_of(one: Found, part: str | None = None) -> tuple[float, float] | None:
     for name in names:
         stream = one.part(name)
         if stream is not None and "time_s" in stream.columns:
-            times = stream.columns["time_s"][stream.used]
+            times = stream.columns["time_s"]
+            times = times if name == "photos" else times[stream.used]
             times = times[np.isfinite(times)]
             if len(times):
                 return float(times.min()), float(times.max())
