@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.flight.time.fitting import ClockFit, fit_clock, rate_is_off, shortfall
+from wildlab.flight.time.fitting import SURE, ClockFit, fit_clock, rate_is_off, shortfall
 
 EPOCH = 1.7e9
 
@@ -160,3 +160,11 @@ def test_stamps_that_are_all_alike_have_no_rate(late: bool) -> None:
     assert fit.rate == 1.0
     assert np.isinf(fit.rate_sd)
     assert rate_is_off(fit) is None
+
+
+def test_coarse_stamps_do_not_hide_the_rate() -> None:
+    """Most pairs of a clock that a loop of 50 Hz reads fall on one line, and the others beside it."""
+    true = np.arange(0.0, 17.0, 0.2)
+    own = np.floor((true / 1.0013 + 0.004) / 0.02) * 0.02
+    fit = fit_clock(own, true, resolution_s=0.02)
+    assert fit.rate == pytest.approx(1.0013, abs=SURE * fit.rate_sd) and fit.used.all()

@@ -104,7 +104,9 @@ class WrongRate(NamedTuple):
         )
 
 
-def fit_clock(own: ArrayLike, reference: ArrayLike, late: bool = False) -> ClockFit:
+def fit_clock(
+    own: ArrayLike, reference: ArrayLike, late: bool = False, resolution_s: float = RESOLUTION_S
+) -> ClockFit:
     """Rate and offset of a clock from pairs of stamps, robust against outliers.
 
     Parameters
@@ -116,6 +118,9 @@ def fit_clock(own: ArrayLike, reference: ArrayLike, late: bool = False) -> Clock
     late
         Stamps of the reference can only be late, as times of receipt are: the line goes under them, not
         through them. The least delay of all stays in the offset; nothing in the stamps tells it.
+    resolution_s
+        How coarse either stamp is, s, as where a loop takes them: pairs that differ by less are not outliers,
+        even where most happen to fall on one line.
 
     Returns
     -------
@@ -144,7 +149,8 @@ def fit_clock(own: ArrayLike, reference: ArrayLike, late: bool = False) -> Clock
     x_0, y_0 = float(np.median(x[known])), float(np.median(y[known]))
     dx, dy = x[known] - x_0, y[known] - y_0
     at_0, rate = _start(dx, dy)
-    at_0, rate, used, sds = (_under if late else _through)(dx, dy, at_0, rate)
+    line = _under(dx, dy, at_0, rate) if late else _through(dx, dy, at_0, rate, resolution_s)
+    at_0, rate, used, sds = line
     middle = float(dx[used].mean())
     residual = np.full(len(x), np.nan)
     residual[known] = dy - at_0 - rate * dx
@@ -222,13 +228,13 @@ def _start(dx: Array, dy: Array) -> tuple[float, float]:
     return float(np.median(dy - rate * dx)), rate
 
 
-def _through(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
+def _through(dx: Array, dy: Array, at_0: float, rate: float, resolution_s: float) -> _Line:
     """The line through the points, and what is known of it."""
     turns = len(dx) > 2 and np.ptp(dx) > 0
     A = np.column_stack([np.ones(len(dx)), dx]) if turns else np.ones((len(dx), 1))
     solution = np.array([at_0, rate])[: A.shape[1]]
     base = dy if turns else dy - rate * dx
-    scale = max(_scale(base - A @ solution), RESOLUTION_S)
+    scale = max(_scale(base - A @ solution), resolution_s)
     weight = np.ones(len(dx))
     for _ in range(50):
         far = (base - A @ solution) / (REACH * scale)
@@ -240,7 +246,7 @@ def _through(dx: Array, dy: Array, at_0: float, rate: float) -> _Line:
         root = np.sqrt(weight)[:, None]
         found, *_ = np.linalg.lstsq(root * A, root[:, 0] * base, rcond=None)
         step, solution = found - solution, found
-        scale = max(_scale((base - A @ solution)[weight > 0]), RESOLUTION_S)
+        scale = max(_scale((base - A @ solution)[weight > 0]), resolution_s)
         if np.abs(step[0]) + np.abs(step[1:]).sum() * np.ptp(dx) < 1e-9:
             break
     used = weight > 0

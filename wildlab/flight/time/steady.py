@@ -17,12 +17,14 @@ EARLY = 5.0
 SLOWEST, FASTEST = 0.5, 2.0
 
 
-def fit_steady(own: ArrayLike, reference: ArrayLike, late: bool = False) -> ClockFit:
+def fit_steady(
+    own: ArrayLike, reference: ArrayLike, late: bool = False, resolution_s: float = RESOLUTION_S
+) -> ClockFit:
     """As `fit_clock`, with a rate of 1 where the pairs cannot tell it from 1.
 
     Parameters
     ----------
-    own, reference, late
+    own, reference, late, resolution_s
         Of `fit_clock`.
 
     Returns
@@ -34,7 +36,7 @@ def fit_steady(own: ArrayLike, reference: ArrayLike, late: bool = False) -> Cloc
     WildlabError
         Where there is no pair.
     """
-    fit = fit_clock(own, reference, late)
+    fit = fit_clock(own, reference, late, resolution_s)
     if abs(fit.rate - 1.0) > TOLD_APART * fit.rate_sd and SLOWEST < fit.rate < FASTEST:
         return fit
     x, y = np.asarray(own, float), np.asarray(reference, float)
