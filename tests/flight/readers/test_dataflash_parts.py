@@ -228,17 +228,17 @@ def change(log: Log, name: str, which: int, **values: float) -> Log:
     ("values", "why"),
     [
         ({"Status": 1}, "no fix"),
-        ({"Status": 2}, "fix without height"),
+        ({"Status": 2}, "a fix without height"),
         ({"Lat": 0, "Lng": 0}, "no place"),
         ({"Lat": 91.0}, "no place"),
         ({"GWk": 0}, "no GPS week"),
         ({"HDop": 99.99}, "HDOP of 99 or more"),
         ({"Spd": 800.0}, "faster than 700 m/s"),
         ({"Spd": float("inf")}, "faster than 700 m/s"),
-        ({"Lat": LATITUDE + 1}, "leap that nothing makes"),
-        ({"Alt": HEIGHT + 90_000}, "leap that nothing makes"),
-        ({"TimeUS": 1_000_000}, "stamp out of order"),
-        ({"TimeUS": 2**60}, "stamp out of order"),
+        ({"Lat": LATITUDE + 1}, "a place out of reach"),
+        ({"Alt": HEIGHT + 90_000}, "a place out of reach"),
+        ({"TimeUS": 1_000_000}, "a stamp out of order"),
+        ({"TimeUS": 2**60}, "a stamp out of order"),
     ],
 )
 def test_rows_that_cannot_be_true_are_marked(values: dict[str, float], why: str) -> None:
@@ -250,7 +250,7 @@ def test_rows_that_cannot_be_true_are_marked(values: dict[str, float], why: str)
 def test_a_stamp_that_repeats_is_marked() -> None:
     log = second_generation(Truth(2025))
     poses = read(change(log, "ATT", 50, TimeUS=round(24.9e6))).parts["poses"]
-    assert poses.columns["why"][50] == "repeated stamp" and poses.used.sum() == 399
+    assert poses.columns["why"][50] == "a repeated stamp" and poses.used.sum() == 399
 
 
 def test_one_wrong_week_does_not_move_the_clock() -> None:
@@ -350,7 +350,8 @@ def test_a_log_with_a_bad_receiver(shared_data: Callable[..., Path]) -> None:
     gnss = log.parts["gnss"].columns
     row = int(np.argmin(np.abs(gnss["time_log_s"] - 19.377493)))
     utc = datetime(1980, 1, 6, tzinfo=UTC).timestamp() + 2347 * 604800 + 481474.0 - 18
-    assert gnss["time_s"][row] == pytest.approx(utc, abs=0.05)
+    # 17 s of true fixes do not tell the rate of this clock, 1.0013: it is off by 0.1 s 69 s before them.
+    assert gnss["time_s"][row] == pytest.approx(utc, abs=0.15)
 
 
 def test_leap_seconds_of_2014(shared_data: Callable[..., Path]) -> None:

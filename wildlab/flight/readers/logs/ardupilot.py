@@ -16,11 +16,11 @@ from wildlab.flight.readers.logs.ardupilot_time import (
     Times,
     longest_run,
     own_stamps,
-    placed,
     times,
     true_fix,
 )
 from wildlab.flight.readers.logs.log import RawLog, Stream
+from wildlab.flight.readers.logs.places import placed
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,8 @@ def raw_log(
     if receiver is not None:
         satellites = motion.gnss(receiver, tables, when, counted_in)
         parts["gnss"] = satellites
-        place = place or motion.place_of_gnss(satellites, receiver, when)
+        if satellites is not None:
+            place = place or motion.place_of_gnss(satellites, receiver, when)
     parts["poses"] = motion.poses(tables, when, place, counted_in)
     parts["imu"] = motion.imu(tables, when, counted_in)
     parts["magnetometer"] = motion.magnetometer(tables, when, counted_in)

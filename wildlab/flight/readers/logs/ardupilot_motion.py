@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.ardupilot_messages import Table
-from wildlab.flight.readers.logs.ardupilot_time import FIX_3D, Times, gps_utc, placed
-from wildlab.flight.readers.logs.log import Stream, make_stream
-from wildlab.flight.readers.logs.order import FASTEST_M_S, in_order, leaps
+from wildlab.flight.readers.logs.ardupilot_time import FIX_3D, Times, gps_utc
+from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.logs.order import FASTEST_M_S, in_order
+from wildlab.flight.readers.logs.places import placed
+from wildlab.flight.readers.logs.stamps import places_that_hold, running_stream
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -64,23 +66,13 @@ def stream(
     counted_in: str,
     unusable: dict[str, Mask],
     utc: Array | None = None,
-) -> Stream:
-    """A part with its times; rows whose stamps are not in order are marked behind all other reasons.
-
-    `utc` are times (N,) in s since 1970 that the messages know better than their stamps.
-    """
+) -> Stream | None:
+    """A part with its times, from stamps (N,); `utc` are times that the messages know better than these."""
     both = {"time_s": times.utc(stamps) if utc is None else utc, "time_log_s": stamps}
-    judged = both["time_s"] if np.isfinite(both["time_s"]).any() else stamps
-    wanted = ~np.logical_or.reduce([*unusable.values(), np.zeros(len(stamps), bool)])
-    kept = in_order(judged, wanted) if times.clock is not None else np.ones(len(stamps), bool)
-    same = np.zeros(len(stamps), bool)
-    same[1:] = judged[1:] == judged[:-1]
-    marks = {**unusable, "no stamp": ~np.isfinite(judged) & ~kept}
-    marks |= {"repeated stamp": ~kept & same, "stamp out of order": ~kept}
-    return make_stream(part, both | columns, rows, counted_in, marks)
+    return running_stream(part, both | columns, rows, counted_in, unusable)
 
 
-def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: str) -> Stream:
+def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: str) -> Stream | None:
     """Satellite positions of one receiver, with what messages GPA say of how sure it was."""
     get = receiver.numbers
     latitude, longitude, height = get("Lat", unit="deg"), get("Lng", unit="deg"), get("Alt", unit="m")
@@ -100,7 +92,7 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
     week = get("GWk", "Week")
     unusable = {
         "no fix": ~(fix >= FIX_3D - 1),
-        "fix without height": ~(fix >= FIX_3D),
+        "a fix without height": ~(fix >= FIX_3D),
         "no place": ~placed(latitude, longitude),
         "no height": ~np.isfinite(height),
         "no GPS week": np.isfinite(week) & np.isnan(gps_utc(receiver)),
@@ -108,19 +100,7 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
         "faster than 700 m/s": (speed > FASTEST_M_S) | (np.abs(down) > FASTEST_M_S),
     }
     utc = times.utc_of_fixes(receiver)
-    judged = utc if np.isfinite(utc).any() else stamps
-    unusable["leap that nothing makes"] = _leaps(judged, latitude, longitude, height, unusable)
     return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable, utc)
-
-
-def _leaps(
-    stamps: Array, latitude: Array, longitude: Array, height: Array, unusable: dict[str, Mask]
-) -> Mask:
-    """(N,) rows far from their neighbours, among those that are not marked yet."""
-    rows = np.flatnonzero(in_order(stamps, ~np.logical_or.reduce(list(unusable.values()))))
-    marked = np.zeros(len(stamps), bool)
-    marked[rows] = leaps(stamps[rows], latitude[rows], longitude[rows], height[rows])
-    return marked
 
 
 def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array) -> dict[str, Array]:
@@ -226,9 +206,8 @@ def place_of(name: str, tables: dict[str, Table], times: Times) -> Place | None:
             # Before the filter has its origin, heights count from nothing.
             nowhere = np.isnan(table.numbers("RelOriginAlt"))
             sea, home = np.where(nowhere, np.nan, sea), np.where(nowhere, np.nan, home)
-    true = placed(latitude, longitude) & (np.isfinite(sea) | np.isfinite(home))
-    true &= ~_leaps(stamps, latitude, longitude, sea, {"": ~true})
-    kept = in_order(stamps, true)
+    where = {"latitude_deg": latitude, "longitude_deg": longitude, "height_sea_m": sea}
+    kept = places_that_hold(stamps, where, ~(np.isfinite(sea) | np.isfinite(home)))
     if not kept.any():
         return None
     return Place(name, stamps[kept], latitude[kept], longitude[kept], sea[kept], home[kept])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +11,16 @@ from numpy.typing import NDArray
 from wildlab.flight.readers.logs.ardupilot_messages import Table, percent
 from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.readers.logs.order import in_order
-from wildlab.flight.time.fitting import fit_clock
+from wildlab.flight.readers.logs.places import placed
 from wildlab.flight.time.leap_seconds import week_to_utc
+from wildlab.flight.time.steady import fit_steady
 
 Array = NDArray[np.float64]
 
 #: `Status` of a fix in space, as MAVLink numbers them.
 FIX_3D = 3
-#: The fitted rate is believed where it differs from 1 by so many of its standard deviations.
-SURE_RATE = 4.0
+#: Fixes are written down by a loop that runs so often, s, at its slowest.
+LOOP_S = 0.02
 #: No fix is written down later than this, s.
 LATEST_S = 5.0
 #: So many messages on both sides of a step back make it one of the board, not of a damaged stamp.
@@ -99,13 +99,6 @@ def gps_utc(table: Table) -> Array:
 
 def _week_in_ms(table: Table) -> bool:
     return table.has("TimeMS") and table.has("Week") and not table.has("GMS")
-
-
-def placed(latitude: Array, longitude: Array) -> NDArray[np.bool_]:
-    """(N,) whether degrees are a place on Earth; 0, 0 stands for none."""
-    with np.errstate(invalid="ignore"):
-        on_earth = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180)
-    return np.asarray(on_earth & ((latitude != 0) | (longitude != 0)))
 
 
 def true_fix(table: Table) -> NDArray[np.bool_]:
@@ -187,12 +180,6 @@ def _stamped(tables: dict[str, Table]) -> tuple[Table, Array] | None:
 
 
 def _clock(own: Array, utc: Array) -> Clock:
-    fit = fit_clock(own, utc)
-    used, rate, offset = fit.used, fit.rate, fit.offset_s
-    # A short log cannot tell the rate of its clock: then seconds are seconds.
-    reach = float(np.std(own[used])) * math.sqrt(used.sum())
-    if used.sum() < 10 or abs(rate - 1) * reach <= SURE_RATE * fit.spread_s:
-        rate, offset = 1.0, float(np.median(utc[used] - own[used]))
-    left = utc[used] - offset - rate * own[used]
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    return Clock("GPS weeks", rate, offset, spread, float(np.abs(left).max()), int(used.sum()))
+    fit = fit_steady(own, utc, resolution_s=LOOP_S)
+    largest = float(np.abs(fit.residual[fit.used]).max())
+    return Clock("GPS weeks", fit.rate, fit.offset_s, fit.spread_s, largest, int(fit.used.sum()))
