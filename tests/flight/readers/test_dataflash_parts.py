@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.flight.readers.dataflash_logs import (
     HEIGHT,
@@ -368,3 +370,16 @@ def test_leap_seconds_of_2014(shared_data: Callable[..., Path]) -> None:
         "poses": 3326,
         "imu": 16627,
     }
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.integers(0, 30), max_size=25))
+def test_no_more_rows_can_be_kept(stamps: list[int]) -> None:
+    kept = in_order(np.array(stamps, float))
+    left = np.array(stamps)[kept]
+    assert (np.diff(left) > 0).all()
+    # The longest increasing subsequence, the slow way.
+    longest: list[int] = []
+    for i, one in enumerate(stamps):
+        longest.append(1 + max((longest[j] for j in range(i) if stamps[j] < one), default=0))
+    assert kept.sum() == max(longest, default=0)

@@ -145,6 +145,8 @@ def longest_run(tables: dict[str, Table]) -> tuple[dict[str, Table], str]:
     if anchor is None or len(anchor[1]) < 2 * _SURE_ROWS:
         return tables, ""
     rows, stamps = anchor[0].rows, anchor[1]
+    if not (np.diff(stamps) < -1.0).any():
+        return tables, ""
     middle = np.median(sliding_window_view(stamps, _SURE_ROWS), axis=1)
     back = np.flatnonzero(middle[_SURE_ROWS:] < middle[:-_SURE_ROWS] - 1.0) + _SURE_ROWS
     # Some places in a row see the same step: it is the one with the largest step between neighbours.

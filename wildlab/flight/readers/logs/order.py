@@ -41,8 +41,9 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.b
     if not len(rows):
         return kept
     rows = rows[np.abs(at[rows] - np.median(at[rows])) <= LONGEST_S]
-    if (np.diff(at[rows]) > 0).all():
-        kept[rows] = True
+    few = _without_few(at[rows])
+    if few is not None:
+        kept[rows[few]] = True
         return kept
     # The longest increasing run of rows: for each length, the row with the smallest stamp that ends one. Of
     # repeated stamps the first is kept.
@@ -63,6 +64,23 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.b
         kept[rows[i]] = True
         i = before[i]
     return kept
+
+
+def _without_few(at: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+    """(N,) what is left where one row is taken out at each step back; None where that does not mend all.
+
+    One has to go at each, so that no more can be left.
+    """
+    kept = np.ones(len(at), bool)
+    back = np.flatnonzero(np.diff(at) <= 0)
+    if not len(back):
+        return kept
+    before = np.where(back > 0, at[back - 1], -np.inf)
+    ahead = (before < at[back + 1]) & (at[back] != at[back + 1])
+    gone = np.where(ahead, back, back + 1)
+    kept[gone] = False
+    mended = (np.diff(at[kept]) > 0).all() and (np.diff(back) > 1).all()
+    return kept if mended else None
 
 
 def leaps(
