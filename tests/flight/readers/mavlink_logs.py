@@ -130,7 +130,7 @@ def ulog(
             (many and f"{many}{_CODES[kind]}") or _CODES[kind]
             for kind, many in re.findall(r"(\w+?)(?:\[(\d+)\])? \w+;", form)
         )
-        rows += [
-            (row[0], message("D", struct.pack("<H", number) + struct.pack(code, *row))) for row in values
-        ]
+        packed = [message("D", struct.pack("<H", number) + struct.pack(code, *row)) for row in values]
+        # As if all topics were written at steady rates from beginning to end.
+        rows += [(at / len(packed), one) for at, one in enumerate(packed)]
     return b"".join([*parts, *(one for _, one in sorted(rows, key=lambda row: row[0])), after])

@@ -43,7 +43,14 @@ _LEAST = {
     "C": 11,
 }
 _KINDS = {ord(kind): least for kind, least in _LEAST.items()}
-_FORMAT, _INFO, _ADD, _DATA, _DROPOUT, _FLAGS = b"FIADOB"
+_FORMAT, _INFO, _ADD, _DATA, _DROPOUT, _FLAGS, _SYNC = b"FIADOBS"
+#: Kinds that hold a key with its value, or a text behind its level, and how many bytes stand before that.
+_KEYED = {ord("I"): 0, ord("P"): 0, ord("M"): 1, ord("Q"): 1}
+_TEXTS = {ord("L"): 9, ord("C"): 11}
+SYNC = bytes.fromhex("2f731320250cbb12")
+_KEY = re.compile(rb"(\w+)(?:\[(\d{1,5})\])? (\S+)")
+_NAME = re.compile(rb"\w+")
+_READABLE = bytes([9, 10, 13, 27, *range(32, 127)])
 _HEAD = struct.Struct("<HB")
 #: Looked through at once where a message that holds is searched: little at first, for it is often near.
 _FIRST_CHUNK, _CHUNK = 1 << 8, 1 << 16
@@ -102,18 +109,36 @@ class _Walk:
         end, kind = self.header(pos, limit)
         if not end:
             return 0
-        if kind == _DATA:
-            topic = int.from_bytes(self.data[pos + 3 : pos + 5], "little")
-            bounds = self.sizes.get(topic)
-            if bounds is not None:
-                return end if bounds[0] <= end - pos - 5 <= bounds[1] else 0
-        elif kind == _FORMAT and self.format(pos + 3, end) is not None:
-            return end
-        # Its content tells little: what follows has to be a message, too.
-        return end if self.followed(end, limit) else 0
+        sure = self.certain(kind, pos, end)
+        # Where its content does not tell, what follows has to be sound beyond doubt.
+        return end if (self.followed(end, limit) if sure is None else sure) else 0
 
     def followed(self, end: int, limit: int) -> bool:
-        return end == limit or self.header(end, limit)[1] in _KINDS
+        if end == limit:
+            return True
+        next_end, kind = self.header(end, limit)
+        return bool(next_end and self.certain(kind, end, next_end))
+
+    def certain(self, kind: int, pos: int, end: int) -> bool | None:
+        """Whether the content of a message shows that it is one, by its kind; None where it shows nothing."""
+        size = end - pos - 3
+        if kind == _DATA:
+            bounds = self.sizes.get(self.data[pos + 3] | self.data[pos + 4] << 8)
+            return None if bounds is None else bounds[0] <= size - 2 <= bounds[1]
+        body = self.data[pos + 3 : end]
+        if kind == _FORMAT:
+            return self.format(pos + 3, end) is not None or None
+        if kind == _ADD:
+            return _NAME.fullmatch(body, 3) is not None or None
+        if kind in _KEYED:
+            return _informs(body[_KEYED[kind] :]) or None
+        if kind in _TEXTS:
+            text = body[_TEXTS[kind] :]
+            said = len(text.translate(None, _READABLE)) <= len(text) / 4
+            return (said and body[0] in b"01234567") or None
+        if kind == _SYNC:
+            return body == SYNC
+        return (size == 2) if kind in b"OR" else (pos == HEADER) if kind == _FLAGS else None
 
     def format(self, start: int, end: int) -> tuple[str, list[tuple[str, int, str]]] | None:
         """Name and fields (type, how many, name) of a definition, None where it cannot be read."""
@@ -137,7 +162,7 @@ class _Walk:
         flat = self.flatten(name, 0)
         if flat is None or not 0 < flat[0] <= LONGEST or flat[1] > MOST_FIELDS:
             return None
-        if ("uint64_t", 0, "timestamp") not in fields or len({one[2] for one in fields}) < len(fields):
+        if ("uint64_t", 0, "timestamp") not in fields:
             return None
         most = least = flat[0]
         for kind, many, field in reversed(fields):
@@ -150,8 +175,11 @@ class _Walk:
         """Bytes and number of the fields of a definition with all that it holds."""
         if depth > DEEPEST or name not in self.formats:
             return None
+        fields = self.formats[name]
+        if len({field for _, _, field in fields}) < len(fields):
+            return None
         size = count = 0
-        for kind, many, _ in self.formats[name]:
+        for kind, many, _ in fields:
             inner = (SIZES[kind], 1) if kind in SIZES else self.flatten(kind, depth + 1)
             if inner is None:
                 return None
@@ -168,7 +196,7 @@ class _Walk:
             if topic not in self.sizes:
                 self.homeless[self.names.get(topic, "")] += 1
             elif topic in self.wanted:
-                self.kept.append((pos, end))
+                self.kept.append((pos, pos + 5 + self.sizes[topic][0]))
         elif kind == _FORMAT:
             read = self.format(pos + 3, end)
             if read is not None and read[0] not in self.formats:
@@ -185,7 +213,7 @@ class _Walk:
                         self.wanted.add(topic)
                         self.kept.append((pos, end))
         elif kind == _INFO:
-            if self.informs(body):
+            if _informs(body):
                 self.kept.append((pos, end))
         elif kind == _DROPOUT:
             self.dropouts += 1
@@ -195,14 +223,6 @@ class _Walk:
             if body[8] & 1:
                 offsets = struct.unpack_from("<3Q", body, 16)
                 self.appended = sorted(one for one in offsets if end < one < len(self.data))
-
-    def informs(self, body: bytes) -> bool:
-        """Whether an information is one that pyulog can unpack."""
-        matched = re.fullmatch(rb"(\w+)(\[\d{1,5}\])? (\w+)", body[1 : 1 + body[0]])
-        if matched is None:
-            return False
-        left, kind = len(body) - 1 - body[0], matched[1].decode()
-        return kind in SIZES and (matched[2] is not None or left == SIZES[kind])
 
     def next_sound(self, pos: int, limit: int) -> int:
         """The next place at which a message holds that says enough of itself; `limit` where none does."""
@@ -255,7 +275,8 @@ def sound_part(data: bytes, topics: frozenset[str]) -> Sound:
     else:
         rest = len(data)
     formats = b"".join(_written(name, fields) for name, fields in walk.formats.items())
-    kept = b"".join([data[a:b] for a, b in walk.kept])
+    # What only fills up is left away: pyulog takes it for a mistake.
+    kept = b"".join([_HEAD.pack(b - a - 3, data[a + 2]) + data[a + 3 : b] for a, b in walk.kept])
     return Sound(
         data[:HEADER] + formats + kept,
         skipped,
@@ -266,6 +287,15 @@ def sound_part(data: bytes, topics: frozenset[str]) -> Sound:
         walk.dropout_ms / 1e3,
         walk.flags,
     )
+
+
+def _informs(body: bytes) -> bool:
+    """Whether a key says how long its value is, and it is so long."""
+    matched = _KEY.fullmatch(body[1 : 1 + body[0]]) if body else None
+    if matched is None or matched[1].decode() not in SIZES:
+        return False
+    many = 1 if matched[2] is None else int(matched[2])
+    return len(body) - 1 - body[0] == SIZES[matched[1].decode()] * many
 
 
 def _written(name: str, fields: list[tuple[str, int, str]]) -> bytes:

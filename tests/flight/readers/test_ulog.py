@@ -1,0 +1,526 @@
+"""PX4 logs: values against pyulog on the whole file, both generations of names, damage of all kinds."""
+
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pymap3d
+import pytest
+from pyulog import ULog
+
+from tests.flight.readers.mavlink_logs import START_S, message, ulog
+from tests.flight.readers.tracks import check, damaged
+from wildlab.errors import WildlabError
+from wildlab.flight.readers.logs import ulog as reader
+from wildlab.flight.readers.logs.formats import recognise
+from wildlab.flight.readers.logs.ulog_frames import sound_part
+from wildlab.flight.readers.logs.ulog_parts import TOPICS
+from wildlab.flight.readers.logs.ulog_topics import from_local
+
+PATH = Path("flight.ulg")
+SAMPLES = [("px4_quad_clean_short", "test.ulg"), ("px4_quad_ekf_failure", "ekf_failure.ulg")]
+LAT, LON = 63.4, 10.4
+
+ATTITUDE = "uint64_t timestamp;uint64_t timestamp_sample;float[4] q;"
+PLACE = "uint64_t timestamp;double lat;double lon;float alt;float eph;float epv;uint8_t[4] _padding0;"
+NEW_GPS = (
+    "uint64_t timestamp;double latitude_deg;double longitude_deg;double altitude_msl_m;"
+    "double altitude_ellipsoid_m;uint64_t time_utc_usec;float eph;float epv;float s_variance_m_s;"
+    "float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;uint8_t fix_type;uint8_t satellites_used;"
+    "bool vel_ned_valid;"
+)
+OLD_GPS = (
+    "uint64_t time_utc_usec;uint64_t timestamp;int32_t lat;int32_t lon;int32_t alt;int32_t alt_ellipsoid;"
+    "float s_variance_m_s;float eph;float epv;float hdop;float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;"
+    "int32_t timestamp_time_relative;uint8_t fix_type;bool vel_ned_valid;uint8_t satellites_used;"
+)
+LOCAL = (
+    "uint64_t timestamp;double ref_lat;double ref_lon;float x;float y;float z;float vx;float vy;float vz;"
+    "float ref_alt;float eph;float epv;float heading_var;float tilt_var;bool xy_global;"
+)
+COMBINED = "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;uint8_t clipping;"
+
+
+def us(row: int, step_s: float = 0.1) -> int:
+    return round((100 + row * step_s) * 1e6)
+
+
+def attitude(count: int = 50) -> tuple[str, list[tuple[Any, ...]]]:
+    half = np.radians(30) / 2
+    return ATTITUDE, [(us(k), us(k) - 400, np.cos(half), 0.0, 0.0, np.sin(half)) for k in range(count)]
+
+
+def place(count: int = 50) -> tuple[str, list[tuple[Any, ...]]]:
+    return PLACE, [(us(k), LAT + 1e-6 * k, LON, 120.0 + k, 0.5, 0.7, 0, 0, 0, 0) for k in range(count)]
+
+
+def new_gps(count: int = 25, **other: float) -> tuple[str, list[tuple[Any, ...]]]:
+    usual = {
+        "lat": LAT,
+        "lon": LON,
+        "up": 120.0,
+        "ellipsoid": 160.0,
+        "fix": 3,
+        "vn": 5.0,
+        "valid": True,
+    } | other
+    rows = []
+    for k in range(count):
+        utc = round((START_S + k * 0.2) * 1e6)
+        where = (usual["lat"] + 1e-7 * k, usual["lon"], usual["up"], usual["ellipsoid"], utc)
+        rows.append(
+            (us(2 * k), *where, 0.9, 1.5, 0.2, usual["vn"], 0.0, 0.0, usual["fix"], 14, usual["valid"])
+        )
+    return NEW_GPS, rows
+
+
+def read(data: bytes) -> Any:
+    return reader.read(PATH, data)
+
+
+def flight(**more: Any) -> dict[str, Any]:
+    return {
+        "vehicle_attitude": attitude(),
+        "vehicle_global_position": place(),
+        "vehicle_gps_position": new_gps(),
+        **more,
+    }
+
+
+@pytest.mark.parametrize(("folder", "name"), SAMPLES)
+def test_every_value_of_the_samples_is_pyulogs(shared_data: Any, folder: str, name: str) -> None:
+    path = shared_data("logs", folder, name)
+    data = path.read_bytes()
+    assert recognise(data[:8192], "unnamed") == "ulog"
+    sound = sound_part(data, TOPICS)
+    assert (sound.skipped, sound.rest, sound.homeless) == (0, 0, {})
+    whole = ULog(str(path), list(TOPICS))
+    log = reader.read(path, data)
+    check(log)
+    assert log.lost == ()
+
+    def same(part: str, topic: str, **fields: tuple[str, float]) -> None:
+        truth = whole.get_dataset(topic).data
+        ours = log.parts[part].columns
+        assert len(log.parts[part]) == len(truth["timestamp"])
+        for column, (field, factor) in fields.items():
+            values = truth[field].astype(float) * factor
+            assert np.array_equal(ours[column], values, equal_nan=True), column
+
+    same(
+        "gnss",
+        "vehicle_gps_position",
+        latitude_deg=("latitude_deg", 1),
+        longitude_deg=("longitude_deg", 1),
+        height_sea_m=("altitude_msl_m", 1),
+        sd_horizontal_m=("eph", 1),
+        sd_vertical_m=("epv", 1),
+        sd_velocity_m_s=("s_variance_m_s", 1),
+        v_north_m_s=("vel_n_m_s", 1),
+        v_east_m_s=("vel_e_m_s", 1),
+        v_down_m_s=("vel_d_m_s", 1),
+        satellites=("satellites_used", 1),
+        fix=("fix_type", 1),
+        hdop=("hdop", 1),
+    )
+    same(
+        "imu",
+        "sensor_combined",
+        f_x_m_s2=("accelerometer_m_s2[0]", 1),
+        f_z_m_s2=("accelerometer_m_s2[2]", 1),
+        w_x_rad_s=("gyro_rad[0]", 1),
+        w_z_rad_s=("gyro_rad[2]", 1),
+    )
+    same("magnetometer", "vehicle_magnetometer", field_y_ut=("magnetometer_ga[1]", 100))
+    q = np.stack([log.parts["poses"].columns[f"q_{axis}"] for axis in "wxyz"], axis=1)
+    truth = whole.get_dataset("vehicle_attitude").data
+    assert np.allclose(q, np.stack([truth[f"q[{k}]"] for k in range(4)], axis=1), atol=1e-6)
+    # UTC, to what the receiver's own stamps scatter by.
+    gps = whole.get_dataset("vehicle_gps_position").data
+    assert np.abs(log.parts["gnss"].columns["time_s"] - gps["time_utc_usec"] / 1e6).max() < 0.05
+
+
+def test_a_crash_is_read_to_its_end(shared_data: Any) -> None:
+    path = shared_data("logs", "px4_quad_ekf_failure", "ekf_failure.ulg")
+    log = reader.read(path, path.read_bytes())
+    poses = log.parts["poses"].columns
+    assert poses["roll_deg"].min() == pytest.approx(-112.8, abs=0.1)
+    first = poses["time_log_s"][np.abs(poses["roll_deg"]) > 60][0]
+    assert first == pytest.approx(114.7, abs=0.1)
+    assert poses["time_log_s"][-1] > 126
+    assert log.vehicle == "PX4 v1.15.0 (beta) on NXP_MR_TROPIC"
+    assert np.nanmedian(poses["height_ellipsoid_m"] - poses["height_sea_m"]) == pytest.approx(45.05, abs=0.05)
+
+
+def test_one_height_for_both_names(shared_data: Any) -> None:
+    path = shared_data("logs", "px4_quad_clean_short", "test.ulg")
+    log = reader.read(path, path.read_bytes())
+    assert "height_ellipsoid_m" not in log.parts["gnss"].columns
+    assert "height_ellipsoid_m" not in log.parts["poses"].columns
+    assert any("one and the same number" in note for note in log.notes)
+
+
+def test_local_frame_gives_the_global_places(shared_data: Any) -> None:
+    path = shared_data("logs", "px4_quad_ekf_failure", "ekf_failure.ulg")
+    whole = ULog(str(path), ["vehicle_local_position", "vehicle_global_position"])
+    local, truth = (whole.get_dataset(f"vehicle_{one}_position").data for one in ("local", "global"))
+    both = np.isin(local["timestamp_sample"], truth["timestamp_sample"])
+    assert both.sum() == len(truth["lat"])
+    lat, lon = from_local(*(local[name][both] for name in ("x", "y", "ref_lat", "ref_lon")))
+    metres = 111_000 * np.hypot(lat - truth["lat"], (lon - truth["lon"]) * np.cos(np.radians(lat)))
+    # Float32 of tens of metres on both sides.
+    assert metres.max() < 1e-3
+
+
+def test_local_frame_is_near_the_ellipsoids() -> None:
+    north, east = np.array([300.0, -50.0]), np.array([-200.0, 900.0])
+    lat, lon = from_local(north, east, LAT, LON)
+    true = pymap3d.ned2geodetic(north, east, 0.0, LAT, LON, 0.0)
+    assert np.allclose(lat, true[0], atol=0.005 * 900 / 111_000)
+    assert np.allclose(lon, true[1], atol=0.005 * 900 / 50_000)
+    assert np.allclose(from_local(0.0, 0.0, LAT, LON), [LAT, LON], atol=1e-12)
+
+
+def test_poses() -> None:
+    log = read(ulog(flight(), {"sys_name": "PX4", "ver_hw": "BOARD", "ver_sw_release": 0x010E02FF}))
+    check(log)
+    assert log.vehicle == "PX4 v1.14.2 on BOARD"
+    poses = log.parts["poses"]
+    assert poses.used.sum() == 49  # the first sample is older than the first place
+    columns = {name: values[poses.used] for name, values in poses.columns.items()}
+    rows = np.arange(1, 50)
+    assert np.allclose(columns["yaw_deg"], 30, atol=1e-4)
+    # Attitudes are of 0.4 ms before their stamps.
+    assert np.allclose(columns["time_log_s"], 100 + 0.1 * rows - 4e-4, atol=1e-9)
+    assert np.allclose(columns["time_s"], START_S + 0.1 * rows - 4e-4, atol=1e-5)
+    assert np.allclose(columns["latitude_deg"], LAT + 1e-6 * (rows - 4e-3), atol=1e-10)
+    assert np.allclose(columns["height_sea_m"], 120 + rows - 4e-3, atol=1e-4)
+    assert np.allclose(columns["sd_horizontal_m"], 0.5)
+    assert np.allclose(columns["sd_vertical_m"], 0.7)
+
+
+def test_poses_from_the_local_frame_alone() -> None:
+    rows = [
+        (us(k), LAT, LON, 1.0 * k, 0.0, -5.0, 10.0, 0.0, 0.0, 100.0, 0.3, 0.4, 0.01, 0.0002, True)
+        for k in range(50)
+    ]
+    topics = flight(vehicle_local_position=(LOCAL, rows))
+    del topics["vehicle_global_position"]
+    log = read(ulog(topics))
+    check(log)
+    assert any("local frame" in note for note in log.notes)
+    poses = log.parts["poses"]
+    columns = {name: values[poses.used] for name, values in poses.columns.items()}
+    assert np.allclose(columns["height_sea_m"], 105)
+    assert np.allclose(columns["v_north_m_s"], 10)
+    assert np.allclose(columns["sd_yaw_deg"], np.degrees(0.1), atol=1e-4)
+    assert np.allclose(columns["sd_roll_deg"], np.degrees(0.01), atol=1e-4)
+    metres = (columns["latitude_deg"] - LAT) * np.pi / 180 * 6371000
+    assert np.allclose(metres, np.arange(1, 50) - 4e-3, atol=1e-5)
+
+
+def test_old_names_and_integers() -> None:
+    rows = []
+    for k in range(25):
+        utc = round((START_S + 0.2 * k - 0.05) * 1e6)
+        where = (round(LAT * 1e7), round(LON * 1e7), 120_500, 161_000)
+        rows.append((utc, us(2 * k), *where, 0.2, 0.9, 1.5, 0.8, 5.0, 1.0, 0.0, -50_000, 3, True, 14))
+    log = read(ulog(flight(vehicle_gps_position=(OLD_GPS, rows))))
+    check(log)
+    columns = log.parts["gnss"].columns
+    assert np.allclose(columns["latitude_deg"], LAT, atol=1e-9)
+    assert np.allclose(columns["height_sea_m"], 120.5)
+    assert np.allclose(columns["height_ellipsoid_m"], 161.0)
+    assert np.allclose(columns["v_east_m_s"], 1.0)
+    # UTC is of 50 ms before the message.
+    assert np.allclose(columns["time_s"], START_S + 0.2 * np.arange(25), atol=1e-5)
+    assert log.clock.base == "UTC of the receiver"
+    assert log.clock.rate == 1.0
+
+
+@pytest.mark.parametrize(
+    ("other", "reason"),
+    [
+        ({"fix": 1}, "no fix"),
+        ({"fix": 2}, "a fix without height"),
+        ({"lat": -1.2e-6, "lon": 0.0}, "no position"),
+        ({"lat": np.nan}, "no position"),
+        ({"lat": 91.0}, "no position"),
+        ({"up": 1e9}, "an impossible height"),
+        ({"up": np.nan, "ellipsoid": np.nan}, "no height"),
+        ({"vn": 900.0}, "an impossible speed"),
+        ({"lat": LAT + 1.0}, "a place out of reach"),
+    ],
+)
+def test_fixes_that_cannot_be_true(other: dict[str, float], reason: str) -> None:
+    form, rows = new_gps()
+    rows[12] = new_gps(**other)[1][12]
+    part = read(ulog(flight(vehicle_gps_position=(form, rows)))).parts["gnss"]
+    assert part.columns["why"][12] == reason
+    assert part.used.sum() == 24
+
+
+def test_velocity_that_is_not_valid_is_none() -> None:
+    columns = read(ulog(flight(vehicle_gps_position=new_gps(valid=False)))).parts["gnss"].columns
+    assert "v_north_m_s" not in columns
+
+
+def test_wrong_stamps_cost_their_rows_alone() -> None:
+    form, rows = attitude()
+    rows[20] = (us(20) + (1 << 40), 0, *rows[20][2:])
+    rows[30] = (rows[29][1], 0, *rows[30][2:])
+    rows[40] = (us(3), 0, *rows[40][2:])
+    poses = read(ulog(flight(vehicle_attitude=(form, rows)))).parts["poses"]
+    assert poses.used.sum() == 46
+    check(read(ulog(flight(vehicle_attitude=(form, rows)))))
+
+
+def test_without_utc_there_is_the_time_since_start() -> None:
+    topics = flight()
+    del topics["vehicle_gps_position"]
+    log = read(ulog(topics))
+    check(log)
+    assert log.clock.base == ""
+    assert np.isnan(log.parts["poses"].columns["time_s"]).all()
+    assert log.parts["poses"].used.sum() == 49
+    assert any("no receiver told UTC" in note for note in log.notes)
+
+
+def test_clock_that_runs_slow_is_found() -> None:
+    form, rows = new_gps(2000)
+    rng = np.random.default_rng(3)
+    slow = [
+        (row[0], *row[1:5], row[5] + round(k * 200 + rng.normal(0, 5e3)), *row[6:])
+        for k, row in enumerate(rows)
+    ]
+    clock = read(ulog(flight(vehicle_gps_position=(form, slow)))).clock
+    assert clock.rate == pytest.approx(1.001, abs=1e-5)
+    assert clock.spread_s == pytest.approx(5e-3, rel=0.1)
+
+
+def test_first_instance_is_read() -> None:
+    form, rows = new_gps()
+    wrong = [(row[0], 1.0, *row[2:]) for row in rows]
+    del (topics := flight())["vehicle_gps_position"]
+    log = read(ulog({"sensor_gps#1": (form, wrong), "sensor_gps#0": (form, rows), **topics}))
+    assert np.allclose(log.parts["gnss"].columns["latitude_deg"], LAT, atol=1e-5)
+
+
+def test_inertial_sensor_and_magnetometers() -> None:
+    rows = [(us(k, 0.01), 0.1, 0.2, 0.3, 0.0, 0.0, np.nan if k == 9 else -9.8, 0) for k in range(400)]
+    field = ("uint64_t timestamp;float x;float y;float z;", [(us(k), 0.1, 0.2, 0.4) for k in range(40)])
+    log = read(ulog(flight(sensor_combined=(COMBINED, rows), sensor_mag=field)))
+    check(log)
+    imu = log.parts["imu"]
+    assert imu.columns["why"][9] == "not a number"
+    assert imu.used.sum() == 399
+    assert np.allclose(imu.columns["w_z_rad_s"], 0.3)
+    assert np.allclose(log.parts["magnetometer"].columns["field_z_ut"], 40)
+
+
+def test_triggers() -> None:
+    form = (
+        "uint64_t timestamp;uint64_t timestamp_utc;uint32_t seq;double lat;double lon;float alt;float[4] q;"
+    )
+    rows = [(us(k), 0, k, LAT if k else 0.0, LON if k else 0.0, 130.0, 1.0, 0.0, 0.0, 0.0) for k in range(10)]
+    part = read(ulog(flight(camera_capture=(form, rows)))).parts["triggers"]
+    assert part.used.all()
+    assert (part.columns["number"] == np.arange(10)).all()
+    assert np.isnan(part.columns["latitude_deg"][0])
+    assert np.allclose(part.columns["height_sea_m"][1:], 130)
+    form = "uint64_t timestamp;uint32_t seq;bool feedback;"
+    part = read(ulog(flight(camera_trigger=(form, [(us(k), k, False) for k in range(10)])))).parts["triggers"]
+    assert np.allclose(part.columns["time_s"], START_S + 0.1 * np.arange(10), atol=1e-5)
+
+
+@pytest.mark.parametrize(("flags", "yaw"), [(0, 30.0), (32, 30.0), (64, 0.0), (16, 0.0)])
+def test_gimbal_device(flags: int, yaw: float) -> None:
+    form = "uint64_t timestamp;float[4] q;uint16_t device_flags;"
+    half = np.radians(-45) / 2
+    rows = [(us(k), np.cos(half), 0.0, np.sin(half), 0.0, flags) for k in range(2, 40)]
+    part = read(ulog(flight(gimbal_device_attitude_status=(form, rows)))).parts["gimbal"]
+    assert part.used.all()
+    assert np.allclose(part.columns["pitch_world_deg"], -45, atol=1e-4)
+    assert np.allclose(part.columns["yaw_world_deg"], yaw, atol=1e-3)
+
+
+def test_mount_orientation() -> None:
+    form = "uint64_t timestamp;float[3] attitude_euler_angle;"
+    rows = [(us(k), 0.0, np.radians(-60), np.radians(10)) for k in range(2, 40)]
+    part = read(ulog(flight(mount_orientation=(form, rows)))).parts["gimbal"]
+    assert np.allclose(part.columns["pitch_world_deg"], -60, atol=1e-4)
+    assert np.allclose(part.columns["yaw_world_deg"], 40, atol=1e-3)
+
+
+def test_fields_in_another_order_extra_and_missing() -> None:
+    form = "bool strange;float[4] q;uint64_t timestamp;uint8_t[3] more;"
+    rows = [(us(k), True) for k in range(50)]
+    body = [(True, 1.0, 0.0, 0.0, 0.0, stamp, 1, 2, 3) for stamp, _ in rows]
+    other = ("uint64_t timestamp;float new;", [(us(1), 2.0)])
+    log = read(ulog(flight(vehicle_attitude=(form, body), vehicle_air_data=other)))
+    assert log.parts["poses"].used.sum() == 50
+    assert np.allclose(log.parts["poses"].columns["roll_deg"], 0)
+    # Without the fields that a part is made of, there is no such part.
+    bare = ("uint64_t timestamp;float else;", [(us(k), 0.0) for k in range(50)])
+    log = read(ulog(flight(vehicle_attitude=bare, sensor_combined=bare, vehicle_magnetometer=bare)))
+    assert set(log.parts) == {"gnss"}
+    assert any("without any attitude" in note for note in log.notes)
+    log = read(ulog({"vehicle_attitude": attitude()}))
+    assert not log.parts["poses"].used.any()
+    assert any("50 attitudes stand without any position" in note for note in log.notes)
+
+
+def test_padding_may_be_left_away() -> None:
+    form, rows = place()
+    whole = ulog(flight(vehicle_global_position=(form, rows)))
+    shorter = ulog(flight())
+    for row in rows:
+        packed = struct.pack("<Qddfff", *row[:6])
+        shorter = shorter.replace(
+            struct.pack("<HB", len(packed) + 6, ord("D")) + b"\x01\x00" + packed + bytes(4),
+            struct.pack("<HB", len(packed) + 2, ord("D")) + b"\x01\x00" + packed,
+        )
+    assert len(shorter) == len(whole) - 4 * len(rows)
+    log = read(shorter)
+    assert log.lost == ()
+    assert log.parts["poses"].used.sum() == 49
+
+
+def test_dropouts_are_counted() -> None:
+    log = read(ulog(flight(), after=message("O", struct.pack("<H", 250)) * 3))
+    assert "the logger fell behind 3 times and lost 0.750 s in all" in log.notes
+
+
+def test_appended_data_is_read() -> None:
+    plain = ulog(flight())
+    broken = plain + message("D", bytes(60))[:30]
+    flags = bytes(8) + b"\x01" + bytes(7) + struct.pack("<3Q", len(broken), 0, 0)
+    late = message("D", struct.pack("<H", 0) + struct.pack("<QQ4f", us(50), 0, 1.0, 0.0, 0.0, 0.0))
+    data = ulog(flight(), flags=flags)[: len(plain)] + broken[len(plain) :] + late
+    log = read(data)
+    assert len(log.parts["poses"]) == 51
+    assert any("30 of" in one and "in 1 places are no messages" in one for one in log.lost)
+
+
+def test_what_cannot_be_read_is_refused() -> None:
+    for data in (b"", b"ULog\x01\x12\x36" + bytes(100)):
+        with pytest.raises(WildlabError, match="does not begin as a ULog does"):
+            read(data)
+    with pytest.raises(WildlabError, match="holds no message of position, attitude or sensors"):
+        read(ulog({"battery_status": ("uint64_t timestamp;float voltage_v;", [(us(1), 12.0)])}))
+    with pytest.raises(WildlabError, match=r"is not known \(flags 0x4\)"):
+        read(ulog(flight(), flags=bytes(8) + b"\x04" + bytes(31)))
+
+
+def claims(form: str, name: str = "vehicle_attitude", before: bytes = b"") -> Any:
+    topics = flight()
+    topics.pop(name, None)
+    claimed = message("F", f"{name}:{form}".encode()) + message(
+        "A", struct.pack("<BH", 0, 77) + name.encode()
+    )
+    return read(ulog(topics, before=before, after=claimed + message("D", struct.pack("<H", 77) + bytes(100))))
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "uint64_t timestamp;uint8_t[99999] q;",
+        "uint64_t timestamp;uint8_t[65535] q;",
+        "uint64_t timestamp;vehicle_attitude again;",
+        "uint64_t timestamp;absent q;",
+        "float[4] q;",
+        "uint64_t timestamp;float q;float q;",
+        "uint64_t timestamp;float[4q;",
+        "",
+    ],
+)
+def test_absurd_definitions_are_left_out_and_said(form: str) -> None:
+    log = claims(form)
+    assert "poses" not in log.parts
+    assert "gnss" in log.parts
+    wanted = "1 messages of the topic 'vehicle_attitude' have no definition that can be true and are left out"
+    assert wanted in log.lost
+
+
+def test_definitions_within_definitions_do_not_multiply() -> None:
+    nested = b"".join(
+        message("F", f"n{k}:{f'n{k + 1}' if k < 6 else 'float'}[60000] x;".encode()) for k in range(7)
+    )
+    began = time.monotonic()
+    log = claims("uint64_t timestamp;n0 q;", before=nested)
+    assert time.monotonic() - began < 2.0
+    assert "poses" not in log.parts
+
+
+def test_many_instances_of_a_wide_topic_take_little_memory() -> None:
+    wide = message("F", b"sensor_mag:uint64_t timestamp;uint8_t[2000] x;")
+    many = b"".join(
+        message("A", struct.pack("<BH", 0, number) + b"sensor_mag") for number in range(100, 20_100)
+    )
+    began = time.monotonic()
+    log = read(ulog(flight(), before=wide + many))
+    assert time.monotonic() - began < 5.0
+    assert "gnss" in log.parts
+
+
+def test_rows_of_a_topic_that_lost_its_introduction_are_counted() -> None:
+    data = bytearray(ulog(flight()))
+    at = data.index(b"vehicle_attitude", data.index(b"A\x00\x00\x00"))
+    data[at] ^= 1
+    log = read(bytes(data))
+    assert "poses" not in log.parts
+    assert any(one.startswith("50 messages of ") for one in log.lost)
+
+
+def test_damage_anywhere() -> None:
+    data = ulog(flight(), {"sys_name": "PX4"})
+    kept = []
+    for spoilt in damaged(data):
+        try:
+            log = read(spoilt)
+        except WildlabError as error:
+            assert "flight.ulg" in str(error)
+            continue
+        check(log)
+        kept.append(sum(len(part) for part in log.parts.values()))
+    assert len(kept) > 100
+
+
+def test_one_wrong_length_costs_one_message() -> None:
+    data = bytearray(ulog(flight()))
+    at = data.index(struct.pack("<HB", 34, ord("D")), len(data) // 2)
+    data[at] ^= 0x10
+    log = read(bytes(data))
+    assert len(log.parts["poses"]) == 49
+    assert f"37 of {len(data)} bytes in 1 places are no messages and are left out" in log.lost
+
+
+@pytest.mark.parametrize(("folder", "name"), SAMPLES)
+def test_damage_to_the_samples(shared_data: Any, folder: str, name: str) -> None:
+    data = shared_data("logs", folder, name).read_bytes()
+    whole = len(read(data).parts["imu"])
+    rng = np.random.default_rng(14)
+    for at in rng.integers(len(data) // 8, len(data), 4):
+        log = read(data[:at])
+        check(log)
+        assert len(log.parts["imu"]) == pytest.approx(whole * at / len(data), abs=0.12 * whole)
+    for _ in range(3):
+        spoilt = bytearray(data)
+        for at in rng.integers(len(data) // 10, len(data), 100):
+            spoilt[at] ^= int(rng.integers(1, 256))
+        log = read(bytes(spoilt))
+        check(log)
+        assert len(log.parts["imu"]) > 0.97 * whole
+        assert log.lost
+
+
+@pytest.mark.parametrize(
+    "unit", [b"\x02\x00D", b"\x00", b"\xff", b"\x03\x00A\x00\x09\x09", b"\x10\x00Q" + bytes(16)]
+)
+def test_no_input_takes_long(unit: bytes) -> None:
+    began = time.monotonic()
+    log = read(ulog(flight(), after=unit * (300_000 // len(unit))))
+    assert time.monotonic() - began < 10.0
+    assert len(log.parts["poses"]) == 50
