@@ -88,6 +88,8 @@ class _Walk:
         self.instances: Counter[str] = Counter()
         # Fewest and most bytes of a topic's data: fields that only fill up may be left away at the end.
         self.sizes: dict[int, tuple[int, int]] = {}
+        # The same of topics without a definition, from the first message that seemed sound.
+        self.learnt: dict[int, tuple[int, int]] = {}
         self.wanted: set[int] = set()
         self.kept: list[tuple[int, int]] = []
         self.homeless: Counter[str] = Counter()
@@ -123,7 +125,8 @@ class _Walk:
         """Whether the content of a message shows that it is one, by its kind; None where it shows nothing."""
         size = end - pos - 3
         if kind == _DATA:
-            bounds = self.sizes.get(self.data[pos + 3] | self.data[pos + 4] << 8)
+            topic = self.data[pos + 3] | self.data[pos + 4] << 8
+            bounds = self.sizes.get(topic) or self.learnt.get(topic)
             return None if bounds is None else bounds[0] <= size - 2 <= bounds[1]
         body = self.data[pos + 3 : end]
         if kind == _FORMAT:
@@ -194,6 +197,7 @@ class _Walk:
         if kind == _DATA:
             topic = int.from_bytes(body[:2], "little")
             if topic not in self.sizes:
+                self.learnt.setdefault(topic, (end - pos - 5, end - pos - 5))
                 self.homeless[self.names.get(topic, "")] += 1
             elif topic in self.wanted:
                 self.kept.append((pos, pos + 5 + self.sizes[topic][0]))
@@ -225,15 +229,16 @@ class _Walk:
                 self.appended = sorted(one for one in offsets if end < one < len(self.data))
 
     def next_sound(self, pos: int, limit: int) -> int:
-        """The next place at which a message holds that says enough of itself; `limit` where none does."""
+        """The next place with a message that shows that it is one; `limit` where none does."""
         chunk = _FIRST_CHUNK
         while pos + 3 <= limit:
             here = np.frombuffer(self.data, np.uint8, min(chunk + 2, limit - pos), pos).astype(np.int64)
             size, kind = here[:-2] | here[1:-1] << 8, here[2:]
             likely = np.isin(kind, list(_KINDS)) & (size > 1) & (size <= limit - pos)
             for at in (pos + np.flatnonzero(likely)).tolist():
-                end = self.holds(at, limit)
-                if end and (end == limit or self.holds(end, limit)):
+                end, here_kind = self.header(at, limit)
+                # Among many places some lead to a message by chance.
+                if end and self.certain(here_kind, at, end) and (end == limit or self.holds(end, limit)):
                     return int(at)
             pos, chunk = pos + len(size), min(2 * chunk, _CHUNK)
         return limit
