@@ -85,7 +85,8 @@ def _log(segments: Sequence[Sequence[Point]], lost: tuple[str, ...]) -> RawLog:
     rows = np.concatenate([np.arange(counts[k], counts[k + 1]) for k in order]) + 1
     columns = _columns(points)
     notes = drop_rare_heights(columns)
-    stream = make_stream("gnss", columns, rows, "point", judge(columns, {"no fix": columns["fix"] == 0.0}))
+    no_fix = columns["fix"] == 0.0 if "fix" in columns else np.zeros(len(points), bool)
+    stream = make_stream("gnss", columns, rows, "point", judge(columns, {"no fix": no_fix}))
     time = columns["time_s"]
     notes += gaps(time, stream.used)
     if order != sorted(order):
@@ -123,7 +124,7 @@ def _columns(points: Sequence[Point]) -> dict[str, Array]:
     return {
         name: values
         for name, values in columns.items()
-        if name in ("time_s", "time_log_s", "fix") or np.isfinite(values).any() or name.endswith("_deg")
+        if name.startswith("time") or name.endswith("_deg") or np.isfinite(values).any()
     }
 
 
