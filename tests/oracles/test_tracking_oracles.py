@@ -13,6 +13,7 @@ from wildlab.tracking import measurement as m
 from wildlab.tracking.batch import run_batch
 from wildlab.tracking.motion import constant_velocity, singer
 from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
 
 CV = partial(constant_velocity, sd_acceleration=0.2)
@@ -130,3 +131,72 @@ def test_a_run_agrees_with_stone_soup():
         assert np.allclose(track.x[row], theirs, rtol=1e-8, atol=1e-8)
         assert np.allclose(batch.x[0, row], theirs, rtol=1e-8, atol=1e-8)
         assert np.allclose(track.P[row], np.asarray(state.covar, float)[np.ix_(order, order)], rtol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_smoothed_runs_agree_with_filterpy(seed):
+    """Uneven times, gaps, every row its own R."""
+    rng = np.random.default_rng(seed)
+    motion = partial(singer, alpha=0.3, variance=0.5)
+    times = np.cumsum(rng.uniform(0.1, 1.0, 40))
+    z, R = rng.normal(0, 3, (40, 2)), np.array([covariance(rng, 2) for _ in range(40)])
+    z[rng.random(40) < 0.2] = np.nan
+    start = Start(0.0, rng.normal(size=6), covariance(rng, 6))
+    ours = run_smoothed(times, z, R, m.positions(), motion, start)
+    again = smooth(run_filter(times, z, R, m.positions(), motion, start), motion)
+    oracle = KalmanFilter(dim_x=6, dim_z=2)
+    oracle.x, oracle.P, oracle.H = start.x.copy(), start.P.copy(), np.eye(2, 6)
+    steps = [motion(dt) for dt in np.diff(times, prepend=0.0)]
+    xs, Ps = [], []
+    for row, (F, Q) in enumerate(steps):
+        oracle.predict(F=F, Q=Q)
+        oracle.update(z[row] if np.isfinite(z[row]).all() else None, R=R[row])
+        xs.append(oracle.x.copy())
+        Ps.append(oracle.P.copy())
+    x, P, *_ = oracle.rts_smoother(
+        np.array(xs), np.array(Ps), Fs=[F for F, _ in steps], Qs=[Q for _, Q in steps]
+    )
+    for found in (ours, again):
+        assert np.allclose(found.x, x, rtol=1e-8, atol=1e-8)
+        assert np.allclose(found.P, P, rtol=1e-8, atol=1e-8)
+
+
+def test_a_smoothed_run_agrees_with_stone_soup():
+    pytest.importorskip("stonesoup")
+    from stonesoup.models.measurement.linear import LinearGaussian
+    from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
+    from stonesoup.predictor.kalman import KalmanPredictor
+    from stonesoup.smoother.kalman import KalmanSmoother
+    from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
+    from stonesoup.types.state import GaussianState
+    from stonesoup.types.track import Track
+    from stonesoup.updater.kalman import KalmanUpdater
+
+    rng = np.random.default_rng(1)
+    times = np.cumsum(rng.integers(1, 2000, 30)) / 1000
+    z = np.cumsum(rng.normal(0, 2, (30, 2)), axis=0)
+    model = CombinedLinearGaussianTransitionModel([ConstantVelocity(0.3)] * 2)
+    order = [0, 2, 1, 3]  # theirs is north, its speed, east, its speed
+
+    def motion(dt):
+        F = np.asarray(model.matrix(time_interval=timedelta(seconds=dt)), float)
+        Q = np.asarray(model.covar(time_interval=timedelta(seconds=dt)), float)
+        return F[np.ix_(order, order)], Q[np.ix_(order, order)]
+
+    start = Start(0.0, np.array([1.0, 2, 0.5, -0.5]), np.diag([30.0, 20, 4, 4]))
+    ours = run_smoothed(times, z, 9 * np.eye(2), m.positions(), motion, start)
+    predictor = KalmanPredictor(model)
+    updater = KalmanUpdater(LinearGaussian(4, (0, 2), 9 * np.eye(2)))
+    epoch = datetime(2020, 1, 1, tzinfo=UTC)
+    state = GaussianState(start.x[order], start.P[np.ix_(order, order)], timestamp=epoch)
+    track = Track()
+    for row, t in enumerate(times):
+        seen = Detection(z[row][:, None], timestamp=epoch + timedelta(seconds=float(t)))
+        state = updater.update(SingleHypothesis(predictor.predict(state, timestamp=seen.timestamp), seen))
+        track.append(state)
+    theirs = KalmanSmoother(transition_model=model).smooth(track)
+    for row, state in enumerate(theirs.states):
+        x = np.asarray(state.state_vector, float).ravel()[order]
+        assert np.allclose(ours.x[row], x, rtol=1e-7, atol=1e-7)
+        assert np.allclose(ours.P[row], np.asarray(state.covar, float)[np.ix_(order, order)], rtol=1e-7)
