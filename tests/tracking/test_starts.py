@@ -14,6 +14,7 @@ from wildlab.tracking.combined import Seen, merge
 from wildlab.tracking.considered import consider
 from wildlab.tracking.considering import considering
 from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.noise import own_noise
 from wildlab.tracking.platforms import bearings, measured_from, polar, ranges_bearings
 from wildlab.tracking.rays import intersect_rays
 from wildlab.tracking.run import Start, run_filter
@@ -284,3 +285,14 @@ def test_what_cannot_be_a_start_is_said():
             start,
             pose=consider({"heading": 1}),
         )
+
+
+def test_a_detections_own_noise():
+    own = np.tile(np.diag([4.0, 9.0]), (3, 2, 1, 1))
+    own[1, 0], own[2, 1] = np.nan, np.diag([1.0, 0.0])
+    R = own_noise(own, np.eye(2))
+    np.testing.assert_array_equal(R[1, 0], np.eye(2))
+    np.testing.assert_array_equal(R[2, 1], np.eye(2))
+    np.testing.assert_array_equal(R[0], own[0])
+    with pytest.raises(WildlabError, match="covariances"):
+        own_noise(own, np.eye(3))

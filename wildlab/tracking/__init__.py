@@ -45,7 +45,7 @@ from wildlab.tracking.motion import (
     rest,
     singer,
 )
-from wildlab.tracking.noise import constant_noise, noise_by_altitude, noise_by_direction
+from wildlab.tracking.noise import constant_noise, noise_by_altitude, noise_by_direction, own_noise
 from wildlab.tracking.platforms import measured_from, polar
 from wildlab.tracking.rays import Crossing, intersect_rays
 from wildlab.tracking.run import Start, Track, run_filter, start_from_first
@@ -87,6 +87,7 @@ __all__ = [
     "nearest_within",
     "noise_by_altitude",
     "noise_by_direction",
+    "own_noise",
     "pixels",
     "polar",
     "positions",

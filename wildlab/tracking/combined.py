@@ -118,20 +118,20 @@ def combined(sensors: Sequence[Sensor], which: ArrayLike) -> Sensor:
         return Prediction(z, H, H_pose)
 
     def ray(row: int, z: Array) -> tuple[Array, Array]:
-        sensor = sensors[kinds[row]]
+        sensor: Sensor = sensors[int(kinds[row])]
         if sensor.ray is None:
             return np.full(3, np.nan), np.full(3, np.nan)
         return sensor.ray(int(own_row[row]), z[: sizes[kinds[row]]])
 
     def locate(row: int, z: Array) -> Array:
-        sensor = sensors[kinds[row]]
+        sensor: Sensor = sensors[int(kinds[row])]
         if sensor.locate is None:
             return np.full(2, np.nan)
         return sensor.locate(int(own_row[row]), z[: sizes[kinds[row]]])
 
     return Sensor(
-        predict, tuple(map(bool, angles.any(axis=0))), N, states, considers=names, ray=ray, locate=locate,
-        sizes=sizes[kinds], row_angles=angles[kinds],
+        predict, tuple(bool(one.any()) for one in angles.T), N, states, considers=names, ray=ray,
+        locate=locate, sizes=sizes[kinds], row_angles=angles[kinds],
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 
 
@@ -76,3 +77,42 @@ def noise_by_direction(rays: ArrayLike, height: ArrayLike, fraction: float = 0.0
     steep = 1 + np.einsum("ni,ni->n", slope, slope)
     shape = steep[:, None, None] * (np.eye(2) + slope[:, :, None] * slope[:, None, :])
     return np.asarray((fraction * h)[:, None, None] ** 2 * shape)
+
+
+def own_noise(covariances: ArrayLike, otherwise: ArrayLike) -> Array:
+    """The detections' own covariances, and another where a detection has none.
+
+    Parameters
+    ----------
+    covariances
+        (N, m, m), or (N, K, m, m) of K detections in a row; in the measurement's units squared. One with NaN
+        in it, or without variance in some direction, is none.
+    otherwise
+        (m, m), or anything that fits beside ``covariances``: what `constant_noise` or another gives.
+
+    Returns
+    -------
+    R, as ``covariances``.
+
+    Raises
+    ------
+    WildlabError
+        Where shapes do not fit each other.
+
+    Examples
+    --------
+    >>> R = own_noise([np.diag([4.0, 9.0]), np.full((2, 2), np.nan)], np.eye(2))
+    >>> R[:, 1, 1].tolist()
+    [9.0, 1.0]
+    """
+    own, rest = np.asarray(covariances, float), np.asarray(otherwise, float)
+    if own.ndim not in (3, 4) or own.shape[-1] != own.shape[-2] or rest.shape[-2:] != own.shape[-2:]:
+        raise WildlabError(
+            f"covariances of the shape {own.shape}, and {rest.shape} otherwise",
+            "give (N, m, m) or (N, K, m, m), and (m, m)", field="covariances",
+        )  # fmt: skip
+    there = np.isfinite(own).all(axis=(-1, -2))
+    whole = np.where(there[..., None, None], own, np.eye(own.shape[-1]))
+    values = np.linalg.eigvalsh((whole + np.swapaxes(whole, -1, -2)) / 2)
+    there &= values[..., 0] > 1e-12 * np.abs(values[..., -1])
+    return np.where(there[..., None, None], own, np.broadcast_to(rest, own.shape))

@@ -158,10 +158,12 @@ def start_from_measurement(
     check_states(sensor, n)
     errors = errors_of(pose, sensor, len(given.times))
     where = sensor.locate
-    for row in range(len(given.times)) if where is not None else ():
+    for row in range(len(given.times)):
         z, noise = _first_detection(given, row)
         known = errors is None or np.isfinite(errors.covariance[row]).all()
-        near = where(row, z) if known and np.isfinite(z).all() else np.full(2, np.nan)
+        near = np.full(2, np.nan)
+        if where is not None and known and np.isfinite(z).all():
+            near = where(row, z)
         if np.isfinite(near).all():
             begin = start_from_position(
                 given.times[row], near, np.zeros((2, 2)), n=n, velocity=velocity, sd_velocity=sd_velocity,
