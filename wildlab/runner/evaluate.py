@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from rich.console import Console
 
 from wildlab.errors import WildlabError
@@ -13,8 +14,10 @@ from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.following.follow import refuse_unusable
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
+from wildlab.pipeline.sensor_tuning import FEWEST
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
@@ -37,7 +40,8 @@ def evaluate_flight(
     An overview, with what is most worth fixing, goes to ``<reports>/<name of the flight>-overview/``,
     whatever the flight lacks; its georeferencing to ``<name>`` (without truth: how far apart sightings of
     the same things lie), its navigation (inertial unit and GNSS
-    against the attitude found on board) to ``<name>-navigation``.
+    against the attitude found on board) to ``<name>-navigation``, the tracks of what was seen often enough to
+    ``<name>-tracking``.
 
     Parameters
     ----------
@@ -116,10 +120,14 @@ def evaluate_flight(
         prepare(f"{flight.name}-navigation", "navigation.ipynb", {}, again)
     elif flight.imu is not None and flight.manifest.twin is None:
         skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
+    untracked = lacking_for_tracking(flight, uses["tracking"], source)
+    if not untracked:
+        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": source or ""}, again)
     # The last to be run, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
     reasons += [f"navigation ({lacking})"] if lacking else []
+    reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": source or ""}
     prepare(f"{flight.name}-overview", "overview.ipynb", about, again)
     outcomes = run_all([jobs[:-1], jobs[-1:]], skipped, studies, reports, console)
@@ -157,6 +165,25 @@ def refuse_other_flight(folder: Path, report: Path) -> None:
 
 def _contents(flight: Mapping[str, Any]) -> set[str]:
     return {*flight.get("files", {}).values(), *flight.get("sources", ())}
+
+
+def lacking_for_tracking(flight: Flight, use: Use, source: str | None = None) -> str:
+    """Why no target of a flight can be followed, or nothing; ``use`` is what the checks say of it.
+
+    A target that is seen less often than `wildlab.pipeline.sensor_tuning.FEWEST` times makes no report.
+    """
+    if not use.usable:
+        return use.why
+    try:
+        refuse_unusable(flight, None, (), (), (), source)
+    except WildlabError as error:
+        return str(error).rstrip(".")
+    seen = flight.table("detections")
+    names = seen["target_id"].fillna("") if "target_id" in seen else pd.Series("", index=seen.index)
+    most = int(seen.groupby([seen["source"], names])["frame_id"].nunique().max())
+    if most < FEWEST:
+        return f"no target is seen in more than {most} looks, and {FEWEST} are the fewest that tell anything"
+    return ""
 
 
 def lacks_only_truth(flight: Flight) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +19,8 @@ from wildlab.pipeline.following.tuned import Against, Tuned, refuse_same, tune_f
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.evaluate import refuse_other_flight
 from wildlab.runner.processes.job import Job
-from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.processes.progress import shown
+from wildlab.runner.processes.scheduling import Outcome, run_jobs
 from wildlab.runner.run import make_job, run_all
 
 NOTEBOOK = "tracking.ipynb"
@@ -110,8 +112,11 @@ def track_flight(
         source=source,
         smooth=smooth,
     )
-    outcomes = run_all([[job]], [], studies, place.parent, console)
-    return outcomes[0]
+    if into is None:
+        return run_all([[job]], [], studies, place.parent, console)[0]
+    # A folder of one's own gets this report and no list of others.
+    with shown(console) if console is not None else nullcontext() as listen:
+        return run_jobs([job], listen=listen)[0]
 
 
 def tracking_job(

@@ -116,19 +116,20 @@ def follow_targets(
         looked[sensor] = truths
         known |= {one.target for one in truths}
         any_truth |= any(np.isfinite(one.position).any() for one in truths)
-        names = chosen_filters(looks, belief, filters)
-        if smooth:
-            names = [one for name in names for one in (name, f"{name}{SMOOTHED}") if one in (name, *SMOOTHABLE)]
+        names, without = chosen_filters(looks, belief, filters)
+        notes += without
+        names = _with_smoothed(names) if smooth else names
         for truth in truths:
             if targets and truth.target not in targets:
                 continue
             others = [one for one in truths if one.target != truth.target]
-            tracks += follow(looks, truth, belief, believed, names, others)
+            mine = follow(looks, truth, belief, believed, names, others)
+            notes += _never(mine, looks)
+            tracks += mine
     _refuse_unknown(targets, known, flight)
     if len(wanted) > 1:
         names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
-        if smooth:
-            names = [one for name in names for one in (name, f"{name}{SMOOTHED}") if one in (name, *SMOOTHABLE)]
+        names = _with_smoothed(names) if smooth else names
         for target in sorted(known):
             if targets and target not in targets:
                 continue
@@ -202,8 +203,12 @@ def _unknown(name: str, scans: Scans) -> Truth:
     return Truth(name, nowhere, nowhere, 0.0)
 
 
-def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> list[str]:
-    """The filters for a sensor: those wanted, always with the white one first; or what there is data for.
+def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The filters for a sensor, the white one first: those wanted, or what there is data for.
+
+    Returns
+    -------
+    Names, and for each that the sensor's detections cannot go through a sentence.
 
     Raises
     ------
@@ -211,15 +216,43 @@ def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> lis
         Where there is no such filter.
     """
     names = ["ekf" if name == "kf" else name for name in wanted]
-    for name in names:
-        if name not in NAMES:
-            raise WildlabError(
-                f"there is no filter {name!r}", f"use one of {', '.join(NAMES)}", field="--filter"
-            )
+    _refuse_unknown_filters(wanted)
     able = possible(scans, beliefs)
     if not names:
         names = [name for name in ("schmidt", "coloured") if not able[name] and not able["schmidt"]]
-    return list(dict.fromkeys([WHITE, *names]))
+    without = [
+        f"The filter {name!r} was not used by the sensor {scans.sensor!r}: {able[name]}."
+        for name in dict.fromkeys(names)
+        if able[name]
+    ]
+    return [name for name in dict.fromkeys([WHITE, *names]) if not able[name]], without
+
+
+def _refuse_unknown_filters(wanted: Sequence[str]) -> None:
+    for name in wanted:
+        if name not in (*NAMES, "kf"):
+            raise WildlabError(
+                f"there is no filter {name!r}", f"use one of {', '.join(NAMES)}", field="--filter"
+            )
+
+
+def _with_smoothed(names: Sequence[str]) -> list[str]:
+    """Each with its smoothed one behind it, where there is such."""
+    both = [one for name in names for one in (name, f"{name}{SMOOTHED}")]
+    return [one for one in both if one in (*NAMES, *SMOOTHABLE)]
+
+
+def _never(tracks: Sequence[SensorTrack], scans: Scans) -> list[str]:
+    """Why a target that was seen has no track."""
+    one = tracks[0]
+    if np.isfinite(one.estimate).any() or not one.near.any():
+        return []
+    why = {
+        "bearing": "its first bearings do not settle on a place; state range_m of the sensor, or tune it",
+        "velocity": "a velocity says nothing of the place; another sensor has to",
+        "pixel": "no ray meets the ground; is the height of its plane stated (plane_down_m)?",
+    }.get(scans.kind, "no detection has a platform beside it; do poses cover the flight?")
+    return [f"{one.target} was never followed by {one.sensor}: {why}."]
 
 
 def order_notes(scans: Scans) -> list[str]:
@@ -268,11 +301,7 @@ def refuse_unusable(
             field="time.kind",
         )
     believed, _ = of_targets(of_flight(flight, settings).targets)
-    for name in filters:
-        if name not in (*NAMES, "kf"):
-            raise WildlabError(
-                f"there is no filter {name!r}", f"use one of {', '.join(NAMES)}", field="--filter"
-            )
+    _refuse_unknown_filters(filters)
     known: set[str] = set()
     for sensor in sensors_with_detections(flight, sensors):
         looks = identified(scans_of(flight, sensor, 0.0, source), believed)

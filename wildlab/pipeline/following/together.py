@@ -1,7 +1,7 @@
 """One target by several sensors in one track, each with its own noise, clock and errors that last.
 
-Errors of one name that two sensors believe in alike (same standard deviation, same correlation time) and share
-are one error, as those of the heading of the platform that both are on; others are each sensor's own.
+Errors of one name that two sensors believe in alike (same standard deviation, same correlation time) and
+share are one error, as that of the heading of the platform that both are on; others are each sensor's own.
 """
 
 from __future__ import annotations
