@@ -9,18 +9,13 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import from_tuning
+from wildlab.pipeline.following.expected import errors_near
+from wildlab.pipeline.following.starts import start_near
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
-from wildlab.pipeline.sensor_tracks import (
-    FILTERS,
-    GATE,
-    PATIENCE_S,
-    WITH_ITS_TARGET_M,
-    SensorTrack,
-    follow_flight,
-    start_near,
-    table,
-)
-from wildlab.pipeline.sensor_tuning import REACH, SensorTuning, errors_near, tune
+from wildlab.pipeline.sensor_tracks import FILTERS, SensorTrack, follow_flight, table
+from wildlab.pipeline.sensor_tuning import SensorTuning
+from wildlab.studies.autoferry.boats import BOATS, tune_sensor
 from wildlab.studies.autoferry.comparison import off_ideal
 
 KEYS = ["sensor", "target"]
@@ -127,12 +122,12 @@ def test_looks_keep_those_that_saw_nothing():
 def test_what_a_late_sensor_saw_stands_where_the_platform_was_then():
     scans = scans_of(make(sd=0.0, late_s=1.5), "lidar", -1.5)
     truth = truths_at(make(), scans.times)[0]
-    error, which = errors_near(scans, truth)
+    error, which = errors_near(scans, truth, BOATS.reach_m)
     seen = which >= 0
     assert seen.sum() > 150
     assert np.abs(error[seen]).max() < 0.02
     uncorrected = scans_of(make(sd=0.0, late_s=1.5), "lidar")
-    late = errors_near(uncorrected, truths_at(make(), uncorrected.times)[0])[0]
+    late = errors_near(uncorrected, truths_at(make(), uncorrected.times)[0], BOATS.reach_m)[0]
     assert np.nanmean(np.hypot(*late.T)) > 2
 
 
@@ -147,11 +142,14 @@ def test_what_cannot_be_followed_is_said():
     flight = make()
     with pytest.raises(WildlabError, match=r"no sensor 'radar'.*Use one of lidar"):
         scans_of(flight, "radar")
-    flight.tables["detections"]["kind"] = "pixel"
-    with pytest.raises(WildlabError, match=r"the sensor 'lidar' detects pixel.*position or bearing"):
+    seen = flight.tables["detections"]
+    seen.loc[seen.index[0], "kind"] = "pixel"
+    with pytest.raises(WildlabError, match=r"the sensor 'lidar' detects pixel and position.*of one kind"):
         scans_of(flight, "lidar")
     del flight.tables["frames"]["sensor"]
-    with pytest.raises(WildlabError, match="the frames do not say which sensor looked"):
+    assert sensors_of(flight) == ["lidar"]  # who detected is who looked
+    flight.tables["detections"] = seen.iloc[:0]
+    with pytest.raises(WildlabError, match="no detections, and no frame says which sensor looked"):
         sensors_of(flight)
 
 
@@ -161,7 +159,7 @@ def test_what_cannot_be_followed_is_said():
 @pytest.mark.slow
 def test_clock_noise_and_correlation_come_back():
     correlation = float(np.exp(-0.5 / 6.0))
-    found = [tune(make(seed, late_s=1.5, correlation=correlation), "lidar") for seed in range(6)]
+    found = [tune_sensor(make(seed, late_s=1.5, correlation=correlation), "lidar") for seed in range(6)]
     assert np.mean([one.offset_s for one in found]) == pytest.approx(-1.5, abs=0.15)
     inside = [one.offset_low_s - 0.05 <= -1.5 <= one.offset_high_s + 0.05 for one in found]
     assert sum(inside) >= 5
@@ -174,7 +172,7 @@ def test_clock_noise_and_correlation_come_back():
 
 
 def test_white_errors_are_found_white():
-    found = tune(make(3), "lidar")
+    found = tune_sensor(make(3), "lidar")
     assert abs(found.next_correlation) < 0.1
     assert found.white_sd == pytest.approx(2.0, rel=0.1)
     # Every look may be kept.
@@ -190,7 +188,7 @@ def test_a_heading_that_is_wrong_is_put_down_to_the_heading():
     turn, offset = np.radians(3.0), seen[["north_m", "east_m"]].to_numpy() - own
     seen["north_m"] = own[:, 0] + np.cos(turn) * offset[:, 0] - np.sin(turn) * offset[:, 1]
     seen["east_m"] = own[:, 1] + np.sin(turn) * offset[:, 0] + np.cos(turn) * offset[:, 1]
-    found = tune(flight, "lidar")
+    found = tune_sensor(flight, "lidar")
     assert np.degrees(found.yaw_sd_rad) == pytest.approx(3.0, rel=0.25)
     assert found.range_m * found.yaw_sd_rad > 2 * found.position_sd_m
 
@@ -199,7 +197,7 @@ def test_too_few_errors_are_no_tuning():
     flight = make()
     flight.tables["detections"] = flight.tables["detections"].iloc[:19]
     with pytest.raises(WildlabError, match="only 19 detections of 'lidar' lie near a target"):
-        tune(flight, "lidar")
+        tune_sensor(flight, "lidar")
 
 
 # --- following ----------------------------------------------------------------------------------------------
@@ -208,9 +206,12 @@ def test_too_few_errors_are_no_tuning():
 @pytest.mark.slow
 def test_white_noise_is_followed_honestly_and_coloured_noise_is_not():
     def mean(correlation: float) -> pd.DataFrame:
-        tuning = tune(make(100, correlation=correlation), "lidar")
+        tuning = tune_sensor(make(100, correlation=correlation), "lidar")
         return pd.concat(
-            [table(follow_flight(make(k, correlation=correlation), {"lidar": tuning})) for k in range(8)]
+            [
+                table(follow_flight(make(k, correlation=correlation), {"lidar": tuning}, BOATS))
+                for k in range(8)
+            ]
         )
 
     white, coloured = mean(0.0), mean(float(np.exp(-0.5 / 8.0)))
@@ -227,9 +228,9 @@ def test_white_noise_is_followed_honestly_and_coloured_noise_is_not():
 def test_a_bearing_sensor_that_moves_sees_where_a_target_is():
     flight = make(2, kind="bearing", sd=0.3, sees=("two",))
     flight.tables["truth"] = flight.tables["truth"].query("target_id == 'two'")
-    tuning = tune(flight, "lidar")
+    tuning = tune_sensor(flight, "lidar")
     assert tuning.kind == "bearing"
-    rows = table(follow_flight(flight, {"lidar": tuning}))
+    rows = table(follow_flight(flight, {"lidar": tuning}, BOATS))
     assert list(rows["filter"]) == list(FILTERS["bearing"])
     assert rows["lag1_autocorrelation_north"].isna().all()
     assert np.isfinite(rows["lag1_autocorrelation"]).all()
@@ -246,11 +247,11 @@ def test_a_track_ends_where_detections_end_and_truth_that_ends_is_counted():
     seen = flight.tables["detections"]
     k = seen["frame_id"].str.removeprefix("lidar-").astype(int)
     flight.tables["detections"] = seen[(k < 100) | (k > 180)]
-    rows = follow_flight(flight, {"lidar": quiet(sd=0.5)})
+    rows = follow_flight(flight, {"lidar": quiet(sd=0.5)}, BOATS)
     one = next(f for f in rows if f.target == "one" and f.filter == "kf")
     alive = one.times[np.isfinite(one.estimate[:, 0])]
     last = one.times[99]
-    assert last < alive.max() <= last + PATIENCE_S
+    assert last < alive.max() <= last + BOATS.patience_s
     assert np.isnan(one.error[one.times > 90.0]).all()
     row = by_filter(rows).loc["kf"]
     known = (one.times <= 90.0).sum()
@@ -259,7 +260,7 @@ def test_a_track_ends_where_detections_end_and_truth_that_ends_is_counted():
 
 
 def test_every_filter_is_given_the_same_detections():
-    rows = follow_flight(make(5), {"lidar": quiet()})
+    rows = follow_flight(make(5), {"lidar": quiet()}, BOATS)
     one = {f.filter: f for f in rows if f.target == "one"}
     used = {name: np.isfinite(f.nis) for name, f in one.items()}
     np.testing.assert_array_equal(used["kf"], used["coloured"])
@@ -268,7 +269,7 @@ def test_every_filter_is_given_the_same_detections():
     assert (used["kf"] | ~used["thinned"]).all()
     gaps = np.diff(one["thinned"].times[used["thinned"]])
     assert gaps.min() >= quiet().thinning_s - 1e-9
-    assert 0 < GATE < 1
+    assert 0 < BOATS.gate_probability < 1
 
 
 def test_a_track_does_not_start_on_another_target():
@@ -280,13 +281,13 @@ def test_a_track_does_not_start_on_another_target():
     flight.tables["truth"] = pd.concat([beside, two], ignore_index=True)
     scans = scans_of(flight, "lidar")
     one, other = truths_at(flight, scans.times)
-    assert start_near(scans, one, quiet()) is not None
-    assert start_near(scans, one, quiet(), [other]) is None
-    start = start_near(scans, other, quiet(), [one])
+    assert start_near(scans, one, from_tuning(quiet()), BOATS) is not None
+    assert start_near(scans, one, from_tuning(quiet()), BOATS, [other]) is None
+    start = start_near(scans, other, from_tuning(quiet()), BOATS, [one])
     assert start is not None
     np.testing.assert_allclose(start.x[:2], other.position[0], atol=0.5)
-    np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * REACH["position"] ** 2)
-    rows = by_filter(follow_flight(flight, {"lidar": quiet()}))
+    np.testing.assert_allclose(start.P[:2, :2], np.eye(2) * BOATS.reach_m**2)
+    rows = by_filter(follow_flight(flight, {"lidar": quiet()}, BOATS))
     assert (rows["share_followed"] == 0).all()
     assert rows["rmse"].isna().all()
 
@@ -295,7 +296,7 @@ def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
     n = 40
     estimate, near = np.zeros((n, 4)), np.arange(n) < 30
     error = np.zeros((n, 4))
-    error[10:, 0] = WITH_ITS_TARGET_M + 1.0  # it strays
+    error[10:, 0] = BOATS.size_m + 1.0  # it strays
     error[20:] = np.nan  # and ends, while the target is still seen
     nan, known = np.full(n, np.nan), np.ones(n, bool)
     one = SensorTrack(
@@ -311,15 +312,15 @@ def test_a_track_is_with_its_target_where_it_is_near_it_while_that_is_seen():
         known,
         near,
     )
-    (row,) = table([one]).to_dict(orient="records")
+    (row,) = table([one], BOATS.size_m).to_dict(orient="records")
     assert (row["seen"], row["share_with_target"]) == (30, pytest.approx(1 / 3))
-    unseen = table([one._replace(near=np.zeros(n, bool))]).iloc[0]
+    unseen = table([one._replace(near=np.zeros(n, bool))], BOATS.size_m).iloc[0]
     assert unseen["seen"] == 0 and np.isnan(unseen["share_with_target"])
 
 
 def test_what_is_near_a_target_is_what_the_sensor_saw_of_it():
-    followed = follow_flight(make(4, sd=0.5, sees=("two",)), {"lidar": quiet(sd=0.5)})
-    shares = table(followed).set_index(["target", "filter"])["share_with_target"]
+    followed = follow_flight(make(4, sd=0.5, sees=("two",)), {"lidar": quiet(sd=0.5)}, BOATS)
+    shares = table(followed, BOATS.size_m).set_index(["target", "filter"])["share_with_target"]
     assert shares["two", "kf"] > 0.95
     seen = {one.target: one.near for one in followed}
     assert seen["two"].sum() == pytest.approx(

@@ -135,7 +135,9 @@ def follow(
         chosen[begin.row] = int(np.argmax(np.isfinite(seen[begin.row]).all(axis=-1)))
     own = np.where(first.used[:, None], seen[rows, np.maximum(chosen, 0)], np.nan)
     ids = np.where(first.used, scans.ids[rows, np.maximum(chosen, 0)], "")
-    last = last_row(scans.times, first.used, begin.time, targets.patience_s)
+    # What names its target finds it again, however long that was out of view.
+    patience = np.inf if scans.labelled else targets.patience_s
+    last = last_row(scans.times, first.used, begin.time, patience, targets.patience_s)
     begun = scans.times > begin.time
     found = []
     for name in filters:
@@ -163,12 +165,14 @@ def begin_of_target(
     return seen, start_first(scans, own, beliefs, targets)
 
 
-def last_row(times: Array, used: NDArray[np.bool_], start: float, patience: float) -> int:
-    """The first row that has a track no more."""
+def last_row(
+    times: Array, used: NDArray[np.bool_], start: float, patience: float, after: float | None = None
+) -> int:
+    """The first row that has a track no more: ``after`` s behind the last one used before a longer pause."""
     hits = np.concatenate([[start], times[used]])
     pauses = np.flatnonzero(np.diff(hits) > patience)
     end = hits[pauses[0]] if len(pauses) else hits[-1]
-    return int(np.searchsorted(times, end + patience, side="right"))
+    return int(np.searchsorted(times, end + (patience if after is None else after), side="right"))
 
 
 def scored(

@@ -10,8 +10,8 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
-from wildlab.pipeline.following.considering import spread_of
-from wildlab.pipeline.following.expected import errors_near, predict_scan, sensor_of
+from wildlab.pipeline.following.considering import errors_of
+from wildlab.pipeline.following.expected import SLOTS, errors_near, sensor_of
 from wildlab.pipeline.scans import Scans, Truth
 from wildlab.tracking.records import Start
 from wildlab.tracking.starts import start_from_rays
@@ -97,12 +97,12 @@ def place_of(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> tuple[Array,
         across = beliefs.range_m * float(beliefs.white[0])
         P = beliefs.range_sd_m**2 * np.outer(ahead, ahead) + across**2 * np.outer(right, right)
         return place, P
-    n = len(scans.times)
-    expected = predict_scan(scans, np.tile(place, (n, 1)), np.zeros((n, 2)))
-    H = expected.H_position[row, :, :2]
-    lasting = spread_of(scans, beliefs, expected.H_pose)
-    if lasting is not None and np.isfinite(lasting[row]).all():
-        R = R + lasting[row]
+    seen = sensor_of(scans, np.zeros_like(scans.platform)).predict(row, np.append(place, [0.0, 0.0]))
+    H = seen.H_position[:, :2]
+    errors = errors_of(scans, beliefs)
+    if errors is not None and np.isfinite(errors.covariance[row]).all():
+        G = seen.H_pose[:, [SLOTS[scans.kind].index(name) for name in errors.names]]
+        R = R + G @ errors.covariance[row] @ G.T
     if not np.isfinite(H).all():
         return None
     inverse = np.linalg.pinv(H)

@@ -75,7 +75,8 @@ def follow_together(
         chosen[begin.row] = int(np.argmax(np.isfinite(z[begin.row]).any(axis=-1)))
     own = np.where(first.used[:, None], z[rows, chosen], np.nan)
     ids = np.where(first.used, looks.ids[rows, chosen], "")
-    last = last_row(merged.times, first.used, begin.time, targets.patience_s)
+    patience = np.inf if labelled else targets.patience_s
+    last = last_row(merged.times, first.used, begin.time, patience, targets.patience_s)
     begun = rows > begin.row if begin.row >= 0 else merged.times > begin.time
     found = []
     for name in filters:
