@@ -170,12 +170,13 @@ def _counted(
     extent = high - low
     size = float(np.median(np.ptp(known, axis=1).min(axis=1)))
     step = max(size / ACROSS, float(np.sqrt(extent.prod() / MOST_CELLS)), 1e-3)
-    rows, columns = (int(cells) for cells in np.ceil(extent / step).astype(int) + 1)
-    # Columns run east and rows north; a cell counts where its centre is inside.
-    grid = Affine(step, 0, low[1] - step / 2, 0, step, low[0] - step / 2)
+    rows, columns = (int(cells) for cells in np.maximum(np.ceil(extent / step), 1).astype(int))
+    # Columns run east and rows north; a cell counts where its centre is inside. Edges of an outline seldom
+    # run through centres where the grid begins at its corner: such cells would count twice.
+    grid = Affine(step, 0, low[1], 0, step, low[0])
     shapes = [({"type": "Polygon", "coordinates": [one[:, ::-1].tolist()]}, 1) for one in _closed(known)]
     counts = rasterize(shapes, (rows, columns), transform=grid, merge_alg=MergeAlg.add, dtype="int32")
-    return Coverage(images, posed, flat, outlines, counts, float(low[0]), float(low[1]), step, ground)
+    return Coverage(images, posed, flat, outlines, counts, low[0] + step / 2, low[1] + step / 2, step, ground)
 
 
 def _closed(outlines: Array) -> Array:

@@ -102,9 +102,10 @@ def path_name(path: Path) -> str:
 
 def _room(ax: Axes, east: Array, north: Array) -> None:
     """Room about a path: at least some metres, so that one that stands still is not noise blown up."""
-    reach = max(float(np.ptp(east)), float(np.ptp(north)), 5.0) * 0.56
-    ax.set_xlim(float(east.min() + east.max()) / 2 - reach, float(east.min() + east.max()) / 2 + reach)
-    ax.set_ylim(float(north.min() + north.max()) / 2 - reach, float(north.min() + north.max()) / 2 + reach)
+    reach = max(float(np.ptp(east)), float(np.ptp(north)), 5.0) / 2
+    middle = np.array([east.min() + east.max(), north.min() + north.max()]) / 2
+    ax.update_datalim([middle - reach, middle + reach])
+    ax.autoscale_view()
 
 
 def _spell_words(trouble: Trouble) -> str:
@@ -130,11 +131,11 @@ def coverage_chart(coverage: Coverage, path: Path | None, title: str) -> Figure:
         shown, origin="lower", extent=extent, cmap=ListedColormap(SHADES), norm=norm, interpolation="nearest"
     )
     if path is not None:
-        keep = thinned(len(path.place))
-        ax.plot(path.place[keep, 1], path.place[keep, 0], color=INK, lw=0.7, alpha=0.8)
-    # What was seen, not the whole way there.
-    ax.set_xlim(extent[0], extent[1])
-    ax.set_ylim(extent[2], extent[3])
+        # What was seen is shown, not the whole way there.
+        place = path.place[thinned(len(path.place))][:, [1, 0]].copy()
+        low, high = np.array([extent[0], extent[2]]), np.array([extent[1], extent[3]])
+        place[((place < low) | (place > high)).any(axis=1)] = np.nan
+        ax.plot(place[:, 0], place[:, 1], color=INK, lw=0.7, alpha=0.8)
     bar = fig.colorbar(picture, ax=ax, shrink=0.8, ticks=LOOKS)
     bar.ax.set_yticklabels([f"{low}" if low < LOOKS[-1] else f"{low} +" for low in LOOKS])
     bar.set_label("images that show a place")

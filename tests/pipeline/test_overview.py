@@ -1,0 +1,364 @@
+"""The overview of a flight: streams, troubles, coverage and losses by closed forms; and whatever it lacks."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.streams import pace_of, runs_of
+from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.image_coverage import cover_images
+from wildlab.pipeline.overview import TROUBLES, best_source, look_over
+from wildlab.pipeline.worth_fixing import (
+    FIX,
+    LEVELS,
+    MEND,
+    SOUND,
+    UNJUDGED,
+    gains_of,
+    numbers_of,
+    verdict_of,
+)
+from wildlab.reporting.overview import show_overview
+from wildlab.reporting.report import open_report
+from wildlab.simulation.twins import simulate_twin
+
+
+def page_of(
+    flight: Flight, folder: Path, *, numbers: Any = None, judged: int = 0
+) -> tuple[str, dict[str, Any]]:
+    """The whole report of a flight as HTML, and the numbers it left."""
+    overview = look_over(flight)
+    found = numbers or {}
+    kind = flight.manifest.kind
+    report = open_report(study="overview", kind=kind, flight=flight.name, seed=1, out=str(folder))
+    show_overview(report, overview, gains_of(overview, found), found, [], ["tracking (none)"], judged)
+    report.save()
+    return "\n".join(report.parts), json.loads((folder / "metrics.json").read_text())
+
+
+def values(content: dict[str, Any]) -> dict[tuple[str, str], float]:
+    return {(one["name"], one["subject"]): one["value"] for one in content["metrics"]}
+
+
+def test_a_stream_with_a_hole_and_lost_samples_is_counted() -> None:
+    t = np.arange(0, 100, 0.02)
+    whole = pace_of(t, 1.0)
+    assert (whole.n, whole.missing, len(whole.gaps), whole.unordered) == (5000, 0, 0, 0)
+    assert whole.rate_hz == pytest.approx(50) and whole.even
+    kept = np.delete(t, np.r_[1000:1100, 3000, 3500:3503])
+    holed = pace_of(kept, 1.0)
+    assert holed.missing == 104
+    assert holed.missing_share == pytest.approx(104 / 5000)
+    assert holed.gaps == pytest.approx(np.array([[19.98, 22.0]]))
+    assert holed.paused_s == pytest.approx(2.02)
+    mixed = kept.copy()
+    mixed[[10, 11]] = mixed[[11, 10]]
+    assert pace_of(mixed, 1.0).unordered == 1
+
+
+def test_what_is_triggered_now_and_then_has_no_rate() -> None:
+    t = np.cumsum(np.random.default_rng(1).uniform(0.1, 5.0, 200))
+    pace = pace_of(t, 100.0)
+    assert not pace.even and pace.missing == 0
+
+
+@pytest.mark.parametrize("stamps", [[], [np.nan], [3.0], [3.0, 3.0]])
+def test_no_stream_is_too_short(stamps: list[float]) -> None:
+    pace = pace_of(stamps, 1.0)
+    assert len(pace.gaps) == 0 and pace.missing == 0 and np.isnan(pace.rate_hz)
+
+
+def test_runs_are_where_the_mask_is() -> None:
+    mask = np.random.default_rng(0).random(500) < 0.5
+    t = np.arange(500.0)
+    spells = runs_of(mask, t)
+    inside = np.zeros(500, bool)
+    for begin, end in spells:
+        inside[int(begin) : int(end) if end < 499 or not mask[-1] else 500] = True
+    assert (inside == mask).all()
+
+
+@pytest.mark.parametrize(("hertz", "size"), [(10.0, 4.0), (35.0, 20.0), (90.0, 50.0)])
+def test_a_sine_shakes_by_what_theory_says(hertz: float, size: float) -> None:
+    """At a rate high enough for the continuous filter: its high pass, and the root mean square of a sine."""
+    t = np.arange(0, 30, 1 / 2000)
+    force = np.stack([0 * t, size * np.sin(2 * np.pi * hertz * t), 0 * t - 9.81], axis=1)
+    found = vibration_of(t, force)
+    assert found is not None
+    passed = size / np.sqrt(2) * hertz / np.hypot(hertz, FLOOR_HZ)
+    assert np.sqrt((found.level[20000:, 1] ** 2).mean()) == pytest.approx(passed, rel=0.03)
+    assert found.level[20000:, 2].max() < 1e-6 * size
+    band = (found.bands[:, 0] <= hertz) & (hertz < found.bands[:, 1])
+    assert found.rms[band, 1] == pytest.approx(size / np.sqrt(2), rel=0.03)
+    assert found.rms[:, 0].max() < 1e-9
+
+
+def test_too_slow_or_too_few_samples_tell_nothing_of_shaking() -> None:
+    t = np.arange(0, 100, 0.1)
+    assert vibration_of(t, np.zeros((len(t), 3))) is None
+    assert vibration_of(t[:50] / 10, np.zeros((50, 3))) is None
+
+
+def level_images(places: list[tuple[float, float]], height: float = 100.0, lean_deg: float = 0.0) -> Flight:
+    """Images straight down at places (north, east), or leaning forward; the ground is level at 0."""
+    twin = simulate_twin("large-ship", 1)
+    camera = {"name": "c", "width_px": 400, "height_px": 200, "fx_px": 200.0, "fy_px": 200.0,
+              "cx_px": 200.0, "cy_px": 100.0}  # fmt: skip
+    changes: dict[str, Any] = {"camera": camera, "mount": {"looks": "down", "pan_deg": 0.0, "tilt_deg": 0.0,
+        "lever_arm_m": (0.0, 0.0, 0.0), "misalignment_roll_deg": 0.0, "misalignment_tilt_deg": 0.0,
+        "misalignment_pan_deg": 0.0}}  # fmt: skip
+    manifest = replace_in_manifest(twin.manifest, changes)
+    names = [f"i{k}" for k in range(len(places))]
+    half = np.radians(lean_deg) / 2
+    nav = pd.DataFrame(places, columns=["north_m", "east_m"]).assign(
+        time_s=np.arange(float(len(places))), down_m=-height, frame_id=names,
+        q_w=np.cos(half), q_x=0.0, q_y=np.sin(half), q_z=0.0,
+    )  # fmt: skip
+    frames = pd.DataFrame({"frame_id": names, "time_s": np.arange(float(len(places)))})
+    truth = pd.DataFrame(
+        {"target_id": ["t"], "time_s": [np.nan], "north_m": 0.0, "east_m": 0.0, "down_m": 0.0}
+    )
+    return Flight(manifest, {"logged": nav}, {"frames": frames, "truth": truth})
+
+
+def test_footprints_have_the_area_and_the_overlap_of_rectangles() -> None:
+    """200 m wide and 100 m long from 100 m: two apart, and two that share half."""
+    apart, _ = cover_images(level_images([(0.0, 0.0), (500.0, 0.0)]), "logged")
+    assert apart is not None
+    assert apart.area_m2 == pytest.approx(2 * 200 * 100, rel=0.01)
+    assert apart.looks == pytest.approx(1) and apart.twice == pytest.approx(0)
+    assert apart.placed.all() and not apart.flat.any()
+    half, _ = cover_images(level_images([(0.0, 0.0), (50.0, 0.0)]), "logged")
+    assert half is not None
+    assert half.area_m2 == pytest.approx(200 * 150, rel=0.02)
+    assert half.twice == pytest.approx(1 / 3, abs=0.02)
+    assert half.looks == pytest.approx(4 / 3, abs=0.02)
+
+
+def test_footprints_on_level_terrain_are_those_on_the_plane() -> None:
+    flight = level_images([(0.0, 0.0), (30.0, 20.0)])
+    terrain = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
+    one, _ = cover_images(flight, "logged")
+    other, _ = cover_images(replace(flight, terrain=terrain), "logged")
+    assert one is not None and other is not None and other.ground == "the flight's terrain"
+    assert other.outlines == pytest.approx(one.outlines, abs=1e-3)
+
+
+def test_an_image_of_the_horizon_has_no_footprint() -> None:
+    seen, _ = cover_images(level_images([(0.0, 0.0)], lean_deg=70.0), "logged")
+    assert seen is not None and seen.flat.tolist() == [True] and not seen.placed.any()
+    assert seen.area_m2 == 0 and np.isnan(seen.looks)
+
+
+@pytest.mark.parametrize(
+    ("without", "why"),
+    [("frames", "it lacks images"), ("truth", "the height of the ground is not known")],
+)
+def test_why_nothing_is_known_of_coverage_is_said(without: str, why: str) -> None:
+    flight = level_images([(0.0, 0.0)])
+    del flight.tables[without]
+    found, said = cover_images(flight, "logged")
+    assert found is None and why in said
+    assert cover_images(flight, None)[1].startswith("it lacks")
+
+
+def holed(make_flight: Callable[..., Flight]) -> Flight:
+    """A flight whose poses have a hole of five seconds, and a receiver with little to see in it."""
+    flight = make_flight(n_images=40)
+    nav = flight.nav["logged"]
+    flight.nav["logged"] = nav[(nav["time_s"] < 10.05) | (nav["time_s"] > 14.95)].reset_index(drop=True)
+    t = np.arange(0.0, 40.0, 0.5)
+    at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
+    flight.tables["gnss"] = pd.DataFrame(
+        {"time_s": t, **at, "satellites": np.where((t > 20) & (t < 23.9), 5.0, 11.0),
+         "sd_horizontal_m": np.where((t > 30) & (t < 31.9), 9.0, 1.0), "fix": 3.0}
+    )  # fmt: skip
+    return flight
+
+
+def test_what_is_wrong_along_the_path_is_found(make_flight: Callable[..., Flight]) -> None:
+    overview = look_over(holed(make_flight))
+    found = {one.what: one for one in overview.troubles}
+    assert set(found) == {TROUBLES[0], TROUBLES[3], TROUBLES[4]}
+    assert found["no poses"].spells == pytest.approx(np.array([[10.0, 15.0]]), abs=0.06)
+    assert found[TROUBLES[3]].spells == pytest.approx(np.array([[20.5, 24.0]]))
+    assert found[TROUBLES[4]].spells == pytest.approx(np.array([[30.5, 32.0]]))
+    assert [one.what for one in overview.troubles] == [what for what in TROUBLES if what in found]
+
+
+def test_a_jump_of_the_poses_is_found_by_their_speeds() -> None:
+    twin = simulate_twin("large-ship", 1)
+    nav = twin.nav["autopilot"].copy()
+    assert not look_over(twin, "autopilot").troubles
+    nav.loc[200:, "east_m"] += 40.0
+    twin.nav["autopilot"] = nav
+    (jump,) = [one for one in look_over(twin, "autopilot").troubles if one.what == "position jumps"]
+    assert jump.spells == pytest.approx(nav["time_s"].to_numpy()[None, 199:201])
+
+
+def test_images_in_a_hole_are_counted_with_the_reason(make_flight: Callable[..., Flight]) -> None:
+    flight = holed(make_flight)
+    frames = flight.tables["frames"]
+    inside = int(((frames["time_s"] > 10.0) & (frames["time_s"] < 15.0)).sum())
+    (lost,) = [one for one in look_over(flight).lost if one.key == "images_without_pose"]
+    assert (lost.lost, lost.of) == (inside, len(frames)) and inside
+    assert lost.why == f"{inside} in its pauses"
+    flight.nav["logged"] = flight.nav["logged"].query("time_s < 20")
+    (lost,) = [one for one in look_over(flight).lost if one.key == "images_without_pose"]
+    after = int((frames["time_s"] >= 20).sum())
+    assert lost.why.startswith(f"{after} before the log of the poses begins or after it ends and {inside} in")
+
+
+def test_detections_whose_target_has_no_truth_are_counted(make_flight: Callable[..., Flight]) -> None:
+    flight = make_flight(n_images=10)
+    detections = flight.tables["detections"]
+    detections.loc[:4, "target_id"] = "nobody"
+    (lost,) = [one for one in look_over(flight).lost if one.key == "detections_without_truth"]
+    assert (lost.lost, lost.of) == (5, int((detections["target_id"] != "").sum()))
+
+
+def georeferenced(gain: float, after: float, low: float) -> dict[str, Any]:
+    def entry(name: str, subject: str, value: float, **more: float) -> dict[str, Any]:
+        return {"name": name, "subject": subject, "value": value, "low": None, "high": None, "n": 90, **more}
+
+    metrics = [
+        entry("gain", "winner", gain, low=low, high=2 * gain - low),
+        entry("boresight_tilt", "calibration", 1.0),
+        entry("clock_offset", "calibration", 0.2),
+    ]
+    if low > 0:
+        metrics.append(entry("horizontal_error_mean", "calibrated-pose", after))
+    return {"metrics": metrics}
+
+
+def test_only_what_was_measured_is_a_gain(make_flight: Callable[..., Flight]) -> None:
+    overview = look_over(holed(make_flight))
+    alone = gains_of(overview, {})
+    assert alone and {one.unit for one in alone} == {"1"}
+    first, *others = gains_of(overview, numbers_of([georeferenced(3.0, 1.0, 2.0)]))
+    assert (first.key, first.causes) == ("cause", ("boresight", "camera's clock"))
+    assert first.share == pytest.approx(0.75) and first.of == pytest.approx(4.0)
+    assert [one.share for one in others] == sorted((one.share for one in others), reverse=True)
+    uncertain = gains_of(overview, numbers_of([georeferenced(3.0, 1.0, -0.1)]))
+    assert [one.key for one in uncertain] == [one.key for one in alone]
+
+
+def test_the_verdict_follows_from_what_was_counted() -> None:
+    assert verdict_of(1, 3, 2) == MEND and verdict_of(0, 1, 0) == FIX
+    assert verdict_of(0, 0, 1) == SOUND and verdict_of(0, 0, 0) == UNJUDGED
+    assert set(LEVELS) == {MEND, FIX, SOUND, UNJUDGED}
+
+
+def test_the_page_says_first_what_is_most_worth_fixing(
+    make_flight: Callable[..., Flight], tmp_path: Path
+) -> None:
+    numbers = numbers_of([georeferenced(3.0, 1.0, 2.0)])
+    html, content = page_of(holed(make_flight), tmp_path, numbers=numbers, judged=1)
+    assert "Something is worth fixing: a constant error of the boresight" in html
+    assert (
+        "gains 3.0 m (2.0 to 4.0) of a mean error of 4.0 m on images that it was not estimated from: 75 %"
+        in html
+    )
+    assert html.index("Most worth fixing") < html.index("Where it flew")
+    found = values(content)
+    assert found["worth_fixing", "flight"] == 2 and found["problems", "flight"] == 0
+    assert found["gain_share", "cause"] == pytest.approx(0.75)
+    assert found["trouble", "no-poses"] == pytest.approx(5.0, abs=0.1)
+
+
+def without(flight: Flight, *, nav: bool = True, tables: tuple[str, ...] = ()) -> Flight:
+    kept = {name: table for name, table in flight.tables.items() if name in tables}
+    return Flight(flight.manifest, dict(flight.nav) if nav else {}, kept)
+
+
+@pytest.mark.parametrize(
+    ("nav", "tables"),
+    [
+        (True, ()),
+        (False, ("gnss",)),
+        (False, ("imu",)),
+        (False, ("frames",)),
+        (False, ("truth",)),
+        (False, ("frames", "detections")),
+        (True, ("frames",)),
+        (True, ("frames", "detections")),
+        (False, ()),
+    ],
+)
+def test_a_flight_that_lacks_anything_has_its_page(
+    nav: bool, tables: tuple[str, ...], tmp_path: Path
+) -> None:
+    whole = simulate_twin("fast-vessel", 1)
+    flight = without(whole, nav=nav, tables=tables)
+    html, content = page_of(flight, tmp_path)
+    assert "Most worth fixing" in html and not re.search(
+        r"\bnan\b", re.sub('data:image[^"]*', "", html.lower())
+    )
+    assert values(content)["reports_beside", "flight"] == 0
+    if not nav and tables not in (("gnss",), ("truth",)):
+        assert "There is no map: no table of this flight has positions over time." in html
+    if not nav and not tables:
+        assert "No table of this flight has stamps." in html
+
+
+def test_poses_without_covariance_or_velocity_and_empty_tables_are_fine(tmp_path: Path) -> None:
+    whole = simulate_twin("large-ship", 1)
+    nav = whole.nav["autopilot"]
+    bare = nav[["time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z"]]
+    flight = Flight(whole.manifest, {"autopilot": bare}, dict(whole.tables))
+    assert "Height, speed and attitude" in page_of(flight, tmp_path)[0]
+    empty = {name: table.iloc[:0] for name, table in whole.tables.items()}
+    html, _ = page_of(Flight(whole.manifest, {"autopilot": bare.iloc[:0]}, empty), tmp_path)
+    assert "There is no map" in html
+
+
+def test_broken_rows_are_left_out_and_counted_as_problems(tmp_path: Path) -> None:
+    whole = simulate_twin("large-ship", 1)
+    nav = whole.nav["autopilot"].copy()
+    nav.loc[10:20, "north_m"] = np.nan
+    nav.loc[30, "time_s"] = nav.loc[28, "time_s"]
+    nav.loc[40, ["q_w", "q_x", "q_y", "q_z"]] = 0.0
+    html, content = page_of(Flight(whole.manifest, {"autopilot": nav}, dict(whole.tables)), tmp_path)
+    assert values(content)["problems", "flight"] >= 2
+    assert "Mend this flight first" in html and "wildlab check" in html
+
+
+def test_photos_without_times_have_no_rates(tmp_path: Path) -> None:
+    flight = level_images([(0.0, 0.0), (50.0, 0.0), (90.0, 10.0)])
+    flight = replace(flight, manifest=replace_in_manifest(flight.manifest, {"time": {"kind": "sequence"}}))
+    html, content = page_of(flight, tmp_path)
+    assert "The photos carry no time" in html
+    assert ("duration", "flight") not in values(content)
+    assert values(content)["area_seen", "flight"] > 0
+
+
+def test_no_page_gives_the_place_away(make_flight: Callable[..., Flight], tmp_path: Path) -> None:
+    flight = holed(make_flight)
+    html, _ = page_of(flight, tmp_path)
+    origin = flight.manifest.origin
+    for value in (origin.latitude_deg, origin.longitude_deg):
+        assert f"{value:.3f}" not in html and f"{value:.2f}" not in html
+
+
+def test_the_best_known_poses_are_shown() -> None:
+    table = pd.DataFrame({"time_s": [0.0]})
+    manifest = simulate_twin("large-ship", 1).manifest
+    assert best_source(Flight(manifest, {"truth": table, "autopilot": table, "logged": table})) == "logged"
+    assert best_source(Flight(manifest, {"truth": table, "mine": table})) == "mine"
+    assert best_source(Flight(manifest, {"truth": table})) == "truth"
+    assert best_source(Flight(manifest, {})) is None
+    with pytest.raises(WildlabError, match="no nav source 'other'"):
+        look_over(Flight(manifest, {"mine": table}), "other")
