@@ -200,7 +200,7 @@ def test_filling_at_the_end_is_no_loss_and_a_cut_message_is() -> None:
         assert dataflash.read(Path("x.bin"), data + filling).lost == ()
     (said,) = dataflash.read(Path("x.bin"), data[:-1]).lost
     share = f"of {len(data) - 1} bytes"
-    assert share in said and "in one place belong to no message." in said
+    assert share in said and "in one place belong to no message" in said
 
 
 @pytest.mark.parametrize(

@@ -167,24 +167,24 @@ def _notes(
     ]
     if unstamped and when.clock is not None:
         names = " and ".join(unstamped)
-        notes.append(f"Messages {names} carry no stamps: their times are those of the messages around them.")
+        notes.append(f"messages {names} carry no stamps: their times are those of the messages around them")
     if "imu" not in found:
-        notes.append("The log has no messages of an IMU: no rates of turn and no accelerations.")
+        notes.append("it has no messages of an IMU: no rates of turn and no accelerations")
     if when.clock is None:
-        notes.append("Its messages carry no stamps.")
+        notes.append("its messages carry no stamps")
     elif not when.clock.base:
-        notes.append("No fix of a satellite receiver tells the time: its stamps are not known in UTC.")
+        notes.append("no fix of a satellite receiver tells the time: its stamps are not known in UTC")
     if "poses" in found and place is not None:
         heights = [
             name for name, of in (("sea level", place.sea), ("home", place.home)) if np.isfinite(of).any()
         ]
         above = " and ".join(heights)
         notes.append(
-            f"Positions of poses are those of messages {place.name}; their heights count from {above}."
+            f"positions of poses are those of messages {place.name}; their heights count from {above}"
         )
     if receiver is not None and len(receivers) > 1:
         number = 1 + next(i for i, one in enumerate(receivers) if one is receiver)
-        notes.append(f"It has {len(receivers)} satellite receivers; receiver {number} is used.")
+        notes.append(f"it has {len(receivers)} satellite receivers; receiver {number} is used")
     if "triggers" in found and "height_sea_m" not in found["triggers"].columns:
-        notes.append("Heights of its messages CAM are left out: it does not say what they count from.")
+        notes.append("heights of its messages CAM are left out: it does not say what they count from")
     return notes

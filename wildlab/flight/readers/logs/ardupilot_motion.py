@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from wildlab.flight.clocks import between
 from wildlab.flight.readers.logs.ardupilot_messages import Table
 from wildlab.flight.readers.logs.ardupilot_time import FIX_3D, Times, gps_utc
+from wildlab.flight.readers.logs.judging import NO_DILUTION
 from wildlab.flight.readers.logs.log import Stream
-from wildlab.flight.readers.logs.order import FASTEST_M_S, in_order
-from wildlab.flight.readers.logs.places import placed
+from wildlab.flight.readers.logs.order import in_order
+from wildlab.flight.readers.logs.places import impossible_places, placed
 from wildlab.flight.readers.logs.stamps import places_that_hold, running_stream
+from wildlab.flight.schema import SPEED
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Dilution of this and more is no measurement.
-WORST_HDOP = 99.0
 #: Spreads of this and more are what 16 bits hold, not what a receiver found.
 WORST_SPREAD_M = 655.0
 #: Beyond these no sensor of a flying thing measures: m/s2, rad/s, microtesla.
@@ -90,14 +90,16 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
         name: values for name, values in columns.items() if name in _NEEDED or np.isfinite(values).any()
     }
     week = get("GWk", "Week")
+    impossible = impossible_places(columns)
+    # Its parts to the north and east may each be possible.
+    impossible["an impossible speed"] = impossible.get("an impossible speed", False) | (speed > SPEED[1])
     unusable = {
         "no fix": ~(fix >= FIX_3D - 1),
         "a fix without height": ~(fix >= FIX_3D),
-        "no place": ~placed(latitude, longitude),
-        "no height": ~np.isfinite(height),
+        "no position": ~placed(latitude, longitude),
         "no GPS week": np.isfinite(week) & np.isnan(gps_utc(receiver)),
-        "HDOP of 99 or more": hdop >= WORST_HDOP,
-        "faster than 700 m/s": (speed > FASTEST_M_S) | (np.abs(down) > FASTEST_M_S),
+        "no dilution of precision": hdop >= NO_DILUTION,
+        **impossible,
     }
     utc = times.utc_of_fixes(receiver)
     return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable, utc)

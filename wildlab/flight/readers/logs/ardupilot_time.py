@@ -167,8 +167,8 @@ def longest_run(tables: dict[str, Table]) -> tuple[dict[str, Table], str]:
     }
     left_out = int(counts.sum() - counts[best])
     said = (
-        f"The board was switched on again within the log: of {len(counts)} stretches the longest is used, "
-        f"{left_out} of {counts.sum()} messages ({percent(left_out, int(counts.sum()))}) are not."
+        f"the board was switched on again within it: of {len(counts)} stretches the longest is used, "
+        f"{left_out} of {counts.sum()} messages ({percent(left_out, int(counts.sum()))}) are not"
     )
     return {name: table for name, table in kept.items() if len(table)}, said
 

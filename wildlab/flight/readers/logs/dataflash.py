@@ -61,5 +61,5 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
         where = "one place" if records.places == 1 else f"{records.places} places"
         share = percent(records.lost_bytes, len(data))
         what = f"{records.lost_bytes} of {len(data)} bytes ({share}) in {where}"
-        lost = (f"{what} belong to no message.",)
+        lost = (f"{what} belong to no message",)
     return ardupilot.raw_log(path, "dataflash", records.tables, lost, "message")

@@ -114,12 +114,12 @@ def _tables(lines: list[str], known: dict[str, _Definition]) -> tuple[dict[str, 
     if undefined:
         names = ", ".join([*list(undefined)[:3], *(["..."] if len(undefined) > 3 else [])])
         lost.append(
-            f"{_of(sum(undefined.values()), lines)} have no line FMT that says what they hold: {names}."
+            f"{_of(sum(undefined.values()), lines)} have no line FMT that says what they hold: {names}"
         )
     if short:
-        lost.append(f"{_of(short, lines)} have more or fewer values than their FMT says.")
+        lost.append(f"{_of(short, lines)} have more or fewer values than their FMT says")
     if strange:
-        lost.append(f"{_of(strange, lines)} are no messages.")
+        lost.append(f"{_of(strange, lines)} are no messages")
     return with_units(tables, {name: known[name].kind for name in tables}), lost
 
 
