@@ -44,7 +44,8 @@ def fit_steady(
     used = fit.used
     if late:
         # Among few pairs `fit_clock` believes all.
-        used = used & (apart >= np.nanmedian(apart) - max(EARLY * _spread(apart), 1.0))
+        believed = used & (apart >= np.nanmedian(apart) - max(EARLY * _spread(apart), 1.0))
+        used = believed if believed.any() else used
         offset = float(apart[used].min())
     else:
         offset = float(np.median(apart[used]))
