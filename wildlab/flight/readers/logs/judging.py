@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.readers.logs.log import HEIGHTS
+from wildlab.flight.readers.logs.order import in_order
 from wildlab.flight.schema import DOWN, SPEED
 from wildlab.flight.time.leap_seconds import GPS_START_S
 
@@ -86,31 +86,6 @@ def plural(count: int, singular: str, several: str | None = None) -> str:
 def _between(values: Array, bounds: tuple[float, float]) -> Mask:
     """True where a value is missing, too."""
     return ~((values < bounds[0]) | (values > bounds[1]))
-
-
-def _increasing(time: Array) -> Mask:
-    """A longest strictly increasing subsequence: one wrong stamp costs one row, whichever way it is wrong."""
-    chosen = np.zeros(len(time), bool)
-    if len(time) < 2 or bool(np.all(np.diff(time) > 0)):
-        chosen[:] = True
-        return chosen
-    tails: list[float] = []
-    at: list[int] = []
-    before = np.full(len(time), -1)
-    for i, value in enumerate(time.tolist()):
-        place = bisect_left(tails, value)
-        before[i] = at[place - 1] if place else -1
-        if place == len(tails):
-            tails.append(value)
-            at.append(i)
-        elif value < tails[place]:
-            # An equal stamp leaves the earlier row in place.
-            tails[place], at[place] = value, i
-    i = at[-1]
-    while i >= 0:
-        chosen[i] = True
-        i = int(before[i])
-    return chosen
 
 
 def _metres(latitude: Array, longitude: Array, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
@@ -223,7 +198,8 @@ def _judge_order(time: Array, latitude: Array, longitude: Array, bad: Mask, foun
     good = np.flatnonzero(~bad & np.isfinite(time))
     if not len(good):
         return
-    kept = _increasing(time[good])
+    # A file of tracks may hold those of years.
+    kept = in_order(time[good], longest_s=np.inf)
     stamps = np.sort(time[good[kept]])
     left = good[~kept]
     place = np.clip(np.searchsorted(stamps, time[left]), 0, len(stamps) - 1)

@@ -15,7 +15,9 @@ FASTEST_M_S, SHORTEST_S = 700.0, 1.0
 _DEGREE_M = 111_000.0
 
 
-def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.bool_]:
+def in_order(
+    stamps: ArrayLike, wanted: ArrayLike | None = None, longest_s: float = LONGEST_S
+) -> NDArray[np.bool_]:
     """The most rows whose stamps strictly increase; the others repeat one, go back or leap ahead.
 
     Parameters
@@ -24,6 +26,8 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.b
         (N,) s, in the order of the file; NaN is left out.
     wanted
         (N,) bool: rows that count; the others are left out, and do not make others be left out.
+    longest_s
+        Stamps further than this from the middle one are left out.
 
     Returns
     -------
@@ -40,7 +44,7 @@ def in_order(stamps: ArrayLike, wanted: ArrayLike | None = None) -> NDArray[np.b
     rows = np.flatnonzero(usable)
     if not len(rows):
         return kept
-    rows = rows[np.abs(at[rows] - np.median(at[rows])) <= LONGEST_S]
+    rows = rows[np.abs(at[rows] - np.median(at[rows])) <= longest_s]
     few = _without_few(at[rows])
     if few is not None:
         kept[rows[few]] = True
