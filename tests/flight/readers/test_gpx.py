@@ -58,6 +58,15 @@ def test_times_that_cannot_be_true(shared_data):
     assert "no point carries a time that can be true" in " ".join(log.notes)
 
 
+def test_times_with_a_zone_and_without():
+    stamps = ["2026-06-01T10:00:00Z", "2026-06-01T12:00:01.250+02:00", "2026-06-01T10:00:02", "yesterday"]
+    log = gpx.read(Path("x.gpx"), document("".join(point(k, stamp=one) for k, one in enumerate(stamps))))
+    found = log.parts["gnss"].columns["time_s"]
+    np.testing.assert_allclose(found[:3] - START.timestamp(), [0.0, 1.25, 2.0], rtol=0, atol=1e-6)
+    assert log.parts["gnss"].columns["why"].tolist() == ["", "", "", "no time"]
+    assert not log.lost
+
+
 def test_no_times():
     log = gpx.read(Path("x.gpx"), document("".join(point(k, inside="<ele>3</ele>") for k in range(5))))
     assert log.parts["gnss"].used.all()
@@ -68,7 +77,7 @@ def test_no_times():
 def test_order_repetition_and_jumps():
     body = [point(k) for k in range(20)]
     body.insert(5, point(4, lat=63.001))
-    body.insert(9, point(0, stamp="2027-06-01T10:00:00Z"))
+    body.insert(9, point(0, stamp="2026-06-03T10:00:00Z"))
     body.insert(15, point(12, lat=-30.0, stamp="2026-06-01T10:00:12.500Z"))
     body.insert(16, point(12, lat=63.0013, inside="<ele>1</ele>"))
     body.insert(17, point(0, lat=0.0).replace('lon="10.5"', 'lon="0.0"'))

@@ -190,10 +190,11 @@ def test_no_date():
 def test_prefixes_comments_unknown_and_checksums():
     lines = track(datetime(2020, 1, 1, tzinfo=UTC), 5).decode().splitlines(keepends=True)
     lines = [f"12:00:0{k % 10} > {line}" for k, line in enumerate(lines)]
-    text = "# a file, $2\r\n" + said("GPXYZ,1,2") + said("GPHDT,12.0,T") + "".join(lines)
+    text = "# a file, $2\r\n# " + said("GPGLL,1000.0,N,01030.0,E,115959.00,A,D")
+    text += said("GPXYZ,1,2") + said("GPHDT,12.0,T") + "".join(lines)
     log = nmea.read(Path("x"), text.encode())
     assert log.parts["gnss"].used.sum() == 5
-    assert log.parts["gnss"].rows[0] == 4
+    assert log.parts["gnss"].rows[0] == 5
     assert any("2 sentences not needed for a track (HDT, XYZ)" in note for note in log.notes)
     spoilt = text.replace("63", "64", 1)
     log = nmea.read(Path("x"), spoilt.encode("latin-1"))

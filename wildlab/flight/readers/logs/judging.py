@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.readers.logs.log import HEIGHTS
-from wildlab.flight.readers.logs.order import in_order
+from wildlab.flight.readers.logs.order import LONGEST_S, in_order
 from wildlab.flight.schema import DOWN, SPEED
 from wildlab.flight.time.leap_seconds import GPS_START_S
 
@@ -30,6 +30,8 @@ NO_DILUTION = 99.0
 #: A gap is so many usual steps long, and at least as many seconds.
 _GAP_STEPS, _GAP_S = 5.0, 2.0
 _EARTH_M = 6371e3
+#: So few stamps do not make a track of their own.
+_HANDFUL = 5
 #: Places of one moment may be so far apart by their noise, m.
 _NOISE_M = 30.0
 _HEIGHTS = tuple(name for name in HEIGHTS if name.startswith("height"))
@@ -194,10 +196,24 @@ def judge(
     return found
 
 
+def _alone(time: Array) -> Mask:
+    """Stamps of which fewer than a handful are within days of each other, where there are many others."""
+    order = np.argsort(time, kind="stable")
+    group = np.cumsum(np.r_[0, np.diff(time[order]) > LONGEST_S])
+    sizes = np.bincount(group)
+    alone = np.zeros(len(time), bool)
+    alone[order] = (sizes < _HANDFUL)[group] & (sizes.max() >= 2 * _HANDFUL)
+    return alone
+
+
 def _judge_order(time: Array, latitude: Array, longitude: Array, bad: Mask, found: dict[str, Mask]) -> None:
     good = np.flatnonzero(~bad & np.isfinite(time))
     if not len(good):
         return
+    alone = _alone(time[good])
+    found["stamp far from all others"] = np.zeros(len(time), bool)
+    found["stamp far from all others"][good[alone]] = True
+    good = good[~alone]
     # A file of tracks may hold those of years.
     kept = in_order(time[good], longest_s=np.inf)
     stamps = np.sort(time[good[kept]])

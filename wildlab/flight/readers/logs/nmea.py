@@ -108,8 +108,16 @@ def tracks(found: Sentences) -> RawLog | None:
 
 def sentences(data: bytes) -> Sentences:
     """Every sentence of a file whose checksum holds; all, where none of them has a checksum."""
+    raw = np.frombuffer(data, np.uint8)
+    ends = np.flatnonzero(raw == ord("\n"))
     matches = list(_SENTENCE.finditer(data))
     starts = np.array([match.start() + 1 for match in matches], np.int64)
+    lines = np.searchsorted(ends, starts) + 1
+    # What stands in a comment is none.
+    begins = np.r_[0, ends + 1][lines - 1]
+    said_so = raw[begins] != ord("#") if len(begins) else np.zeros(0, bool)
+    matches = [match for match, kept in zip(matches, said_so.tolist(), strict=True) if kept]
+    starts, lines = starts[said_so], lines[said_so]
     stops = np.array([match.end(3) for match in matches], np.int64)
     said = [match[4] for match in matches]
     checked = np.array([one is not None for one in said], bool)
@@ -117,8 +125,6 @@ def sentences(data: bytes) -> Sentences:
     if checked.any():
         sums = np.array([int(one, 16) if one else 0 for one in said], np.uint8)
         good = checked & (_xor(data, starts, stops) == sums)
-    ends = np.flatnonzero(np.frombuffer(data, np.uint8) == ord("\n"))
-    lines = np.searchsorted(ends, starts) + 1
     talker: list[str] = []
     kind: list[str] = []
     fields: list[list[str]] = []
