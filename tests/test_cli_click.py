@@ -24,6 +24,7 @@ from wildlab import cli
 from wildlab.flight.readers.frames.image import read_image
 from wildlab.flight.readers.logs import clicks as click_files
 from wildlab.flight.store import load_flight, save_flight
+from wildlab.runner.clicking.pictures import Picture, picture_of
 from wildlab.runner.clicking.server import ClickServer, open_server
 from wildlab.runner.clicking.session import Session, check_points, open_session, read_points, table_of
 
@@ -306,6 +307,20 @@ def test_images_of_16_bits_are_stretched_and_others_are_as_they_are(images: Path
     assert (shown[1].min(), shown[1].max()) == (0, 255)
     order = np.argsort(dark, axis=None)
     assert (np.diff(shown[1].ravel()[order].astype(int)) >= 0).all()
+
+
+def test_a_large_colour_image_keeps_its_pixels(tmp_path: Path) -> None:
+    rows, columns = np.indices((2100, 2000))
+    image = np.stack([rows % 256, columns // 8 % 256, (rows + columns) // 16 % 256], axis=-1).astype(np.uint8)
+    image = cv2.GaussianBlur(image, (0, 0), 2)
+    (tmp_path / "a.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
+    found = picture_of(tmp_path / "a.png")
+    assert isinstance(found, Picture)
+    assert found.kind == "image/jpeg"
+    shown = cv2.imdecode(np.frombuffer(found.data, np.uint8), cv2.IMREAD_COLOR)
+    assert shown.shape == image.shape
+    assert np.abs(shown.astype(int) - image).mean() < 4
+    assert picture_of(tmp_path / "b.png") == "This image cannot be shown: there is no such file any more."
 
 
 # -- the table

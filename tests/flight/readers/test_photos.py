@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.flight.readers import made_up_photos as made
 from wildlab.errors import WildlabError
+from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.logs import photo_tags
 from wildlab.flight.readers.logs import photo_values as values
 from wildlab.flight.readers.logs.log import RawLog
@@ -420,6 +421,29 @@ def test_cut_and_spoilt_images_end_in_no_traceback(tmp_path: Path) -> None:
         for name in ("latitude_deg", "longitude_deg"):
             assert np.isfinite(part.columns[name][part.used]).all()
         assert log.lost
+
+
+def test_real_images_cut_and_spoilt(tmp_path: Path, shared_data: Any) -> None:
+    random = np.random.default_rng(15)
+    for folder in ("deervision_rjpeg", "flirpy", "rjpeg_samples"):
+        for path in sorted(shared_data("imagery", folder).iterdir()):
+            if path.suffix.lower() not in SUFFIXES:
+                continue
+            data, place = path.read_bytes(), tmp_path / path.name
+            place.mkdir()
+            for at in range(50):
+                # Most damage is done where the headers are.
+                end = len(data) if at % 2 else min(len(data), 20_000)
+                (place / f"cut{at}{path.suffix}").write_bytes(data[: random.integers(0, end)])
+                spoilt = np.frombuffer(data, np.uint8).copy()
+                spoilt[random.integers(0, end, 100)] = random.integers(0, 256, 100)
+                (place / f"flip{at}{path.suffix}").write_bytes(spoilt.tobytes())
+            part = read_photos(place).parts["photos"]
+            assert len(part) == 100
+            for name in ("latitude_deg", "longitude_deg"):
+                assert np.isfinite(part.columns[name][part.used]).all()
+            for one in place.iterdir():
+                one.unlink()
 
 
 # -- images of real cameras

@@ -115,7 +115,7 @@ class _Handler(BaseHTTPRequestHandler):
             if isinstance(found, str):
                 self._text(422, found)
             else:
-                self._answer(200, "image/png", found)
+                self._answer(200, found.kind, found.data)
         else:
             self._text(404, "there is nothing here")
 

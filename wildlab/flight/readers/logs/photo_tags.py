@@ -186,7 +186,7 @@ def _jpeg(stream: BinaryIO, size: int, found: Tags) -> None:
                 pieces[name[6]] = (at + 12, length - 8)
         at += 2 + max(length + 2, 2)
     if exif:
-        _exif(io.BytesIO(exif), found)
+        _exif(_Bounded(io.BytesIO(exif), 2 * len(exif)), found)
     if pieces:
         _records(stream, [pieces[number] for number in sorted(pieces)], found)
 
@@ -208,7 +208,7 @@ def _png(stream: BinaryIO, size: int, found: Tags) -> None:
         if kind == b"IHDR" and length >= 8:
             found.width, found.height = struct.unpack(">II", stream.read(8))
         elif kind == b"eXIf" and length <= MOST_EXIF:
-            _exif(io.BytesIO(stream.read(length)), found)
+            _exif(_Bounded(io.BytesIO(stream.read(length)), 2 * length), found)
         elif kind == b"iTXt" and length <= MOST_XMP:
             body = stream.read(length)
             # Flag 0: as it is, not packed.
