@@ -153,6 +153,11 @@ def test_images_before_the_first_fix_were_taken() -> None:
     assert triggers.used.all() and np.isnan(triggers.columns["latitude_deg"]).tolist() == [True] + 7 * [False]
 
 
+def test_a_vertical_velocity_that_the_receiver_does_not_have() -> None:
+    gnss = read(change(second_generation(Truth(2025)), "GPA", 100, VV=0)).parts["gnss"]
+    assert np.flatnonzero(np.isnan(gnss.columns["v_down_m_s"])).tolist() == [100] and gnss.used.all()
+
+
 def test_quaternions_where_there_is_no_attitude() -> None:
     truth = Truth(2025)
     log = read(third_generation(truth, attitude=False))

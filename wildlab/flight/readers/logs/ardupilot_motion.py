@@ -78,7 +78,7 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
     latitude, longitude, height = get("Lat", unit="deg"), get("Lng", unit="deg"), get("Alt", unit="m")
     speed, course, down = get("Spd", unit="m/s"), np.radians(get("GCrs", unit="deg")), get("VZ", unit="m/s")
     fix, hdop, stamps = get("Status"), get("HDop"), times.of(receiver)
-    found = _accuracies(receiver, tables, stamps)
+    found = _accuracies(receiver, tables, stamps, down)
     columns = {
         **{"latitude_deg": latitude, "longitude_deg": longitude, "height_sea_m": height},
         **{"v_north_m_s": speed * np.cos(course), "v_east_m_s": speed * np.sin(course), "v_down_m_s": down},
@@ -105,7 +105,7 @@ def gnss(receiver: Table, tables: dict[str, Table], times: Times, counted_in: st
     return stream("gnss", columns, stamps, times, receiver.rows, counted_in, unusable, utc)
 
 
-def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array) -> dict[str, Array]:
+def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array, down: Array) -> dict[str, Array]:
     """Columns from the messages GPA of the same receiver, which have the stamps of its GPS messages."""
     instance = receiver.numbers("I")[:1]
     names = ("GPA",) if receiver.name == "GPS" else ("GPA" + receiver.name[3:], "GPA2")
@@ -128,6 +128,8 @@ def _accuracies(receiver: Table, tables: dict[str, Table], stamps: Array) -> dic
             "sd_horizontal_m": column("HAcc", WORST_SPREAD_M),
             "sd_vertical_m": column("VAcc", WORST_SPREAD_M),
             "sd_velocity_m_s": column("SAcc", WORST_SPREAD_M),
+            # A receiver that has no vertical velocity is logged with one of 0.
+            "v_down_m_s": np.where(met & (table.numbers("VV")[at] == 0), np.nan, down),
             # ArduPilot has it the other way round: sea level minus ellipsoid.
             "undulation_m": -column("Und", 200.0),
         }
