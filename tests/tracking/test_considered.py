@@ -226,6 +226,7 @@ def mean_nees(track, states, rows):
     return float(np.einsum("ni,nij,nj->n", e, np.linalg.inv(track.P[rows]), e).mean())
 
 
+@pytest.mark.slow
 def test_a_considered_heading_is_consistent_where_it_is_not_known_of():
     rng, pose = np.random.default_rng(5), consider({"heading": np.radians(2.0), "range_bias": 2.0})
     last = {"ekf": [], "schmidt": []}

@@ -16,6 +16,7 @@ from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.motion import constant_velocity, rest
 from wildlab.tracking.platforms import measured_from
 from wildlab.tracking.run import Start, run_filter
+from wildlab.tracking.schmidt import PoseUncertainty
 from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
 
@@ -132,6 +133,7 @@ def test_its_covariance_is_its_errors_with_considered_ones(time):
     np.testing.assert_allclose(found.P, covariance, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_never_worse_than_the_filter_over_a_hundred_twins():
     rng, pose = np.random.default_rng(11), consider({"heading": np.radians(2.0), "range_bias": 2.0})
     middle = slice(10, 50)
@@ -203,18 +205,12 @@ def test_rows_whose_pose_is_not_known():
     times, uv, poses, truth = overflight(40)
     P = np.tile(np.diag([1.0, 1, 1, 1e-4, 1e-4, 1e-4]), (40, 1, 1))
     P[[0, 1, 20, 21]] = np.nan
-    pose = m_pose(P)
+    pose = PoseUncertainty(P, 30.0)
     filtered = run_filter(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
     smoothed = run_smoothed(times, uv, 4 * np.eye(2), m.pixels(poses, 0.0), CV, START, pose=pose)
     assert not filtered.used[[0, 1, 20, 21]].any() and filtered.used.sum() == 36
     off = [np.sqrt(np.mean((track.x - truth)[:, :2] ** 2)) for track in (filtered, smoothed)]
     assert np.isfinite(smoothed.P).all() and off[1] < off[0]
-
-
-def m_pose(P):
-    from wildlab.tracking.schmidt import PoseUncertainty
-
-    return PoseUncertainty(P, 30.0)
 
 
 def test_a_track_at_other_times_is_refused():

@@ -120,6 +120,7 @@ def test_covariance_of_a_start_is_that_of_its_errors(kind, sds):
     assert_consistent(np.array(errors)[:, :2], np.array(covariances)[:, :2, :2], 2)
 
 
+@pytest.mark.slow
 def test_a_start_that_knows_its_errors_keeps_the_filter_honest():
     """The same heading is wrong in the start and in every bearing after it."""
     rng, pose = np.random.default_rng(2), consider({"heading": 0.01})
@@ -141,6 +142,7 @@ def test_a_start_that_knows_its_errors_keeps_the_filter_honest():
     assert np.mean(np.einsum("ri,rij,rj->r", e, np.linalg.inv(P), e)) > 2.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sd_velocity", [0.0, 0.2])
 def test_start_from_bearings_alone(sd_velocity):
     """A platform goes by a target that moves as it is supposed to, with a heading that is off."""
