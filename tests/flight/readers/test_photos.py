@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 import warnings
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +17,6 @@ from scipy.spatial.transform import Rotation
 
 from tests.flight.readers import made_up_photos as made
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.logs import photo_tags
 from wildlab.flight.readers.logs import photo_values as values
 from wildlab.flight.readers.logs.log import RawLog
@@ -228,6 +226,36 @@ def test_flirs_autopilot_and_tags_as_elements(tmp_path: Path) -> None:
     assert [column(log, f"{one}_deg") for one in ("roll", "pitch", "yaw")] == [[4.0], [-2.5], [10.0]]
 
 
+def test_the_makers_calibration_goes_before_its_design(tmp_path: Path) -> None:
+    data = "2018-09-04;3678.87,3671.84,10.1,27.29,-0.268652,0.114663,0.0000152,-0.000046,-0.0350261"
+    for number, more in enumerate(({}, {"DewarpFlag": 1})):
+        tags = made.dji(number, DewarpData=data, CalibratedFocalLength="3666.666504", **more)
+        made.write(tmp_path, f"{number}.jpg", **tags)
+    log = read_photos(tmp_path)
+    assert column(log, "focal_px") == pytest.approx([math.sqrt(3678.87 * 3671.84)] * 2)
+    assert "1 image with the maker's calibration of the lens" in said(log)
+
+
+def test_images_that_lost_rtk_are_told(tmp_path: Path) -> None:
+    for number, flag in enumerate((50, 50, 0)):
+        made.write(tmp_path, f"{number}.jpg", **made.dji(number, RtkFlag=flag))
+    log = read_photos(tmp_path)
+    assert np.isnan(column(log, "height_ellipsoid_m")).tolist() == [False, False, True]
+    assert np.isnan(column(log, "height_sea_m")).tolist() == [True, True, False]
+    assert "RTK was lost in 1 image, " in said(log)
+
+
+def test_place_and_stamp_of_xmp_alone(tmp_path: Path) -> None:
+    tags = {"exif:GPSLatitude": "53,26.85617N", "exif:GPSLongitude": "2,48,44.17W"}
+    tags["xmp:CreateDate"] = "2024-06-12T11:30:05.5+02:00"
+    spaces = 'xmlns:exif="http://ns.adobe.com/exif/1.0/" xmlns:xmp="http://ns.adobe.com/xap/1.0/"'
+    made.write(tmp_path, "a.jpg", xmp=made.xmp_of(spaces, tags))
+    log = read_photos(tmp_path)
+    assert column(log, "latitude_deg") == pytest.approx([53 + 26.85617 / 60])
+    assert column(log, "longitude_deg") == pytest.approx([-(2 + 48 / 60 + 44.17 / 3600)])
+    assert column(log, "time_s") == pytest.approx([NOON + 5.5 - 7200])
+
+
 def test_focal_length_by_the_equivalent_over_the_diagonal(tmp_path: Path) -> None:
     exif = made.exif_of(own={0x920A: 9.1, 0xA405: 40})
     for name in ("DJI_1_T.JPG", "DJI_2_T.JPG"):
@@ -319,131 +347,6 @@ def test_no_image(tmp_path: Path) -> None:
         read_photos(tmp_path)
     with pytest.raises(WildlabError, match="cannot be read"):
         read_photos(tmp_path / "none")
-
-
-# -- hostile files
-
-
-@pytest.mark.parametrize(
-    ("packet", "problem"),
-    [
-        (b'<!DOCTYPE x [<!ENTITY a "b">]><x:xmpmeta>&a;</x:xmpmeta>', "declares a document type"),
-        (b"<x>" * 200 + b"</x>" * 200, "nested too deeply"),
-    ],
-)
-def test_xmp_that_is_refused(tmp_path: Path, packet: bytes, problem: str) -> None:
-    made.write(tmp_path, "a.jpg", xmp=packet)
-    assert problem in said(read_photos(tmp_path))
-
-
-def test_xmp_that_is_no_xml_any_more_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    whole = made.dji(1)["xmp"]
-    cut = whole[: whole.find(b"drone-dji:FlightRollDegree")]
-    undeclared = whole.replace(made.DJI.encode(), b"")
-    for number, packet in enumerate((cut + b">", undeclared)):
-        made.write(tmp_path, f"{number}.jpg", xmp=packet)
-    log = read_photos(tmp_path)
-    assert column(log, "pitch_world_deg") == [-89.9] * 2
-
-
-def test_a_claim_of_ten_gigabytes_is_not_believed(tmp_path: Path) -> None:
-    # A tag of EXIF that claims as much, a TIFF with such a tag, and a PNG of as many pixels.
-    entry = struct.pack("<HHII", 0x010F, 2, 0xFFFFFFF0, 26)
-    tiff = b"II*\0" + struct.pack("<IH", 8, 1) + entry + struct.pack("<I", 0) + b"abc"
-    (tmp_path / "a.jpg").write_bytes(made.jpeg(more=made.segment(0xE1, b"Exif\0\0" + tiff)))
-    (tmp_path / "b.tif").write_bytes(tiff)
-    head = b"IHDR" + struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
-    (tmp_path / "c.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + b"\0\0\0\0")
-    (tmp_path / "d.jpg").write_bytes(b"\xff\xd8\xff\xe1\xff\xff" + b"Exif\0\0" + tiff)
-    (tmp_path / "e.jpg").write_bytes(b"")
-    log = read_photos(tmp_path)
-    assert column(log, "use") == [0.0] * 5
-    assert column(log, "width_px")[2] == 100_000
-    assert "1 image: is empty" in log.lost
-
-
-def test_a_large_file_is_not_read_beyond_its_headers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made.write(tmp_path, "a.jpg", **made.dji(1))
-    with (tmp_path / "a.jpg").open("ab") as stream:
-        stream.truncate(20 << 30)  # a hole
-    taken = []
-    plain = Path.open
-
-    class Counting:
-        def __init__(self, stream: Any) -> None:
-            self.stream = stream
-
-        def __enter__(self) -> Counting:
-            return self
-
-        def __exit__(self, *_: object) -> None:
-            self.stream.close()
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self.stream, name)
-
-        def read(self, size: int) -> bytes:
-            taken.append(size)
-            return bytes(self.stream.read(size))
-
-    monkeypatch.setattr(Path, "open", lambda self, mode: Counting(plain(self, mode)))
-    assert column(read_photos(tmp_path), "use") == [1.0]
-    assert sum(taken) < 100_000
-
-
-def test_names_stay_names(tmp_path: Path) -> None:
-    names = ["<img src=x onerror=alert(1)>.jpg", "=cmd|'x'!A1.jpg", "a\udcff.jpg"]
-    for name in names:
-        made.write(tmp_path, name, exif=made.exif_of({0x010F: "<b>\x1b[31mMake", 0x0110: "=1+1"}))
-    log = read_photos(tmp_path)
-    assert set(column(log, "file")) == {*names[:2], "a\\udcff.jpg"}
-    assert all(name.isprintable() for name in column(log, "camera"))
-
-
-def test_cut_and_spoilt_images_end_in_no_traceback(tmp_path: Path) -> None:
-    whole = made.jpeg(**made.dji(1, RtkFlag=50, UTCAtExposure="2024-06-12T09:30:01.123456"))
-    random = np.random.default_rng(14)
-    for number, data in enumerate((whole, made.tiff(made.dji(1)["exif"]))):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        ending = ("jpg", "tif")[number]
-        head = len(data) if number else data.find(b"\xff\xda")
-        for place in random.integers(0, head, 50):
-            (folder / f"cut{place}.{ending}").write_bytes(data[:place])
-        for at in range(50):
-            spoilt = np.frombuffer(data, np.uint8).copy()
-            spoilt[random.integers(0, head, 100 if at % 2 else 3)] = random.integers(0, 256, 1)
-            (folder / f"flip{at}.{ending}").write_bytes(spoilt.tobytes())
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            log = read_photos(folder)
-        part = log.parts["photos"]
-        for name in ("latitude_deg", "longitude_deg"):
-            assert np.isfinite(part.columns[name][part.used]).all()
-        assert log.lost
-
-
-def test_real_images_cut_and_spoilt(tmp_path: Path, shared_data: Any) -> None:
-    random = np.random.default_rng(15)
-    for folder in ("deervision_rjpeg", "flirpy", "rjpeg_samples"):
-        for path in sorted(shared_data("imagery", folder).iterdir()):
-            if path.suffix.lower() not in SUFFIXES:
-                continue
-            data, place = path.read_bytes(), tmp_path / path.name
-            place.mkdir()
-            for at in range(50):
-                # Most damage is done where the headers are.
-                end = len(data) if at % 2 else min(len(data), 20_000)
-                (place / f"cut{at}{path.suffix}").write_bytes(data[: random.integers(0, end)])
-                spoilt = np.frombuffer(data, np.uint8).copy()
-                spoilt[random.integers(0, end, 100)] = random.integers(0, 256, 100)
-                (place / f"flip{at}{path.suffix}").write_bytes(spoilt.tobytes())
-            part = read_photos(place).parts["photos"]
-            assert len(part) == 100
-            for name in ("latitude_deg", "longitude_deg"):
-                assert np.isfinite(part.columns[name][part.used]).all()
-            for one in place.iterdir():
-                one.unlink()
 
 
 # -- images of real cameras

@@ -102,8 +102,19 @@ def _places(why: NDArray[Any]) -> list[str]:
 def _conventions(tags: list[Tags]) -> list[str]:
     said = []
     by_rtk = sum(values.rtk_of(one) in values.RTK_FIXES for one in tags)
+    without = sum(values.rtk_of(one) >= 0 and values.rtk_of(one) not in values.RTK_FIXES for one in tags)
     if by_rtk:
         said.append(f"heights of {images(by_rtk)} with RTK are taken to count from the ellipsoid")
+    if by_rtk and without:
+        said.append(f"RTK was lost in {images(without)}, whose heights are taken to count from sea level")
+    curved = sum(
+        math.isfinite(values.dewarped_of(one)) and one.xmp.get("dji:DewarpFlag", "0") != "1" for one in tags
+    )
+    if curved:
+        said.append(
+            f"{images(curved)} with the maker's calibration of the lens (DewarpData): its focal length is "
+            "used, its distortion is not"
+        )
     if any("dji:AbsoluteAltitude" in one.xmp and values.rtk_of(one) not in values.RTK_FIXES for one in tags):
         said.append(
             "DJI's absolute altitude without RTK hangs on the barometer and may be tens of metres off; the "

@@ -11,7 +11,6 @@ import re
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wildlab.flight.readers.logs.photo_tags import Tags
@@ -206,14 +205,12 @@ def from_nadir(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
     >>> [round(one, 6) for one in from_nadir(0.0, 60.0, 45.0)]
     [0.0, -30.0, 45.0]
     """
-    with np.errstate(all="ignore"):
-        # Ahead of the optical axis' frame is down of the other.
-        R = (
-            Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True)
-            * Rotation.from_euler("Y", -90, degrees=True)
-        ).as_matrix()
-    pitch = math.asin(float(np.clip(-R[2, 0], -1, 1)))
-    if abs(R[2, 0]) > 1 - 1e-12:
+    # Ahead of the optical axis' frame is down of the other.
+    down = Rotation.from_euler("ZYX", [yaw, pitch, roll], degrees=True)
+    R = (down * Rotation.from_euler("Y", -90, degrees=True)).as_matrix()
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], level)
+    if level < 1e-9:
         # Straight down there is one turn about the vertical; it stands in yaw.
         return 0.0, math.degrees(pitch), math.degrees(math.atan2(-R[0, 1], R[1, 1]))
     turned, heading = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -317,7 +314,9 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
     if not width or not height:
         return found
     scale = max(width, height) / max(tags.width or width, tags.height or height)
-    own = number(tags.xmp.get("dji:CalibratedFocalLength"))
+    own = dewarped_of(tags)
+    if not math.isfinite(own):
+        own = number(tags.xmp.get("dji:CalibratedFocalLength"))
     if 0 < own < 1e6:
         found.append((CALIBRATED, own * scale))
     mm = _mm(tags)
@@ -337,6 +336,14 @@ def focal_px_of(tags: Tags, width: int, height: int) -> list[tuple[str, float]]:
     if film > 0:
         found.append((BY_FILM, film * math.hypot(width, height) / DIAGONAL_35MM))
     return [(what, px) for what, px in found if 1 < px < 1e7]
+
+
+def dewarped_of(tags: Tags) -> float:
+    """Focal length of DJI's calibration of this very lens (DewarpData: a date; fx, fy, ...), px, or NaN."""
+    given = tags.xmp.get("dji:DewarpData", "").partition(";")[2].split(",")
+    both = [number(one) for one in given[:2]]
+    usable = len(given) == 9 and all(0 < one < 1e6 for one in both) and abs(both[0] / both[1] - 1) < 0.05
+    return math.sqrt(both[0] * both[1]) if usable else NAN
 
 
 def focal_mm_of(tags: Tags) -> float:
