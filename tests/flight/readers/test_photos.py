@@ -216,6 +216,21 @@ def test_angles_from_nadir_are_the_same_rotation(roll: float, pitch: float, yaw:
     assert ahead[:, 2] == pytest.approx(-down[:, 0], abs=1e-6)
 
 
+def test_a_phone(tmp_path: Path) -> None:
+    gps = made.gps_of(-41.25, 174.75, 12.0, date="2024:06:11", clock=(23.0, 30.0, 4.0)) | {31: 4.75}
+    own = {0x9003: "2024:06:12 11:30:05", 0x9291: "125", 0x9011: "+12:00", 0xA405: 26}
+    exif = made.exif_of({0x010F: "Apple", 0x0110: "iPhone 15", 0x0112: 6}, own, gps)
+    made.write(tmp_path, "IMG_0001.JPG", size=(400, 300), exif=exif)
+    log = read_photos(tmp_path)
+    assert column(log, "time_s") == pytest.approx([NOON + 5.125 - 12 * 3600])
+    assert column(log, "sd_horizontal_m") == [4.75]
+    assert column(log, "use") == [1.0]
+    assert "roll_world_deg" not in log.parts["photos"].columns
+    # As stored, whatever way up viewers show it.
+    assert (column(log, "width_px"), column(log, "height_px")) == ([400], [300])
+    assert log.vehicle == "Apple iPhone 15"
+
+
 def test_flirs_autopilot_and_tags_as_elements(tmp_path: Path) -> None:
     inside = "".join(
         f"<FLIR:MAV{one}>{value}</FLIR:MAV{one}>" for one, value in (("Yaw", 10), ("Pitch", "-5/2"))

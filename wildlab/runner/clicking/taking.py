@@ -73,12 +73,21 @@ def take_clicks(folder: Path) -> Taken:
     frames = flight.table("frames")["frame_id"].astype(str).tolist()
     find = _finder(frames)
     rows: list[tuple[str, str, float, float]] = []
+    of_frame: dict[str, str] = {}
     left: dict[str, int] = {}
     for image, marked in points.items():
         frame = find(image)
         if frame is None:
             left[image] = len(marked)
             continue
+        if marked and (other := of_frame.setdefault(frame, image)) != image:
+            raise WildlabError(
+                f"points are marked in two images of the frame {printable(frame)}: {printable(other)} and "
+                f"{printable(image)}",
+                "mark those of one camera, and take the lines of the other out",
+                file=table,
+                field="image",
+            )
         rows += [(frame, one.name, one.u, one.v) for one in marked]
     if not rows:
         first = printable(next(iter(left)))
