@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.flight.readers import made_up_photos as made
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs import clicks
 from wildlab.flight.readers.logs.log import RawLog
@@ -119,6 +120,26 @@ def test_yolo_folder(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="has no text file of YOLO's"):
         (tmp_path / "none").mkdir()
         clicks.clicks_of_folder(tmp_path / "none")
+
+
+@pytest.mark.parametrize("layout", [("", ""), ("images", "labels"), ("images/train", "labels/train")])
+def test_sizes_of_images_beside_labels(tmp_path: Path, layout: tuple[str, str]) -> None:
+    images, labels = (tmp_path / one for one in layout)
+    for folder in (images, labels):
+        folder.mkdir(parents=True, exist_ok=True)
+    for at, (name, _, u, v, w, h) in enumerate(BOXES):
+        made.write(images, name, size=(200, 100))
+        line = f"{at} {(u + w / 2) / 200} {(v + h / 2) / 100} {w / 200} {h / 100}\n"
+        (labels / name).with_suffix(".txt").write_text(line, encoding="utf-8")
+    (tmp_path / "classes.txt").write_text("".join(f"{one[1]}\n" for one in BOXES), encoding="utf-8")
+    check_boxes(clicks.read_clicks_folder(labels), stems=True)
+    # MegaDetector names images with their folders, and a file may name what lies elsewhere.
+    check_boxes(clicks.read(images / "md.json", megadetector()))
+    above = megadetector().replace(b"a.jpg", b"../../../a.jpg").replace(b"b.jpg", b"/etc/b.jpg")
+    log = clicks.read(images / "md.json", above)
+    assert column(log, "u_px") == pytest.approx([12.0, 50.0])
+    deep = megadetector().replace(b'"a.jpg', b'"images/a.jpg').replace(b'"b.jpg', b'"images\\\\b.jpg')
+    assert clicks.read(tmp_path / "md.json", deep).parts["clicks"].used.all() == (layout[0] != "images/train")
 
 
 def test_points() -> None:

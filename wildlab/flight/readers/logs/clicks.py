@@ -1,7 +1,7 @@
 """Clicks and boxes in images, out of what other programs write: COCO, MegaDetector, CVAT, tables, YOLO.
 
 A box stands for its middle. Programs that give shares of an image want its size: `sizes` by the name of the
-file, as the headers of images have them; without it such rows say so and are not used.
+file, or that of the images that lie beside; without either such rows say so and are not used.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from wildlab.flight.readers.label_table import (
     SIZES,
 )
 from wildlab.flight.readers.label_yolo import read_yolo_folder
+from wildlab.flight.readers.logs.image_sizes import sizes_beside
 from wildlab.flight.readers.logs.log import RawLog, make_stream
 from wildlab.flight.readers.logs.text_table import (
     header_of,
@@ -67,13 +68,14 @@ def read(path: Path, data: bytes, zone: str | None = None, sizes: Sizes | None =
     Parameters
     ----------
     path
-        For messages.
+        For messages, and to find the images beside it.
     data
         The file's content.
     zone
         Not used: nothing here has a time.
     sizes
-        Width and height by the name of the image, px, for formats that give shares of it.
+        Width and height by the name of the image, px, for formats that give shares of it; left out, those of
+        images beside the file.
 
     Returns
     -------
@@ -87,7 +89,7 @@ def read(path: Path, data: bytes, zone: str | None = None, sizes: Sizes | None =
     """
     start = data.lstrip(b"\xef\xbb\xbf \r\n\t")[:1]
     if start in (b"{", b"["):
-        return _of_marked(read_json_boxes(data.removeprefix(b"\xef\xbb\xbf"), path), sizes, path)
+        return _of_marked(read_json_boxes(data.removeprefix(b"\xef\xbb\xbf"), path), sizes, path, path.parent)
     if start == b"<":
         return _cvat(data, path)
     return _table(data, path)
@@ -101,7 +103,8 @@ def clicks_of_folder(folder: Path, sizes: Sizes | None = None) -> RawLog:
     folder
         Of the text files.
     sizes
-        Width and height by the name of the image (or without its ending), px.
+        Width and height by the name of the image (or without its ending), px; left out, those of images
+        beside the folder.
 
     Returns
     -------
@@ -113,7 +116,12 @@ def clicks_of_folder(folder: Path, sizes: Sizes | None = None) -> RawLog:
     WildlabError
         Where there is no such file, or a line is wrong.
     """
-    return _of_marked(read_yolo_folder(folder), sizes, folder)
+    return _of_marked(read_yolo_folder(folder), sizes, folder, folder)
+
+
+def read_clicks_folder(folder: Path, zone: str | None = None) -> RawLog:
+    """Boxes of a folder of YOLO's, with the sizes of the images that lie beside it: as `clicks_of_folder`."""
+    return clicks_of_folder(folder)
 
 
 def _log(columns: dict[str, Any], rows: Any, counted_in: str, lost: list[str], notes: list[str]) -> RawLog:
@@ -134,7 +142,7 @@ def _of_boxes(boxes: Array) -> dict[str, Array]:
     return found | {one: np.where(wide, boxes[:, at], np.nan) for at, one in enumerate(sides)}
 
 
-def _of_marked(marked: Marked, sizes: Sizes | None, path: Path) -> RawLog:
+def _of_marked(marked: Marked, sizes: Sizes | None, path: Path, folder: Path) -> RawLog:
     keep = np.isfinite(marked.boxes).all(axis=1) & ~marked.crowd
     if not keep.any():
         raise WildlabError("marks nothing", "give a file with boxes or points", file=path)
@@ -144,7 +152,7 @@ def _of_marked(marked: Marked, sizes: Sizes | None, path: Path) -> RawLog:
     if marked.crowd.any():
         lost.append(f"{int(marked.crowd.sum())} regions of many that are not told apart")
     if marked.relative:
-        known = _known(sizes or {}, names)
+        known = _known(sizes_beside(folder, names) if sizes is None else sizes, names)
         boxes = boxes * np.concatenate([known, known], axis=1)
         without = int((~np.isfinite(known).all(axis=1)).sum())
         if without:

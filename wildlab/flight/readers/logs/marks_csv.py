@@ -61,19 +61,7 @@ HIGH = frozenset(
 )
 #: What a table of marks has none of: it is over time.
 TIMES = frozenset(
-    {
-        "time",
-        "date",
-        "datetime",
-        "timestamp",
-        "stamp",
-        "utc",
-        "gpst",
-        "tow",
-        "epoch",
-        "seconds",
-        "millisecond",
-    }
+    {"time", "date", "datetime", "timestamp", "stamp", "utc", "gpst", "tow", "epoch", "millisecond"}
 )
 METRES = frozenset({"easting", "northing", "east", "north", "utm_e", "utm_n", "rechtswert", "hochwert"})
 _DEG = ("", "_deg", "_degrees", "_dd", "_wgs84", "_decimal", "_decimal_degrees", "_decimaldegree")

@@ -84,6 +84,12 @@ class Tags:
     problem: str = ""
 
 
+def size_of(tags: Tags) -> tuple[int, int]:
+    """Width and height of the pixels that are read, px: FLIR's raw image goes before the picture."""
+    raw = tags.raw_width, tags.raw_height
+    return raw if all(raw) else (tags.width, tags.height)
+
+
 class _Bounded(io.RawIOBase):
     """A file of which no more than so many bytes are given, wherever they stand."""
 

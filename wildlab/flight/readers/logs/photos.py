@@ -22,7 +22,7 @@ from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.logs import photo_values as values
 from wildlab.flight.readers.logs.log import RawLog, make_stream
 from wildlab.flight.readers.logs.photo_said import images, said_of
-from wildlab.flight.readers.logs.photo_tags import Tags, read_tags
+from wildlab.flight.readers.logs.photo_tags import Tags, read_tags, size_of
 from wildlab.flight.readers.logs.photo_times import times_of
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def read_photos(folder: Path, zone: str | None = None) -> RawLog:
     """
     paths, left = _files(folder)
     tags = [read_tags(path) for path in paths]
-    sizes = [_size(one) for one in tags]
+    sizes = [size_of(one) for one in tags]
     places = [values.place_of(one) for one in tags]
     columns: dict[str, Any] = {"file": [file_name(path) for path in paths]}
     columns["latitude_deg"], columns["longitude_deg"] = [p[0] for p in places], [p[1] for p in places]
@@ -236,13 +236,6 @@ def _files(folder: Path) -> tuple[list[Path], list[str]]:
     if len(paths) > MOST_IMAGES:
         left.append(f"{images(len(paths) - MOST_IMAGES)} beyond the first {MOST_IMAGES:,}")
     return sorted(paths, key=lambda one: (natural_key(one.name), one.name))[:MOST_IMAGES], left
-
-
-def _size(tags: Tags) -> tuple[int, int]:
-    """Of the pixels that are read: FLIR's raw image goes before the picture."""
-    return (
-        (tags.raw_width, tags.raw_height) if tags.raw_width and tags.raw_height else (tags.width, tags.height)
-    )
 
 
 def _cameras(files: list[str], tags: list[Tags], sizes: list[tuple[int, int]]) -> list[str]:
