@@ -161,7 +161,13 @@ def _of_marked(marked: Marked, sizes: Sizes | None, path: Path, folder: Path) ->
         notes.append("images are told by their ids, and which file has which id is not said")
     columns: dict[str, Any] = {"image": names, "name": [marked.kinds[row] for row in at], **_of_boxes(boxes)}
     columns["score"] = marked.scores[at]
-    return _log(columns, at + 1, "box", lost, [f"{marked.format}: {len(at)} boxes", *notes])
+    return _log(
+        columns,
+        at + 1,
+        "box",
+        lost,
+        [f"{marked.format}: {len(at)} {'box' if len(at) == 1 else 'boxes'}", *notes],
+    )
 
 
 def _known(sizes: Sizes, names: list[str]) -> Array:
