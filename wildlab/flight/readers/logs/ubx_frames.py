@@ -1,6 +1,6 @@
 """Messages of UBX, the binary protocol of u-blox: where they are in a stream of bytes, and their fields.
 
-Messages of a kind are taken all at once, which is about 100 times as fast as `pyubx2` makes an object of each.
+Messages of a kind are taken all at once, some 100 times as fast as `pyubx2` makes an object of each.
 Facts of the protocol: u-blox interface descriptions of series 6 to 9, as `pyubx2` has them.
 """
 
