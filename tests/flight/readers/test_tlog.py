@@ -469,3 +469,14 @@ def test_no_input_takes_long(unit: bytes) -> None:
     began = time.monotonic()
     read(start + unit * (300_000 // len(unit)))
     assert time.monotonic() - began < 5.0
+
+
+def test_clocks_without_end_take_no_time() -> None:
+    rows = []
+    for row in range(4000):
+        at = START_S + row * 0.01
+        rows.append((at, frame(made("ATTITUDE", time_boot_ms=1000 + 60_000 * (row % 2) + row * 10), at)))
+    began = time.monotonic()
+    log = read(joined(rows))
+    assert time.monotonic() - began < 5.0
+    assert any("stamps fall back 1999 times" in note for note in log.notes)

@@ -524,3 +524,8 @@ def test_no_input_takes_long(unit: bytes) -> None:
     log = read(ulog(flight(), after=unit * (300_000 // len(unit))))
     assert time.monotonic() - began < 10.0
     assert len(log.parts["poses"]) == 50
+
+
+def test_zero_above_the_ellipsoid_is_not_known() -> None:
+    log = read(ulog(flight(vehicle_gps_position=new_gps(ellipsoid=0.0))))
+    assert "height_ellipsoid_m" not in log.parts["gnss"].columns

@@ -97,14 +97,13 @@ def walk(data: bytes) -> Frames:
     while pos + 16 <= length:
         end, message, system, component, payload = _header(data, pos)
         whole = 0 < end <= length and _plausible(data, pos)
-        followed = whole and (end == length or _begins(data, end))
         known = message in extra
         sound = False
         if whole and known:
             tail = data[pos + 9] + payload
             found = checksum(data[pos + 9 : tail] + extra[message]).crc
             sound = found == data[tail] | data[tail + 1] << 8
-        if not sound and not followed:
+        if not sound and not (whole and _begins(data, end)):
             next_ = _BEGINNING.search(data, pos + 1)
             if next_ is None:
                 break

@@ -23,6 +23,7 @@ Flags = NDArray[np.bool_]
 DAY_S = 86400.0
 #: Stamps that fall back by more than this mean that the vehicle was switched on again.
 RESTART_S = 10.0
+MOST_RUNS = 50
 #: A stamp goes with its receipt if it lies within this of it, the clocks' difference taken off.
 BESIDE_S = 60.0
 #: Messages with time since start that each autopilot sends all the time.
@@ -71,6 +72,10 @@ def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
     if not len(own):
         return None
     starts = np.r_[0, 1 + np.flatnonzero(np.diff(own) < -RESTART_S)]
+    falls = len(starts) - 1
+    if falls >= MOST_RUNS:
+        # No vehicle is switched on so often: the stamps are of no use, and one line goes under most of them.
+        starts = starts[:1]
     told = kinds[_STAMPED.index("SYSTEM_TIME")]
     unix = told["time_unix_usec"] / 1e6
     said = unix > 0
@@ -95,6 +100,8 @@ def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
     late = received - np.array([one.offset_s for one in fits])[_runs(starts, len(own))]
     late = late - np.array([one.rate for one in fits])[_runs(starts, len(own))] * own
     notes = _notes(unix[said], told.received_s[said], believed, len(starts), late, from_vehicle[main])
+    if falls >= MOST_RUNS:
+        notes.append(f"the vehicle's stamps fall back {falls} times: they are of several clocks")
     first = number[starts]
     return Boot(
         first,

@@ -50,6 +50,7 @@ _TEXTS = {ord("L"): 9, ord("C"): 11}
 SYNC = bytes.fromhex("2f731320250cbb12")
 _KEY = re.compile(rb"(\w+)(?:\[(\d{1,5})\])? (\S+)")
 _NAME = re.compile(rb"\w+")
+_COLON = ord(":")
 _READABLE = bytes([9, 10, 13, 27, *range(32, 127)])
 _HEAD = struct.Struct("<HB")
 #: Looked through at once where a message that holds is searched: little at first, for it is often near.
@@ -128,19 +129,23 @@ class _Walk:
             topic = self.data[pos + 3] | self.data[pos + 4] << 8
             bounds = self.sizes.get(topic) or self.learnt.get(topic)
             return None if bounds is None else bounds[0] <= size - 2 <= bounds[1]
-        body = self.data[pos + 3 : end]
+        # What is long is looked at only where its beginning is right.
+        start = pos + 3
         if kind == _FORMAT:
-            return self.format(pos + 3, end) is not None or None
+            begins = _NAME.match(self.data, start, start + 100)
+            named = begins is not None and self.data[begins.end()] == _COLON
+            return (named and self.format(start, end) is not None) or None
         if kind == _ADD:
-            return _NAME.fullmatch(body, 3) is not None or None
+            return (size <= 300 and _NAME.fullmatch(self.data, start + 3, end) is not None) or None
         if kind in _KEYED:
-            return _informs(body[_KEYED[kind] :]) or None
+            return _informs(self.data[start + _KEYED[kind] : start + 300], size - _KEYED[kind]) or None
         if kind in _TEXTS:
-            text = body[_TEXTS[kind] :]
-            said = len(text.translate(None, _READABLE)) <= len(text) / 4
-            return (said and body[0] in b"01234567") or None
+            if self.data[start] not in b"01234567":
+                return None
+            text = self.data[start + _TEXTS[kind] : end]
+            return len(text.translate(None, _READABLE)) <= len(text) / 4 or None
         if kind == _SYNC:
-            return body == SYNC
+            return self.data[start:end] == SYNC
         return (size == 2) if kind in b"OR" else (pos == HEADER) if kind == _FLAGS else None
 
     def format(self, start: int, end: int) -> tuple[str, list[tuple[str, int, str]]] | None:
@@ -217,7 +222,7 @@ class _Walk:
                         self.wanted.add(topic)
                         self.kept.append((pos, end))
         elif kind == _INFO:
-            if _informs(body):
+            if _informs(body, len(body)):
                 self.kept.append((pos, end))
         elif kind == _DROPOUT:
             self.dropouts += 1
@@ -294,13 +299,13 @@ def sound_part(data: bytes, topics: frozenset[str]) -> Sound:
     )
 
 
-def _informs(body: bytes) -> bool:
-    """Whether a key says how long its value is, and it is so long."""
+def _informs(body: bytes, size: int) -> bool:
+    """Whether a key at the beginning of so many bytes says how long its value is, and it is so long."""
     matched = _KEY.fullmatch(body[1 : 1 + body[0]]) if body else None
     if matched is None or matched[1].decode() not in SIZES:
         return False
     many = 1 if matched[2] is None else int(matched[2])
-    return len(body) - 1 - body[0] == SIZES[matched[1].decode()] * many
+    return size - 1 - body[0] == SIZES[matched[1].decode()] * many
 
 
 def _written(name: str, fields: list[tuple[str, int, str]]) -> bytes:

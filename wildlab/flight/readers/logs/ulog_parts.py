@@ -104,7 +104,7 @@ def _from_global(place: Topic) -> dict[str, Array]:
         "latitude_deg": _degrees(place, "latitude_deg", "lat"),
         "longitude_deg": _degrees(place, "longitude_deg", "lon"),
         "height_sea_m": _metres(place, "altitude_msl_m", "alt"),
-        "height_ellipsoid_m": _metres(place, "altitude_ellipsoid_m", "alt_ellipsoid"),
+        "height_ellipsoid_m": _ellipsoid(place),
         "v_north_m_s": place.get("vel_n"),
         "v_east_m_s": place.get("vel_e"),
         "v_down_m_s": place.get("vel_d"),
@@ -176,7 +176,7 @@ def _gnss(topics: dict[str, Topic], fit: ClockFit | None) -> Stream | None:
         "latitude_deg": _degrees(found, "latitude_deg", "lat"),
         "longitude_deg": _degrees(found, "longitude_deg", "lon"),
         "height_sea_m": _metres(found, "altitude_msl_m", "alt"),
-        "height_ellipsoid_m": _metres(found, "altitude_ellipsoid_m", "alt_ellipsoid"),
+        "height_ellipsoid_m": _ellipsoid(found),
         "sd_horizontal_m": found.get("eph"),
         "sd_vertical_m": found.get("epv"),
         "sd_velocity_m_s": found.get("s_variance_m_s"),
@@ -279,6 +279,12 @@ def _metres(topic: Topic, new: str, old: str) -> Array:
     name = new if new in topic.data else old
     values = topic.get(name)
     return values * 1e-3 if name in topic.data and topic.data[name].dtype.kind in "iu" else values
+
+
+def _ellipsoid(topic: Topic) -> Array:
+    """Height above the ellipsoid, m; NaN where it is just zero, which drivers write that do not know it."""
+    height = _metres(topic, "altitude_ellipsoid_m", "alt_ellipsoid")
+    return np.where(height == 0, np.nan, height)
 
 
 def _stream(part: str, columns: dict[str, Array], found: Topic, wrong: dict[str, Flags]) -> Stream | None:
