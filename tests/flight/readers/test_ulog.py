@@ -237,7 +237,7 @@ def test_old_names_and_integers() -> None:
     # UTC is of 50 ms before the message.
     assert np.allclose(columns["time_s"], START_S + 0.2 * np.arange(25), atol=1e-5)
     assert log.clock.base == "UTC of the receiver"
-    assert log.clock.rate == 1.0
+    assert log.clock.rate == pytest.approx(1.0, abs=1e-7)
 
 
 @pytest.mark.parametrize(

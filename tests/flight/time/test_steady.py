@@ -1,4 +1,4 @@
-"""A rate other than 1 only where the log can tell it, for instants and for receipts."""
+"""A rate that is none of a quartz only where the log can tell it, for instants and for receipts."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_a_short_log_does_not_tell_the_rate(late: bool) -> None:
     own = 300 + np.arange(0, 12, 0.2)
     noise = rng.exponential(0.3, len(own)) if late else rng.normal(0, 0.02, len(own))
     fit = fit_steady(own, UTC + own + noise, late)
-    assert fit.rate == 1.0
+    assert abs(fit.rate - 1) < 1e-4
     assert abs(fit.to_reference(306.0) - UTC - 306) < 0.03
     assert np.allclose(fit.residual, UTC + own + noise - fit.to_reference(own), atol=1e-6)
 
@@ -39,7 +39,7 @@ def test_early_receipts_of_a_short_log_are_outliers() -> None:
     received = UTC + own + np.linspace(0, 0.2, 50) % 0.07
     received[20] -= 40.0
     fit = fit_steady(own, received, late=True)
-    assert fit.rate == 1.0
+    assert abs(fit.rate - 1) < 1e-4
     assert not fit.used[20]
     assert abs(fit.to_reference(305.0) - UTC - 305) < 0.01
 

@@ -1,4 +1,4 @@
-"""Clocks of a log against UTC, with another rate than 1 only where the log is long enough to tell it."""
+"""Clocks of a log against UTC, with the rate of a quartz as far as the log is too short to tell another."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 TOLD_APART = 4.0
 #: Receipts before the middle one by more than so many robust standard deviations (and 1 s) are wrong.
 EARLY = 5.0
+#: Standard deviation of a quartz's rate.
+USUAL = 1e-4
 #: A clock that is further from the other's rate is none.
 SLOWEST, FASTEST = 0.5, 2.0
 
@@ -20,7 +22,9 @@ SLOWEST, FASTEST = 0.5, 2.0
 def fit_steady(
     own: ArrayLike, reference: ArrayLike, late: bool = False, resolution_s: float = RESOLUTION_S
 ) -> ClockFit:
-    """As `fit_clock`, with a rate of 1 where the pairs cannot tell it from 1.
+    """As `fit_clock`, with a rate near 1 where the pairs cannot tell it from 1.
+
+    What they say of it is then weighed against what a quartz does.
 
     Parameters
     ----------
@@ -39,9 +43,12 @@ def fit_steady(
     fit = fit_clock(own, reference, late, resolution_s)
     if abs(fit.rate - 1.0) > TOLD_APART * fit.rate_sd and SLOWEST < fit.rate < FASTEST:
         return fit
+    turned = np.clip(fit.rate - 1.0, -1.0, 1.0) if np.isfinite(fit.rate_sd) else 0.0
+    rate = 1.0 + float(turned) * USUAL**2 / (USUAL**2 + min(fit.rate_sd, 1e9) ** 2)
     x, y = np.asarray(own, float), np.asarray(reference, float)
-    apart = y - x
     used = fit.used
+    middle = float(np.mean(x[used]))
+    apart = y - middle - rate * (x - middle)
     if late:
         # Among few pairs `fit_clock` believes all.
         believed = used & (apart >= np.nanmedian(apart) - max(EARLY * _spread(apart), 1.0))
@@ -50,11 +57,10 @@ def fit_steady(
     else:
         offset = float(np.median(apart[used]))
     residual = apart - offset
-    middle = float(np.mean(x[used]))
     return ClockFit(
         middle,
         middle + offset,
-        1.0,
+        rate,
         residual,
         np.asarray(used),
         max(_spread(residual[used]), RESOLUTION_S),
