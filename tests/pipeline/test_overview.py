@@ -24,6 +24,7 @@ from wildlab.pipeline.overview import TROUBLES, best_source, look_over
 from wildlab.pipeline.worth_fixing import (
     FIX,
     LEVELS,
+    LOOK,
     MEND,
     SOUND,
     UNJUDGED,
@@ -257,9 +258,10 @@ def test_only_what_was_measured_is_a_gain(make_flight: Callable[..., Flight]) ->
 
 
 def test_the_verdict_follows_from_what_was_counted() -> None:
-    assert verdict_of(1, 3, 2) == MEND and verdict_of(0, 1, 0) == FIX
-    assert verdict_of(0, 0, 1) == SOUND and verdict_of(0, 0, 0) == UNJUDGED
-    assert set(LEVELS) == {MEND, FIX, SOUND, UNJUDGED}
+    assert verdict_of(1, 3, 1, 2) == MEND and verdict_of(0, 1, 1, 0) == FIX
+    assert verdict_of(0, 0, 2, 1) == LOOK
+    assert verdict_of(0, 0, 0, 1) == SOUND and verdict_of(0, 0, 0, 0) == UNJUDGED
+    assert set(LEVELS) == {MEND, FIX, LOOK, SOUND, UNJUDGED}
 
 
 def test_the_page_says_first_what_is_most_worth_fixing(

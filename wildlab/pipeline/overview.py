@@ -124,6 +124,26 @@ class Overview:
     warnings: int
 
 
+def troubled_for(overview: Overview, share: float) -> list[Trouble]:
+    """Troubles that last for a share of the flight or more, longest first.
+
+    Parameters
+    ----------
+    overview
+        Of the flight.
+    share
+        Of its length.
+
+    Returns
+    -------
+    list of Trouble
+    """
+    if not overview.length_s > 0:
+        return []
+    long = [one for one in overview.troubles if one.seconds >= share * overview.length_s]
+    return sorted(long, key=lambda one: -one.seconds)
+
+
 def look_over(flight: Flight, source: str | None = None) -> Overview:
     """Collect what there is to know of a flight.
 

@@ -20,8 +20,9 @@ LISTED, WORTH = 0.005, 0.1
 MOST = 3
 
 #: What a flight comes to, and the colour of it.
-MEND, FIX, SOUND, UNJUDGED = "mend first", "worth fixing", "sound", "not judged"
-LEVELS = {MEND: "bad", FIX: "warn", SOUND: "good", UNJUDGED: "neutral"}
+MEND, FIX, LOOK = "mend first", "worth fixing", "look closer"
+SOUND, UNJUDGED = "sound", "not judged"
+LEVELS = {MEND: "bad", FIX: "warn", LOOK: "warn", SOUND: "good", UNJUDGED: "neutral"}
 
 #: Which parameters of a calibration tell which cause, by the names of their metrics.
 CAUSES = {
@@ -135,7 +136,7 @@ def _data(lost: Recovered) -> Gain:
     )
 
 
-def verdict_of(problems: int, worth: int, judged: int) -> str:
+def verdict_of(problems: int, worth: int, troubled: int, judged: int) -> str:
     """What a flight comes to, in a word or two.
 
     Parameters
@@ -144,6 +145,8 @@ def verdict_of(problems: int, worth: int, judged: int) -> str:
         Things in its tables that cannot be used or contradict each other.
     worth
         Gains of `WORTH` or more.
+    troubled
+        Things that are wrong along the path for that share of the time or more.
     judged
         Its other reports.
 
@@ -154,11 +157,13 @@ def verdict_of(problems: int, worth: int, judged: int) -> str:
 
     Examples
     --------
-    >>> verdict_of(0, 2, 1), verdict_of(1, 0, 0), verdict_of(0, 0, 0)
+    >>> verdict_of(0, 2, 0, 1), verdict_of(1, 0, 0, 0), verdict_of(0, 0, 0, 0)
     ('worth fixing', 'mend first', 'not judged')
     """
     if problems:
         return MEND
     if worth:
         return FIX
+    if troubled:
+        return LOOK
     return SOUND if judged else UNJUDGED

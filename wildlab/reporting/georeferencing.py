@@ -151,6 +151,12 @@ def record_accuracy(
         report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
+    if diagnosis and diagnosis.outliers and diagnosis.inliers.any():
+        kept, whole = diagnosis.held_summary(diagnosis.inliers), diagnosis.held_summary()
+        record_summary(report, "without-far-out", kept)
+        report.metric("gain", "without-far-out", whole.mean - kept.mean, "m", n=kept.n)
+        out = int((~diagnosis.inliers).sum())
+        report.metric("points_far_out", "winner", out, "1", n=len(diagnosis.inliers))
     if np.isfinite(found.learnt):
         report.metric("ellipse_coverage_90", "logged-pose/estimated-noise", found.learnt, "1")
     others = {}

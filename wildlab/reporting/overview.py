@@ -9,7 +9,7 @@ import numpy as np
 from wildlab.evaluation.vibration import FLOOR_HZ, SMOOTH_HZ
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
 from wildlab.pipeline.image_coverage import FLATTEST
-from wildlab.pipeline.overview import JUMP, JUMP_M, Overview
+from wildlab.pipeline.overview import JUMP, JUMP_M, Overview, troubled_for
 from wildlab.pipeline.worth_fixing import LEVELS, LISTED, MOST, WORTH, Gain, Numbers, verdict_of
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
@@ -44,7 +44,8 @@ def show_overview(
     """
     problems = overview.problems + sum(one.startswith("problem") for one in amiss)
     worth = sum(gain.share >= WORTH for gain in gains)
-    word = verdict_of(problems, worth, judged)
+    troubled = len(troubled_for(overview, WORTH))
+    word = verdict_of(problems, worth, troubled, judged)
     shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
     report.summary(words.summary_sentences(overview, word, gains, problems, lacking), level=LEVELS[word])
@@ -78,7 +79,12 @@ def record(
         if np.isfinite(value):
             report.metric(name, FLIGHT, value, unit, n=n)
 
-    for name, count in (("problems", problems), ("worth_fixing", worth), ("reports_beside", judged)):
+    for name, count in (
+        ("problems", problems),
+        ("worth_fixing", worth),
+        ("troubled", len(troubled_for(overview, WORTH))),
+        ("reports_beside", judged),
+    ):
         note(name, count, "1")
     note("duration", overview.length_s, "s")
     note("path_length", words.way_of(overview), "m")

@@ -9,8 +9,8 @@ import pandas as pd
 
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
 from wildlab.pipeline.image_coverage import Coverage
-from wildlab.pipeline.overview import Overview, Trouble
-from wildlab.pipeline.worth_fixing import FIX, MEND, MOST, SOUND, WORTH, Gain
+from wildlab.pipeline.overview import Overview, Trouble, troubled_for
+from wildlab.pipeline.worth_fixing import FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
 from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.text import percent
 
@@ -118,6 +118,9 @@ def headline(overview: Overview, word: str, gains: Sequence[Gain], problems: int
         first = _lower(gain_title(worth[0]))
         more = f", and {len(worth) - 1} more" if len(worth) > 1 else ""
         return f"Something is worth fixing: {first}{more}."
+    if word == LOOK:
+        first = troubled_for(overview, WORTH)[0]
+        return f"Look closer: {first.what} for {trouble_share(overview, first)} of the time."
     if word == SOUND:
         return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
     return "This flight is shown, not judged: none of the other reports could be made of it."
@@ -136,7 +139,10 @@ def summary_sentences(
         what = "" if word == FIX else f"The most: {_lower(gain_title(gains[0]))}. "
         said.append(f"{what}{gain_measured(gains[0])}")
     elif word != SOUND:
-        said.append("No gain was measured.")
+        said.append("No gain was measured that mending anything would bring.")
+    if overview.troubles and word != LOOK:
+        longest = max(overview.troubles, key=lambda one: one.seconds)
+        said.append(f"Along the path: {longest.what} for {trouble_share(overview, longest)} of the time.")
     if lacking:
         said.append(f"Not judged: {'; '.join(lacking)}.")
     return said
@@ -164,14 +170,16 @@ def path_title(overview: Overview) -> str:
     """What is wrong along the path, in a line."""
     if not overview.troubles:
         return "Nothing wrong was found along the path"
-    worst = overview.troubles[0]
+    worst = max(overview.troubles, key=lambda one: one.seconds)
     if not np.isfinite(overview.length_s) or overview.length_s <= 0 or worst.seconds < 1:
         return f"Along the path: {worst.what}"
     return f"{trouble_share(overview, worst)} of the time: {worst.what}"
 
 
 def trouble_share(overview: Overview, trouble: Trouble) -> str:
-    """Share of the time."""
+    """Share of the time; an instant has none."""
+    if not trouble.seconds or not overview.length_s > 0:
+        return "an instant"
     return percent(min(1.0, trouble.seconds / overview.length_s), 0)
 
 

@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from wildlab.pipeline.worth_fixing import FIX, MEND, SOUND, UNJUDGED, verdict_of
+from wildlab.pipeline.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
 from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.text import NOTHING, escape
 
 #: The page, beside the ledger.
 PAGE = "flights.html"
-_PILLS = {MEND: "no", FIX: "part", SOUND: "yes", UNJUDGED: ""}
+#: What the verdict follows from, of the overview.
+COUNTS = ("problems", "worth_fixing", "troubled", "reports_beside")
+_PILLS = {MEND: "no", FIX: "part", LOOK: "part", SOUND: "yes", UNJUDGED: ""}
 
 
 class OwnReport(NamedTuple):
@@ -70,11 +72,11 @@ class OwnFlight(NamedTuple):
     @property
     def verdict(self) -> str | None:
         """What it comes to; None without an overview that is done."""
-        counts = [self.value(name, "flight") for name in ("problems", "worth_fixing", "reports_beside")]
+        counts = [self.value(name, "flight") for name in COUNTS]
         if any(count is None for count in counts):
             return None
-        problems, worth, judged = (int(count or 0) for count in counts)
-        return verdict_of(problems, worth, judged)
+        problems, worth, troubled, judged = (int(count or 0) for count in counts)
+        return verdict_of(problems, worth, troubled, judged)
 
     @property
     def finished(self) -> str:
@@ -132,13 +134,15 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
         parts.append("<p>None yet: <code>wildlab evaluate</code> makes the reports of a flight.</p>")
     if comparison:
         parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
-    parts.append(
-        f"<p class='note'><b>{MEND}</b>: something in its tables cannot be used or contradicts "
-        f"itself. <b>{FIX}</b>: "
-        f"a gain was measured that is worth it. <b>{SOUND}</b>: it was judged, and none was. "
-        f"<b>{UNJUDGED}</b>: "
-        "no other report could be made of it.</p>"
-    )
+    meanings = {
+        MEND: "something in its tables cannot be used or contradicts itself",
+        FIX: "a gain was measured that is worth it",
+        LOOK: "something is wrong along the path for long, and what mending it gains was not measured",
+        SOUND: "it was judged, and neither is so",
+        UNJUDGED: "no other report could be made of it",
+    }
+    legend = "; ".join(f"<b>{word}</b>: {meaning}" for word, meaning in meanings.items())
+    parts.append(f'<p class="note">{legend}.</p>')
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return page(
         title="Flights evaluated here",

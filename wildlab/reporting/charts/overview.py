@@ -155,6 +155,8 @@ def streams_chart(streams: Mapping[str, Pace], clock: Clock, title: str) -> Figu
             left, right = clock(gap)
             ax.plot([left, right], [row, row], color="white", lw=9, solid_capstyle="butt")
             ax.plot([left, right], [row, row], color=VERMILLION, lw=3, solid_capstyle="butt")
+            # Also where the pause is too short to be seen.
+            ax.plot((left + right) / 2, row, "|", color=VERMILLION, ms=12, mew=1.6)
     ax.set_yticks(range(len(named)), list(named))
     ax.set_ylim(len(named) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)

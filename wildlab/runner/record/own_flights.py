@@ -41,12 +41,12 @@ def own_flights(reports: Path, studies: Collection[str]) -> list[OwnFlight]:
         folder = status.parent
         if folder.name in studies or folder.name.startswith(".") or not (folder / "report.html").is_file():
             continue
-        if any(folder.name.startswith(f"{study}-") for study in studies):
-            continue  # a study on another flight than its own
         provenance = read_provenance(folder)
         flight = provenance.get("flight")
         if not isinstance(flight, dict) or not isinstance(flight.get("name"), str):
             continue
+        if any(folder.name == f"{study}-{flight['name']}" for study in studies):
+            continue  # a study on another flight than its own
         found.setdefault(flight["name"], []).append(_report(folder, flight["name"], provenance))
         kinds[flight["name"]] = str(flight.get("kind", ""))
     order = list(ABOUT.values())

@@ -1,0 +1,224 @@
+"""`wildlab compare`, and the page of all flights evaluated here: by made-up reports, and one evaluation."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from wildlab.cli import main
+from wildlab.flight.store import save_flight
+from wildlab.reporting import metrics as schema
+from wildlab.reporting.comparison import QUANTITIES
+from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.simulation.twins import simulate_twin
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, " ".join(said.err.split())
+
+
+def leave(
+    reports: Path,
+    flight: str,
+    end: str = "-overview",
+    *,
+    numbers: dict[tuple[str, str], tuple[float, float | None, float | None, int | None]] | None = None,
+    state: str = "done",
+    lacking: tuple[str, ...] = (),
+    folder: Path | None = None,
+) -> Path:
+    """What a run leaves behind, without the run."""
+    target = reports / f"{flight}{end}"
+    target.mkdir(parents=True)
+    (target / "report.html").write_text("<p>report</p>")
+    entries = [
+        schema.metric(name, subject, value, "m", low=low, high=high, n=n)
+        for (name, subject), (value, low, high, n) in (numbers or {}).items()
+    ]
+    if state == "done":
+        content = schema.document(
+            study=target.name, flight=flight, kind="logged", seed=1, seeds=None, metrics=entries, claims=[]
+        )
+        schema.write_metrics(target / "metrics.json", content)
+    about = provenance_of_flight(folder) if folder else {"name": flight, "kind": "logged", "files": {}}
+    provenance = {"flight": about, "parameters": {"lacking": list(lacking)}}
+    (target / "provenance.json").write_text(json.dumps(provenance))
+    status = {"state": state, "seconds": 3.0, "finished": "2026-11-22T10:15:00+00:00", "reason": "it rained"}
+    (target / "status.json").write_text(json.dumps(status))
+    return target
+
+
+def counts(problems: int, worth: int, troubled: int, judged: int, length: float = 600.0) -> dict[Any, Any]:
+    values = {"problems": problems, "worth_fixing": worth, "troubled": troubled, "reports_beside": judged}
+    return {(name, "flight"): (value, None, None, None) for name, value in values.items()} | {
+        ("duration", "flight"): (length, None, None, None)
+    }
+
+
+@pytest.fixture
+def reports(tmp_path: Path) -> Path:
+    """Three flights: one whole, one of which only navigation could be judged, one that failed."""
+    folder = tmp_path / "reports"
+    error = {("horizontal_error_mean", "logged-pose"): (3.2, 2.8, 3.7, 90),
+             ("ellipse_coverage_90", "logged-pose"): (0.71, None, None, 90)}  # fmt: skip
+    leave(folder, "monday", numbers=counts(0, 1, 0, 1))
+    leave(folder, "monday", "", numbers=error)
+    lacking = ("georeferencing (it lacks truth)",)
+    leave(folder, "tuesday", numbers=counts(0, 0, 0, 1, 7300.0), lacking=lacking)
+    leave(folder, "tuesday", "-navigation", numbers={("rms_yaw", "mekf"): (2.5, None, None, None)})
+    leave(folder, "friday", numbers=counts(2, 0, 0, 0))
+    leave(folder, "friday", "", state="failed")
+    return folder
+
+
+def test_the_page_and_the_table_have_every_flight(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
+    folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
+    code, out, err = call(capsys, "compare", *folders, "--out", reports)
+    assert code == 0, err
+    assert out.strip().endswith("comparison/report.html")
+    page = (reports / "comparison" / "report.html").read_text(encoding="utf-8")
+    for word in ("worth fixing", "sound", "mend first", "3.2 m (2.8 to 3.7) (90 points)", "71 % (90 points)"):
+        assert word in page, word
+    assert "3 flights: 1 worth fixing; 1 sound; 1 mend first." in page
+    assert "<script" not in page and not re.search("https?:", page)
+    with (reports / "comparison" / "flights.csv").open() as file:
+        rows = {row["flight"]: row for row in csv.DictReader(file)}
+    assert list(rows) == ["monday", "tuesday", "friday"]
+    assert float(rows["monday"]["error_mean_m"]) == 3.2 and rows["monday"]["error_mean_m_n"] == "90.0"
+    assert rows["tuesday"]["error_mean_m"] == "" and rows["tuesday"]["verdict"] == "sound"
+    assert float(rows["tuesday"]["yaw_deg"]) == 2.5
+
+
+def test_what_lacks_says_why(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
+    folders = [reports / f"{name}-overview" for name in ("monday", "tuesday", "friday")]
+    assert call(capsys, "compare", *folders, "--out", reports)[0] == 0
+    page = (reports / "comparison" / "report.html").read_text(encoding="utf-8")
+    assert "not measured" in page
+    table = pd.read_csv(reports / "comparison" / "flights.csv").set_index("flight")
+    assert table.loc["tuesday", "error_mean_m_why"] == "it lacks truth"
+    assert table.loc["friday", "error_mean_m_why"] == "the report on the georeferencing is failed"
+    assert table.loc["monday", "yaw_deg_why"] == "there is no report on the navigation"
+    assert table.loc["monday", "imu_hz_why"] == "the overview has no such number of this flight"
+    for quantity in QUANTITIES:
+        known = table[quantity.key].notna()
+        assert (table[f"{quantity.key}_why"].isna() == known).all(), quantity.key
+    for why in ("it lacks truth", "there is no report on the navigation"):
+        assert why in page
+
+
+def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
+    two = {("rmse", f"radar/{target}/ekf"): (4.0, None, None, 9) for target in ("a", "b")}
+    leave(reports, "monday", "-tracking", numbers=two)
+    leave(reports, "tuesday", "-tracking", numbers={("rmse", "radar/a/ekf"): (4.0, None, None, 9)})
+    from wildlab.reporting.comparison import flights_table
+
+    table = flights_table(own_flights(reports, ())).set_index("flight")
+    assert table.loc["tuesday", "track_rmse_m"] == 4.0
+    assert table.loc["monday", "track_rmse_m_why"] == "several tracks, none of which stands for all"
+
+
+def test_into_another_folder_has_no_links_that_lead_nowhere(
+    capsys: pytest.CaptureFixture[str], reports: Path, tmp_path: Path
+) -> None:
+    folders = [reports / "monday", reports / "tuesday-overview"]
+    code, out, _ = call(capsys, "compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
+    assert code == 0 and out.strip().endswith("a/b/report.html")
+    assert "href" not in (tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        (("monday-overview",), "there is nothing to compare: one flight was named"),
+        (("monday-overview", "monday"), "the flight 'monday' is named twice"),
+        (("monday-overview", "nowhere"), "this is neither a flight nor a report on one"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(
+    capsys: pytest.CaptureFixture[str], reports: Path, named: tuple[str, ...], said: str
+) -> None:
+    code, out, err = call(capsys, "compare", *(reports / name for name in named), "--out", reports)
+    assert code == 2 and not out
+    assert said in err.lower()
+    assert not (reports / "comparison").exists()
+
+
+def test_a_report_without_a_flight_is_refused(capsys: pytest.CaptureFixture[str], reports: Path) -> None:
+    (reports / "monday-overview" / "provenance.json").write_text("[]")
+    code, _, err = call(capsys, "compare", reports / "monday-overview", reports / "tuesday-overview",
+                        "--out", reports)  # fmt: skip
+    assert code == 2 and "there is no report of a flight in this folder" in err.lower()
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call(capsys, "compare", "--help")
+    assert code == 0 and "wildlab compare flights/tuesday flights/wednesday" in out
+
+
+def test_names_out_of_logs_are_only_text(reports: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (reports / "monday-overview" / "provenance.json").write_text(
+        json.dumps({"flight": {"name": "<b>x", "kind": "<i>"}, "parameters": {"lacking": ["<script>"]}})
+    )
+    build_ledger(reports, {})
+    assert call(capsys, "compare", reports / "monday-overview", reports / "tuesday-overview",
+                "--out", reports)[0] == 0  # fmt: skip
+    for page in (reports / "flights.html", reports / "comparison" / "report.html"):
+        text = page.read_text(encoding="utf-8")
+        assert "&lt;b&gt;x" in text and "<b>x" not in text and "<script" not in text and "<i>" not in text
+
+
+def test_the_list_of_flights_links_their_reports_and_leaves_studies_out(reports: Path) -> None:
+    (reports / "schmidt-monday").mkdir()
+    for name in ("status.json", "provenance.json", "report.html", "metrics.json"):
+        (reports / "schmidt-monday" / name).write_text((reports / "monday-overview" / name).read_text())
+    flights = {one.name: one for one in own_flights(reports, ("schmidt", "friday"))}
+    assert {name: len(one.reports) for name, one in flights.items()} == {
+        "monday": 2, "tuesday": 2, "friday": 1,
+    }  # fmt: skip
+    (one,) = flights["friday"].reports
+    assert one.about == "overview" and flights["friday"].verdict == "mend first"
+    shutil.rmtree(reports / "schmidt-monday")
+    build_ledger(reports, {})
+    page = (reports / "flights.html").read_text(encoding="utf-8")
+    for link in ("monday-overview", "monday", "tuesday-navigation", "friday"):
+        assert f'href="{link}/report.html"' in page
+    assert "(failed)" in page and "10 min" in page and "2 h 2 min" in page and "2026-11-22 10:15 UTC" in page
+    assert 'href="index.html"' in page
+    assert 'href="flights.html"' in (reports / "index.html").read_text(encoding="utf-8")
+    assert page.index('href="monday-overview/') < page.index('href="monday/')
+
+
+@pytest.mark.parametrize("damage", ["status.json", "provenance.json", "metrics.json"])
+def test_a_damaged_report_does_not_spoil_the_list(reports: Path, damage: str) -> None:
+    (reports / "monday-overview" / damage).write_text("{")
+    build_ledger(reports, {})
+    page = (reports / "flights.html").read_text(encoding="utf-8")
+    assert "tuesday" in page and "friday" in page
+
+
+@pytest.mark.slow
+def test_a_flight_without_reports_is_evaluated_first(
+    capsys: pytest.CaptureFixture[str], reports: Path, tmp_path: Path
+) -> None:
+    flight = simulate_twin("large-ship", 1)
+    for name in ("detections", "truth", "frames"):
+        flight.tables.pop(name, None)
+    save_flight(flight, tmp_path / "flight")
+    code, _, err = call(capsys, "compare", tmp_path / "flight", reports / "monday", "--out", reports)
+    assert code == 0, err
+    made = (reports / f"{flight.name}-overview" / "status.json").stat().st_mtime_ns
+    assert "georeferencing" in (reports / "comparison" / "report.html").read_text(encoding="utf-8")
+    assert call(capsys, "compare", tmp_path / "flight", reports / "monday", "--out", reports)[0] == 0
+    assert (reports / f"{flight.name}-overview" / "status.json").stat().st_mtime_ns == made
