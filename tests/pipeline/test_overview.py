@@ -33,6 +33,7 @@ from wildlab.pipeline.worth_fixing import (
     verdict_of,
 )
 from wildlab.reporting.overview import show_overview
+from wildlab.reporting.overview_words import gain_measured
 from wildlab.reporting.report import open_report
 from wildlab.simulation.twins import simulate_twin
 
@@ -364,3 +365,34 @@ def test_the_best_known_poses_are_shown() -> None:
     assert best_source(Flight(manifest, {})) is None
     with pytest.raises(WildlabError, match="no nav source 'other'"):
         look_over(Flight(manifest, {"mine": table}), "other")
+
+
+def test_trouble_that_lasts_asks_for_a_closer_look(
+    make_flight: Callable[..., Flight], tmp_path: Path
+) -> None:
+    flight = make_flight(n_images=40)
+    t = np.arange(0.0, 40.0, 0.5)
+    nav = flight.nav["logged"]
+    at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
+    flight.tables["gnss"] = pd.DataFrame({"time_s": t, **at, "satellites": np.where(t < 12, 4.0, 9.0)})
+    html, content = page_of(flight, tmp_path, judged=1)
+    share = 12.0 / look_over(flight).length_s
+    assert f"Look closer: fewer than 6 satellites for {100 * share:.0f} % of the time." in html
+    assert values(content)["troubled", "flight"] == 1
+
+
+def test_points_that_are_far_out_are_listed_with_what_stays(make_flight: Callable[..., Flight]) -> None:
+    def entry(name: str, subject: str, value: float, n: int) -> dict[str, Any]:
+        return {"name": name, "subject": subject, "value": value, "low": None, "high": None, "n": n}
+
+    numbers = numbers_of([{"metrics": [
+        entry("gain", "without-far-out", 0.5, 88),
+        entry("horizontal_error_mean", "without-far-out", 1.5, 88),
+        entry("points_far_out", "winner", 2, 90),
+    ]}])  # fmt: skip
+    (far,) = [one for one in gains_of(look_over(make_flight(n_images=8)), numbers) if one.key == "far_out"]
+    assert far.share == pytest.approx(0.25)
+    said = gain_measured(far)
+    assert (
+        said == "2 of 90 points are far out; without them the mean error is 1.5 m and not 2.0 m: 25 % less."
+    )

@@ -149,7 +149,7 @@ def _rings(placed: pd.DataFrame) -> Array:
     north = along * np.cos(bearing) - across * np.sin(bearing)
     east = along * np.sin(bearing) + across * np.cos(bearing)
     middle = placed[["north_m", "east_m", "down_m"]].to_numpy(float)[:, None, :]
-    return middle + np.stack([north, east, np.zeros_like(north)], axis=2)
+    return np.asarray(middle + np.stack([north, east, np.zeros_like(north)], axis=2))
 
 
 def _geojson(flight: Flight, table: pd.DataFrame) -> dict[str, object]:

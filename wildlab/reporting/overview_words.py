@@ -119,8 +119,8 @@ def headline(overview: Overview, word: str, gains: Sequence[Gain], problems: int
         more = f", and {len(worth) - 1} more" if len(worth) > 1 else ""
         return f"Something is worth fixing: {first}{more}."
     if word == LOOK:
-        first = troubled_for(overview, WORTH)[0]
-        return f"Look closer: {first.what} for {trouble_share(overview, first)} of the time."
+        longest = troubled_for(overview, WORTH)[0]
+        return f"Look closer: {longest.what} for {trouble_share(overview, longest)} of the time."
     if word == SOUND:
         return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
     return "This flight is shown, not judged: none of the other reports could be made of it."
