@@ -206,9 +206,10 @@ def evaluate(
 ) -> None:
     """What is a flight worth? FLIGHT is a folder made by `wildlab import`.
 
-    First an overview, whatever the flight lacks: where it flew and what is wrong on the way, what was recorded
-    and where it pauses, what the images showed, and the three things most worth fixing, each with its measured
-    gain. Then a report on the accuracy of its georeferencing, and one on its navigation, as far as the data go.
+    First an overview, whatever the flight lacks: where it flew and what is wrong on the way, what was
+    recorded and where it pauses, what the images showed, and the three things most worth fixing, each with
+    its measured gain. Then a report on the accuracy of its georeferencing, and one on its navigation, as far
+    as the data go.
     All flights evaluated are listed in reports/flights.html.
 
     \b
