@@ -54,7 +54,13 @@ def robot_flight(
     azimuth = np.arctan2(off[:, 1], off[:, 0]) + np.radians(heading_off_deg)
     rows = []
     for k in range(len(t)):
-        seen = [(distance[k] + rng.normal(0, range_sd), azimuth[k] + rng.normal(0, np.radians(bearing_sd_deg)), "boat")]
+        seen = [
+            (
+                distance[k] + rng.normal(0, range_sd),
+                azimuth[k] + rng.normal(0, np.radians(bearing_sd_deg)),
+                "boat",
+            )
+        ]
         seen += [(rng.uniform(20, 200), rng.uniform(-np.pi, np.pi), "") for _ in range(clutter)]
         for i, (r, a, target) in enumerate(seen):
             row: dict[str, Any] = {
@@ -91,7 +97,9 @@ def robot_flight(
     }
     if heading_sd_deg is not None:
         parts["uncertainty"] = {"yaw_deg": heading_sd_deg}
-    frames = pd.DataFrame({"frame_id": [f"{sensor}-{k}" for k in range(len(t))], "time_s": t, "sensor": sensor})
+    frames = pd.DataFrame(
+        {"frame_id": [f"{sensor}-{k}" for k in range(len(t))], "time_s": t, "sensor": sensor}
+    )
     tables = {"frames": frames, "detections": pd.DataFrame(rows)}
     if truth:
         tables["truth"] = way

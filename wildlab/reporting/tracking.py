@@ -35,6 +35,16 @@ WORDS = {
 }
 
 
+SHORT = {"ekf": "EKF", "ukf": "UKF", "imm": "IMM", "coloured": "coloured", "schmidt": "Schmidt",
+         "thinned": "thinned"}  # fmt: skip
+
+
+def short_words(name: str) -> str:
+    """The same for titles."""
+    base = name.removesuffix("-smoothed")
+    return SHORT.get(base, base) + (" smoothed" if name != base else "")
+
+
 def filter_words(name: str) -> str:
     """A filter's name in words; a smoothed one says so."""
     return WORDS.get(name.removesuffix("-smoothed"), name) + (
@@ -135,10 +145,10 @@ def _root(values: pd.Series) -> float:
 
 def _error_change(gain: float) -> str:
     if gain < 1 / 1.05:
-        return f"its errors are {1 / gain:.2f} times as large as the other's"
+        return f"it is {1 / gain:.2f} times as far off"
     if gain > 1.05:
-        return f"its errors are {1 / gain:.2f} of the other's"
-    return "its errors are about the other's"
+        return f"it is {1 / gain:.2f} times as far off, which is less"
+    return "both are about as far off"
 
 
 def _counts(rows: pd.DataFrame, column: str = "verdict") -> str:
@@ -196,40 +206,36 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
     shown = []
     for _, row in rows.iterrows():
         one = {
-            "sensor": row["sensor"],
-            "target": row["target"],
+            "track": f"{row['target']}, {row['sensor']}",
             "filter": filter_words(row["filter"]),
+            "verdict": verdict_words(row, "nees" if truth else "nis"),
             "detections": int(row["detections"]),
         }
         if truth:
             inside = "–"
             if np.isfinite(row["inside"]):
                 low, high = 100 * row["inside_low"], 100 * row["inside_high"]
-                inside = f"{100 * row['inside']:.0f} % ({low:.0f} to {high:.0f})"
+                inside = f"{100 * row['inside']:.0f} ({low:.0f} to {high:.0f})"
             one |= {
                 "rmse": row["rmse"],
                 "nees": band(row, "nees"),
                 "inside": inside,
-                "verdict": verdict_words(row),
             }
         one |= {"nis": band(row, "nis"), "lag1": row["lag1"]}
-        if not truth:
-            one["verdict"] = verdict_words(row, "nis")
         shown.append(one)
     return pd.DataFrame(shown)
 
 
 HEADINGS = {
-    "sensor": "sensor",
-    "target": "target",
+    "track": "target, sensor",
     "filter": "filter",
-    "detections": "detections",
-    "rmse": "RMS error (m)",
-    "nees": "mean NEES (95 % band)",
-    "inside": "inside the band",
-    "nis": "mean NIS (95 % band)",
-    "lag1": "autocorrelation",
     "verdict": "verdict",
+    "rmse": "RMS error (m)",
+    "nees": "mean NEES (band)",
+    "inside": "inside (%)",
+    "nis": "mean NIS (band)",
+    "lag1": "lag 1",
+    "detections": "used",
 }
 
 
@@ -252,8 +258,8 @@ def assumed_sentence(said: Sequence[Said]) -> str:
     if not assumed:
         return "All that the filters were told is stated or was tuned on another flight."
     return (
-        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in flight.toml "
-        "or with --settings, or tune them on another flight (--tune)."
+        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in `flight.toml` "
+        "or with `--settings`, or tune them on another flight with `--tune`."
     )
 
 

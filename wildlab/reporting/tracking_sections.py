@@ -44,12 +44,18 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
     )
     report.section("Every track", intro)
     table = words.tracks_table(rows)
+    truth = (
+        " Inside: share of looks whose NEES is in the band of single values, with its interval."
+        if followed.truth
+        else ""
+    )
     report.table(
         table,
         columns=words.columns_of(table),
         digits={"rmse": 2, "lag1": 2, "detections": 0},
-        caption="Autocorrelation: of innovations from one detection to the next, of the element where it is "
-        "largest; near zero is right.",
+        caption="Bands: where the mean of a consistent filter lies with 95 %. Lag 1: autocorrelation of "
+        "innovations from one detection to the next, of the element where it is largest; near zero is right. "
+        f"Used: detections.{truth}",
     )
 
 
@@ -79,8 +85,10 @@ def pictures_section(
         figures = [charts.squares_shown(mine, rows, "nis")]
         if any(np.isfinite(one.nees).any() for one in mine):
             figures = [charts.errors_shown(mine, rows), charts.squares_shown(mine, rows, "nees"), *figures]
-        white = charts.whiteness_shown(mine, followed.scans[sensor].elements)
-        figures += [] if white is None else [white]
+        if sensor in followed.scans and (
+            white := charts.whiteness_shown(mine, followed.scans[sensor].elements)
+        ):
+            figures.append(white)
         for i in range(0, len(figures), 2):
             report.figures(figures[i : i + 2])
     if len(pairs) > MOST_DRAWN:

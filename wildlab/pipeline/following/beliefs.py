@@ -41,6 +41,10 @@ _OF_PLATFORM = {
 #: sensor is no gap, so it is one and a half looks at least.
 LONGEST_GAP_S, LONGEST_GAP_LOOKS = 1.0, 1.5
 
+_GATE, _PATIENCE = "probability that its own detection is let in", "a track ends without a detection for"
+_REACH, _REACH_OF_RAYS = "a detection of its own is within", "a ray to it is within"
+#: What is not asked of targets that detections name.
+OF_UNNAMED = (_GATE, _PATIENCE, _REACH, _REACH_OF_RAYS)
 STATED, ASSUMED = "stated", "assumed"
 
 
@@ -136,10 +140,10 @@ def of_targets(stated: TargetsPart) -> tuple[TargetBeliefs, list[Said]]:
     found = TargetBeliefs(
         one("acceleration_m_s_sqrt_s", "acceleration, SD of the velocity that grows in a second", " m/s"),
         one("start_speed_m_s", "speed at the start, SD of each axis", " m/s"),
-        one("gate_probability", "probability that its own detection is let in", ""),
-        one("patience_s", "a track ends without a detection for", " s"),
-        one("reach_m", "a detection of its own is within", " m"),
-        float(np.radians(one("reach_deg", "a bearing of its own is within", "°"))),
+        one("gate_probability", _GATE, ""),
+        one("patience_s", _PATIENCE, " s"),
+        one("reach_m", _REACH, " m"),
+        float(np.radians(one("reach_deg", _REACH_OF_RAYS, "°"))),
         one("size_m", "a track is with it within", " m"),
         stated.identified,
     )

@@ -10,7 +10,15 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import Beliefs, Said, TargetBeliefs, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.beliefs import (
+    OF_UNNAMED,
+    Beliefs,
+    Said,
+    TargetBeliefs,
+    of_flight,
+    of_sensor,
+    of_targets,
+)
 from wildlab.pipeline.following.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
 from wildlab.pipeline.following.together import ABLE, follow_together
 from wildlab.pipeline.following.tuned import Tuned
@@ -127,6 +135,8 @@ def follow_targets(
             notes += _never(mine, looks)
             tracks += mine
     _refuse_unknown(targets, known, flight)
+    if all(one.labelled for one in scans.values()):
+        said = [one for one in said if one.subject != "targets" or one.what not in OF_UNNAMED]
     if len(wanted) > 1:
         names = [name for name in (filters or (WHITE, "schmidt")) if name in ABLE]
         names = _with_smoothed(names) if smooth else names

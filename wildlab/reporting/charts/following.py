@@ -32,7 +32,7 @@ from wildlab.reporting.figures import (
     new_figure,
     thinned,
 )
-from wildlab.reporting.tracking import WORDS, filter_words
+from wildlab.reporting.tracking import WORDS, filter_words, short_words
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
@@ -99,10 +99,10 @@ def _middle(x: Array) -> Array:
 def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) -> Shown:
     """NEES (``"nees"``) or NIS of one target by one sensor over time, by filter, with the band."""
     first = tracks[0]
-    dof = 2 if what == "nees" else first.innovation.shape[1]
+    dof = 2.0 if what == "nees" else first.dof
     fig, ax = new_figure(5.8, 3.8)
     lowest = highest = float(dof)
-    said = []
+    said, brief = [], []
     mine = rows[(rows["sensor"] == first.sensor) & (rows["target"] == first.target)].set_index("filter")
     for one in tracks:
         values = one.nees if what == "nees" else one.nis
@@ -119,6 +119,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
             ax.plot(t, y, ".", ms=3.5, alpha=0.6, mec="none", **look)
         highest, lowest = max(highest, float(y.max())), min(lowest, float(y.min()))
         said.append(f"{filter_words(one.filter)} {mine.loc[one.filter, what]:.2f}")
+        brief.append(f"{short_words(one.filter)} {mine.loc[one.filter, what]:.2f}")
     low, high = chi_square_interval(dof)
     log_band(ax, low, high)
     ax.set_ylim(max(lowest / 2, low / 30), 3 * highest)
@@ -126,19 +127,19 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
     if len(used) > 2:
         mark_gaps(ax, used, max(PAUSE * float(np.median(np.diff(used))), 1.0))
     ax.set(xlabel="time (s)", ylabel="NEES of the position" if what == "nees" else "NIS of the detections")
-    ax.set_title(f"{first.target} by {first.sensor}: mean {what.upper()} {dof} would be right\n" + _two(said))
-    fig.legend(loc="outside lower center", ncols=2)
+    ax.set_title(f"{first.target} by {first.sensor}: mean {what.upper()}, {dof:g} is right\n" + _few(brief))
+    fig.legend(loc="outside lower center", ncols=2, markerscale=3)
     words = "; ".join(said)
     alt = (
         f"{what.upper()} over time of {first.target} by {first.sensor} on a logarithmic axis with the 95 "
         f"percent band; means: {words}."
     )
-    return fig, slug(what, first.sensor, first.target), alt, f"Means: {words}; {dof} is ideal."
+    return fig, slug(what, first.sensor, first.target), alt, f"Means: {words}; {dof:g} is ideal."
 
 
-def _two(said: Sequence[str]) -> str:
-    """The first and the last, so that a title fits."""
-    return " · ".join(said if len(said) < 3 else [said[0], said[-1]])
+def _few(brief: Sequence[str]) -> str:
+    """No more than fit into a title."""
+    return " · ".join(brief[:3]) + (" …" if len(brief) > 3 else "")
 
 
 def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
@@ -146,7 +147,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     first = tracks[0]
     mine = rows[(rows["sensor"] == first.sensor) & (rows["target"] == first.target)].set_index("filter")
     fig, ax = new_figure(5.8, 3.6)
-    said = []
+    said, brief = [], []
     for one in tracks:
         away = np.hypot(*one.error[:, :2].T)
         there = np.isfinite(away)
@@ -156,12 +157,19 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         stated = np.sqrt(np.trace(one.covariance[:, :2, :2], axis1=1, axis2=2))
         ax.plot(one.times[there][keep], away[there][keep], color=colour(one.filter.removesuffix(SMOOTHED)), lw=1.5,
                 label=filter_words(one.filter))  # fmt: skip
-        ax.plot(one.times[there][keep], stated[there][keep], color=colour(one.filter.removesuffix(SMOOTHED)), lw=1.0, ls=":")
+        ax.plot(
+            one.times[there][keep],
+            stated[there][keep],
+            color=colour(one.filter.removesuffix(SMOOTHED)),
+            lw=1.0,
+            ls=":",
+        )
         said.append(f"{filter_words(one.filter)} {mine.loc[one.filter, 'rmse']:.3g} m")
+        brief.append(f"{short_words(one.filter)} {mine.loc[one.filter, 'rmse']:.3g} m")
     ax.plot([], [], color=INK, lw=1.0, ls=":", label="what each states of it")
     ax.set_ylim(bottom=0)
     ax.set(xlabel="time (s)", ylabel="distance from the truth (m)")
-    ax.set_title(f"{first.target} by {first.sensor}: root mean square error\n{_two(said)}")
+    ax.set_title(f"{first.target} by {first.sensor}: root mean square error\n{_few(brief)}")
     fig.legend(loc="outside lower center", ncols=2)
     words = "; ".join(said)
     alt = (
@@ -185,8 +193,9 @@ def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> S
     far = {name: float(max(r[:, 1], key=abs)) for name, r in series.items()}
     said = [f"{filter_words(name)} {value:+.2f}".replace("-", "−") for name, value in far.items()]
     names = {name: WORDS.get(name, filter_words(name)) for name in series}
-    title = f"{first.target} by {first.sensor}: at lag one\n{_two(said)}"
-    axes = tuple(f"{i + 1}. of {len(elements)}" for i in range(len(elements))) if len(elements) > 1 else ("",)
+    brief = [f"{short_words(name)} {value:+.2f}".replace("-", "−") for name, value in far.items()]
+    title = f"{first.target} by {first.sensor}: autocorrelation at lag one\n{_few(brief)}"
+    axes = tuple(f"element {i + 1}" for i in range(len(elements))) if len(elements) > 1 else (elements[0],)
     fig = innovation_correlations(series, white_bound(n), names, title, axes)
     words = "; ".join(said)
     alt = (

@@ -1,0 +1,454 @@
+"""Targets followed by any sensor, on made-up flights whose every number is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.pipeline.robots import boat, robot, robot_flight
+from wildlab.errors import WildlabError
+from wildlab.flight.following import CONSIDERED, Settings, parse_settings
+from wildlab.flight.manifest import make_manifest, manifest_toml, parse_manifest
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.estimates import estimates_table, write_estimates
+from wildlab.pipeline.following.expected import SLOTS, predict_scan
+from wildlab.pipeline.following.follow import Followed, follow_targets
+from wildlab.pipeline.following.judged import apart, judged, worth_of_errors
+from wildlab.pipeline.following.roughness import roughness
+from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.pipeline.scans import KINDS, Scans, scans_of, truths_at
+
+KNOWN = """
+[sensors.radar.noise]
+range_m = 0.5
+azimuth_deg = 0.3
+
+[targets]
+acceleration_m_s_sqrt_s = 0.15
+start_speed_m_s = 1.0
+"""
+
+
+def rows_of(followed: Followed, sensor: str = "radar") -> pd.DataFrame:
+    rows = judged(followed)
+    return rows[rows["sensor"] == sensor].set_index("filter")
+
+
+def both(one: Flight, other: Flight) -> Flight:
+    """One flight with the sensors of two."""
+    joined = {name: pd.concat([one.tables[name], other.tables[name]], ignore_index=True)
+              for name in ("frames", "detections")}  # fmt: skip
+    return Flight(one.manifest, one.nav, {**one.tables, **joined})
+
+
+# --- a heading that is off ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_considered_heading_is_inside_the_bounds_where_the_white_filter_is_not(seed: int):
+    off = 2.0 if seed % 2 else -2.0
+    rows = rows_of(follow_targets(robot_flight(seed, heading_off_deg=off, heading_sd_deg=2.0)))
+    assert list(rows.index[:2]) == ["ekf", "schmidt"]
+    assert rows.loc["schmidt", "verdict"] == "consistent"
+    assert rows.loc["ekf", "verdict"] == "overconfident" and rows.loc["ekf", "nees"] > 20
+    # Both are as far off: nothing estimates the heading.
+    assert rows.loc["schmidt", "rmse"] == pytest.approx(rows.loc["ekf", "rmse"], rel=0.1)
+
+
+def test_an_honest_sensor_is_followed_honestly():
+    """Over flights: the errors of one are few independent values."""
+    settings = parse_settings(KNOWN)
+    rows = pd.concat([judged(follow_targets(robot_flight(seed), settings=settings)) for seed in range(6)])
+    # The boat turns a little less than the filter allows it to.
+    assert 1.2 < rows["nees"].mean() < 2.4
+    assert 1.7 < rows["nis"].mean() < 2.2
+    assert set(rows["filter"]) == {"ekf"}
+
+
+@pytest.mark.parametrize("kind", ["range-bearing", "position"])
+def test_every_filter_follows(kind: str):
+    flight = robot_flight(2, kind=kind, heading_sd_deg=1.0)
+    settings = Settings(sensors={"radar": {"thinning_s": 2.0}})
+    names = ("ekf", "ukf", "imm", "coloured", "schmidt", "thinned")
+    rows = rows_of(follow_targets(flight, filters=names, settings=settings, smooth=True))
+    assert set(names) <= set(rows.index)
+    assert {"ekf-smoothed", "schmidt-smoothed"} <= set(rows.index) and "coloured-smoothed" not in rows.index
+    assert (rows["rmse"] < 3.0).all()
+    assert rows.loc["ekf-smoothed", "rmse"] <= rows.loc["ekf", "rmse"]
+    # Innovations of a smoothed track are the filter's, and not counted twice.
+    assert rows.loc["ekf-smoothed", "detections"] == 0
+    assert rows.loc["thinned", "detections"] < rows.loc["ekf", "detections"] / 3
+
+
+def test_kf_is_another_name_of_the_white_filter():
+    rows = rows_of(follow_targets(robot_flight(kind="position"), filters=["kf"]))
+    assert list(rows.index) == ["ekf"]
+
+
+# --- kinds of detections ------------------------------------------------------------------------------------
+
+
+def test_a_platform_that_never_moves_has_one_pose():
+    rows = rows_of(follow_targets(robot_flight(1, fixed=True)))
+    assert rows.loc["ekf", "detections"] > 230 and rows.loc["ekf", "rmse"] < 1.5
+
+
+def test_a_range_along_the_line_of_sight_knows_how_far_below_the_target_is():
+    high = 60.0
+    flight = robot_flight(3)
+    flight.nav["own"]["down_m"] = -high
+    seen = flight.tables["detections"]
+    level = seen["range_m"].to_numpy(float)
+    seen["range_m"] = np.hypot(level, high)
+    truth = follow_targets(flight)
+    assert rows_of(truth).loc["ekf", "rmse"] < 1.5
+    # With an elevation nothing has to be known of heights.
+    seen["elevation_rad"] = -np.arctan2(high, level)
+    flight.tables["truth"]["down_m"] = 500.0
+    assert rows_of(follow_targets(flight)).loc["ekf", "rmse"] < 1.5
+
+
+def test_bearings_with_elevation_start_where_they_meet_the_plane():
+    high = 60.0
+    flight = robot_flight(3, kind="bearing")
+    flight.nav["own"]["down_m"] = -high
+    seen, t = flight.tables["detections"], flight.tables["frames"]["time_s"].to_numpy()
+    distance = np.hypot(*(boat(t) - robot(t)).T)
+    noise = np.random.default_rng(0).normal(0, np.radians(0.3), len(t))
+    seen["elevation_rad"] = -np.arctan2(high, distance) + noise
+    rows = rows_of(follow_targets(flight))
+    assert rows.loc["ekf", "rmse"] < 4.0 and rows.loc["ekf", "detections"] > 230
+
+
+def test_bearings_alone_start_where_they_cross_or_say_why_not():
+    flight = robot_flight(3, kind="bearing")
+    followed = follow_targets(flight)
+    rows = rows_of(followed)
+    if rows.loc["ekf", "detections"] == 0:
+        assert any("do not settle on a place" in note for note in followed.notes)
+    settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
+    rows = rows_of(follow_targets(flight, settings=settings))
+    assert rows.loc["ekf", "detections"] > 230
+
+
+def test_velocities_alone_start_nothing_and_say_so():
+    followed = follow_targets(robot_flight(kind="velocity"))
+    assert rows_of(followed).loc["ekf", "detections"] == 0
+    assert any("a velocity says nothing of the place" in note for note in followed.notes)
+
+
+def test_velocities_help_positions_in_one_track():
+    """They say how fast, the others where."""
+    flight = both(
+        robot_flight(1, kind="position", position_sd=5.0),
+        robot_flight(2, kind="velocity", sensor="flow"),
+    )
+    rows = judged(follow_targets(flight, sensors=["radar", "flow"])).set_index(["sensor", "filter"])
+    assert rows.loc[("together", "ekf"), "rmse"] < 0.7 * rows.loc[("radar", "ekf"), "rmse"]
+
+
+@pytest.mark.parametrize("kind", ["position", "range-bearing", "bearing"])
+def test_derivatives_for_what_is_considered_are_those_of_the_measurement(kind: str):
+    """By finite differences: the platform moved or turned, the stamp wrong."""
+    flight = robot_flight(kind=kind, heading_off_deg=0.0)
+    flight.tables["detections"]["plane_down_m"] = 30.0
+    scans = scans_of(flight, "radar")
+    n = len(scans.times)
+    p = np.tile([55.0, -20.0], (n, 1))
+    v = np.tile([1.0, -2.0], (n, 1))
+    seen, step = predict_scan(scans, p, v), 1e-5
+
+    def shifted(**changes: np.ndarray) -> np.ndarray:
+        return predict_scan(scans._replace(**changes), p, v).z
+
+    for i, name in enumerate(("platform_north", "platform_east")):
+        if kind == "position":
+            continue  # its own position is in what it publishes
+        off = np.zeros(2)
+        off[i] = step
+        column = (shifted(platform=scans.platform + off) - seen.z) / step
+        np.testing.assert_allclose(seen.H_pose[..., SLOTS[kind].index(name)], column, atol=1e-4, err_msg=name)
+    later = predict_scan(scans, p + step * (v - scans.platform_velocity), v).z
+    np.testing.assert_allclose(
+        seen.H_pose[..., SLOTS[kind].index("clock")], (later - seen.z) / step, atol=1e-3
+    )
+
+
+def test_every_kind_has_its_errors_and_units():
+    assert set(SLOTS) == set(KINDS)
+    assert {name for names in SLOTS.values() for name in names} <= set(CONSIDERED)
+
+
+# --- whose detection it is ----------------------------------------------------------------------------------
+
+
+def test_without_names_the_nearest_in_the_gate_is_taken_from_near_the_truth_on():
+    flight = robot_flight(4, labelled=False, clutter=3)
+    followed = follow_targets(flight)
+    rows = rows_of(followed)
+    assert rows.loc["ekf", "rmse"] < 1.5
+    own = followed.tracks[0].detection
+    assert all(name.endswith("-0") for name in own[own != ""])  # the boat's, never clutter's
+
+
+def test_without_names_and_truth_all_are_of_one():
+    followed = follow_targets(robot_flight(4, labelled=False, truth=False))
+    assert not followed.truth and [one.target for one in followed.tracks] == ["target"]
+    assert rows_of(followed).loc["ekf", "detections"] > 230
+
+
+def test_names_may_be_left_aside():
+    flight = robot_flight(4, clutter=3)
+    settings = Settings(targets={"identified": "gate"})
+    assert rows_of(follow_targets(flight, settings=settings)).loc["ekf", "rmse"] < 1.5
+    with pytest.raises(WildlabError, match="no detection of the sensor 'radar' names its target"):
+        follow_targets(robot_flight(labelled=False), settings=Settings(targets={"identified": "label"}))
+
+
+def test_a_named_target_is_found_again_after_a_pause_and_an_unnamed_one_is_not():
+    def paused(labelled: bool) -> Followed:
+        flight = robot_flight(5, labelled=labelled)
+        seen = flight.tables["detections"]
+        k = seen["frame_id"].str.removeprefix("radar-").astype(int)
+        flight.tables["detections"] = seen[(k < 60) | (k > 120)].reset_index(drop=True)
+        return follow_targets(flight)
+
+    named, unnamed = paused(True).tracks[0], paused(False).tracks[0]
+    assert np.isfinite(named.estimate[-1]).all() and np.isnan(unnamed.estimate[-1]).all()
+
+
+# --- order --------------------------------------------------------------------------------------------------
+
+
+def test_late_looks_are_put_in_order_and_change_nothing():
+    flight = robot_flight(6)
+    straight = follow_targets(flight)
+    frames = flight.tables["frames"]
+    order = np.arange(len(frames))
+    order[10:13] = [12, 10, 11]
+    flight.tables["frames"] = frames.iloc[order].reset_index(drop=True)
+    late = follow_targets(flight)
+    np.testing.assert_array_equal(straight.tracks[0].estimate, late.tracks[0].estimate)
+    assert late.notes == [
+        f"2 looks of radar of {len(frames)} came after one with a later stamp, and were put in order."
+    ]
+    assert straight.notes == []
+
+
+def test_two_looks_at_one_time_both_count():
+    flight = robot_flight(6)
+    frames = flight.tables["frames"]
+    frames.loc[21, "time_s"] = frames.loc[20, "time_s"]
+    followed = follow_targets(flight)
+    assert any("1 of radar have the stamp of the look before" in note for note in followed.notes)
+    assert followed.tracks[0].detection[20] and followed.tracks[0].detection[21]
+
+
+# --- several sensors ----------------------------------------------------------------------------------------
+
+
+def test_two_sensors_in_one_track_share_what_the_platform_has_wrong():
+    one = robot_flight(1, heading_off_deg=2.0, heading_sd_deg=2.0)
+    other = robot_flight(51, kind="position", heading_off_deg=2.0, sensor="lidar")
+    followed = follow_targets(both(one, other))
+    rows = rows_of(followed, "together")
+    assert rows.loc["schmidt", "verdict"] == "consistent"
+    assert rows.loc["ekf", "verdict"] == "overconfident"
+    assert rows.loc["ekf", "detections"] > 470
+    (pair,) = (pair for pair in apart(followed) if pair.filter == "schmidt")
+    assert (pair.one, pair.other) == ("radar", "lidar") and pair.rms < 2.0
+
+
+def test_two_sensors_in_one_track_are_better_than_either():
+    flight = both(
+        robot_flight(1, kind="position", position_sd=2.0),
+        robot_flight(2, kind="position", position_sd=2.0, sensor="lidar"),
+    )
+    settings = Settings(
+        sensors={name: {"noise": {"position_m": 2.06}} for name in ("radar", "lidar")},
+        targets={"acceleration_m_s_sqrt_s": 0.15},
+    )
+    rows = judged(follow_targets(flight, settings=settings)).set_index("sensor")
+    assert rows.loc["together", "rmse"] < min(rows.loc["radar", "rmse"], rows.loc["lidar", "rmse"])
+    assert rows.loc["together", "dof"] == 2
+
+
+# --- what is believed ---------------------------------------------------------------------------------------
+
+
+def test_stated_goes_before_assumed_and_the_page_is_told():
+    flight = robot_flight()
+    scans = scans_of(flight, "radar")
+    beliefs, said = of_sensor(flight, scans, of_flight(flight))
+    assert beliefs.white == pytest.approx([0.5, np.radians(0.3)], rel=0.3)
+    assert all(one.source.startswith(ASSUMED) for one in said)
+    stated = parse_settings(
+        KNOWN + "\n[sensors.radar.considered.heading]\nsd_deg = 2.0\ncorrelation_time_s = 60.0\n"
+    )
+    beliefs, said = of_sensor(flight, scans, of_flight(flight, stated))
+    np.testing.assert_allclose(beliefs.white, [0.5, np.radians(0.3)])
+    (heading,) = beliefs.considered
+    assert heading[:3] == ("heading", pytest.approx(np.radians(2.0)), 60.0)
+    assert {one.source for one in said} == {STATED}
+    targets, said = of_targets(stated.targets)
+    assert targets.density == 0.15 and targets.patience_s == 10.0
+    assert {one.source for one in said} == {STATED, ASSUMED}
+
+
+def test_settings_stand_in_the_manifest_too():
+    parts = {
+        "sensors": {"radar": {"clock_offset_s": -0.5, "noise": {"range_m": 0.7}}},
+        "targets": {"gate_probability": 0.95},
+    }
+    manifest = robot_flight(manifest=parts).manifest
+    again = parse_manifest(manifest_toml(manifest), __file__)  # type: ignore[arg-type]
+    assert again == manifest and again.sensors["radar"].noise.range_m == 0.7
+    flight = robot_flight(manifest=parts)
+    told = of_flight(flight, parse_settings("[targets]\npatience_s = 3.0"))
+    assert (told.targets.gate_probability, told.targets.patience_s) == (0.95, 3.0)
+    assert of_sensor(flight, scans_of(flight, "radar"), told)[0].offset_s == -0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[sensors.radar.considered.wind]\nsd_m = 1.0", "no error 'wind' can be considered"),
+        ("[sensors.radar.considered.heading]\nsd_m = 1.0", "has its standard deviation in deg"),
+        ("[sensors.radar.noise]\nrange_m = -1.0", "greater than 0"),
+        ("[targets]\nsped = 1.0", "sped"),
+        ("[targets", "TOML"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(text: str, said: str):
+    with pytest.raises(WildlabError, match=said):
+        parse_settings(text)
+
+
+def test_noise_is_found_from_how_rough_detections_are():
+    found = [
+        roughness(scans_of(robot_flight(seed, range_sd=0.7, bearing_sd_deg=0.5), "radar"))
+        for seed in range(5)
+    ]
+    np.testing.assert_allclose(np.mean(found, axis=0), [0.7, np.radians(0.5)], rtol=0.12)
+
+
+def test_noise_that_nobody_knows_is_asked_for():
+    flight = robot_flight(seconds=1.6)
+    with pytest.raises(WildlabError, match=r"how noisy 'range' .* \[sensors.radar.noise\]"):
+        follow_targets(flight)
+
+
+# --- tuning -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_innovations_tell_noise_and_liveliness():
+    found = tune_flight(robot_flight(7, truth=False, range_sd=0.8, bearing_sd_deg=0.5), ["radar"])
+    assert found.against == "innovations" and found.density is not None
+    np.testing.assert_allclose(found.sensors["radar"].sds, [0.8, np.radians(0.5)], rtol=0.3)
+    assert found.density < 0.4
+    again = read_tuned(tuned_text(found))
+    assert again is not None and repr(again) == repr(found)
+
+
+@pytest.mark.slow
+def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
+    found = tune_flight(robot_flight(8, name="first", heading_off_deg=2.0), ["radar"])
+    assert found.against == "truth" and found.flight == "first"
+    assert np.degrees(found.sensors["radar"].yaw_sd_rad) == pytest.approx(2.0, rel=0.4)
+    followed = follow_targets(robot_flight(9, heading_off_deg=-2.0), tuned=found)
+    assert any(one.source == "tuned on first" for one in followed.said)
+    rows = rows_of(followed)
+    assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]
+
+
+def test_nothing_is_tuned_where_it_is_judged():
+    flight = robot_flight(1)
+    with pytest.raises(WildlabError, match="nothing is tuned where it is judged"):
+        refuse_same(flight, robot_flight(1, name="renamed"))
+    refuse_same(flight, robot_flight(2))
+
+
+def test_truth_that_is_not_there_is_no_teacher():
+    with pytest.raises(WildlabError, match="'robot' has no truth to tune against"):
+        tune_flight(robot_flight(truth=False), ["radar"], against="truth")
+    with pytest.raises(WildlabError, match="only .* detections of 'radar' can be followed"):
+        tune_flight(robot_flight(truth=False, seconds=6.0), ["radar"])
+
+
+# --- refusals -----------------------------------------------------------------------------------------------
+
+
+def test_what_is_not_there_is_said():
+    flight = robot_flight()
+    with pytest.raises(WildlabError, match=r"no target 'ship'.*Use one of boat"):
+        follow_targets(flight, targets=["ship"])
+    with pytest.raises(WildlabError, match=r"no sensor 'sonar'.*Use one of radar"):
+        follow_targets(flight, sensors=["sonar"])
+    with pytest.raises(WildlabError, match=r"no filter 'magic'.*Use one of ekf"):
+        follow_targets(flight, filters=["magic"])
+    with pytest.raises(WildlabError, match=r"no target 'boat'.*[Ll]eave --target out"):
+        follow_targets(robot_flight(labelled=False, truth=False), targets=["boat"])
+    flight.tables["detections"] = flight.tables["detections"].iloc[:0]
+    with pytest.raises(WildlabError, match="there are no detections"):
+        follow_targets(flight)
+    sequence = make_manifest(
+        {**robot_flight().manifest.model_dump(exclude_none=True), "time": {"kind": "sequence"}}
+    )
+    with pytest.raises(WildlabError, match="the photos carry no time"):
+        follow_targets(Flight(sequence, flight.nav, flight.tables))
+
+
+def test_a_filter_that_detections_cannot_go_through_is_left_out_with_the_reason():
+    settings = Settings(sensors={"radar": {"range_m": 90.0, "range_sd_m": 30.0}})
+    followed = follow_targets(robot_flight(kind="bearing"), filters=["coloured"], settings=settings)
+    assert list(rows_of(followed).index) == ["ekf"]
+    assert followed.notes[0].startswith(
+        "The filter 'coloured' was not used by the sensor 'radar': a bearing is"
+    )
+    wrong = Settings(sensors={"radar": {"considered": {"range_bias": {"sd_m": 2.0}}}})
+    with pytest.raises(
+        WildlabError, match="'range_bias' cannot be considered for detections of kind 'bearing'"
+    ):
+        follow_targets(robot_flight(kind="bearing"), settings=wrong)
+
+
+# --- out ----------------------------------------------------------------------------------------------------
+
+
+def test_estimates_say_what_was_used_and_how_sure_they_are(tmp_path):
+    flight = robot_flight(2, heading_sd_deg=1.0)
+    followed = follow_targets(flight)
+    table = estimates_table(followed.tracks, followed.scans)
+    write_estimates(table, tmp_path)
+    read = pd.read_parquet(tmp_path / "estimates.parquet")
+    pd.testing.assert_frame_equal(read, table)
+    assert len(pd.read_csv(tmp_path / "estimates.csv")) == len(table)
+    ekf = table[table["filter"] == "ekf"]
+    used = ekf[ekf["detection"] != ""]
+    assert set(used["detection"]) <= set(flight.tables["detections"]["detection_id"])
+    S = np.stack([[used["s_00"], used["s_01"]], [used["s_01"], used["s_11"]]]).transpose(2, 0, 1)
+    nu = used[["innovation_range_m", "innovation_azimuth_rad"]].to_numpy()
+    known = np.isfinite(nu).all(axis=1)
+    nis = np.einsum("ni,nij,nj->n", nu[known], np.linalg.inv(S[known]), nu[known])
+    np.testing.assert_allclose(nis, used["nis"].to_numpy()[known])
+    P = ekf[["p_00", "p_01", "p_11"]].to_numpy()
+    assert (P[:, 0] * P[:, 2] > P[:, 1] ** 2).all()
+    truth = truths_at(flight, ekf["time_s"])[0].position
+    np.testing.assert_allclose(truth[:, 0] - ekf["north_m"], ekf["error_north_m"], atol=1e-9)
+
+
+def test_a_standing_error_is_one_independent_value():
+    rng = np.random.default_rng(0)
+    eye = np.tile(np.eye(2), (400, 1, 1))
+    assert worth_of_errors(rng.normal(size=(400, 2)), eye) > 200
+    standing = np.tile(rng.normal(size=2), (400, 1)) + rng.normal(0, 0.05, (400, 2))
+    assert worth_of_errors(standing, eye) < 3
+
+
+def test_scans_of_one_platform_pose_hold_at_all_times():
+    scans = scans_of(robot_flight(fixed=True), "radar")
+    assert isinstance(scans, Scans) and np.isfinite(scans.platform).all()
+    np.testing.assert_array_equal(scans.platform_velocity, 0.0)
