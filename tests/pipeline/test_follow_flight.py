@@ -374,7 +374,7 @@ def test_nothing_is_tuned_where_it_is_judged():
 def test_truth_that_is_not_there_is_no_teacher():
     with pytest.raises(WildlabError, match="'robot' has no truth to tune against"):
         tune_flight(robot_flight(truth=False), ["radar"], against="truth")
-    with pytest.raises(WildlabError, match="only .* detections of 'radar' can be followed"):
+    with pytest.raises(WildlabError, match=r"only .* detections of 'radar' can be followed"):
         tune_flight(robot_flight(truth=False, seconds=6.0), ["radar"])
 
 

@@ -255,7 +255,7 @@ def platform_at(
 
 
 def _plane_of(flight: Flight, seen: pd.DataFrame, row: NDArray[np.intp], n: int) -> Array:
-    """(N,) down coordinate of the plane that the targets move on: stated, else the truth's; NaN if neither."""
+    """(N,) down coordinate of the plane that targets move on: stated, else the truth's; NaN if neither."""
     stated = np.full(len(seen), np.nan)
     if "plane_down_m" in seen:
         stated = seen["plane_down_m"].to_numpy(float)

@@ -117,8 +117,8 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
     are = "is" if len(mine) == 1 else "are"
     said.append(
-        f"{what} of the filter with {filter_words(best)} {are} off by {length(_root(mine['rmse']))} (root mean "
-        f"square), and the errors are {size_words(float(mine['nees'].mean()))}: {_counts(mine)}."
+        f"{what} of the filter with {filter_words(best)} {are} off by {length(_root(mine['rmse']))} "
+        f"(root mean square), and the errors are {size_words(float(mine['nees'].mean()))}: {_counts(mine)}."
     )
     if white is not None and best != "ekf":
         gain = _root(mine["rmse"]) / _root(white["rmse"])
@@ -258,8 +258,8 @@ def assumed_sentence(said: Sequence[Said]) -> str:
     if not assumed:
         return "All that the filters were told is stated or was tuned on another flight."
     return (
-        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in `flight.toml` "
-        "or with `--settings`, or tune them on another flight with `--tune`."
+        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in "
+        "`flight.toml` or with `--settings`, or tune them on another flight with `--tune`."
     )
 
 

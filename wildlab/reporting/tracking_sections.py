@@ -138,22 +138,25 @@ def end_section(report: Report, followed: Followed) -> None:
     """What the page does not tell, and how it was computed."""
     limits = [
         "Where the truth has no standard deviation of its own, its error counts as the filter's.",
-        "All filters of a target get the same detections: those that the filter with white noise let into its "
-        "gate. What it wrongly left out, none has.",
+        "All filters of a target get the same detections: those that the filter with white noise let in. "
+        "What it wrongly left out, none has.",
     ]
     if not followed.truth:
         limits[0] = (
-            "Errors that last, of a heading for instance, are in all detections alike: no innovation shows them."
+            "Errors that last, of a heading for instance, are in all detections alike: innovations do not "
+            "show them."
         )
     report.limits(limits)
     report.method(
-        "Constant velocity with white acceleration. Detections that name their target are its own; else a track "
-        "starts on the first detection within reach of its true place and takes the nearest in its gate; "
-        "without truth and names all are of one target. The extended filter (EKF) takes errors for new at every "
-        "look, H (3.5) and (3.7); the one for coloured noise works on differences of positions, H 7.2.2; the "
-        "Schmidt filter considers errors that last without estimating them, H 7.4.\n\n"
-        "NEES is of the position, truth minus estimate, the truth's own variance added to the filter's. A mean is "
-        "consistent inside of the 95 % interval of the mean of as many independent values as its correlated "
-        "ones are worth, overconfident above and too cautious below. Shares have Wilson's interval for as many. "
-        "Innovations are whitened by their own covariance before they are correlated."
+        "Constant velocity with white acceleration. Detections that name their target are its own; else a "
+        "track starts on the first detection within reach of its true place and takes the nearest in its "
+        "gate; without truth and names all are of one target. The extended filter (EKF) takes errors for "
+        "new at every look, H (3.5) and (3.7); the one for coloured noise works on differences of "
+        "positions, H 7.2.2; the Schmidt filter considers errors that last without estimating them, H "
+        "7.4. Smoothed estimates know later detections too.\n\n"
+        "NEES is of the position, truth minus estimate, the truth's own variance added to the filter's. A "
+        "mean is consistent inside of the 95 % interval of the mean of as many independent values as its "
+        "correlated ones are worth, overconfident above and too cautious below; an error that is the same "
+        "throughout is one value. Shares have Wilson's interval for as many. Innovations are whitened by "
+        "their own covariance before they are correlated."
     )

@@ -308,6 +308,8 @@ def _manifest(
             },
             "uncertainty": recipe.uncertainty,
             "scoring": recipe.scoring,
+            "sensors": recipe.sensors,
+            "targets": recipe.targets,
             "sources": [
                 {"file": name, "sha256": digest, "what": recipe.files.get(name, "")}
                 for name, digest in raw.hashes.items()
@@ -322,7 +324,7 @@ def _refuse_problems(flight: Flight, recipe: Recipe, folder: Path) -> None:
     for finding in find(flight, meaning=False):
         if finding.level != "problem":
             continue
-        sensor = recipe.sensors.get(finding.table)
+        sensor = recipe.on_board.get(finding.table)
         if sensor is not None:
             part, files = finding.table, [sensor.file]
         elif finding.table.startswith("nav/"):

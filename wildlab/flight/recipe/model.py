@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
+from wildlab.flight.following import SensorPart, TargetsPart
 from wildlab.flight.manifest import (
     CameraPart,
     ClocksPart,
@@ -157,6 +158,8 @@ class Recipe(Strict):
     terrain: TerrainSays | None = None
     uncertainty: UncertaintyPart = UncertaintyPart()
     scoring: ScoringPart = ScoringPart()
+    sensors: dict[str, SensorPart] = Field(default_factory=dict)
+    targets: TargetsPart = TargetsPart()
     files: dict[str, str] = Field(default_factory=dict)
     tables: dict[str, MatlabTable] = Field(default_factory=dict)
     logs: dict[str, LogTable] = Field(default_factory=dict)
@@ -170,7 +173,7 @@ class Recipe(Strict):
     truth: tuple[Truth, ...] = ()
 
     @property
-    def sensors(self) -> dict[str, Inertial | Satellite | Magnetometer | Gimbal]:
+    def on_board(self) -> dict[str, Inertial | Satellite | Magnetometer | Gimbal]:
         """Those on board, by the names of their tables."""
         every = {"imu": self.imu, "gnss": self.gnss, "magnetometer": self.magnetometer, "gimbal": self.gimbal}
         return {name: one for name, one in every.items() if one is not None}
@@ -234,7 +237,7 @@ class Recipe(Strict):
     @model_validator(mode="after")
     def _times(self) -> Self:
         times = {} if self.frames is None else {"frames": self.frames.time}
-        times |= {name: one.time for name, one in self.sensors.items()}
+        times |= {name: one.time for name, one in self.on_board.items()}
         times |= {f"poses.{name}": one.time for name, one in self.poses.items()}
         times |= {f"truth[{i}]": one.time for i, one in enumerate(self.truth)}
         if self.time.kind == "utc" and self.frames is not None and self.frames.time is None:

@@ -155,12 +155,12 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
             continue
         keep = thinned(int(there.sum()))
         stated = np.sqrt(np.trace(one.covariance[:, :2, :2], axis1=1, axis2=2))
-        ax.plot(one.times[there][keep], away[there][keep], color=colour(one.filter.removesuffix(SMOOTHED)), lw=1.5,
-                label=filter_words(one.filter))  # fmt: skip
+        tint = colour(one.filter.removesuffix(SMOOTHED))
+        ax.plot(one.times[there][keep], away[there][keep], color=tint, lw=1.5, label=filter_words(one.filter))
         ax.plot(
             one.times[there][keep],
             stated[there][keep],
-            color=colour(one.filter.removesuffix(SMOOTHED)),
+            color=tint,
             lw=1.0,
             ls=":",
         )

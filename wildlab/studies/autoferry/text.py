@@ -312,9 +312,10 @@ def method_text(first: str) -> str:
     return rf"""
 Each boat is followed by each sensor on its own: constant velocity with white acceleration
 (${BOATS.density:.2f}$ m/s per root second: a boat at 2.5 m/s may turn by a right angle in 20 s), the
-nearest detection in a {100 * BOATS.gate_probability:.0f} % gate, a track dropped after {BOATS.patience_s:g} s without one. Positions go through the
-linear filter, bearings through the extended one, started at the mean distance that {first} shows. All filters
-of a track get the same detections, those that the filter with white noise let in.
+nearest detection in a {100 * BOATS.gate_probability:.0f} % gate, a track dropped after
+{BOATS.patience_s:g} s without one. Positions go through the linear filter,
+bearings through the extended one, started at the mean distance that {first} shows. All filters of a track get
+the same detections, those that the filter with white noise let in.
 
 Tuning, on {first} alone: the detection nearest to a boat within {BOATS.reach_m:g} m or
 {np.degrees(BOATS.reach_rad):g}° is taken for its own. The clock offset is the one with the least sum of
