@@ -9,6 +9,8 @@ import pandas as pd
 
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.judged import judged
 
 
 def boat(t: np.ndarray) -> np.ndarray:
@@ -104,3 +106,19 @@ def robot_flight(
     if truth:
         tables["truth"] = way
     return Flight(make_manifest(parts | (manifest or {})), {"own": nav}, tables)
+
+
+KNOWN = """
+[sensors.radar.noise]
+range_m = 0.5
+azimuth_deg = 0.3
+
+[targets]
+acceleration_m_s_sqrt_s = 0.15
+start_speed_m_s = 1.0
+"""
+
+
+def rows_of(followed: Followed, sensor: str = "radar") -> pd.DataFrame:
+    rows = judged(followed)
+    return rows[rows["sensor"] == sensor].set_index("filter")

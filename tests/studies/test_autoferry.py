@@ -36,7 +36,10 @@ def tunings(flights: dict[int, Flight]) -> dict[str, SensorTuning]:
 @pytest.fixture(scope="module")
 def tracks(flights: dict[int, Flight], tunings: dict[str, SensorTuning]) -> pd.DataFrame:
     return pd.concat(
-        [table(follow_flight(flight, tunings, BOATS), BOATS.size_m).assign(case=number) for number, flight in flights.items()]
+        [
+            table(follow_flight(flight, tunings, BOATS), BOATS.size_m).assign(case=number)
+            for number, flight in flights.items()
+        ]
     )
 
 

@@ -277,7 +277,8 @@ def _camera_plane(
     observed = observe(flight, source)
     down = pd.Series(observed.plane_down, index=observed.table["detection_id"])
     down = down[~down.index.duplicated()]
-    return _filled(seen["detection_id"].map(down).to_numpy(float), row, len(plane))
+    met = np.asarray(seen["detection_id"].map(down).to_numpy(float), np.float64)
+    return _filled(met, row, len(plane))
 
 
 def _filled(stated: Array, row: NDArray[np.intp], n: int) -> Array:

@@ -39,8 +39,6 @@ FILTERS = {
 }
 #: The filter that the others are held against, by kind of detection.
 WHITE = {kind: names[0] for kind, names in FILTERS.items()}
-#: What a target is called of which nobody says a name.
-UNNAMED = "target"
 
 
 class SensorTrack(NamedTuple):
@@ -160,8 +158,9 @@ def begin_of_target(
         return seen, start_near(scans, truth, beliefs, targets, others)
     if scans.labelled:
         seen = np.where((scans.labels == truth.target)[..., None], seen, np.nan)
-    mine = np.isfinite(seen).all(axis=-1)
-    own = np.where(mine.any(axis=1)[:, None], seen[np.arange(len(seen)), np.argmax(mine, axis=1)], np.nan)
+    mine = np.asarray(np.isfinite(seen).all(axis=-1))
+    any_of = np.asarray(mine.any(axis=1))
+    own = np.where(any_of[:, None], seen[np.arange(len(seen)), np.argmax(mine, axis=1)], np.nan)
     return seen, start_first(scans, own, beliefs, targets)
 
 

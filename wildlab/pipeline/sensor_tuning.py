@@ -169,13 +169,15 @@ def tune(
         )
     sized = np.concatenate([one.sized[np.isfinite(one.error[:, 0])] for one in errors])
     sd = float(np.sqrt(np.mean(sized**2)))
-    own = tuple(np.sqrt(np.mean(known**2, axis=0)).tolist()) if len(set(UNITS_OF[scans.kind])) > 1 else ()
+    alike = len(UNITS_OF[scans.kind]) == 1 and "elevation" not in scans.elements
+    own = () if alike else tuple(np.sqrt(np.mean(known**2, axis=0)).tolist())
     sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
     worth = sum(_worth(one.error) for one in errors)
     near = offsets[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
     share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
-    considered = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
+    lasting = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
+    position, clock, yaw, range_bias, roll_pitch = lasting
     distance = np.concatenate(
         [np.hypot(*(one.truth.position - scans.platform).T)[np.isfinite(one.error[:, 0])] for one in errors]
     )
@@ -188,13 +190,16 @@ def tune(
         float(sds[0]) if not own else sd,
         share,
         correlation_time,
-        *considered[:3],
+        position,
+        clock,
+        yaw,
         float(distance.mean()),
         float(distance.std()),
         scans.interval_s,
         n,
         own,
-        *considered[3:],
+        range_bias,
+        roll_pitch,
     )
 
 

@@ -22,8 +22,9 @@ from wildlab.pipeline.following.beliefs import (
 from wildlab.pipeline.following.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
 from wildlab.pipeline.following.together import ABLE, follow_together
 from wildlab.pipeline.following.tuned import Tuned
-from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of, truths_at
-from wildlab.pipeline.sensor_tracks import UNNAMED, SensorTrack, follow
+from wildlab.pipeline.following.whose import UNNAMED, identified, targets_of
+from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of
+from wildlab.pipeline.sensor_tracks import SensorTrack, follow
 
 #: The filter without anything but white noise, which the others are held against.
 WHITE = "ekf"
@@ -183,34 +184,6 @@ def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[
             field="detections.source",
         )
     return found
-
-
-def identified(scans: Scans, targets: TargetBeliefs) -> Scans:
-    """The scans with labels as far as they are to be believed."""
-    if targets.identified in ("gate", "one"):
-        return scans._replace(labels=np.full(scans.labels.shape, "", object))
-    if targets.identified == "label" and not scans.labelled:
-        raise WildlabError(
-            f"no detection of the sensor {scans.sensor!r} names its target",
-            'set identified = "gate" in [targets], or leave it out',
-            field="targets.identified",
-        )
-    return scans
-
-
-def targets_of(flight: Flight, scans: Scans) -> list[Truth]:
-    """The targets that a sensor may follow, with their true places as far as they are known."""
-    truths = [] if flight.truth is None or not len(flight.truth) else truths_at(flight, scans.times)
-    if not scans.labelled:
-        return truths or [_unknown(UNNAMED, scans)]
-    by_name = {one.target: one for one in truths}
-    names = dict.fromkeys(str(one) for one in scans.labels.ravel() if one)
-    return [by_name.get(name) or _unknown(name, scans) for name in names]
-
-
-def _unknown(name: str, scans: Scans) -> Truth:
-    nowhere = np.full((len(scans.times), 2), np.nan)
-    return Truth(name, nowhere, nowhere, 0.0)
 
 
 def chosen_filters(scans: Scans, beliefs: Beliefs, wanted: Sequence[str]) -> tuple[list[str], list[str]]:

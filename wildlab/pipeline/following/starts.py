@@ -65,7 +65,8 @@ def start_first(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBelie
 
 
 def _start_from_rays(scans: Scans, own: Array, beliefs: Beliefs, targets: TargetBeliefs) -> Start | None:
-    usable = np.where(np.isfinite(scans.platform).all(axis=1)[:, None], own, np.nan)
+    there = np.asarray(np.isfinite(scans.platform).all(axis=1))
+    usable = np.where(there[:, None], own, np.nan)
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     try:
         return start_from_rays(
@@ -127,4 +128,4 @@ def _place(scans: Scans, row: int, z: Array, beliefs: Beliefs) -> Array | None:
     else:
         r = beliefs.range_m
     azimuth = elements["azimuth"]
-    return scans.platform[row] + r * np.array([np.cos(azimuth), np.sin(azimuth)])
+    return np.asarray(scans.platform[row] + r * np.array([np.cos(azimuth), np.sin(azimuth)]))

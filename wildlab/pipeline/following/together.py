@@ -58,11 +58,11 @@ def follow_together(
         others = [one for one in truths if one.target != target]
         seen[name], begins[name] = begin_of_target(scans, truth, beliefs, targets, others)
     merged = _merged(mine, seen, {name: np.zeros_like(part[0].platform) for name, part in mine.items()}, True)
-    looks = _looks(mine, merged)
+    looks, sizes = _looks(mine, merged), np.asarray(merged.sensor.sizes, np.int64)
     truth = _truth(flight, looks, target)
     begin = _begin(mine, merged, begins)
     if begin is None:
-        return [no_track(looks, truth, name, targets)._replace(sizes=merged.sensor.sizes) for name in filters]
+        return [no_track(looks, truth, name, targets)._replace(sizes=sizes) for name in filters]
     labelled = any(part[0].labelled for part in mine.values())
     first = run_filter(
         merged.times, merged.measurements, merged.R, merged.sensor, motion_of(targets), begin,
@@ -83,7 +83,7 @@ def follow_together(
         track = _run(name, mine, merged, own, first, targets, begin)
         if track is not None:
             one = scored(looks, truth, name, track, begun, last, targets, ids)
-            found.append(one._replace(sizes=merged.sensor.sizes))
+            found.append(one._replace(sizes=sizes))
     return found
 
 

@@ -11,6 +11,7 @@ from wildlab.flight.checksums import checksums_of
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, TargetBeliefs, of_flight, of_targets
+from wildlab.pipeline.following.likelihood import tune_by_innovations
 from wildlab.pipeline.sensor_tuning import SensorTuning, tune
 
 Against = Literal["truth", "innovations"]
@@ -77,8 +78,6 @@ def tune_flight(
             field="--against",
         )
     if against == "innovations" or not has_truth:
-        from wildlab.pipeline.following.likelihood import tune_by_innovations
-
         found, density = tune_by_innovations(flight, sensors, settings, source)
         return Tuned(flight.name, "innovations", found, density)
     targets: TargetBeliefs = of_targets(of_flight(flight, settings).targets)[0]
@@ -98,7 +97,8 @@ def refuse_same(flight: Flight, other: Flight) -> None:
     if flight.folder is not None and other.folder is not None:
         mine, its = checksums_of(flight.folder), checksums_of(other.folder)
         same = "detections.parquet" in mine and mine["detections.parquet"] == its.get("detections.parquet")
-    same = same or (flight.detections is not None and flight.detections.equals(other.detections))
+    if flight.detections is not None and other.detections is not None:
+        same = same or flight.detections.equals(other.detections)
     if same:
         raise WildlabError(
             "this is the flight that is judged: its detections are the same, and nothing is tuned where it "

@@ -1,0 +1,118 @@
+"""What filters are told of sensors and targets: stated, tuned on another flight, assumed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from wildlab.errors import WildlabError
+from wildlab.flight.following import parse_settings
+from wildlab.flight.manifest import manifest_toml, parse_manifest
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.follow import follow_targets
+from wildlab.pipeline.following.roughness import roughness
+from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.pipeline.scans import scans_of
+
+# --- what is believed ---------------------------------------------------------------------------------------
+
+
+def test_stated_goes_before_assumed_and_the_page_is_told():
+    flight = robot_flight()
+    scans = scans_of(flight, "radar")
+    beliefs, said = of_sensor(flight, scans, of_flight(flight))
+    assert beliefs.white == pytest.approx([0.5, np.radians(0.3)], rel=0.3)
+    assert all(one.source.startswith(ASSUMED) for one in said)
+    stated = parse_settings(
+        KNOWN + "\n[sensors.radar.considered.heading]\nsd_deg = 2.0\ncorrelation_time_s = 60.0\n"
+    )
+    beliefs, said = of_sensor(flight, scans, of_flight(flight, stated))
+    np.testing.assert_allclose(beliefs.white, [0.5, np.radians(0.3)])
+    (heading,) = beliefs.considered
+    assert heading[:3] == ("heading", pytest.approx(np.radians(2.0)), 60.0)
+    assert {one.source for one in said} == {STATED}
+    targets, said = of_targets(stated.targets)
+    assert targets.density == 0.15 and targets.patience_s == 10.0
+    assert {one.source for one in said} == {STATED, ASSUMED}
+
+
+def test_settings_stand_in_the_manifest_too():
+    parts = {
+        "sensors": {"radar": {"clock_offset_s": -0.5, "noise": {"range_m": 0.7}}},
+        "targets": {"gate_probability": 0.95},
+    }
+    manifest = robot_flight(manifest=parts).manifest
+    again = parse_manifest(manifest_toml(manifest), __file__)  # type: ignore[arg-type]
+    assert again == manifest and again.sensors["radar"].noise.range_m == 0.7
+    flight = robot_flight(manifest=parts)
+    told = of_flight(flight, parse_settings("[targets]\npatience_s = 3.0"))
+    assert (told.targets.gate_probability, told.targets.patience_s) == (0.95, 3.0)
+    assert of_sensor(flight, scans_of(flight, "radar"), told)[0].offset_s == -0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[sensors.radar.considered.wind]\nsd_m = 1.0", "no error 'wind' can be considered"),
+        ("[sensors.radar.considered.heading]\nsd_m = 1.0", "has its standard deviation in deg"),
+        ("[sensors.radar.noise]\nrange_m = -1.0", "greater than 0"),
+        ("[targets]\nsped = 1.0", "sped"),
+        ("[targets", "TOML"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(text: str, said: str):
+    with pytest.raises(WildlabError, match=said):
+        parse_settings(text)
+
+
+def test_noise_is_found_from_how_rough_detections_are():
+    found = [
+        roughness(scans_of(robot_flight(seed, range_sd=0.7, bearing_sd_deg=0.5), "radar"))
+        for seed in range(5)
+    ]
+    np.testing.assert_allclose(np.mean(found, axis=0), [0.7, np.radians(0.5)], rtol=0.12)
+
+
+def test_noise_that_nobody_knows_is_asked_for():
+    flight = robot_flight(seconds=1.6)
+    with pytest.raises(WildlabError, match=r"how noisy 'range' .* \[sensors.radar.noise\]"):
+        follow_targets(flight)
+
+
+# --- tuning -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_innovations_tell_noise_and_liveliness():
+    found = tune_flight(robot_flight(7, truth=False, range_sd=0.8, bearing_sd_deg=0.5), ["radar"])
+    assert found.against == "innovations" and found.density is not None
+    np.testing.assert_allclose(found.sensors["radar"].sds, [0.8, np.radians(0.5)], rtol=0.3)
+    assert found.density < 0.4
+    again = read_tuned(tuned_text(found))
+    assert again is not None and repr(again) == repr(found)
+
+
+@pytest.mark.slow
+def test_truth_tells_a_heading_and_the_other_flight_is_judged_by_it():
+    found = tune_flight(robot_flight(8, name="first", heading_off_deg=2.0), ["radar"])
+    assert found.against == "truth" and found.flight == "first"
+    assert np.degrees(found.sensors["radar"].yaw_sd_rad) == pytest.approx(2.0, rel=0.4)
+    followed = follow_targets(robot_flight(9, heading_off_deg=-2.0), tuned=found)
+    assert any(one.source == "tuned on first" for one in followed.said)
+    rows = rows_of(followed)
+    assert rows.loc["schmidt", "nees"] < rows.loc["ekf", "nees"]
+
+
+def test_nothing_is_tuned_where_it_is_judged():
+    flight = robot_flight(1)
+    with pytest.raises(WildlabError, match="nothing is tuned where it is judged"):
+        refuse_same(flight, robot_flight(1, name="renamed"))
+    refuse_same(flight, robot_flight(2))
+
+
+def test_truth_that_is_not_there_is_no_teacher():
+    with pytest.raises(WildlabError, match="'robot' has no truth to tune against"):
+        tune_flight(robot_flight(truth=False), ["radar"], against="truth")
+    with pytest.raises(WildlabError, match=r"only .* detections of 'radar' can be followed"):
+        tune_flight(robot_flight(truth=False, seconds=6.0), ["radar"])
