@@ -11,10 +11,10 @@ from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import from_tuning
 from wildlab.pipeline.following.expected import errors_near
+from wildlab.pipeline.following.sensor_tracks import FILTERS, SensorTrack, follow_flight, table
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.pipeline.following.starts import start_near
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
-from wildlab.pipeline.sensor_tracks import FILTERS, SensorTrack, follow_flight, table
-from wildlab.pipeline.sensor_tuning import SensorTuning
 from wildlab.studies.autoferry.boats import BOATS, tune_sensor
 from wildlab.studies.autoferry.comparison import off_ideal
 

@@ -11,8 +11,8 @@ import pytest
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import DATA
-from wildlab.pipeline.sensor_tracks import FILTERS, follow_flight, table
-from wildlab.pipeline.sensor_tuning import SensorTuning
+from wildlab.pipeline.following.sensor_tracks import FILTERS, follow_flight, table
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.studies.autoferry.boats import BOATS, tune_sensor
 from wildlab.studies.autoferry.comparison import OUTCOMES, choose_filter, of_use, outcomes
 

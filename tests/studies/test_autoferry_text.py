@@ -9,8 +9,8 @@ import pytest
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.flight.manifest import make_manifest
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import COLUMNS, SensorTrack, table
-from wildlab.pipeline.sensor_tuning import SensorTuning
+from wildlab.pipeline.following.sensor_tracks import COLUMNS, SensorTrack, table
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.reporting.published import load_claims
 from wildlab.reporting.report import Report, open_report
 from wildlab.studies.autoferry import charts, tables

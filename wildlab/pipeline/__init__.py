@@ -7,7 +7,7 @@ in b). Errors of points are point minus truth; those of tracks and poses truth m
 
 Of each subject its file has more: `wildlab.pipeline.georeference.georeference` (which has its file's name, so
 that it is not repeated here), `diagnose` (likewise), `navigation_errors` (against a reference),
-`sensor_tracks` and `sensor_tuning` (ranges and bearings of a moving platform).
+`following` (targets by any sensor: what `wildlab track` does).
 """
 
 from typing import TYPE_CHECKING

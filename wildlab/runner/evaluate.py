@@ -15,9 +15,9 @@ from wildlab.flight.learnt import learnt_toml, read_learnt, refuse_other_camera
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.pipeline.following.follow import refuse_unusable
+from wildlab.pipeline.following.sensor_tuning import FEWEST
 from wildlab.pipeline.navigation_errors import reference_of
 from wildlab.pipeline.navigation_inputs import imu_noise
-from wildlab.pipeline.sensor_tuning import FEWEST
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
@@ -170,7 +170,7 @@ def _contents(flight: Mapping[str, Any]) -> set[str]:
 def lacking_for_tracking(flight: Flight, use: Use, source: str | None = None) -> str:
     """Why no target of a flight can be followed, or nothing; ``use`` is what the checks say of it.
 
-    A target that is seen less often than `wildlab.pipeline.sensor_tuning.FEWEST` times makes no report.
+    A target that is seen less often than `FEWEST` times makes no report.
     """
     if not use.usable:
         return use.why

@@ -18,9 +18,9 @@ from wildlab.geometry.frames import Array
 from wildlab.paths import DATA
 from wildlab.pipeline.following.expected import SLOTS
 from wildlab.pipeline.following.roughness import roughness
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.pipeline.georeference import assumed_deviations
 from wildlab.pipeline.scans import Scans
-from wildlab.pipeline.sensor_tuning import SensorTuning
 
 #: Of which noise each element of a measurement has its standard deviation, and in what the file has it.
 NOISE_OF = {

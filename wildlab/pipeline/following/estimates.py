@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.scans import Scans
-from wildlab.pipeline.sensor_tracks import SensorTrack
 
 STATE = ("north_m", "east_m", "v_north_m_s", "v_east_m_s")
 #: Units of the elements of a measurement, as names of columns have them.

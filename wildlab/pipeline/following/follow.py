@@ -20,11 +20,11 @@ from wildlab.pipeline.following.beliefs import (
     of_targets,
 )
 from wildlab.pipeline.following.filters import NAMES, SMOOTHABLE, SMOOTHED, possible
+from wildlab.pipeline.following.sensor_tracks import SensorTrack, follow
 from wildlab.pipeline.following.together import ABLE, follow_together
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.pipeline.following.whose import UNNAMED, identified, targets_of
 from wildlab.pipeline.scans import Scans, Truth, scans_of, sensors_of
-from wildlab.pipeline.sensor_tracks import SensorTrack, follow
 
 #: The filter without anything but white noise, which the others are held against.
 WHITE = "ekf"

@@ -22,7 +22,7 @@ from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.follow import TOGETHER, Followed
-from wildlab.pipeline.sensor_tracks import SensorTrack
+from wildlab.pipeline.following.sensor_tracks import SensorTrack
 
 #: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
 FEW_INDEPENDENT = 30.0

@@ -15,10 +15,10 @@ from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.expected import sensor_of
 from wildlab.pipeline.following.filters import choose, motion_of, white_noise
+from wildlab.pipeline.following.sensor_tracks import begin_of_target
+from wildlab.pipeline.following.sensor_tuning import FEWEST, SensorTuning
 from wildlab.pipeline.following.whose import identified, targets_of
 from wildlab.pipeline.scans import Scans, scans_of
-from wildlab.pipeline.sensor_tracks import begin_of_target
-from wildlab.pipeline.sensor_tuning import FEWEST, SensorTuning
 from wildlab.tracking.run import Start, run_filter
 
 #: Looks of a sensor that are gone over: enough to tell, and few enough to go over often.

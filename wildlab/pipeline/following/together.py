@@ -24,8 +24,8 @@ from wildlab.pipeline.following.filters import (
     white_noise,
     without_innovations,
 )
+from wildlab.pipeline.following.sensor_tracks import SensorTrack, begin_of_target, last_row, no_track, scored
 from wildlab.pipeline.scans import Scans, Truth, truths_at
-from wildlab.pipeline.sensor_tracks import SensorTrack, begin_of_target, last_row, no_track, scored
 from wildlab.tracking.combined import Merged, Seen, merge
 from wildlab.tracking.considered import Considered, consider_all
 from wildlab.tracking.considering import renamed

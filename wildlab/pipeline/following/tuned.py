@@ -12,7 +12,7 @@ from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, TargetBeliefs, of_flight, of_targets
 from wildlab.pipeline.following.likelihood import tune_by_innovations
-from wildlab.pipeline.sensor_tuning import SensorTuning, tune
+from wildlab.pipeline.following.sensor_tuning import SensorTuning, tune
 
 Against = Literal["truth", "innovations"]
 

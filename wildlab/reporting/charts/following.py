@@ -14,7 +14,7 @@ from wildlab.geometry.frames import Array
 from wildlab.pipeline.following.filters import SMOOTHED
 from wildlab.pipeline.following.follow import Followed
 from wildlab.pipeline.following.judged import whitened
-from wildlab.pipeline.sensor_tracks import SensorTrack
+from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.reporting.charts.tracks import innovation_correlations
 from wildlab.reporting.figures import (
     BLUE,

@@ -6,11 +6,11 @@ from wildlab.flight.following import read_settings
 from wildlab.flight.store import Flight
 from wildlab.paths import DATA
 from wildlab.pipeline.following.beliefs import of_targets
-from wildlab.pipeline.sensor_tuning import SensorTuning, tune
+from wildlab.pipeline.following.sensor_tuning import SensorTuning, tune
 
 BOATS, _ = of_targets(read_settings(DATA / "settings" / "autoferry.toml").targets)
 
 
 def tune_sensor(flight: Flight, sensor: str) -> SensorTuning:
-    """Everything of a sensor from one scenario, see `wildlab.pipeline.sensor_tuning.tune`."""
+    """Everything of a sensor from one scenario, see `wildlab.pipeline.following.sensor_tuning.tune`."""
     return tune(flight, sensor, BOATS.reach)

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
-from wildlab.pipeline.sensor_tracks import FILTERS, SensorTrack
+from wildlab.pipeline.following.sensor_tracks import FILTERS, SensorTrack
 from wildlab.reporting.figures import (
     BLUE,
     GREEN,

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.runs import share_interval as wilson
-from wildlab.pipeline.sensor_tracks import FILTERS, WHITE
+from wildlab.pipeline.following.sensor_tracks import FILTERS, WHITE
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def off_ideal(anees: ArrayLike) -> Array:
 
 
 def stays(table: pd.DataFrame, mostly: float = MOSTLY) -> NDArray[np.bool_]:
-    """Which tracks (rows of `wildlab.pipeline.sensor_tracks.table`) stay with their boat; see `MOSTLY`.
+    """Which tracks stay with their boat, by the rows of `sensor_tracks.table`; see `MOSTLY`.
 
     One that never began, or whose boat the sensor never saw, does not.
     """
@@ -59,7 +59,7 @@ def beside_white(table: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
     Parameters
     ----------
     table
-        Rows of `wildlab.pipeline.sensor_tracks.table`, of one flight or many.
+        Rows of `wildlab.pipeline.following.sensor_tracks.table`, of one flight or many.
     keys
         Columns that name a case: what was followed, by what, when.
 
@@ -84,7 +84,7 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
     Parameters
     ----------
     table
-        Rows of `wildlab.pipeline.sensor_tracks.table`.
+        Rows of `wildlab.pipeline.following.sensor_tracks.table`.
     keys
         Columns that name a case.
     fixed
@@ -130,7 +130,7 @@ def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     Parameters
     ----------
     table
-        Rows of `wildlab.pipeline.sensor_tracks.table` of that flight.
+        Rows of `wildlab.pipeline.following.sensor_tracks.table` of that flight.
     keys
         Columns that name a case.
     """

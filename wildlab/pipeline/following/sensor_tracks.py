@@ -25,9 +25,9 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, from_tuning
 from wildlab.pipeline.following.expected import errors_near
 from wildlab.pipeline.following.filters import choose, follow_with
+from wildlab.pipeline.following.sensor_tuning import SensorTuning
 from wildlab.pipeline.following.starts import start_first, start_near
 from wildlab.pipeline.scans import Scans, Truth, scans_of, truths_at
-from wildlab.pipeline.sensor_tuning import SensorTuning
 from wildlab.tracking.run import Start, Track
 
 Array = NDArray[np.float64]
