@@ -209,9 +209,16 @@ def way_of(one: Found) -> Way | None:
         good = stream.used & np.isfinite(place).all(axis=1) & np.isfinite(c["time_s"])
         if good.any():
             # Above take-off, a boat and an aircraft have nothing in common.
-            heights = {key: c[key][good] for key in ("height_ellipsoid_m", "height_sea_m") if key in c}
+            heights: dict[str, Array] = {
+                key: c[key][good] for key in ("height_ellipsoid_m", "height_sea_m") if key in c
+            }
             return Way(c["time_s"][good], place[good], heights)
     return None
+
+
+def _level(place: Array, origin: tuple[float, float, float]) -> Array:
+    """(N, 3) metres from the origin, of latitudes and longitudes."""
+    return np.asarray(geodetic_to_ned(place[:, 0], place[:, 1], np.zeros(len(place)), origin))
 
 
 def _distance(mine: Way, theirs: Way) -> tuple[float, float]:
@@ -221,7 +228,7 @@ def _distance(mine: Way, theirs: Way) -> tuple[float, float]:
     if not both.any():
         return math.inf, math.nan
     origin = (float(mine.place[0, 0]), float(mine.place[0, 1]), 0.0)
-    a, b = (geodetic_to_ned(*one.place.T, np.zeros(len(one.place)), origin) for one in (mine, theirs))
+    a, b = (_level(one.place, origin) for one in (mine, theirs))
     at = np.column_stack(
         [np.interp(theirs.times[both], mine.times[order], a[order, axis]) for axis in (0, 1)]
     )

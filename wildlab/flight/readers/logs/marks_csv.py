@@ -139,7 +139,7 @@ def _height(names: list[str], others: set[int], path: Path, there: str) -> tuple
             return at, "height_sea_m"
     plain_one = next((names[at] for at, own in words.items() if own & HIGH), None)
     raise WildlabError(
-        f"the column {plain_one!r} does not say what heights count from, as height_ellipsoid and height_sea do"
+        f"the column {plain_one!r} does not say what its heights count from, as height_ellipsoid does"
         if plain_one
         else f"has no column of heights: {there}",
         "name it height_ellipsoid or height_sea, in metres",
