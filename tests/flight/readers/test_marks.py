@@ -103,7 +103,7 @@ def test_order_comments_and_spreads_of_a_table() -> None:
     [
         (
             "name,lat,lon,height",
-            "'height' does not say what heights count from",
+            "'height' does not say what its heights count from",
             "height_ellipsoid or height_sea",
         ),
         ("name,lat,lon,altitude", "'altitude' does not say", "height_ellipsoid or height_sea"),
