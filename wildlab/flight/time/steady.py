@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 TOLD_APART = 4.0
 #: Receipts before the middle one by more than so many robust standard deviations (and 1 s) are wrong.
 EARLY = 5.0
+#: Fewer pairs do not tell how well they tell a rate.
+FEW = 10
 #: Standard deviation of a quartz's rate.
 USUAL = 1e-4
 #: A clock that is further from the other's rate is none.
@@ -41,10 +43,11 @@ def fit_steady(
         Where there is no pair.
     """
     fit = fit_clock(own, reference, late, resolution_s)
-    if abs(fit.rate - 1.0) > TOLD_APART * fit.rate_sd and SLOWEST < fit.rate < FASTEST:
+    told = int(fit.used.sum()) >= FEW and np.isfinite(fit.rate_sd)
+    if told and abs(fit.rate - 1.0) > TOLD_APART * fit.rate_sd and SLOWEST < fit.rate < FASTEST:
         return fit
-    turned = np.clip(fit.rate - 1.0, -1.0, 1.0) if np.isfinite(fit.rate_sd) else 0.0
-    rate = 1.0 + float(turned) * USUAL**2 / (USUAL**2 + min(fit.rate_sd, 1e9) ** 2)
+    turned = float(np.clip(fit.rate - 1.0, -1.0, 1.0))
+    rate = 1.0 + (turned * USUAL**2 / (USUAL**2 + fit.rate_sd**2) if told else 0.0)
     x, y = np.asarray(own, float), np.asarray(reference, float)
     used = fit.used
     middle = float(np.mean(x[used]))
