@@ -21,7 +21,7 @@ import pytest
 from tests.clicking import HOSTILE, serving, write_images
 from tests.pipeline.survey_twin import Survey, simulate
 from wildlab import cli
-from wildlab.flight.readers.logs import clicks as click_files
+from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.runner.clicking.server import ClickServer, open_server
 from wildlab.runner.clicking.session import Session, check_points, open_session, read_points, table_of

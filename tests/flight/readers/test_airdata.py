@@ -9,7 +9,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import airdata
+from wildlab.flight.readers.dji import airdata
 
 START = datetime(2026, 6, 1, 10, tzinfo=UTC)
 METRIC = (

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from tests.flight.readers import made_up_photos as made
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import clicks
+from wildlab.flight.readers.clicks import clicks
 from wildlab.flight.readers.logs.log import RawLog
-from wildlab.flight.readers.logs.text_table import guarded, unguarded
+from wildlab.flight.readers.marks.text_table import guarded, unguarded
 
 HERE = Path("clicks")
 #: Image, name, left, top, width, height.

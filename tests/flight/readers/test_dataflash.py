@@ -23,8 +23,9 @@ from tests.flight.readers.dataflash_logs import (
     third_generation,
 )
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import dataflash, dataflash_text
-from wildlab.flight.readers.logs.dataflash_records import read_records
+from wildlab.flight.readers.ardupilot import binary as dataflash
+from wildlab.flight.readers.ardupilot import text as dataflash_text
+from wildlab.flight.readers.ardupilot.records import read_records
 from wildlab.flight.readers.logs.log import RawLog
 
 GENERATIONS = {2014: first_generation, 2025: third_generation}

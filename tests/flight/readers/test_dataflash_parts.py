@@ -22,7 +22,8 @@ from tests.flight.readers.dataflash_logs import (
     second_generation,
     third_generation,
 )
-from wildlab.flight.readers.logs import dataflash, dataflash_text
+from wildlab.flight.readers.ardupilot import binary as dataflash
+from wildlab.flight.readers.ardupilot import text as dataflash_text
 from wildlab.flight.readers.logs.formats import read_log
 from wildlab.flight.readers.logs.log import RawLog, Stream
 from wildlab.flight.readers.logs.order import in_order, leaps

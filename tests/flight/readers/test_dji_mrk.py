@@ -7,7 +7,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import dji_mrk
+from wildlab.flight.readers.dji import mrk as dji_mrk
 from wildlab.flight.time.leap_seconds import week_to_utc
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import dji_srt
+from wildlab.flight.readers.dji import srt as dji_srt
 
 #: Sample -> subtitles, rows with a place, first latitude, longitude, height, first stamp (local), satellites.
 SAMPLES = {

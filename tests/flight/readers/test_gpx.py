@@ -10,7 +10,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import gpx
+from wildlab.flight.readers.tracks import gpx
 
 START = datetime(2026, 6, 1, 10, tzinfo=UTC)
 SAMPLES = ("around-visnjan-with-car", "cerknicko-jezero", "Mojstrovka", "korita-zbevnica")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wildlab.flight.readers.logs.judging import decode, drop_rare_heights, gaps, judge, number, numbers
+from wildlab.flight.readers.tracks.judging import decode, drop_rare_heights, gaps, judge, number, numbers
 
 WORDS = ["", " 1.5", "-2", "+.5", "1e3", "1_0", "nan", "inf", "1e999", "0x10", "1,5", "٣", "=1+1", "1" * 100]
 VALUES = [np.nan, 1.5, -2.0, 0.5, 1000.0, *[np.nan] * 9]

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import marks_csv, marks_geojson, marks_kml
 from wildlab.flight.readers.logs.log import RawLog
+from wildlab.flight.readers.marks import geojson as marks_geojson
+from wildlab.flight.readers.marks import kml as marks_kml
+from wildlab.flight.readers.marks import table as marks_csv
 
 HERE = Path("marks")
 #: Name, latitude, longitude, height.

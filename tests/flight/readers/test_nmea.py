@@ -10,7 +10,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import nmea
+from wildlab.flight.readers.tracks import nmea
 
 KNOT = 1852 / 3600
 

@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from tests.flight.readers import made_up_photos as made
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import photo_tags
-from wildlab.flight.readers.logs import photo_values as values
 from wildlab.flight.readers.logs.log import RawLog
-from wildlab.flight.readers.logs.photo_values import from_nadir
-from wildlab.flight.readers.logs.photos import camera_of, is_photos, read_photos
+from wildlab.flight.readers.photos import tags as photo_tags
+from wildlab.flight.readers.photos import values
+from wildlab.flight.readers.photos.folder import camera_of, is_photos, read_photos
+from wildlab.flight.readers.photos.values import from_nadir
 
 NOON = datetime(2024, 6, 12, 11, 30, tzinfo=UTC).timestamp()
 

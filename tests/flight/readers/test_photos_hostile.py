@@ -13,7 +13,7 @@ import pytest
 from tests.flight.readers import made_up_photos as made
 from tests.flight.readers.test_photos import column, said
 from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.logs.photos import read_photos
+from wildlab.flight.readers.photos.folder import read_photos
 
 
 @pytest.mark.parametrize(

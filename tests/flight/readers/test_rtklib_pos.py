@@ -11,7 +11,7 @@ import pytest
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import rtklib_pos
+from wildlab.flight.readers.tracks import rtklib_pos
 from wildlab.flight.time.leap_seconds import leap_seconds
 
 START = datetime(2025, 3, 1, 23, 59, 50, tzinfo=UTC)

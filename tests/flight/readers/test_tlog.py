@@ -13,9 +13,9 @@ from pymavlink.dialects.v20 import ardupilotmega
 from tests.flight.readers.mavlink_logs import BOOT_S, ORIGIN, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import check, damaged
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import tlog
 from wildlab.flight.readers.logs.formats import recognise
-from wildlab.flight.readers.logs.mavlink_frames import messages, walk
+from wildlab.flight.readers.mavlink import telemetry as tlog
+from wildlab.flight.readers.mavlink.frames import messages, walk
 
 PATH = Path("flight.tlog")
 

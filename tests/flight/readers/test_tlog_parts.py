@@ -8,7 +8,7 @@ import pytest
 
 from tests.flight.readers.mavlink_logs import BOOT_S, START_S, frame, joined, made, telemetry
 from tests.flight.readers.tracks import check
-from wildlab.flight.readers.logs import tlog
+from wildlab.flight.readers.mavlink import telemetry as tlog
 
 PATH = Path("flight.tlog")
 

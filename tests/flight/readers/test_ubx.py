@@ -11,8 +11,8 @@ from pyubx2 import GET, UBXMessage, UBXReader
 
 from tests.flight.readers.tracks import check, survives
 from wildlab.errors import WildlabError
-from wildlab.flight.readers.logs import ubx
-from wildlab.flight.readers.logs.ubx_frames import LAYOUTS, frames, rows
+from wildlab.flight.readers.tracks import ubx
+from wildlab.flight.readers.tracks.ubx_frames import LAYOUTS, frames, rows
 
 #: 2025-03-01 12:00:00 UTC is so many s into GPS week 2355.
 WEEK, TOW = 2355, 6 * 86400 + 43200 + 18

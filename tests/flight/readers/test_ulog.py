@@ -11,11 +11,11 @@ from pyulog import ULog
 
 from tests.flight.readers.mavlink_logs import START_S, ulog
 from tests.flight.readers.tracks import check
-from wildlab.flight.readers.logs import ulog as reader
 from wildlab.flight.readers.logs.formats import recognise
-from wildlab.flight.readers.logs.ulog_frames import sound_part
-from wildlab.flight.readers.logs.ulog_parts import TOPICS
-from wildlab.flight.readers.logs.ulog_topics import from_local
+from wildlab.flight.readers.px4 import ulog as reader
+from wildlab.flight.readers.px4.frames import sound_part
+from wildlab.flight.readers.px4.streams import TOPICS
+from wildlab.flight.readers.px4.topics import from_local
 
 PATH = Path("flight.ulg")
 SAMPLES = [("px4_quad_clean_short", "test.ulg"), ("px4_quad_ekf_failure", "ekf_failure.ulg")]

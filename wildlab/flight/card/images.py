@@ -13,7 +13,7 @@ from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.logs.log import Stream
-from wildlab.flight.readers.logs.photos import camera_of
+from wildlab.flight.readers.photos.folder import camera_of
 from wildlab.flight.time.matching import match_triggers
 
 #: Time zones are whole quarters of an hour, s.

@@ -15,11 +15,11 @@ from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
+from wildlab.flight.readers.clicks import clicks as click_files
 from wildlab.flight.readers.frames.frame import file_name
 from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.logs import clicks as click_files
-from wildlab.flight.readers.logs.photos import is_photos, natural_key
-from wildlab.flight.readers.logs.text_table import guarded
+from wildlab.flight.readers.marks.text_table import guarded
+from wildlab.flight.readers.photos.folder import is_photos, natural_key
 from wildlab.flight.store import load_flight
 
 #: Images of a folder, points in one image, letters of a name, and bytes of a table, at most.

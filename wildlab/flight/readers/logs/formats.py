@@ -26,21 +26,21 @@ HEAD = 8192
 
 #: Name in recipes -> (module of the reader, what it is called in sentences). Asked in this order.
 FORMATS: dict[str, tuple[str, str]] = {
-    "dataflash": ("wildlab.flight.readers.logs.dataflash", "ArduPilot DataFlash log"),
-    "dataflash-text": ("wildlab.flight.readers.logs.dataflash_text", "ArduPilot DataFlash log as text"),
-    "ulog": ("wildlab.flight.readers.logs.ulog", "PX4 ULog"),
-    "tlog": ("wildlab.flight.readers.logs.tlog", "MAVLink telemetry log"),
-    "ubx": ("wildlab.flight.readers.logs.ubx", "u-blox UBX"),
-    "gpx": ("wildlab.flight.readers.logs.gpx", "GPX track"),
-    "dji-srt": ("wildlab.flight.readers.logs.dji_srt", "DJI subtitles"),
-    "dji-mrk": ("wildlab.flight.readers.logs.dji_mrk", "DJI time stamps of images"),
-    "airdata": ("wildlab.flight.readers.logs.airdata", "AirData table"),
-    "rtklib-pos": ("wildlab.flight.readers.logs.rtklib_pos", "RTKLIB positions"),
-    "nmea": ("wildlab.flight.readers.logs.nmea", "NMEA 0183"),
-    "marks-kml": ("wildlab.flight.readers.logs.marks_kml", "KML placemarks"),
-    "marks-geojson": ("wildlab.flight.readers.logs.marks_geojson", "GeoJSON points"),
-    "marks-csv": ("wildlab.flight.readers.logs.marks_csv", "table of surveyed points"),
-    "clicks": ("wildlab.flight.readers.logs.clicks", "clicks or boxes in images"),
+    "dataflash": ("wildlab.flight.readers.ardupilot.binary", "ArduPilot DataFlash log"),
+    "dataflash-text": ("wildlab.flight.readers.ardupilot.text", "ArduPilot DataFlash log as text"),
+    "ulog": ("wildlab.flight.readers.px4.ulog", "PX4 ULog"),
+    "tlog": ("wildlab.flight.readers.mavlink.telemetry", "MAVLink telemetry log"),
+    "ubx": ("wildlab.flight.readers.tracks.ubx", "u-blox UBX"),
+    "gpx": ("wildlab.flight.readers.tracks.gpx", "GPX track"),
+    "dji-srt": ("wildlab.flight.readers.dji.srt", "DJI subtitles"),
+    "dji-mrk": ("wildlab.flight.readers.dji.mrk", "DJI time stamps of images"),
+    "airdata": ("wildlab.flight.readers.dji.airdata", "AirData table"),
+    "rtklib-pos": ("wildlab.flight.readers.tracks.rtklib_pos", "RTKLIB positions"),
+    "nmea": ("wildlab.flight.readers.tracks.nmea", "NMEA 0183"),
+    "marks-kml": ("wildlab.flight.readers.marks.kml", "KML placemarks"),
+    "marks-geojson": ("wildlab.flight.readers.marks.geojson", "GeoJSON points"),
+    "marks-csv": ("wildlab.flight.readers.marks.table", "table of surveyed points"),
+    "clicks": ("wildlab.flight.readers.clicks.clicks", "clicks or boxes in images"),
 }
 
 
@@ -88,8 +88,8 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
 
 #: Formats of whole folders: name in recipes -> (module, its reader, what it is called in sentences).
 FOLDERS: dict[str, tuple[str, str, str]] = {
-    "photos": ("wildlab.flight.readers.logs.photos", "read_photos", "folder of images"),
-    "clicks-yolo": ("wildlab.flight.readers.logs.clicks", "read_clicks_folder", "folder of YOLO's labels"),
+    "photos": ("wildlab.flight.readers.photos.folder", "read_photos", "folder of images"),
+    "clicks-yolo": ("wildlab.flight.readers.clicks.clicks", "read_clicks_folder", "folder of YOLO's labels"),
 }
 #: So much of the beginning of each file goes into a folder's checksum: images are large and many.
 HASHED = 65536

@@ -1,0 +1,1 @@
+"""Pixels of things in images: points and boxes of other programs, and of `wildlab click`."""

@@ -1,0 +1,1 @@
+"""What DJI aircraft leave: subtitles, records of images, tables of AirData."""

@@ -1,0 +1,1 @@
+"""Surveyed points: KML, GeoJSON and tables."""

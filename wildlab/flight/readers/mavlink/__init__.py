@@ -1,0 +1,1 @@
+"""Telemetry of MAVLink as ground stations keep it."""

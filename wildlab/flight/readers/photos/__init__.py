@@ -1,0 +1,1 @@
+"""Folders of images: what stands in their headers."""

@@ -1,0 +1,1 @@
+"""ULog of PX4, with names of fields old and new."""

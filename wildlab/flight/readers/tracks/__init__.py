@@ -1,0 +1,1 @@
+"""Tracks of satellite receivers: GPX, NMEA 0183, u-blox UBX, RTKLIB."""
