@@ -224,6 +224,18 @@ def test_images_in_a_hole_are_counted_with_the_reason(make_flight: Callable[...,
     assert lost.why.startswith(f"{after} before the log of the poses begins or after it ends and {inside} in")
 
 
+def test_time_without_poses_is_that_of_the_record(make_flight: Callable[..., Flight]) -> None:
+    flight = make_flight(n_images=40)
+    nav = flight.nav["logged"]
+    flight.nav["logged"] = nav[(nav["time_s"] >= 20) & ((nav["time_s"] < 25) | (nav["time_s"] >= 30))]
+    t = np.arange(0.0, 40.0, 0.1)
+    flight.tables["magnetometer"] = pd.DataFrame({"time_s": t, **{f"field_{a}_ut": 0.0 for a in "xyz"}})
+    (lost,) = [one for one in look_over(flight).lost if one.key == "time_without_poses"]
+    end = float(nav["time_s"].max())
+    assert lost.lost == pytest.approx(25, abs=0.6) and lost.of == pytest.approx(end, abs=0.6)
+    assert lost.why == "20 before it begins or after it ends and 5 in its pauses"
+
+
 def test_detections_whose_target_has_no_truth_are_counted(make_flight: Callable[..., Flight]) -> None:
     flight = make_flight(n_images=10)
     detections = flight.tables["detections"]
@@ -277,7 +289,7 @@ def test_the_page_says_first_what_is_most_worth_fixing(
     )
     assert html.index("Most worth fixing") < html.index("Where it flew")
     found = values(content)
-    assert found["worth_fixing", "flight"] == 2 and found["problems", "flight"] == 0
+    assert found["worth_fixing", "flight"] == 3 and found["problems", "flight"] == 0
     assert found["gain_share", "cause"] == pytest.approx(0.75)
     assert found["trouble", "no-poses"] == pytest.approx(5.0, abs=0.1)
 
@@ -371,10 +383,10 @@ def test_trouble_that_lasts_asks_for_a_closer_look(
     make_flight: Callable[..., Flight], tmp_path: Path
 ) -> None:
     flight = make_flight(n_images=40)
-    t = np.arange(0.0, 40.0, 0.5)
     nav = flight.nav["logged"]
+    t = np.arange(nav["time_s"].min(), nav["time_s"].max(), 0.5)
     at = {name: np.interp(t, nav["time_s"], nav[name]) for name in ("north_m", "east_m", "down_m")}
-    flight.tables["gnss"] = pd.DataFrame({"time_s": t, **at, "satellites": np.where(t < 12, 4.0, 9.0)})
+    flight.tables["gnss"] = pd.DataFrame({"time_s": t, **at, "satellites": np.where(t < t[0] + 12, 4.0, 9.0)})
     html, content = page_of(flight, tmp_path, judged=1)
     share = 12.0 / look_over(flight).length_s
     assert f"Look closer: fewer than 6 satellites for {100 * share:.0f} % of the time." in html

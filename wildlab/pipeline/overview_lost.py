@@ -86,15 +86,38 @@ def lost_data(flight: Flight, source: str | None, streams: dict[str, Pace]) -> l
         placed, has_pose = _placed(flight, source)
         away = int((has_pose & ~placed).sum())
         found.append(Recovered("detections_off_ground", away, len(placed), "detections", ""))
-    for key, name in (("time_without_satellites", "gnss"), ("time_without_inertial", "imu")):
-        pace = streams.get(name)
-        if timed and pace is not None and pace.length_s > 0:
-            found.append(Recovered(key, round(pace.paused_s), max(1, round(pace.length_s)), "seconds", ""))
+    if timed:
+        found += _unrecorded(flight, source, streams)
     imu = streams.get("imu")
     if timed and imu is not None and imu.missing:
         found.append(Recovered("inertial_samples", imu.missing, imu.n + imu.missing, "inertial samples", ""))
     found += _untrue(flight)
     return [one for one in found if one.lost]
+
+
+def _unrecorded(flight: Flight, source: str | None, streams: dict[str, Pace]) -> list[Recovered]:
+    """Seconds of the record without poses, satellite positions or inertial samples, and when these are."""
+    carried = [pace for name, pace in streams.items() if pace.n and name != "truth"]
+    if not carried:
+        return []
+    begin, end = min(pace.begin for pace in carried), max(pace.end for pace in carried)
+    names = {"time_without_satellites": "gnss", "time_without_inertial": "imu"}
+    if source is not None and "frame_id" not in flight.nav[source]:
+        names = {"time_without_poses": f"nav/{source}"} | names
+    found = []
+    for key, name in names.items():
+        pace = streams.get(name)
+        if pace is None or not pace.n or end <= begin:
+            continue
+        outside = pace.begin - begin + end - pace.end
+        lost = round(outside + pace.paused_s)
+        said = [
+            *([f"{outside:.0f} before it begins or after it ends"] if round(outside) else []),
+            *([f"{pace.paused_s:.0f} in its pauses"] if round(pace.paused_s) else []),
+        ]
+        what = "seconds of the record"
+        found.append(Recovered(key, lost, max(1, round(end - begin)), what, " and ".join(said)))
+    return found
 
 
 def _why_unposed(flight: Flight, source: str, unposed: NDArray[np.bool_]) -> str:

@@ -14,6 +14,9 @@ from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import number, percent
 
+#: Positions closer than this are the same, but for rounding, m.
+SAME_M = 1e-3
+
 
 def tiles(overview: Overview) -> list[tuple[str, str]]:
     """The few numbers to remember."""
@@ -225,6 +228,8 @@ def differences(overview: Overview) -> str:
     own = np.stack([np.interp(times[inside], path.times, column) for column in path.place.T], axis=1)
     off = own - place[inside]
     level, up = np.hypot(off[:, 0], off[:, 1]), -off[:, 2]
+    if np.median(np.abs(off)) < SAME_M:
+        return f"The poses of {charts.path_name(path)} have the positions of the satellites."
     return (
         f"The poses of {charts.path_name(path)} lie {np.median(level):.2f} m beside the satellite "
         "positions in "
