@@ -14,6 +14,7 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import Series, mean_of_runs, navigation_series
 from wildlab.pipeline.follow import ACCELERATION, FILTERS, START_SPEED, Filter, usual_tuning
+from wildlab.pipeline.following.judged import FEW_INDEPENDENT, verdict
 from wildlab.pipeline.georeference import assumed_deviations
 from wildlab.pipeline.navigate import MekfTuning, Navigated, navigate_mekf, navigate_observer
 from wildlab.pipeline.navigation_errors import (
@@ -28,10 +29,6 @@ from wildlab.pipeline.track import CvTuning, Scored, Sighting, evaluate_track, s
 from wildlab.tracking.run import Track
 
 Method = Literal["mekf", "observer"]
-
-
-#: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
-FEW_INDEPENDENT = 30.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -287,12 +284,12 @@ class Consistency(Brief):
         """A row for each mean."""
         rows = []
         for name, a in self.means.items():
-            verdict = "consistent" if a.inside else "overconfident" if a.mean > a.high else "too cautious"
+            said = verdict(a)
             if not a.inside and a.worth < FEW_INDEPENDENT:
-                verdict += ", but on few independent values"
+                said += ", but on few independent values"
             count = f"{a.n}, worth {a.worth:.0f}"
             dof = str(self.series[name][0].dof)
-            rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, verdict))
+            rows.append((name, f"{a.mean:.2f}", dof, f"{a.low:.2f} to {a.high:.2f}", count, said))
         head = ("mean of", "is", "should be", "95 % interval", "values", "so the filter is")
         return Summary("Consistency", rows, head)
 

@@ -20,6 +20,7 @@ from wildlab.pipeline.following.judged import (
 )
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import NOTHING
 
 #: Errors nearer to what is stated than by this factor are "about as large".
 ALIKE = 1.2
@@ -97,10 +98,10 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
         )
     known = rows[rows["compared"] > 0]
     said, level = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
-    lost = rows[(rows["detections"] == 0)].drop_duplicates(["sensor", "target"])
-    if len(lost):
-        names = ", ".join(f"{one.target} by {one.sensor}" for one in lost.itertuples())
-        said.append(f"Never followed: {names}.")
+    used = rows.groupby(["sensor", "target"], sort=False)["detections"].sum()
+    never = [f"{target} by {sensor}" for (sensor, target), count in used.items() if count == 0]
+    if never:
+        said.append(f"Never followed: {', '.join(never)}.")
     if tuned is not None:
         how = "its truth" if tuned.against == "truth" else "the likelihood of its innovations"
         said.append(f"Tuned on the flight {tuned.flight} by {how}, judged on this one.")
@@ -111,43 +112,51 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     filters = list(dict.fromkeys(rows["filter"]))
     said = []
     by_name = {name: rows[rows["filter"] == name] for name in filters}
-    white = by_name.get("ekf")
-    best = _most_consistent(by_name)
-    mine = by_name[best]
+    best = leading(filters)
+    mine, white = by_name[best], by_name.get("ekf")
     what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
     are = "is" if len(mine) == 1 else "are"
     said.append(
-        f"{what} of the filter with {filter_words(best)} {are} off by {length(_root(mine['rmse']))} "
-        f"(root mean square), and the errors are {size_words(float(mine['nees'].mean()))}: {_counts(mine)}."
+        f"{what} of the filter with {filter_words(best)} {are} off by {_far(mine)}, and the errors are "
+        f"{size_words(float(mine['nees'].median()))}: {_counts(mine)}."
     )
     if white is not None and best != "ekf":
-        gain = _root(mine["rmse"]) / _root(white["rmse"])
+        keys = ["sensor", "target"]
+        pairs = mine.merge(white, on=keys, suffixes=("", "_white"))
+        white = white[white.set_index(keys).index.isin(mine.set_index(keys).index)]
+        ratio = float((pairs["rmse_white"] / pairs["rmse"]).median())
         said.append(
-            f"With {filter_words('ekf')} the errors are {size_words(float(white['nees'].mean()))}: "
-            f"{_counts(white)}; {_error_change(gain)}."
+            f"With {filter_words('ekf')} the errors are {size_words(float(white['nees'].median()))}: "
+            f"{_counts(white)}; {_error_change(ratio)}."
+        )
+    pairs_in_all = len(rows.drop_duplicates(["sensor", "target"]))
+    if len(mine) < pairs_in_all:
+        said.append(
+            f"These are {len(mine)} of {pairs_in_all} tracks: the others' detections cannot go through it."
         )
     good = (mine["verdict"] == CONSISTENT).all()
     none = not (mine["verdict"] == CONSISTENT).any()
     return said, "good" if good else "bad" if none and (mine["verdict"] == OVERCONFIDENT).all() else "warn"
 
 
-def _most_consistent(by_name: dict[str, pd.DataFrame]) -> str:
-    def score(name: str) -> tuple[float, float]:
-        mine = by_name[name]
-        return -float((mine["verdict"] == CONSISTENT).mean()), float(np.abs(np.log(mine["nees"] / 2)).mean())
-
-    return min(by_name, key=score)
+def leading(filters: Sequence[str]) -> str:
+    """The filter that is spoken of: the first that is not the white one, whatever came out."""
+    return next((name for name in filters if name != "ekf" and not name.endswith("-smoothed")), "ekf")
 
 
-def _root(values: pd.Series) -> float:
-    return float(np.sqrt(np.mean(np.square(values.to_numpy(float)))))
+def _far(rows: pd.DataFrame) -> str:
+    """Root mean square errors: of one track its own, of several the middle one's and their range."""
+    values = rows["rmse"]
+    if len(rows) == 1:
+        return f"{length(float(values.iloc[0]))} (root mean square)"
+    low, high = length(float(values.min())), length(float(values.max()))
+    return f"{length(float(values.median()))} in the middle (root mean squares from {low} to {high})"
 
 
-def _error_change(gain: float) -> str:
-    if gain < 1 / 1.05:
-        return f"it is {1 / gain:.2f} times as far off"
-    if gain > 1.05:
-        return f"it is {1 / gain:.2f} times as far off, which is less"
+def _error_change(ratio: float) -> str:
+    """Errors of the white filter over the other's, in the middle of the tracks."""
+    if ratio > 1.05 or ratio < 1 / 1.05:
+        return f"it is {ratio:.2f} times as far off"
     return "both are about as far off"
 
 
@@ -162,7 +171,7 @@ def _counts(rows: pd.DataFrame, column: str = "verdict") -> str:
 def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str], str]:
     filters = list(dict.fromkeys(rows["filter"]))
     by_name = {name: rows[rows["filter"] == name] for name in filters}
-    name = min(filters, key=lambda one: -float((by_name[one]["nis_verdict"] == CONSISTENT).mean()))
+    name = leading(filters)
     mine = by_name[name]
     factor = float(np.sqrt((mine["nis"] / mine["dof"]).mean()))
     said = [
@@ -200,7 +209,7 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
 
     def band(row: pd.Series, what: str) -> str:
         if not np.isfinite(row[what]):
-            return "–"
+            return NOTHING
         return f"{row[what]:.2f} ({row[f'{what}_low']:.2f} to {row[f'{what}_high']:.2f})"
 
     shown = []
@@ -209,10 +218,10 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
             "track": f"{row['target']}, {row['sensor']}",
             "filter": filter_words(row["filter"]),
             "verdict": verdict_words(row, "nees" if truth else "nis"),
-            "detections": int(row["detections"]),
+            "detections": NOTHING if row["filter"].endswith("-smoothed") else f"{row['detections']:.0f}",
         }
         if truth:
-            inside = "–"
+            inside = NOTHING
             if np.isfinite(row["inside"]):
                 low, high = 100 * row["inside_low"], 100 * row["inside_high"]
                 inside = f"{100 * row['inside']:.0f} ({low:.0f} to {high:.0f})"

@@ -7,7 +7,7 @@ import pandas as pd
 
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.follow import Followed
-from wildlab.pipeline.following.judged import Apart, best_of, verdict
+from wildlab.pipeline.following.judged import Apart, verdict
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting import tracking as words
 from wildlab.reporting.charts import following as charts
@@ -21,13 +21,14 @@ def head_section(
     report: Report, followed: Followed, rows: pd.DataFrame, pairs: list[Apart], tuned: Tuned | None
 ) -> None:
     """Title and summary."""
-    targets, sensors = rows["target"].nunique(), rows["sensor"].nunique()
+    targets, sensors = rows["target"].nunique(), len(followed.scans)
     title = (
         "Does a track know how wrong it is?" if followed.truth else "Are the tracks surprised as they expect?"
     )
     of = "1 target" if targets == 1 else f"{targets} targets"
     by = "1 sensor" if sensors == 1 else f"{sensors} sensors"
-    report.head(title, f"{of} followed by {by}")
+    ways = "" if sensors == 1 else ", each alone and all together"
+    report.head(title, f"{of} followed by {by}{ways}")
     said, level = words.summary(rows, pairs, tuned)
     report.summary(said, level=level)
     if followed.notes:
@@ -52,7 +53,7 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
     report.table(
         table,
         columns=words.columns_of(table),
-        digits={"rmse": 2, "lag1": 2, "detections": 0},
+        digits={"rmse": 2, "lag1": 2},
         caption="Bands: where the mean of a consistent filter lies with 95 %. Lag 1: autocorrelation of "
         "innovations from one detection to the next, of the element where it is largest; near zero is right. "
         f"Used: detections.{truth}",
@@ -67,7 +68,7 @@ def pictures_section(
     if not len(shown):
         return
     filters = list(dict.fromkeys(rows["filter"]))
-    name = best_of(shown[shown["compared"] > 0], filters) if followed.truth else filters[-1]
+    name = words.leading(filters)
     name_of_nav, nav = flight.pose_source(source)
     platforms = {name_of_nav: nav[["north_m", "east_m"]].to_numpy(float)}
     report.section("Where it went", f"Tracks with {words.filter_words(name)}.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -189,14 +188,3 @@ def _between(one: SensorTrack, times: Array) -> tuple[Array, Array]:
     ended = ~there | (times > one.times[-1])
     x[ended] = np.nan
     return x, P
-
-
-def best_of(rows: pd.DataFrame, filters: Sequence[str]) -> str:
-    """The filter whose tracks are most often consistent; of equals the one with the smaller error."""
-    score = []
-    for name in filters:
-        mine = rows[rows["filter"] == name]
-        share = float((mine["verdict"] == CONSISTENT).mean()) if len(mine) else 0.0
-        off = float(np.abs(np.log(mine["nees"] / 2)).mean()) if len(mine) else np.inf
-        score.append((-share, off if np.isfinite(off) else np.inf, name))
-    return min(score)[2]
