@@ -17,7 +17,7 @@ from tests.flight.frames.test_cptv import pictures, video, written
 from tests.pipeline.test_detect import folder, picture
 from tests.test_cli_camera import huge_png
 from wildlab import cli
-from wildlab.pipeline.detection_said import too_few_or_many
+from wildlab.pipeline.detecting.said import too_few_or_many
 
 
 def call(capsys, *arguments):
@@ -118,7 +118,7 @@ def test_a_fit_says_what_it_is_worth_and_its_thresholds_can_be_used_again(capsys
 
 
 def test_a_second_run_computes_nothing_again(capsys, tmp_path, monkeypatch):
-    from wildlab.pipeline import detect as subject
+    from wildlab.pipeline.detecting import detect as subject
 
     monkeypatch.setattr(subject, "PART", 2)
     path = folder(tmp_path / "in")

@@ -11,10 +11,10 @@ from tests.flight.test_mission_writers import check_plan, read_wpl
 from tests.pipeline.test_plan import FIELD
 from wildlab import cli
 from wildlab.geometry.camera import Camera
-from wildlab.pipeline.plan import make_plan
-from wildlab.pipeline.plan_coverage import cover
-from wildlab.pipeline.plan_said import plan_result
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.coverage import cover
+from wildlab.pipeline.plans.plan import make_plan
+from wildlab.pipeline.plans.said import plan_result
+from wildlab.pipeline.plans.wanted import Wanted
 
 SHEET = ("--image", "640x512", "--view", "45")
 

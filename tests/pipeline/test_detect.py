@@ -18,14 +18,14 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames, read_image
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline import detect as subject
-from wildlab.pipeline.detect import detect_frame, run_detection
-from wildlab.pipeline.detect_command import samples_of
-from wildlab.pipeline.detection_fit import Sample, fit_thresholds
-from wildlab.pipeline.detection_judged import judge_detections
-from wildlab.pipeline.detection_methods import METHODS, for_distance
-from wildlab.pipeline.detection_shape_fit import fit_shapes
-from wildlab.pipeline.detection_thresholds import read_thresholds, thresholds_from, write_thresholds
+from wildlab.pipeline.detecting import detect as subject
+from wildlab.pipeline.detecting.command import samples_of
+from wildlab.pipeline.detecting.detect import detect_frame, run_detection
+from wildlab.pipeline.detecting.fit import Sample, fit_thresholds
+from wildlab.pipeline.detecting.judged import judge_detections
+from wildlab.pipeline.detecting.methods import METHODS, for_distance
+from wildlab.pipeline.detecting.shape_fit import fit_shapes
+from wildlab.pipeline.detecting.thresholds import read_thresholds, thresholds_from, write_thresholds
 
 
 def picture(places: list[tuple[int, int]], seed: int, size: int = 5, warmer: int = 60) -> np.ndarray:

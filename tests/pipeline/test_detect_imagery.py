@@ -13,11 +13,11 @@ from wildlab.detection.detections import Detections
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline.detect import detect_frame
-from wildlab.pipeline.detect_command import samples_of
-from wildlab.pipeline.detection_fit import Fitted, Sample, fit_thresholds
-from wildlab.pipeline.detection_part_fit import fit_part
-from wildlab.pipeline.detection_shape_fit import fit_shapes
+from wildlab.pipeline.detecting.command import samples_of
+from wildlab.pipeline.detecting.detect import detect_frame
+from wildlab.pipeline.detecting.fit import Fitted, Sample, fit_thresholds
+from wildlab.pipeline.detecting.part_fit import fit_part
+from wildlab.pipeline.detecting.shape_fit import fit_shapes
 
 pytestmark = pytest.mark.slow
 

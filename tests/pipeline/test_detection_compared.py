@@ -14,8 +14,8 @@ from tests.test_cli_detect import call
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline.detect_command import samples_of
-from wildlab.pipeline.detection_compared import compare_detectors, named_file, read_others
+from wildlab.pipeline.detecting.command import samples_of
+from wildlab.pipeline.detecting.compared import compare_detectors, named_file, read_others
 
 #: Of the frames of `folder`.
 WIDTH, HEIGHT = 128, 96

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from wildlab.errors import WildlabError
-from wildlab.pipeline.detection_fused import FUSED_COLUMNS, fuse_runs
+from wildlab.pipeline.detecting.fused import FUSED_COLUMNS, fuse_runs
 
 #: The second camera has twice as many pixels, and its corner elsewhere.
 TO_FIRST = np.array([[0.5, 0, -10], [0, 0.5, 5], [0, 0, 1]])

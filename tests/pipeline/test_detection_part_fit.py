@@ -12,8 +12,8 @@ from wildlab.detection.shape import Shape
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.flight.readers.frames import Frame
-from wildlab.pipeline.detection_fit import Sample
-from wildlab.pipeline.detection_part_fit import (
+from wildlab.pipeline.detecting.fit import Sample
+from wildlab.pipeline.detecting.part_fit import (
     Found,
     PartFit,
     fit_part,

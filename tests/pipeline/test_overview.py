@@ -19,9 +19,9 @@ from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.image_coverage import cover_images
-from wildlab.pipeline.overview import TROUBLES, best_source, look_over
-from wildlab.pipeline.worth_fixing import (
+from wildlab.pipeline.overviews.image_coverage import cover_images
+from wildlab.pipeline.overviews.overview import TROUBLES, best_source, look_over
+from wildlab.pipeline.overviews.worth_fixing import (
     FIX,
     LEVELS,
     LOOK,

@@ -13,15 +13,15 @@ from wildlab.errors import WildlabError
 from wildlab.flight.writers.mission import CHANGE_SPEED, mission_items
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan import make_plan
-from wildlab.pipeline.plan_coverage import cover
-from wildlab.pipeline.plan_files import missions
-from wildlab.pipeline.plan_forbidden import nearest_ground, refuse_near
-from wildlab.pipeline.plan_heights import TOLERANCE, follow
-from wildlab.pipeline.plan_said import plan_result, warnings
-from wildlab.pipeline.plan_sorties import fly_rows
-from wildlab.pipeline.plan_view import look
-from wildlab.pipeline.plan_wanted import LIMITS, Wanted
+from wildlab.pipeline.plans.coverage import cover
+from wildlab.pipeline.plans.files import missions
+from wildlab.pipeline.plans.forbidden import nearest_ground, refuse_near
+from wildlab.pipeline.plans.heights import TOLERANCE, follow
+from wildlab.pipeline.plans.plan import make_plan
+from wildlab.pipeline.plans.said import plan_result, warnings
+from wildlab.pipeline.plans.sorties import fly_rows
+from wildlab.pipeline.plans.view import look
+from wildlab.pipeline.plans.wanted import LIMITS, Wanted
 
 CAMERA = Camera(640, 512, 800.0, 800.0, 319.5, 255.5)
 #: 200 m east and 400 m north.

@@ -11,13 +11,13 @@ from tests.flight.test_area import collection, feature, polygon
 from tests.pipeline.test_plan import CAMERA, hills, plan
 from wildlab.geometry.camera import normalise, project
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan import make_plan
-from wildlab.pipeline.plan_advice import swing_advice
-from wildlab.pipeline.plan_coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
-from wildlab.pipeline.plan_flown import ExecutionErrors, with_errors
-from wildlab.pipeline.plan_outlines import simplified
-from wildlab.pipeline.plan_said import animals_in, assumed, head_count, percent, plan_result, unseen
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.advice import swing_advice
+from wildlab.pipeline.plans.coverage import FURTHEST, Covered, cover, gimbal_rate, images_of
+from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
+from wildlab.pipeline.plans.outlines import simplified
+from wildlab.pipeline.plans.plan import make_plan
+from wildlab.pipeline.plans.said import animals_in, assumed, head_count, percent, plan_result, unseen
+from wildlab.pipeline.plans.wanted import Wanted
 
 HOLE = [[50, 50], [50, 90], [90, 90], [90, 50], [50, 50]]
 FIELD = [[0, 0], [0, 160], [200, 160], [200, 0], [0, 0]]

@@ -13,8 +13,8 @@ from wildlab.detection.warm import Warm, find_warm
 from wildlab.evaluation.matching import Rates, match, rates
 from wildlab.flight.readers.frames import open_frames
 from wildlab.flight.readers.labels import read_labels
-from wildlab.pipeline.detect_command import samples_of
-from wildlab.pipeline.detection_fit import Sample
+from wildlab.pipeline.detecting.command import samples_of
+from wildlab.pipeline.detecting.fit import Sample
 from wildlab.studies.wildlife_detection.trial import CONSTANT, ENHANCED, METHODS, SUBTRACTED, read_as
 
 pytestmark = pytest.mark.slow

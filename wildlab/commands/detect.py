@@ -106,7 +106,7 @@ def detect(
       wildlab detect trap.cptv --method warm --even --into found
     """
     from wildlab.flight.files import printable
-    from wildlab.pipeline.detect_command import Wanted, detect_images
+    from wildlab.pipeline.detecting.command import Wanted, detect_images
 
     wanted = Wanted(
         images,

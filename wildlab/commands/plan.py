@@ -15,7 +15,7 @@ from wildlab.terminal import print_json, shown
 
 if TYPE_CHECKING:
     from wildlab.geometry.camera import Camera
-    from wildlab.pipeline.plan_wanted import Gimbal
+    from wildlab.pipeline.plans.wanted import Gimbal
 
 
 class Pair(click.ParamType[tuple[float, float]]):
@@ -163,9 +163,9 @@ def plan(
       wildlab plan fence.kml --camera camera.toml --turn-radius 40 --wind 6 --wind-from 270 --into flight
     """
     from wildlab.files import write_atomic
-    from wildlab.pipeline.plan_command import plan_flight
-    from wildlab.pipeline.plan_files import PAGE
-    from wildlab.pipeline.plan_wanted import Wanted
+    from wildlab.pipeline.plans.command import plan_flight
+    from wildlab.pipeline.plans.files import PAGE
+    from wildlab.pipeline.plans.wanted import Wanted
 
     wanted = Wanted(
         area,

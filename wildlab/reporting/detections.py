@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.detections import PART
-from wildlab.pipeline.detection_judged import ellipse_sentence, rate_words
+from wildlab.pipeline.detecting.judged import ellipse_sentence, rate_words
 from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
 from wildlab.reporting.html import examine

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wildlab.pipeline.detection_judged import rate_words
+from wildlab.pipeline.detecting.judged import rate_words
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, new_figure, png_bytes
 from wildlab.reporting.text import NOTHING, escape
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from wildlab.evaluation.vibration import FLOOR_HZ, SMOOTH_HZ
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
-from wildlab.pipeline.image_coverage import FLATTEST
-from wildlab.pipeline.overview import JUMP, JUMP_M, Overview, troubled_for
-from wildlab.pipeline.worth_fixing import LEVELS, LISTED, MOST, WORTH, Gain, Numbers, verdict_of
+from wildlab.pipeline.overviews.image_coverage import FLATTEST
+from wildlab.pipeline.overviews.overview import JUMP, JUMP_M, Overview, troubled_for
+from wildlab.pipeline.overviews.worth_fixing import LEVELS, LISTED, MOST, WORTH, Gain, Numbers, verdict_of
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
@@ -32,9 +32,9 @@ def show_overview(
     report
         Is added to.
     overview
-        From `wildlab.pipeline.overview.look_over`.
+        From `wildlab.pipeline.overviews.overview.look_over`.
     gains, numbers
-        From `wildlab.pipeline.worth_fixing`, and the numbers of the other reports that they come from.
+        From `wildlab.pipeline.overviews.worth_fixing`, and the numbers of the other reports behind them.
     amiss
         What does not fit together: `wildlab.flight.checks.sense.sense.sense_sentences`.
     lacking

@@ -7,8 +7,8 @@ import pandas as pd
 
 from wildlab.evaluation.vibration import FINE, HARMFUL
 from wildlab.flight.clocks import gnss_times
-from wildlab.pipeline.overview import Overview
-from wildlab.pipeline.worth_fixing import Numbers
+from wildlab.pipeline.overviews.overview import Overview
+from wildlab.pipeline.overviews.worth_fixing import Numbers
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.report import Report

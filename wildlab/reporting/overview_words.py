@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
-from wildlab.pipeline.image_coverage import Coverage
-from wildlab.pipeline.overview import Overview, Trouble, troubled_for
-from wildlab.pipeline.worth_fixing import FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
+from wildlab.pipeline.overviews.image_coverage import Coverage
+from wildlab.pipeline.overviews.overview import Overview, Trouble, troubled_for
+from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
 from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.text import percent
 

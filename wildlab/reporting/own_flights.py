@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from wildlab.pipeline.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
+from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
 from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.text import NOTHING, escape

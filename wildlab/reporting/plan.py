@@ -16,10 +16,10 @@ from matplotlib.path import Path as Outline
 from wildlab.flight.readers.area import Area
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan import Plan
-from wildlab.pipeline.plan_coverage import Covered
-from wildlab.pipeline.plan_files import origin_text
-from wildlab.pipeline.plan_said import count, head_count, hectares, minutes, percent
+from wildlab.pipeline.plans.coverage import Covered
+from wildlab.pipeline.plans.files import origin_text
+from wildlab.pipeline.plans.plan import Plan
+from wildlab.pipeline.plans.said import count, head_count, hectares, minutes, percent
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
 from wildlab.reporting.html import examine
@@ -44,7 +44,7 @@ def plan_page(
     Parameters
     ----------
     plan
-        From `wildlab.pipeline.plan.make_plan`.
+        From `wildlab.pipeline.plans.plan.make_plan`.
     covered
         Of each area, from `wildlab.pipeline.plan_coverage.cover`.
     result

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.evaluation.streams import Pace
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
-from wildlab.pipeline.image_coverage import Coverage
-from wildlab.pipeline.overview import TROUBLES, Path, Trouble
+from wildlab.pipeline.overviews.image_coverage import Coverage
+from wildlab.pipeline.overviews.overview import TROUBLES, Path, Trouble
 from wildlab.reporting.figures import (
     BLUE,
     COLOURS,

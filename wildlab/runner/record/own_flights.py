@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from wildlab.pipeline.worth_fixing import numbers_of
+from wildlab.pipeline.overviews.worth_fixing import numbers_of
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
 from wildlab.runner.record.beside import finished_metrics, state_of
 from wildlab.runner.record.provenance import read_provenance

@@ -17,7 +17,7 @@ from wildlab.evaluation.shares import Check
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, as_planned, execute, held_with
+from wildlab.pipeline.plans.flown import Executed, ExecutionErrors, as_planned, execute, held_with
 from wildlab.planning.courses import fly
 from wildlab.planning.coverage import Coverage, nodes_in, share_seen
 from wildlab.planning.gimbal import (

@@ -18,7 +18,7 @@ from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_flown import Executed, ExecutionErrors, Looks, as_planned, execute, held_with
+from wildlab.pipeline.plans.flown import Executed, ExecutionErrors, Looks, as_planned, execute, held_with
 from wildlab.planning.courses import Course, fly
 from wildlab.planning.coverage import Coverage, nodes_in, share_seen
 from wildlab.planning.gimbal import camera_on_course, look_down, swing_yaw

@@ -16,7 +16,7 @@ from wildlab.evaluation.runs import Interval
 from wildlab.evaluation.score_curve import Curve, ScoredFrame, curve_along_score, difference_of_f1
 from wildlab.flight.files import printable
 from wildlab.flight.readers.labels import Labels, choose_classes, read_labels
-from wildlab.pipeline.detection_judged import boxes_by_frame, plain_rates, rate_words, rates_sentence
+from wildlab.pipeline.detecting.judged import boxes_by_frame, plain_rates, rate_words, rates_sentence
 
 NOTHING = np.zeros((0, 4))
 

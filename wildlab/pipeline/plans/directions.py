@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.wanted import Wanted
 from wildlab.planning.areas import edge_directions
 from wildlab.planning.courses import fly
 from wildlab.planning.patterns import lawn_mower

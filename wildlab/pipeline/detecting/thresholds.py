@@ -11,7 +11,7 @@ from typing import Any
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
 from wildlab.flight.files import read_regular
-from wildlab.pipeline.detection_methods import METHODS
+from wildlab.pipeline.detecting.methods import METHODS
 
 #: Bytes of a file of thresholds at most.
 MOST_BYTES = 1_000_000

@@ -13,7 +13,7 @@ from wildlab.detection.detections import Detections
 from wildlab.detection.shape import PERMISSIVE, Shape, choose, fit_shape
 from wildlab.detection.warm import to_grey
 from wildlab.evaluation.matching import Rule, match, rates
-from wildlab.pipeline.detection_fit import Fitted, Sample, checked_groups
+from wildlab.pipeline.detecting.fit import Fitted, Sample, checked_groups
 
 Counts = NDArray[np.intp]
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from wildlab.flight.files import printable
 from wildlab.flight.readers.area import Area
-from wildlab.pipeline.plan import Plan
-from wildlab.pipeline.plan_advice import swing_advice
-from wildlab.pipeline.plan_coverage import EDGE, SHARP, Covered, gimbal_rate
-from wildlab.pipeline.plan_sorties import Sortie
-from wildlab.pipeline.plan_view import FURTHEST
+from wildlab.pipeline.plans.advice import swing_advice
+from wildlab.pipeline.plans.coverage import EDGE, SHARP, Covered, gimbal_rate
+from wildlab.pipeline.plans.plan import Plan
+from wildlab.pipeline.plans.sorties import Sortie
+from wildlab.pipeline.plans.view import FURTHEST
 
 #: Pixels along an animal below which F 3.2's chain and people alike miss many.
 FEW_PIXELS = 5.0

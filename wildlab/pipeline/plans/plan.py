@@ -15,12 +15,12 @@ from wildlab.flight.terrain.laying import CutOut, terrain_about
 from wildlab.flight.terrain_model import TerrainSays
 from wildlab.geometry.frames import Array, geodetic_to_ned, ned_to_geodetic
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_directions import directions
-from wildlab.pipeline.plan_forbidden import refuse_heights, refuse_near, refuse_take_off
-from wildlab.pipeline.plan_outlines import simplified, sizes_alone
-from wildlab.pipeline.plan_sorties import Sortie, split_rows
-from wildlab.pipeline.plan_view import FURTHEST, View, look
-from wildlab.pipeline.plan_wanted import CLEARANCE, Wanted
+from wildlab.pipeline.plans.directions import directions
+from wildlab.pipeline.plans.forbidden import refuse_heights, refuse_near, refuse_take_off
+from wildlab.pipeline.plans.outlines import simplified, sizes_alone
+from wildlab.pipeline.plans.sorties import Sortie, split_rows
+from wildlab.pipeline.plans.view import FURTHEST, View, look
+from wildlab.pipeline.plans.wanted import CLEARANCE, Wanted
 from wildlab.planning.areas import contains
 from wildlab.planning.patterns import Pattern, lawn_mowers, row_distance
 

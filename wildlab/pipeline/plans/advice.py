@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from wildlab.pipeline.plan import Plan
-from wildlab.pipeline.plan_coverage import Covered, images_of
-from wildlab.pipeline.plan_sorties import fly_rows
+from wildlab.pipeline.plans.coverage import Covered, images_of
+from wildlab.pipeline.plans.plan import Plan
+from wildlab.pipeline.plans.sorties import fly_rows
 
 #: Share of ground in blurred images alone from which a speed is looked for, and of images to be sharp there.
 MUCH, NEARLY_ALL = 0.5, 0.95

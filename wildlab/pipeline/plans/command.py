@@ -8,11 +8,11 @@ from typing import Any
 from rich.console import Console
 
 from wildlab.files import write_atomic, write_json
-from wildlab.pipeline.plan import Plan, make_plan
-from wildlab.pipeline.plan_coverage import Covered, cover
-from wildlab.pipeline.plan_files import RESULT, clear_folder, plan_texts, refuse_folder
-from wildlab.pipeline.plan_said import plan_result
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.coverage import Covered, cover
+from wildlab.pipeline.plans.files import RESULT, clear_folder, plan_texts, refuse_folder
+from wildlab.pipeline.plans.plan import Plan, make_plan
+from wildlab.pipeline.plans.said import plan_result
+from wildlab.pipeline.plans.wanted import Wanted
 
 
 def plan_flight(

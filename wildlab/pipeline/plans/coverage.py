@@ -20,10 +20,10 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.geometry.visibility import lines_clear
-from wildlab.pipeline.plan import Plan
-from wildlab.pipeline.plan_outlines import simplified
-from wildlab.pipeline.plan_sorties import Sortie
-from wildlab.pipeline.plan_view import FURTHEST
+from wildlab.pipeline.plans.outlines import simplified
+from wildlab.pipeline.plans.plan import Plan
+from wildlab.pipeline.plans.sorties import Sortie
+from wildlab.pipeline.plans.view import FURTHEST
 from wildlab.planning.areas import contains
 from wildlab.planning.gimbal import (
     GimbalAngles,

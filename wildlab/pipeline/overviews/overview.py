@@ -18,8 +18,8 @@ from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
-from wildlab.pipeline.image_coverage import Coverage, cover_images, ground_height
-from wildlab.pipeline.overview_lost import POSITION, Recovered, detections_of, lost_data, ordered
+from wildlab.pipeline.overviews.image_coverage import Coverage, cover_images, ground_height
+from wildlab.pipeline.overviews.lost import POSITION, Recovered, detections_of, lost_data, ordered
 
 Array = NDArray[np.float64]
 

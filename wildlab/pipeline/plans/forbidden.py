@@ -9,9 +9,9 @@ import numpy as np
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_heights import Followed, clear_of
-from wildlab.pipeline.plan_sorties import Sortie
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.heights import Followed, clear_of
+from wildlab.pipeline.plans.sorties import Sortie
+from wildlab.pipeline.plans.wanted import Wanted
 
 #: Metres above what the rules allow that are rounding.
 ROUNDING = 0.05

@@ -23,15 +23,15 @@ from wildlab.flight.files import printable, read_regular
 from wildlab.flight.readers.frames import Frames, Polarity, open_frames
 from wildlab.flight.readers.labels import Labels, read_labels
 from wildlab.flight.store import load_flight
-from wildlab.pipeline.detect import Detected, run_detection
-from wildlab.pipeline.detection_compared import (
+from wildlab.pipeline.detecting.compared import (
     compare_detectors,
     compared_sentences,
     curve_table,
     read_others,
 )
-from wildlab.pipeline.detection_fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
-from wildlab.pipeline.detection_judged import (
+from wildlab.pipeline.detecting.detect import Detected, run_detection
+from wildlab.pipeline.detecting.fit import MOST_FRAMES, Fitted, Sample, fit_thresholds
+from wildlab.pipeline.detecting.judged import (
     Judged,
     ellipse_sentence,
     judge_detections,
@@ -39,12 +39,12 @@ from wildlab.pipeline.detection_judged import (
     plain_rates,
     rates_sentence,
 )
-from wildlab.pipeline.detection_methods import METHODS, for_distance
-from wildlab.pipeline.detection_part_fit import PartFit, fit_part, part_sentence, with_part
-from wildlab.pipeline.detection_pictures import write_pictures
-from wildlab.pipeline.detection_said import frames_said, not_judged, too_few_or_many
-from wildlab.pipeline.detection_shape_fit import fit_shapes
-from wildlab.pipeline.detection_thresholds import read_thresholds, write_thresholds
+from wildlab.pipeline.detecting.methods import METHODS, for_distance
+from wildlab.pipeline.detecting.part_fit import PartFit, fit_part, part_sentence, with_part
+from wildlab.pipeline.detecting.pictures import write_pictures
+from wildlab.pipeline.detecting.said import frames_said, not_judged, too_few_or_many
+from wildlab.pipeline.detecting.shape_fit import fit_shapes
+from wildlab.pipeline.detecting.thresholds import read_thresholds, write_thresholds
 
 #: Bytes of an earlier run's result.json at most.
 MOST_BYTES = 50_000_000

@@ -18,7 +18,7 @@ from wildlab.detection.warm import to_grey
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic, write_json
 from wildlab.flight.readers.frames import Frame, Frames
-from wildlab.pipeline.detection_methods import METHODS
+from wildlab.pipeline.detecting.methods import METHODS
 
 #: Frames between two savings: what is lost at most where a run is broken off.
 PART = 25

@@ -5,8 +5,8 @@ from __future__ import annotations
 from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import Frames, Polarity
 from wildlab.flight.readers.frames.shutter import CORRECTIONS
-from wildlab.pipeline.detect import Detected
-from wildlab.pipeline.detection_judged import Judged
+from wildlab.pipeline.detecting.detect import Detected
+from wildlab.pipeline.detecting.judged import Judged
 
 #: Detections an image from which on defaults are said to fit badly: more than anyone looks through.
 MANY = 10

@@ -15,8 +15,8 @@ from wildlab.detection.warm import Warm
 from wildlab.errors import WildlabError
 from wildlab.evaluation.matching import Rates, Rule, match, rates
 from wildlab.flight.readers.frames import Frame
-from wildlab.pipeline.detect import detect_frame
-from wildlab.pipeline.detection_methods import METHODS
+from wildlab.pipeline.detecting.detect import detect_frame
+from wildlab.pipeline.detecting.methods import METHODS
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.plan_heights import Followed, follow
-from wildlab.pipeline.plan_wanted import Wanted
+from wildlab.pipeline.plans.heights import Followed, follow
+from wildlab.pipeline.plans.wanted import Wanted
 from wildlab.planning.courses import Course, fly
 from wildlab.planning.patterns import Pattern
 

@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from wildlab.pipeline.overview import Overview
-from wildlab.pipeline.overview_lost import Recovered
+from wildlab.pipeline.overviews.lost import Recovered
+from wildlab.pipeline.overviews.overview import Overview
 
 #: Shares below which a gain is not listed, and from which on it is said to be worth fixing.
 LISTED, WORTH = 0.005, 0.1

@@ -13,7 +13,7 @@ from wildlab.flight.writers.maps import plan_geojson, plan_kml
 from wildlab.flight.writers.mission import Mission
 from wildlab.flight.writers.qgc_plan import qgc_plan
 from wildlab.flight.writers.waypoints import waypoints_text
-from wildlab.pipeline.plan import Plan, on_earth, rings_on_earth
+from wildlab.pipeline.plans.plan import Plan, on_earth, rings_on_earth
 
 #: Files besides those of each flight. All but the page and its numbers hold positions on the Earth.
 MAPS = ("plan.geojson", "plan.kml")
