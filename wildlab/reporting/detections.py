@@ -53,7 +53,7 @@ def detections_page(
     name
         What was looked at: the name of a folder, never its path.
     result
-        From `wildlab.pipeline.detect_command.detect_images`.
+        From `wildlab.pipeline.detecting.command.detect_images`.
     frames
         One row for each, with ``frame_id``, ``detections`` and ``problem``.
     sheets

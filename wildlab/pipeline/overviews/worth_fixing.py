@@ -43,7 +43,7 @@ class Gain(NamedTuple):
     Attributes
     ----------
     key
-        ``cause``, ``far_out``, or what is lost: `wildlab.pipeline.overview_lost.Recovered`.
+        ``cause``, ``far_out``, or what is lost: `wildlab.pipeline.overviews.lost.Recovered`.
     causes
         Of a constant error, which; else empty.
     value, low, high, unit
