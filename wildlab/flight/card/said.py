@@ -79,7 +79,11 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
             base and f"; its time is from {base}",
             heights and f"; its heights count from {heights}",
         )
-        said.append(f"{name} holds {holds}{base}{heights}")
+        vehicle = f" ({printable(one.found.log.vehicle)})" if one.found.log.vehicle else ""
+        said.append(f"{name}{vehicle} holds {holds}{base}{heights}")
+        fixes = one.found.part("gnss")
+        if fixes is not None:
+            said += [f"{name}: {text}" for text in _quality(fixes)]
         if one.role == "nothing":
             said.append(f"{name} is not used: {printable(one.why)}")
         elif one.why:
@@ -98,6 +102,26 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
                 f"{1000 * clock.spread_s:.0f} ms are left over (largest {1000 * clock.largest_s:.0f} ms)"
             )
     return said
+
+
+#: As MAVLink numbers them, and all readers with it.
+_FIXES = {2: "level", 3: "in space", 4: "differential", 5: "RTK float", 6: "RTK fixed", 7: "static", 8: "PPP"}
+
+
+def _quality(fixes: Stream) -> list[str]:
+    """How good the satellite positions are that can be used, by what the receiver says."""
+    said = []
+    kinds = fixes.columns.get("fix")
+    if kinds is not None and np.isfinite(kinds[fixes.used]).any():
+        known = kinds[fixes.used][np.isfinite(kinds[fixes.used])]
+        counted = Counter(_FIXES.get(int(one), f"of kind {int(one)}") for one in known)
+        said.append("fixes " + ", ".join(f"{kind} {n}" for kind, n in counted.most_common()))
+    satellites = fixes.columns.get("satellites")
+    if satellites is not None and np.isfinite(satellites[fixes.used]).any():
+        values = satellites[fixes.used]
+        low, middle, high = np.nanmin(values), np.nanmedian(values), np.nanmax(values)
+        said.append(f"satellites {low:.0f} to {high:.0f}, {middle:.0f} in the median")
+    return [", ".join(said)] if said else []
 
 
 def _article(choice: Choice) -> str:
