@@ -188,7 +188,7 @@ def _read_folder(folder: Path, name: str, format_: str, zone: str | None) -> Fou
     try:
         log, _ = read_folder(folder, format_, zone)
     except WildlabError as error:
-        return Found(name, size, format_, problem=error.problem)
+        return Found(name, size, format_, problem=_why(error))
     return Found(name, size, format_, log)
 
 
@@ -207,8 +207,13 @@ def _read_file(path: Path, name: str, zone: str | None) -> Found | None:
     try:
         return Found(name, size, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
     except WildlabError as error:
-        return Found(name, size, format_, problem=error.problem)
+        return Found(name, size, format_, problem=_why(error))
 
 
 def _unknown(head: bytes) -> str:
     return "is empty" if not head else "no reader knows this format"
+
+
+def _why(error: WildlabError) -> str:
+    """Why a file could not be read, and what to do."""
+    return f"{error.problem}; {error.fix}" if error.fix else error.problem
