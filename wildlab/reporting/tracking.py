@@ -98,8 +98,9 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
         )
     known = rows[rows["compared"] > 0]
     said, level = _with_truth(known) if len(known) else _without_truth(rows[rows["detections"] > 0], pairs)
-    used = rows.groupby(["sensor", "target"], sort=False)["detections"].sum()
-    never = [f"{target} by {sensor}" for (sensor, target), count in used.items() if count == 0]
+    pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
+    unseen = [group for group in pairs_of if not (group["detections"] > 0).any()]
+    never = [f"{group['target'].iloc[0]} by {group['sensor'].iloc[0]}" for group in unseen]
     if never:
         said.append(f"Never followed: {', '.join(never)}.")
     if tuned is not None:

@@ -1,0 +1,73 @@
+"""What the page on tracks says turns with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.evaluation.consistency import Average
+from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.judged import Apart
+from wildlab.reporting import tracking as words
+
+
+def rows(**changes: object) -> pd.DataFrame:
+    """A white and a Schmidt track of one boat."""
+    base = {
+        "sensor": "radar", "kind": "range-bearing", "target": "boat", "detections": 100, "compared": 100,
+        "rmse": 4.0, "mae": 3.0, "rmse_speed": 0.5, "nees_low": 0.5, "nees_high": 5.0, "nees_worth": 4.0,
+        "inside": 0.9, "inside_low": 0.6, "inside_high": 1.0, "nis": 2.0, "nis_low": 1.7, "nis_high": 2.3,
+        "nis_worth": 90.0, "nis_verdict": "consistent", "dof": 2.0, "lag1": 0.1, "lag1_bound": 0.2,
+        "followed": 1.0,
+    }  # fmt: skip
+    white = base | {"filter": "ekf", "nees": 80.0, "verdict": "overconfident"}
+    schmidt = base | {"filter": "schmidt", "nees": 2.0, "verdict": "consistent"} | changes
+    return pd.DataFrame([white, schmidt])
+
+
+def test_the_asked_filter_leads_whatever_came_out() -> None:
+    said, level = words.summary(rows(), [], None)
+    assert level == "good"
+    assert said[0].startswith("The track of the filter with considered errors (Schmidt) is off by 4.0 m")
+    assert "about as large as stated: consistent" in said[0]
+    assert "6.3 times as large as stated: overconfident; both are about as far off" in said[1]
+    worse, level = words.summary(rows(nees=50.0, verdict="overconfident", rmse=8.0), [], None)
+    assert level == "bad" and "5.0 times as large as stated: overconfident" in worse[0]
+    assert "it is 0.50 times as far off" in worse[1]
+
+
+def test_a_smoothed_track_without_innovations_is_not_a_lost_one() -> None:
+    both = pd.concat([rows(), rows(filter="schmidt-smoothed", detections=0, nis=np.nan).iloc[1:]])
+    said, _ = words.summary(both, [], None)
+    assert not any("Never followed" in one for one in said)
+    lost = rows().assign(detections=0, compared=0, sensor="ir", nees=np.nan, verdict="not judged")
+    said, _ = words.summary(pd.concat([rows(), lost]), [], None)
+    assert said[-1] == "Never followed: boat by ir."
+    table = words.tracks_table(both)
+    assert table["detections"].tolist() == ["100", "100", words.NOTHING]
+
+
+def test_without_truth_surprises_and_sensors_are_spoken_of() -> None:
+    blind = rows().assign(compared=0, nees=np.nan, verdict="not judged")
+    pair = Apart("boat", "schmidt", "radar", "lidar", 3.0, 90, Average(8.0, 1.5, 2.5, 90, 60.0))
+    said, level = words.summary(blind, [pair], None)
+    assert level == "warn" and "cannot be said without" in said[1]
+    assert (
+        said[2]
+        == "radar and lidar put boat 3.0 m apart (root mean square), 2.0 times as far as their tracks state."
+    )
+    assert "rmse" not in words.columns_of(words.tracks_table(blind))
+
+
+@pytest.mark.parametrize(("nees", "few"), [(5.5, True), (80.0, False), (2.0, False)])
+def test_few_values_are_an_excuse_near_the_band_only(nees: float, few: bool) -> None:
+    row = rows(nees=nees, verdict="overconfident" if nees > 5 else "consistent").iloc[1]
+    assert ("few independent" in words.verdict_words(row)) == few
+
+
+def test_what_is_assumed_is_counted() -> None:
+    said = [Said("radar", "noise", "1 m", "assumed: rough"), Said("targets", "speed", "3 m/s", "stated")]
+    assert words.assumed_sentence(said).startswith("1 of 2 values")
+    assert words.assumed_sentence(said[1:]).startswith("All that the filters were told is stated")
+    assert words.said_table(said[::-1])["source"].tolist() == ["assumed: rough", "stated"]
