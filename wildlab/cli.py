@@ -21,6 +21,7 @@ from wildlab.commands import studies
 from wildlab.commands.calibrate import calibrate
 from wildlab.commands.camera import camera
 from wildlab.commands.click import click_
+from wildlab.commands.clock import clock
 from wildlab.commands.compare import compare
 from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
@@ -82,6 +83,7 @@ for _command in (
     camera,
     detect,
     calibrate,
+    clock,
     terrain,
     plan,
 ):

@@ -101,7 +101,7 @@ def installed_grid() -> str | None:
     """The file name of the first of `GRIDS` that PROJ finds on this machine, or None."""
     from pyproj import datadir
 
-    folders = [*datadir.get_data_dir().split(os.pathsep), datadir.get_user_data_dir()]
+    folders = [*datadir.get_data_dir().split(os.pathsep), str(datadir.get_user_data_dir())]  # type: ignore[attr-defined]
     return _found(tuple(folders))
 
 

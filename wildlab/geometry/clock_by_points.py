@@ -113,7 +113,7 @@ def clock_by_points(
         poses, points = kept[offset]
         trial = Calibration(BORESIGHT, angles, np.zeros((3, 3)), {}, 0, 0)
         turned = replace(poses, mount=apply_calibration(trial, poses.mount))
-        return ground_to_pixel(poses.camera, points, turned.p_nc, turned.R_nc) - pixels
+        return np.asarray(ground_to_pixel(poses.camera, points, turned.p_nc, turned.R_nc) - pixels)
 
     def best_angles(offset: float, start: Array, rounds: int) -> tuple[Array, Array]:
         """Angles and residuals (N, 2) there, NaN for what has none."""
@@ -178,9 +178,8 @@ def _settled(
     residuals: Callable[[float, Array], Array], offset: float, turn: Array
 ) -> tuple[float, Array, Fit]:
     """Offset and angles where derivatives wider than the log's noise see nothing to gain."""
-    usable = np.isfinite(residuals(offset, turn)).all(axis=1)
-    for far in (-STEP_S, STEP_S):
-        usable &= np.isfinite(residuals(offset + far, turn)).all(axis=1)
+    near = np.stack([residuals(offset + step, turn) for step in (0.0, -STEP_S, STEP_S)])
+    usable = np.asarray(np.isfinite(near).all(axis=(0, 2)), np.bool_)
     sizes = np.array([PARAMETERS["clock"]] + [PARAMETERS[name] for name in BORESIGHT])
     start, x = offset, np.concatenate([[offset], turn])
     for _ in range(12):

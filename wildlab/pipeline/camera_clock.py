@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from wildlab.detection.image_motion import as_grey, image_motion
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
+from wildlab.flight.readers.frames import Frame
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.clock_by_motion import FEWEST, ClockByMotion, clock_by_motion
 from wildlab.geometry.clock_by_points import ClockByPoints, clock_by_points
+from wildlab.geometry.frames import matrix_to_rotation_vector
 from wildlab.pipeline.evaluate import blocks_of
 from wildlab.pipeline.flow import Reading, camera_poses_at
 from wildlab.pipeline.georeference import truth_of
 
 Array = NDArray[np.float64]
+
+#: Images further apart in time (s) are not compared: between them the camera may have turned to and fro.
+LONGEST_PAIR_S = 1.0
 
 
 def refuse_without_clock(flight: Flight, source: str | None = None) -> None:
@@ -124,4 +135,207 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
         )
     return found._replace(
         offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
+    )
+
+
+def image_motions(
+    frames: Iterable[Frame], flight: Flight, camera: Camera, progress: Callable[[], None] | None = None
+) -> tuple[NDArray[np.intp], Array]:
+    """How the scene moved from each image of a flight to the next that follows it closely.
+
+    Parameters
+    ----------
+    frames
+        Images in any order of names that the flight's frames have: by file name, with or without its ending.
+    flight
+        With frames.
+    camera
+        Its lens.
+    progress
+        Called after each image.
+
+    Returns
+    -------
+    (pairs, motion)
+        (N, 2) rows of the table ``frames``, and (N, 3) as from `image_motion`.
+    """
+    names = flight.table("frames")["frame_id"].astype(str)
+    rows = {name: number for number, name in enumerate(names)}
+    for number, name in enumerate(names):
+        rows.setdefault(Path(name).stem, number)
+    stamps = flight.table("frames")["time_s"].to_numpy(float)
+    pairs: list[tuple[int, int]] = []
+    motion: list[Array] = []
+    before: tuple[int, NDArray[np.uint8], NDArray[np.bool_]] | None = None
+    for frame in frames:
+        row = rows.get(frame.name, rows.get(Path(frame.name).stem))
+        if progress is not None:
+            progress()
+        if row is None or not frame.usable:
+            before = None
+            continue
+        grey = as_grey(frame.image, frame.valid)
+        if before is not None and before[1].shape == grey.shape:
+            apart = stamps[row] - stamps[before[0]]
+            if 0 < apart <= LONGEST_PAIR_S:
+                pairs.append((before[0], row))
+                motion.append(image_motion(before[1], grey, camera, before[2]))
+        before = row, grey, frame.valid
+    return np.array(pairs, np.intp).reshape(-1, 2), np.array(motion, float).reshape(-1, 3)
+
+
+def camera_clock_by_motion(
+    flight: Flight, pairs: NDArray[np.intp], motion: Array, source: str | None = None
+) -> ClockByMotion:
+    """What to add to the stamps of the images so that they moved as the log says that the camera turned.
+
+    Parameters
+    ----------
+    flight
+        With frames and poses; gyros are used where it has them and the camera is fixed to the airframe.
+    pairs, motion
+        From `image_motions`.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+
+    Returns
+    -------
+    ClockByMotion
+        All its offsets are whole ones, as ``clocks.camera_offset_s`` has them.
+
+    Raises
+    ------
+    WildlabError
+        Where the images have no clock, or too few of them could be followed within the log.
+    """
+    refuse_without_clock(flight, source)
+    times, turned, moved = _camera_motion(flight, source)
+    spans = frame_times(flight)[pairs].reshape(-1, 2)
+    found = clock_by_motion(spans, motion, times, turned, moved)
+    if found is None:
+        followed = int(np.isfinite(motion).all(axis=1).sum())
+        raise WildlabError(
+            f"{followed} of {len(pairs)} pairs of images that follow each other within {LONGEST_PAIR_S:g} s "
+            f"could be followed, and {FEWEST} within the log are needed",
+            "give more images of a stretch in which the camera turns, or state the offset",
+            file=flight.folder,
+            field="frames",
+        )
+    stated = flight.manifest.clocks.camera_offset_s
+    return found._replace(
+        offset_s=found.offset_s + stated, offsets=found.offsets + stated, rival_s=found.rival_s + stated
+    )
+
+
+def _camera_motion(flight: Flight, source: str | None) -> tuple[Array, Array, Array]:
+    """Times (T,), and integrals (T, 3) of the camera's angular velocity and velocity in c."""
+    _, nav = flight.pose_source(source)
+    t = nav["time_s"].to_numpy(float)
+    poses = camera_poses_at(flight, t, Reading(source=source))
+    good = np.isfinite(poses.p_nc).all(axis=1) & np.isfinite(poses.R_nc).all(axis=(1, 2))
+    t, p, R = t[good], poses.p_nc[good], poses.R_nc[good]
+    if len(t) < 2:
+        raise WildlabError(
+            "the poses are too few to tell how the camera turned", "import more of the log", field="nav"
+        )
+    steps = matrix_to_rotation_vector(np.einsum("nji,njk->nik", R[:-1], R[1:]))
+    turned = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    moved = np.vstack([np.zeros(3), np.cumsum(np.einsum("nji,nj->ni", R[:-1], np.diff(p, axis=0)), axis=0)])
+    if flight.imu is None or flight.gimbal is not None or "pan_rad" in flight.table("frames"):
+        return t, turned, moved
+    imu = flight.imu
+    rates = imu[["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]].to_numpy(float)
+    at = imu["time_s"].to_numpy(float)
+    known = np.isfinite(rates).all(axis=1) & np.isfinite(at) & (at >= t[0]) & (at <= t[-1])
+    if known.sum() < len(t):
+        return t, turned, moved
+    at, rates = at[known], rates[known] @ camera_rotation(flight)
+    between = (rates[1:] + rates[:-1]) / 2 * np.diff(at)[:, None]
+    by_gyro = np.vstack([np.zeros(3), np.cumsum(between, axis=0)])
+    return at, by_gyro, np.stack([np.interp(at, t, one) for one in moved.T], axis=1)
+
+
+def camera_rotation(flight: Flight) -> Array:
+    """(3, 3) `R_bc` of a camera that is fixed to the airframe."""
+    still = CameraPoses(
+        flight.manifest.geometry_camera(), flight.manifest.geometry_mount(), np.zeros((1, 3)), np.eye(3)
+    )
+    return np.asarray(np.asarray(still.R_bc).reshape(-1, 3, 3)[0])
+
+
+class CameraClock(NamedTuple):
+    """An estimate in numbers and in words.
+
+    Attributes
+    ----------
+    numbers
+        ``offset_s`` (for ``clocks.camera_offset_s``), ``sd_s``, ``certain``, ``method``, the next best offset
+        ``rival_s`` and what the estimate rests on.
+    curve
+        ``offset_s``, and ``cost`` or ``correlation``.
+    sentence
+        The same in words.
+    """
+
+    numbers: dict[str, object]
+    curve: pd.DataFrame
+    sentence: str
+
+
+def by_points_in_words(flight: Flight, source: str | None = None) -> CameraClock:
+    """`camera_clock_by_points` with its words.
+
+    Raises
+    ------
+    WildlabError
+        As that.
+    """
+    found = camera_clock_by_points(flight, source)
+    rests = {"points": found.points, "images": found.images, "blocks": found.draws}
+    numbers = {**_numbers(found, "known points"), **rests}
+    by = f"{found.points} sightings of known points in {found.images} images"
+    curve = pd.DataFrame({"offset_s": found.offsets, "cost": found.cost})
+    return CameraClock(numbers, curve, _sentence(found, by))
+
+
+def by_motion_in_words(
+    flight: Flight,
+    frames: Iterable[Frame],
+    source: str | None = None,
+    progress: Callable[[], None] | None = None,
+) -> CameraClock:
+    """`camera_clock_by_motion` of images, with its words.
+
+    Raises
+    ------
+    WildlabError
+        As that.
+    """
+    refuse_without_clock(flight, source)
+    pairs, motion = image_motions(frames, flight, flight.manifest.geometry_camera(), progress)
+    found = camera_clock_by_motion(flight, pairs, motion, source)
+    rests = {"pairs": found.pairs, "correlation": found.peak, "rival_correlation": found.rival_correlation}
+    numbers = {**_numbers(found, "image motion"), **rests, "gain": found.gain}
+    by = f"the motion between {found.pairs} pairs of images (correlation {found.peak:.2f}"
+    by += f", next best {found.rival_correlation:.2f}, gain {found.gain:.2f})"
+    curve = pd.DataFrame({"offset_s": found.offsets, "correlation": found.correlation})
+    return CameraClock(numbers, curve, _sentence(found, by))
+
+
+def _numbers(found: ClockByPoints | ClockByMotion, method: str) -> dict[str, object]:
+    return {
+        "offset_s": found.offset_s,
+        "sd_s": found.sd_s,
+        "certain": found.certain,
+        "method": method,
+        "rival_s": found.rival_s,
+    }
+
+
+def _sentence(found: ClockByPoints | ClockByMotion, by: str) -> str:
+    if found.certain:
+        return f"The stamps of the images get {found.offset_s:+.3f} s (SD {found.sd_s:.3f} s), by {by}."
+    return (
+        f"The offset of the camera's clock cannot be told by {by}: {found.offset_s:+.3f} s fits best, and "
+        f"does not stand out against others, as {found.rival_s:+.2f} s."
     )

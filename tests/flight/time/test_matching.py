@@ -36,7 +36,7 @@ def test_missing_and_extra_ones_and_hours_between(resolution: float, interval: f
         number = np.full(len(true), -1)
         number[has_record] = np.arange(has_record.sum())
         wanted = number[has_image]
-        right = match.index == wanted
+        right = match.trigger == wanted
         assert match.resolution_s == resolution
         if resolution <= interval:
             assert match.certain
@@ -45,14 +45,14 @@ def test_missing_and_extra_ones_and_hours_between(resolution: float, interval: f
         assert match.fit.to_reference(images.mean() + resolution / 2) == pytest.approx(
             np.mean(images) * (1 + 2e-5) + offset + resolution / 2, abs=0.02 + 0.6 * resolution
         )
-        assert match.images_left == (match.index < 0).sum()
-        assert match.triggers_left == has_record.sum() - (match.index >= 0).sum()
+        assert match.images_left == (match.trigger < 0).sum()
+        assert match.triggers_left == has_record.sum() - (match.trigger >= 0).sum()
 
 
 def test_as_many_as_there_are_records() -> None:
     times = np.arange(0, 100, 2.0)
     match = match_triggers(times - 7200.0, times)
-    assert match.index.tolist() == list(range(50))
+    assert match.trigger.tolist() == list(range(50))
     assert match.certain
     assert match.fit.offset_s == pytest.approx(7200.0)
     assert match.sentence == "50 of 50 images go with a record of their trigger"
@@ -76,7 +76,7 @@ def test_order_and_missing_stamps() -> None:
     match = match_triggers(stamps, times)
     wanted = shuffled.copy()
     wanted[4] = -1
-    assert (match.index == wanted).all()
+    assert (match.trigger == wanted).all()
 
 
 def test_nothing_to_match() -> None:
@@ -85,7 +85,7 @@ def test_nothing_to_match() -> None:
     with pytest.raises(WildlabError, match="no trigger has a time"):
         match_triggers([1.0], [])
     alone = match_triggers([1.0], [5.0])
-    assert alone.index.tolist() == [0]
+    assert alone.trigger.tolist() == [0]
     assert not alone.certain or alone.images_left == 0
 
 

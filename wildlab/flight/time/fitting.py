@@ -230,7 +230,7 @@ def _start(dx: Array, dy: Array) -> tuple[float, float]:
 
 def _through(dx: Array, dy: Array, at_0: float, rate: float, resolution_s: float) -> _Line:
     """The line through the points, and what is known of it."""
-    turns = len(dx) > 2 and np.ptp(dx) > 0
+    turns = len(dx) > 2 and bool(np.ptp(dx) > 0)
     A = np.column_stack([np.ones(len(dx)), dx]) if turns else np.ones((len(dx), 1))
     solution = np.array([at_0, rate])[: A.shape[1]]
     base = dy if turns else dy - rate * dx

@@ -34,7 +34,7 @@ class TriggerMatch(NamedTuple):
 
     Attributes
     ----------
-    index
+    trigger
         (N,) the trigger of each image, counted from 0; -1 where it has none.
     fit
         The camera's clock against that of the triggers, through the middle of the steps of its stamps.
@@ -49,7 +49,7 @@ class TriggerMatch(NamedTuple):
         How far off the next best offset is, s; NaN where there is none.
     """
 
-    index: Index
+    trigger: Index
     fit: ClockFit
     resolution_s: float
     images_left: int
@@ -60,7 +60,7 @@ class TriggerMatch(NamedTuple):
     @property
     def sentence(self) -> str:
         """What was matched, in a clause."""
-        images = len(self.index)
+        images = len(self.trigger)
         said = f"{images - self.images_left} of {images} images go with a record of their trigger"
         if self.images_left or self.triggers_left:
             said += f" ({self.images_left} images and {self.triggers_left} records are left over)"
@@ -96,7 +96,7 @@ def match_triggers(image_stamps: ArrayLike, trigger_times: ArrayLike) -> Trigger
     Examples
     --------
     >>> match = match_triggers([7200.0, 7203.0, 7209.0], [1.0, 2.1, 5.2, 11.1])
-    >>> match.index.tolist(), match.triggers_left
+    >>> match.trigger.tolist(), match.triggers_left
     ([1, 2, 3], 1)
     """
     stamps, times = np.asarray(image_stamps, float), np.asarray(trigger_times, float)

@@ -1,0 +1,163 @@
+"""The offset of a camera's clock, on twins whose stamps were shifted by a known amount."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.clocks import poses_at
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.readers.frames import Frame
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.pipeline.camera_clock import (
+    by_motion_in_words,
+    camera_clock_by_motion,
+    camera_clock_by_points,
+    image_motions,
+)
+from wildlab.simulation.twins import simulate_twin
+
+
+def late(flight: Flight, shift: float) -> Flight:
+    """The same flight by a camera whose stamps are early by so many seconds."""
+    frames = flight.table("frames")
+    return replace(flight, tables={**flight.tables, "frames": frames.assign(time_s=frames["time_s"] - shift)})
+
+
+@pytest.fixture(scope="module")
+def tracking() -> Flight:
+    """Static and moving points under a gimballed camera, 1800 sightings."""
+    return simulate_twin("uav-tracking", 1)
+
+
+@pytest.fixture(scope="module")
+def antenna() -> Flight:
+    return simulate_twin("static-antenna", 1)
+
+
+@pytest.mark.parametrize("shift", [0.37, -14.05])
+def test_within_20_ms_from_known_points(tracking: Flight, shift: float) -> None:
+    found = camera_clock_by_points(late(tracking, shift), "autopilot")
+    assert found.offset_s == pytest.approx(shift, abs=0.020)
+    assert found.sd_s < 0.010 and abs(found.offset_s - shift) < 4 * found.sd_s
+    assert found.certain
+    best = found.offsets[np.nanargmin(found.cost)]
+    assert best == pytest.approx(shift, abs=0.1)
+
+
+def test_the_uncertainty_is_honest_where_the_attitude_wanders(antenna: Flight) -> None:
+    """One degree for half a minute at 350 m: more than the clock's 20 ms can be told from."""
+    found = camera_clock_by_points(late(antenna, 0.8), "autopilot-uncalibrated")
+    assert found.certain
+    assert 0.02 < found.sd_s < 0.1
+    assert abs(found.offset_s - 0.8) < 3 * found.sd_s
+    true = camera_clock_by_points(late(antenna, 0.8), "truth")
+    assert true.offset_s == pytest.approx(0.8, abs=0.020)
+
+
+def test_the_offset_is_a_whole_one(antenna: Flight) -> None:
+    shifted = late(antenna, 0.8)
+    stated = replace_in_manifest(shifted.manifest, {"clocks": {"camera_offset_s": 0.5}})
+    found = camera_clock_by_points(replace(shifted, manifest=stated), "truth")
+    assert found.offset_s == pytest.approx(0.8, abs=0.020)
+
+
+def test_what_cannot_be_estimated_is_refused(tracking: Flight) -> None:
+    nobody = replace(tracking, tables={**tracking.tables, "truth": tracking.table("truth").head(0)})
+    with pytest.raises(WildlabError, match="0 detections are of a target whose position is known"):
+        camera_clock_by_points(nobody, "autopilot")
+    apart = late(tracking, 1e6)
+    with pytest.raises(WildlabError, match="fewer than four sightings of known points have a pose"):
+        camera_clock_by_points(apart, "autopilot")
+
+
+def over_land(flight: Flight, first: int, count: int) -> Iterator[Frame]:
+    """Images of level ground with a texture, as the true poses have it."""
+    rng = np.random.default_rng(7)
+    side, cell = 2048, 1.0
+    ground = np.zeros((side, side), np.float32)
+    for octave in (4, 8, 16, 64):
+        small = rng.normal(0, 1, (side // octave, side // octave)).astype(np.float32)
+        ground += cv2.resize(small, (side, side), interpolation=cv2.INTER_CUBIC)
+    frames, camera = flight.table("frames"), flight.manifest.geometry_camera()
+    p, R, _ = poses_at(flight.nav["truth"], frames["time_s"].to_numpy(float)[first : first + count])
+    poses = CameraPoses(camera, flight.manifest.geometry_mount(), p, R)
+    middle = poses.p_nc[:, :2].mean(axis=0)
+    for k in range(count):
+        # Column and row of the texture -> north, east -> pixel.
+        plane = np.array([[0, cell, middle[0] - side / 2 * cell], [cell, 0, middle[1] - side / 2 * cell]])
+        to_n = np.vstack([plane, [0, 0, 0], [0, 0, 1]])
+        to_c = poses.R_nc[k].T @ np.hstack([np.eye(3), -poses.p_nc[k][:, None]])
+        H = camera.matrix @ to_c @ to_n
+        seen = cv2.warpPerspective(ground, H, (camera.width, camera.height), borderMode=cv2.BORDER_REFLECT)
+        noisy = 120 + 30 * seen + rng.normal(0, 2, seen.shape)
+        grey = np.clip(noisy, 0, 255).astype(np.uint8)
+        name = f"{frames['frame_id'].iloc[first + k]}.png"
+        yield Frame(name, None, grey, "grey", "white-hot", np.ones(grey.shape, bool))
+
+
+def test_from_the_motion_of_images(antenna: Flight) -> None:
+    shifted = late(antenna, 1.3)
+    found = by_motion_in_words(shifted, over_land(antenna, 3000, 240), "autopilot")
+    assert found.numbers["certain"], found.sentence
+    assert found.numbers["offset_s"] == pytest.approx(1.3, abs=0.030)
+    assert found.numbers["gain"] == pytest.approx(1.0, abs=0.3)
+    assert f"get {found.numbers['offset_s']:+.3f} s" in found.sentence
+    at = found.curve["correlation"].idxmax()
+    assert found.curve["offset_s"][at] == pytest.approx(1.3, abs=0.05)
+
+
+def test_from_attitudes_where_there_is_no_gyro(antenna: Flight) -> None:
+    bare = replace(antenna, tables={k: v for k, v in antenna.tables.items() if k != "imu"})
+    bare = late(bare, -4.2)
+    camera = antenna.manifest.geometry_camera()
+    pairs, motion = image_motions(over_land(antenna, 3000, 160), antenna, camera)
+    assert len(pairs) == 159 and np.isfinite(motion).all(axis=1).mean() > 0.95
+    found = camera_clock_by_motion(bare, pairs, motion, "autopilot")
+    assert found.certain and found.offset_s == pytest.approx(-4.2, abs=0.040)
+
+
+def test_images_that_show_nothing_but_the_sensor_cannot_tell(antenna: Flight) -> None:
+    still = pd.DataFrame(antenna.table("frames")).iloc[3000:3080]
+    rng = np.random.default_rng(1)
+    pattern = rng.normal(120, 30, (512, 640))
+
+    def frames() -> Iterator[Frame]:
+        for name in still["frame_id"]:
+            grey = np.clip(pattern + rng.normal(0, 2, pattern.shape), 0, 255).astype(np.uint8)
+            yield Frame(f"{name}.png", None, grey, "grey", "unknown", np.ones(grey.shape, bool))
+
+    found = by_motion_in_words(antenna, frames(), "autopilot")
+    assert not found.numbers["certain"]
+    assert "cannot be told" in found.sentence
+    with pytest.raises(WildlabError, match="0 of 0 pairs of images"):
+        by_motion_in_words(antenna, iter(()), "autopilot")
+
+
+def test_the_command_prints_a_curve_and_sets_the_offset(tracking: Flight, tmp_path: Path) -> None:
+    folder, curve = tmp_path / "flight", tmp_path / "curve.csv"
+    save_flight(late(tracking, 0.25), folder)
+    asked = ["clock", str(folder), "--source", "autopilot", "--set", "--curve", str(curve), "--json"]
+    run = CliRunner().invoke(wildlab, asked)
+    assert run.exit_code == 0, run.output
+    said = json.loads(run.stdout[: run.stdout.rindex("}") + 1])
+    assert said["offset_s"] == pytest.approx(0.25, abs=0.020) and said["method"] == "known points"
+    assert load_flight(folder).manifest.clocks.camera_offset_s == pytest.approx(0.25, abs=0.020)
+    table = pd.read_csv(curve)
+    assert table["offset_s"][table["cost"].idxmin()] == pytest.approx(0.25, abs=0.1)
+    run = CliRunner().invoke(wildlab, ["clock", str(folder), "--offset", "0.5", "--set"])
+    assert run.exit_code == 0 and "+0.500 s" in run.output
+    assert load_flight(folder).manifest.clocks.camera_offset_s == 0.5
+    refused = CliRunner().invoke(wildlab, ["clock", str(folder), "--offset", "1", "--curve", str(curve)])
+    assert isinstance(refused.exception, WildlabError)
