@@ -164,8 +164,8 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
     if not match.certain:
         return None
     matched = len(stamps) - match.images_left
-    left = f"; {match.images_left} images have none and are left out" if match.images_left else ""
-    left += f"; {match.triggers_left} records have no image" if match.triggers_left else ""
+    left = f"; {_have(match.images_left, 'image')} no record and no time" if match.images_left else ""
+    left += f"; {_have(match.triggers_left, 'record')} no image" if match.triggers_left else ""
     return ImageClock(
         "utc",
         0.0,
@@ -173,6 +173,10 @@ def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | No
         f"the intervals{left}.",
         {"triggers": name},
     )
+
+
+def _have(count: int, what: str) -> str:
+    return f"{count} {what} has" if count == 1 else f"{count} {what}s have"
 
 
 def _known(column: NDArray[Any] | None) -> NDArray[np.float64]:

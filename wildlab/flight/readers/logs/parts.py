@@ -112,5 +112,5 @@ def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
             file=path,
             field="triggers",
         )
-    taken = np.where(match.index >= 0, of_record[np.maximum(match.index, 0)], np.nan)
+    taken = np.where(match.trigger >= 0, of_record[np.maximum(match.trigger, 0)], np.nan)
     return Stream({**images.columns, "time_s": taken}, images.rows, images.counted_in)
