@@ -247,7 +247,7 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "flight.toml",
             "clocks.camera_offset_s",
             "the clock of the camera is taken to agree with that of the poses",
-            "estimate the offset from known points: at 20 m/s a tenth of a second is 2 m",
+            "let `wildlab clock` estimate the offset: at 20 m/s a tenth of a second is 2 m",
         )
     if manifest.vertical.reference != "ellipsoid" and manifest.vertical.correction_m == 0:
         # Where nothing is placed on the ground, a constant height changes no result.
