@@ -117,7 +117,9 @@ def fit_clock(
         (N,) s by the reference, at the same instants.
     late
         Stamps of the reference can only be late, as times of receipt are: the line goes under them, not
-        through them. The least delay of all stays in the offset; nothing in the stamps tells it.
+        through them. The least delay of all stays in the offset; nothing in the stamps tells it. Where they
+        jitter to both sides besides, the line lies low by up to three standard deviations of that jitter,
+        and what is stated does not hold it.
     resolution_s
         How coarse either stamp is, s, as where a loop takes them: pairs that differ by less are not outliers,
         even where most happen to fall on one line.
