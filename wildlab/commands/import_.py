@@ -30,6 +30,12 @@ ANYTHING = click.Path(path_type=Path)
 )  # fmt: skip
 @click.option("--name", help="Of the flight.  [default: that of the folder]")
 @click.option("--camera", type=FILE, help="A camera.toml of `wildlab camera`.  [default: what images say]")
+@click.option(
+    "--focal",
+    type=click.FloatRange(1, 1e6),
+    metavar="PX",
+    help="Focal length in pixels, without a camera.toml.",
+)
 @click.option("--zone", help="Of wall clocks that state none: Europe/Oslo, or +02:00.")
 @click.option("--camera-offset", type=float, metavar="SECONDS", help="To add to the stamps of the images.")
 @click.option("--geoid", type=float, metavar="METRES", help="How far the geoid is above the ellipsoid there.")
@@ -74,7 +80,9 @@ def import_(
       wildlab import CARD/ --dry-run
       wildlab import recipe.toml --source logs --into flights/mine
     """
-    options = {name: stated.pop(name) for name in ("roles", "name", "camera", "zone", "camera_offset")}
+    options = {
+        name: stated.pop(name) for name in ("roles", "name", "camera", "focal", "zone", "camera_offset")
+    }
     options |= {name: stated.pop(name) for name in ("geoid", "take_off", "start")}
     terrain = says_of(map_, stated, "--terrain-")
     recipe = len(raw) == 1 and raw[0].suffix.lower() == ".toml"
@@ -177,6 +185,7 @@ def _wishes(raw: tuple[Path, ...], into: Path | None, options: dict[str, Any]) -
     return Wishes(
         name=options["name"] or safe_name(named.resolve().stem if into is None else named.resolve().name),
         camera=None if options["camera"] is None else read_camera(options["camera"]).camera,
+        focal_px=options["focal"],
         camera_offset_s=options["camera_offset"],
         geoid_m=options["geoid"],
         take_off_m=options["take_off"],

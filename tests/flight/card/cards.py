@@ -63,7 +63,12 @@ def place(camera: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def write_photo(
-    path: Path, camera: tuple[float, float, float], angles: tuple[float, float, float], when: datetime
+    path: Path,
+    camera: tuple[float, float, float],
+    angles: tuple[float, float, float],
+    when: datetime,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+    focal: float = FOCAL,
 ) -> None:
     """A JPEG with what a drone with RTK writes into it."""
     lat, lon, height = place(camera)
@@ -76,9 +81,9 @@ def write_photo(
     inner[37521] = f"{when.microsecond // 1000:03d}"
     roll, pitch, yaw = angles
     xmp = _XMP.format(
-        lat=lat, lon=lon, high=height, above=camera[2], roll=roll, pitch=pitch, yaw=yaw, focal=FOCAL
+        lat=lat, lon=lon, high=height, above=camera[2], roll=roll, pitch=pitch, yaw=yaw, focal=focal
     )
-    Image.new("RGB", (WIDTH, HEIGHT), (90, 120, 90)).save(path, exif=exif, xmp=xmp.encode())
+    Image.new("RGB", size, (90, 120, 90)).save(path, exif=exif, xmp=xmp.encode())
 
 
 def write_card(folder: Path, images: int = 4) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import tomllib
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card
+from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card, write_photo
 from wildlab.api.points import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
@@ -171,3 +172,65 @@ def test_taken_is_what_the_frames_say(tmp_path: Path):
     assert flight.frames is not None
     assert np.allclose(flight.frames["time_s"], [0.0, 2.5, 5.0, 7.5], atol=1e-6)
     assert flight.manifest.time.epoch == TAKEN
+
+
+def test_several_folders_of_images_are_one_series(tmp_path: Path):
+    write_card(tmp_path / "card")
+    second = tmp_path / "card" / "DCIM" / "101MEDIA"
+    second.mkdir()
+    (tmp_path / "card" / "DCIM" / "100MEDIA" / "DJI_0004.JPG").rename(second / "DJI_0004.JPG")
+    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    assert flight.table("frames")["frame_id"].tolist() == ["DJI_0001", "DJI_0002", "DJI_0003", "DJI_0004"]
+    assert len(flight.nav["camera"]) == 4
+
+
+def test_of_two_cameras_the_thermal_one_is_taken_and_the_other_can_be(tmp_path: Path):
+    write_card(tmp_path / "card")
+    pictures = tmp_path / "card" / "DCIM" / "100MEDIA"
+    for path in sorted(pictures.glob("*.JPG")):
+        path.rename(path.with_name(path.stem + "_W.JPG"))
+    for i in range(3):
+        when = datetime.fromtimestamp(TAKEN.timestamp() + i, UTC)
+        angles = (0.0, -70.0, 0.0)
+        write_photo(pictures / f"DJI_{i + 1:04d}_T.JPG", (0.0, i, 60.0), angles, when, (320, 256), 400.0)
+    (tmp_path / "card" / "clicks.csv").unlink()
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    assert any("the thermal one; left out are 4 of" in one for one in card.proposal.said)
+    flight = import_card(card, tmp_path / "flight")
+    assert flight.manifest.camera is not None
+    assert (flight.manifest.camera.width_px, flight.manifest.camera.fx_px) == (320, 400.0)
+    assert len(flight.table("frames")) == 3
+    roles = {"DCIM/100MEDIA": "images:wide"}
+    wide = import_card(read_card([tmp_path / "card"], Wishes("wide", zone="UTC"), roles), tmp_path / "wide")
+    assert len(wide.table("frames")) == 4
+    with pytest.raises(WildlabError, match="no camera's name has 'infra'"):
+        read_card([tmp_path / "card"], Wishes("x", zone="UTC"), {"DCIM/100MEDIA": "images:infra"})
+
+
+def test_pixels_of_images_that_are_not_there_are_counted_and_left_out(tmp_path: Path):
+    write_card(tmp_path / "card")
+    with (tmp_path / "card" / "clicks.csv").open("a", encoding="utf-8") as clicks:
+        clicks.write("DJI_0900.JPG,pole,10,20\n")
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {})
+    assert any(
+        "1 of" in one and "pixels are in images that are not here" in one for one in card.proposal.said
+    )
+    flight = import_card(card, tmp_path / "flight")
+    assert set(flight.table("detections")["frame_id"]) <= set(flight.table("frames")["frame_id"])
+
+
+def test_a_counter_that_begins_again_is_put_in_the_order_of_time(tmp_path: Path):
+    write_card(tmp_path / "card")
+    pictures = tmp_path / "card" / "DCIM" / "100MEDIA"
+    (pictures / "DJI_0001.JPG").rename(pictures / "DJI_0999.JPG")
+    (tmp_path / "card" / "clicks.csv").unlink()
+    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    assert flight.table("frames")["frame_id"].tolist() == ["DJI_0999", "DJI_0002", "DJI_0003", "DJI_0004"]
+
+
+def test_a_focal_length_can_be_stated_alone(tmp_path: Path):
+    write_card(tmp_path / "card")
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", focal_px=750.0), {})
+    flight = import_card(card, tmp_path / "flight")
+    assert flight.manifest.camera is not None
+    assert (flight.manifest.camera.fx_px, flight.manifest.camera.height_px) == (750.0, 512)

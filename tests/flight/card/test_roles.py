@@ -23,6 +23,8 @@ def log(
     attitude: bool = False,
     part: str | None = None,
     up: float = 0.0,
+    climb: float = 0.0,
+    vehicle: str = "",
 ) -> Found:
     """A log that moves east at 1 m/s, so far north, from so many seconds on."""
     t = np.arange(seconds, dtype=float)
@@ -31,7 +33,7 @@ def log(
         "time_s": START + begin + t,
         "latitude_deg": lat,
         "longitude_deg": lon,
-        "height_sea_m": up + 0 * t,
+        "height_sea_m": up + climb * np.sin(t / 9),
     }
     parts = {"gnss": make_stream("gnss", columns)}
     if attitude:
@@ -41,7 +43,7 @@ def log(
         parts = {
             "marks": make_stream("marks", {"name": ["a"], "latitude_deg": [59.0], "longitude_deg": [10.0]})
         }
-    return Found(name, 1, "gpx", RawLog("gpx", parts))
+    return Found(name, 1, "gpx", RawLog("gpx", parts, vehicle=vehicle))
 
 
 def roles(*found: Found, **stated: str) -> dict[str, str]:
@@ -107,3 +109,24 @@ def test_rows_that_cannot_be_used_are_no_track():
     stream = make_stream("gnss", columns, unusable={"no fix": np.ones(5, bool)})
     choice = choose_roles([Found("bench", 1, "gpx", RawLog("gpx", {"gnss": stream}))], {})[0]
     assert (choice.role, choice.why) == ("nothing", "no row of it can be used: no fix")
+
+
+def test_what_flies_is_own_also_where_another_log_is_longer():
+    rover = log("rover", attitude=True, seconds=200, vehicle="ArduRover V4.5")
+    copter = log("copter", attitude=True, seconds=130, up=80.0, vehicle="ArduCopter V4.5")
+    choices = choose_roles([rover, copter], {})
+    assert [one.role for one in choices] == ["target", "own"]
+    assert "it alone is of a vehicle that flies" in choices[1].why
+
+
+def test_what_climbs_is_own_where_no_log_names_its_vehicle():
+    choices = choose_roles(
+        [log("a", attitude=True, seconds=200, north=50.0), log("b", attitude=True, climb=30.0)], {}
+    )
+    assert [one.role for one in choices] == ["target", "own"]
+    assert "goes up and down" in choices[1].why
+
+
+def test_logs_that_are_alike_are_said_to_be():
+    choices = choose_roles([log("a", attitude=True), log("b", attitude=True, north=80.0)], {})
+    assert "2 logs with an attitude are alike" in choices[0].why

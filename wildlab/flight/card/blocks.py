@@ -53,7 +53,7 @@ def velocity(stream: Stream) -> dict[str, Any]:
     if any(name not in stream.columns for name in names):
         return {}
     values = np.column_stack([stream.columns[name] for name in names])[stream.used]
-    if not np.isfinite(values).all():
+    if not np.isfinite(values).all() or _only_level(stream):
         return {}
     axes = ("north", "east", "down")
     return {"velocity": {axis: quantity(name, "m/s") for axis, name in zip(axes, names, strict=True)}}
@@ -84,3 +84,15 @@ def spreads(stream: Stream) -> dict[str, Any]:
 def truth_spreads(stream: Stream) -> dict[str, Any]:
     names = {"sd_horizontal": "sd_horizontal_m", "sd_vertical": "sd_vertical_m"}
     return {key: quantity(column, "m") for key, column in names.items() if column in stream.columns}
+
+
+#: A vehicle that goes up or down by more than this does not do so at 0 m/s.
+CLIMBED_M = 3.0
+
+
+def _only_level(stream: Stream) -> bool:
+    """Whether a receiver that does not measure climbing says 0 for it, as those that speak NMEA do."""
+    if stream.columns["v_down_m_s"][stream.used].any():
+        return False
+    heights = [one[stream.used] for name, one in stream.columns.items() if name.startswith("height_")]
+    return any(np.isfinite(one).any() and np.nanmax(one) - np.nanmin(one) > CLIMBED_M for one in heights)

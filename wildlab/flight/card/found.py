@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import printable, read_regular
+from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.logs.formats import (
     FOLDERS,
     FORMATS,
@@ -26,7 +27,7 @@ from wildlab.flight.recipe.raw import RAW_LIMIT
 Array = NDArray[np.float64]
 
 #: Endings of images, in small letters.
-IMAGES = frozenset({".jpg", ".jpeg", ".tif", ".tiff", ".png"})
+IMAGES = frozenset(SUFFIXES)
 #: What lies on cards and is no log: not worth a sentence.
 KNOWN_OTHERS = frozenset({".mp4", ".mov", ".lrv", ".thm", ".dng", ".lrf", ".toml", ".md", ".txt", ".parm"})
 #: More files than any card of a day's flights has.
@@ -134,7 +135,7 @@ def search(
         if folder or path.suffix.lower() not in KNOWN_OTHERS:
             tell(name)
         found.append(_read_folder(path, name, folder, zone) if folder else _read_file(path, name, zone))
-    return [one for one in found if one is not None]
+    return sorted((one for one in found if one is not None), key=lambda one: one.name)
 
 
 def _items(paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
@@ -159,18 +160,20 @@ def _single(path: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _below(folder: Path) -> Iterator[tuple[Path, str]]:
+    pictured: list[Path] = []
     for here, folders, files in os.walk(folder):
         folders[:] = sorted(one for one in folders if not one.startswith("."))
         names = sorted(one for one in files if not one.startswith("."))
         images = {one for one in names if Path(one).suffix.lower() in IMAGES}
         boxes = {one for one in names if one.lower().endswith(".txt") and _is_yolo(Path(here) / one)}
-        if images:
-            yield Path(here), "photos"
+        pictured += [Path(here)] if images else []
         if boxes:
             yield Path(here), "clicks-yolo"
         for name in names:
             if name not in images | boxes:
                 yield Path(here) / name, ""
+    if pictured:  # 100MEDIA and 101MEDIA are one series of images
+        yield Path(os.path.commonpath(pictured)), "photos"
 
 
 def _is_yolo(path: Path) -> bool:
@@ -184,7 +187,7 @@ def _is_yolo(path: Path) -> bool:
 
 
 def _read_folder(folder: Path, name: str, format_: str, zone: str | None) -> Found:
-    size = sum(one.stat().st_size for one in folder.iterdir() if one.is_file())
+    size = sum(one.stat().st_size for one in folder.rglob("*") if one.is_file())
     try:
         log, _ = read_folder(folder, format_, zone)
     except WildlabError as error:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
 from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.logs.log import Stream
-from wildlab.flight.readers.photos.folder import camera_of
+from wildlab.flight.readers.photos.folder import camera_of, of_camera
 from wildlab.flight.time.matching import match_triggers
 
 #: Time zones are whole quarters of an hour, s.
@@ -44,7 +45,53 @@ class ImageClock:
     block: dict[str, Any] = field(default_factory=dict)
 
 
-def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPart | None, str]:
+def one_camera(images: Found, wanted: str = "") -> tuple[Found, str | None, str]:
+    """The images of one camera: of that whose name has what is wanted, else of the thermal one, else of that
+    with the most.
+
+    Parameters
+    ----------
+    images
+        With the part ``photos``.
+    wanted
+        A part of the camera's name, as the user states it.
+
+    Returns
+    -------
+    Found, the camera's name (None where all images are of one), and a sentence ("" where there is no choice)
+
+    Raises
+    ------
+    WildlabError
+        Where no camera's name has what is wanted.
+    """
+    if images.log is None or "photos" not in images.log.parts:
+        return images, None, ""
+    named = Counter(str(one) for one in images.log.parts["photos"].columns.get("camera", ()))
+    if len(named) < 2 and not wanted:
+        return images, None, ""
+    those = [name for name in named if wanted.lower() in name.lower()]
+    if not those:
+        known = ", ".join(repr(name) for name in named)
+        raise WildlabError(f"no camera's name has {wanted!r}", f"there are {known}", field="--role")
+    thermal = [name for name in those if "thermal" in name.lower()]
+    chosen = max(thermal or those, key=lambda name: named[name])
+    others = ", ".join(
+        f"{count} of {name or 'none that is named'}" for name, count in named.items() if name != chosen
+    )
+    said = ""
+    if others:
+        said = (
+            f"Of {images.shown} the {named[chosen]} images of {chosen or 'no named camera'} are taken"
+            f"{', the thermal one' if thermal and not wanted else ''}; left out are {others}. "
+            f"--role {images.name}=images:NAME takes another camera."
+        )
+    return replace(images, log=of_camera(images.log, chosen)), chosen, said
+
+
+def camera_of_images(
+    images: Found, stated: CameraPart | None, focal_px: float | None = None
+) -> tuple[CameraPart | None, str]:
     """The camera that took the images and how it is known; or None and why it is not.
 
     Parameters
@@ -53,6 +100,8 @@ def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPa
         With the part ``photos``.
     stated
         By the user, which counts for more than the tags.
+    focal_px
+        Likewise, where the rest of the camera is to be that of the images.
 
     Returns
     -------
@@ -62,6 +111,8 @@ def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPa
         return stated, "as you stated it"
     if images.log is None:
         return None, images.problem
+    if focal_px is not None:
+        return _by_focal_length(images.log.parts["photos"], focal_px)
     try:
         found = camera_of(images.log)
     except WildlabError as error:
@@ -80,6 +131,30 @@ def camera_of_images(images: Found, stated: CameraPart | None) -> tuple[CameraPa
     )
     return camera, (
         f"{width} x {height} px with a focal length of {focal:.0f} px by {found['how']}; its centre and a "
+        "lens without distortion are assumed"
+    )
+
+
+def _by_focal_length(photos: Stream, focal_px: float) -> tuple[CameraPart | None, str]:
+    """A camera of that focal length, as large as the images."""
+    columns = photos.columns
+    sizes = np.column_stack([columns["width_px"], columns["height_px"]])
+    sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
+    if len(sizes) != 1:
+        return None, "they are of several sizes" if len(sizes) else "nothing says how large they are"
+    width, height = (int(one) for one in sizes[0])
+    names = {str(one) for one in columns.get("camera", ())} - {""}
+    camera = CameraPart(
+        name=names.pop() if len(names) == 1 else "not stated",
+        width_px=width,
+        height_px=height,
+        fx_px=focal_px,
+        fy_px=focal_px,
+        cx_px=(width - 1) / 2,
+        cy_px=(height - 1) / 2,
+    )
+    return camera, (
+        f"{width} x {height} px with a focal length of {focal_px:g} px, as you stated it; its centre and a "
         "lens without distortion are assumed"
     )
 

@@ -35,6 +35,8 @@ class Wishes:
         Of the flight.
     camera
         From a file of `wildlab camera`, None for what the images say.
+    focal_px
+        Focal length of the camera, where the rest is as the images have it.
     camera_offset_s
         What to add to the stamps of the images, None for an estimate.
     geoid_m
@@ -51,6 +53,7 @@ class Wishes:
 
     name: str
     camera: CameraPart | None = None
+    focal_px: float | None = None
     camera_offset_s: float | None = None
     geoid_m: float | None = None
     take_off_m: float | None = None

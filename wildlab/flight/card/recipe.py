@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from wildlab.errors import WildlabError
 from wildlab.flight.card.assumed import uncertainty_of
 from wildlab.flight.card.blocks import angles
 from wildlab.flight.card.found import Found
+from wildlab.flight.card.images import one_camera
 from wildlab.flight.card.proposal import Proposal, Sources, Wishes
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.card.seen import add_frames, add_seen, add_targets
@@ -44,6 +46,11 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     triggers, clicks = _only(by_role, "triggers"), by_role.get("clicks", [])
     images = _most_images(by_role.get("images", []))
     proposal = Proposal({"name": wishes.name})
+    lens: str | None = None
+    if images is not None:
+        found, lens, said = one_camera(images.found, images.target)
+        images = replace(images, found=found)
+        proposal.said += [said] if said else []
     placed = _placed(images)
     if own is None and camera is None and receiver is None and not placed:
         if any("without a zone" in one.why for one in choices):
@@ -74,7 +81,7 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     if camera is not None:
         add_poses(proposal, sources, camera, "camera")
     if images is not None:
-        add_frames(proposal, sources, images, own, triggers, by_role, placed)
+        add_frames(proposal, sources, images, lens, own, triggers, by_role, placed)
     _uncertainty(proposal, streams)
     _mount(proposal, camera is not None or "camera" in data.get("poses", {}))
     add_targets(proposal, sources, by_role)

@@ -101,7 +101,7 @@ def _stated(found: Sequence[Found], stated: Mapping[str, str]) -> dict[str, tupl
             raise WildlabError(
                 f"nothing called {name!r} was found", did_you_mean(name, names), field="--role"
             )
-        if kind not in ROLES or (target and kind != "target"):
+        if kind not in ROLES or (target and kind not in ("target", "images")):
             raise WildlabError(f"{role!r} is no role", did_you_mean(kind, ROLES), field="--role")
         given[name] = (kind, target)
     if sum(kind == "own" for kind, _ in given.values()) > 1:
@@ -159,11 +159,44 @@ def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, st
     if len(turned) == 1:
         return turned[0], "it is the only log with an attitude"
     taken = span_of(images, "photos") if images is not None else None
-    during = [one for one in turned if taken is not None and _overlap(span_of(one), taken) > SHARED_S]
-    longest = max(during or turned, key=_duration)
-    if len(during) == 1:
-        return longest, "of the logs with an attitude it alone covers the images"
+    left = list(turned)
+    for said, holds in (
+        ("covers the images", lambda one: taken is not None and _overlap(span_of(one), taken) > SHARED_S),
+        ("has records of a camera's triggers", lambda one: one.part("triggers") is not None),
+        ("is of a vehicle that flies", _flies),
+        ("goes up and down by more than 15 m", lambda one: _climb(one) > ON_BOARD_M),
+    ):
+        those = [one for one in left if holds(one)]
+        if len(those) == 1:
+            return those[0], f"of the {len(left)} logs with an attitude it alone {said}"
+        left = those or left
+    longest = max(left, key=_duration)
+    if sum(_duration(one) > _duration(longest) - SHARED_S for one in left) > 1:
+        return longest, f"{len(left)} logs with an attitude are alike, and it is the first: say with --role"
     return longest, "of the logs with an attitude it is the longest"
+
+
+#: Words of what flies, in what logs say of their vehicle.
+_FLYING = re.compile(
+    r"copter|plane|vtol|quad|hexa|octo|fixed.wing|heli|rotor|airship|balloon|kite|dji|mavic", re.I
+)
+
+
+def _flies(one: Found) -> bool:
+    return one.log is not None and bool(_FLYING.search(one.log.vehicle))
+
+
+def _climb(one: Found) -> float:
+    """From the lowest to the highest place of a log, m, without the outermost hundredths."""
+    for part in ("poses", "gnss"):
+        stream = one.part(part)
+        for name in () if stream is None else stream.columns:
+            if stream is not None and name.startswith("height_"):
+                heights = stream.columns[name][stream.used]
+                heights = heights[np.isfinite(heights)]
+                if len(heights):
+                    return float(np.ptp(np.quantile(heights, [0.01, 0.99])))
+    return 0.0
 
 
 def _has_place(images: Found) -> bool:

@@ -20,6 +20,7 @@ def add_frames(
     proposal: Proposal,
     sources: Sources,
     images: Choice,
+    lens: str | None,
     own: Choice | None,
     triggers: Choice | None,
     by_role: Mapping[str, Sequence[Choice]],
@@ -27,15 +28,17 @@ def add_frames(
 ) -> None:
     """The images, with the poses that stand in them."""
     photos, data, wishes = stream_of(images, "photos"), proposal.data, sources.wishes
-    others = [one for one in by_role["images"] if one is not images]
+    others = [one for one in by_role["images"] if one.found.name != images.found.name]
     for one in others:
         proposal.said.append(
             f"The images of {one.found.shown} are left out: a flight has those of one folder, and "
             f"{images.found.shown} has more. Import them as a flight of their own."
         )
-    camera, how = camera_of_images(images.found, wishes.camera)
+    camera, how = camera_of_images(images.found, wishes.camera, wishes.focal_px)
     if camera is None:
-        proposal.said.append(f"The images are left out: {how}. Give the camera with --camera.")
+        proposal.said.append(
+            f"The images are left out: {how}. Give the camera with --camera, or with --focal alone."
+        )
         return
     data["camera"] = camera.model_dump()
     proposal.said.append(f"The camera: {how}.")
@@ -48,7 +51,7 @@ def add_frames(
     proposal.said.append(clock.said)
     id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
     file = sources.table(images, "photos", "images")
-    sources.logs[file] |= clock.block
+    sources.logs[file] |= clock.block | ({} if lens is None else {"camera": lens})
     if "triggers" not in clock.block:
         sources.logs.pop("triggers", None)
     frames: dict[str, Any] = {"file": file, "id": id_}
@@ -135,6 +138,7 @@ def add_seen(
         block: dict[str, Any] = {
             "source": "clicks" if len(clicks) == 1 else f"clicks-{number}",
             "file": sources.table(one, "clicks", f"clicks-{number}"),
+            "where": USED,
             "prefix": f"click-{number}-",
             "frame": "stem" if id_ == "stem" else "image",
             "pixel": {"u": quantity("u_px", "px"), "v": quantity("v_px", "px")},
@@ -143,8 +147,23 @@ def add_seen(
             block["target"] = "name"
         if level is not None:
             block["ground"] = {"height": {"value": level, "unit": "m"}}
+        sources.logs[block["file"]]["images"] = proposal.data["frames"]["file"]
+        strange = _strange(stream, images)
+        if strange:
+            proposal.said.append(
+                f"{one.found.shown}: {strange} of {len(stream)} pixels are in images that are not here, or "
+                "not taken, and are left out."
+            )
         blocks.append(block)
     proposal.data["detections"] = blocks
+
+
+def _strange(pixels: Stream, images: Choice) -> int:
+    """How many pixels are of none of the images."""
+    photos = stream_of(images, "photos")
+    known = {*_stems(photos), *(str(one) for one in photos.columns["file"])}
+    of = [str(one) for one in pixels.columns["image"][pixels.used]]
+    return sum(one not in known and PurePosixPath(one).stem not in known for one in of)
 
 
 def _level(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> float | None:

@@ -23,7 +23,7 @@ from wildlab.flight.files import did_you_mean, inside, printable, read_regular
 from wildlab.flight.readers.autoferry import Part, read_part
 from wildlab.flight.readers.logs.formats import FOLDERS, read_folder, read_log
 from wildlab.flight.readers.logs.log import RawLog, Stream
-from wildlab.flight.readers.logs.parts import stamped_by, stream_of
+from wildlab.flight.readers.logs.parts import of_images, stamped_by, stream_of
 from wildlab.flight.recipe.delimited import is_packed, packed, read_delimited
 from wildlab.flight.recipe.matlab import read_matlab, table_of
 from wildlab.flight.recipe.parts import Quantity, Stamp, parse_zone
@@ -152,6 +152,8 @@ class RawFiles:
                 stream = stream_of(self._log(block, f"logs.{name}"), block, path)
                 if block.triggers is not None:
                     stream = stamped_by(stream, self._triggers(block.triggers, name), path)
+                if block.images is not None:
+                    stream = of_images(stream, self._images(block.images, name))
                 cells = stream.columns
                 self._tables[name, ""] = RawTable(path, tuple(cells), cells, stream.rows, stream.counted_in)
         return self._tables[name, ""]
@@ -167,6 +169,18 @@ class RawFiles:
                 field=f"logs.{images}.triggers",
             )
         return stream_of(self._log(other, f"logs.{triggers}"), other, self.folder / other.file)
+
+    def _images(self, images: str, pixels: str) -> Stream:
+        """The images that pixels have to be of."""
+        if images not in self.logs or self.logs[images].part != "photos":
+            raise WildlabError(
+                f"{images!r} is no log of images of this recipe",
+                did_you_mean(images, self.logs),
+                file=self.recipe,
+                field=f"logs.{pixels}.images",
+            )
+        table = self._log_table(images)
+        return Stream(table.cells, table.lines, table.counted_in)
 
     def _log(self, block: LogTable, part: str) -> RawLog:
         key = (block.file, block.format, block.zone)

@@ -160,7 +160,8 @@ class LogTable(Strict):
     ``height`` makes a column ``height_m`` of the heights that count from there, with ``add_m`` added;
     ``offset_s`` is added to ``time_s``, and makes it of ``time_log_s`` where the log does not know UTC;
     ``zone`` is that of a wall clock without one. ``triggers`` names another log, whose records of triggers
-    give images their times.
+    give images their times; ``camera`` takes the images of one camera; ``images`` names the log of the images
+    that pixels have to be of, to be used.
     """
 
     file: str
@@ -171,6 +172,8 @@ class LogTable(Strict):
     offset_s: float = 0.0
     zone: Zone | None = None
     triggers: str | None = None
+    camera: str | None = None
+    images: str | None = None
 
     @field_validator("file")
     @classmethod

@@ -88,7 +88,7 @@ def read_log(path: Path, data: bytes, format_: str, zone: str | None = None) -> 
 
 #: Formats of whole folders: name in recipes -> (module, its reader, what it is called in sentences).
 FOLDERS: dict[str, tuple[str, str, str]] = {
-    "photos": ("wildlab.flight.readers.photos.folder", "read_photos", "folder of images"),
+    "photos": ("wildlab.flight.readers.photos.folder", "read_tree", "folder of images"),
     "clicks-yolo": ("wildlab.flight.readers.clicks.clicks", "read_clicks_folder", "folder of YOLO's labels"),
 }
 #: So much of the beginning of each file goes into a folder's checksum: images are large and many.

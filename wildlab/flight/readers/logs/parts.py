@@ -9,6 +9,7 @@ import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.readers.logs.log import RawLog, Stream
+from wildlab.flight.readers.photos.folder import of_camera
 from wildlab.flight.time.matching import match_triggers
 
 
@@ -23,6 +24,8 @@ class Wanted(Protocol):
     def add_m(self) -> float: ...
     @property
     def offset_s(self) -> float: ...
+    @property
+    def camera(self) -> str | None: ...
 
 
 def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
@@ -52,6 +55,8 @@ def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
         raise WildlabError(
             f"this log has no {wanted.part}", f"use what it has: {there}", file=path, field="part"
         )
+    if wanted.camera is not None and "photos" in log.parts:
+        log = of_camera(log, wanted.camera)
     stream = log.parts[wanted.part]
     columns = dict(stream.columns)
     use, why = columns["use"].copy(), columns["why"].copy()
@@ -74,7 +79,51 @@ def stream_of(log: RawLog, wanted: Wanted, path: Path) -> Stream:
     for name in ("file", "image"):
         if name in columns:
             columns["stem"] = np.array([Path(str(one)).stem for one in columns[name]], dtype=object)
-    return Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+    done = Stream({**columns, "use": use, "why": why}, stream.rows, stream.counted_in)
+    return in_order(done) if wanted.part == "photos" else done
+
+
+def in_order(stream: Stream) -> Stream:
+    """Images in the order of their stamps: counters begin again, and copies have names of their own."""
+    times = stream.columns.get("time_s")
+    if times is None or not np.isfinite(times).any():
+        return stream
+    order = np.argsort(times, kind="stable")
+    return Stream(
+        {name: one[order] for name, one in stream.columns.items()}, stream.rows[order], stream.counted_in
+    )
+
+
+def of_images(pixels: Stream, images: Stream) -> Stream:
+    """Pixels, those marked as not used that are of no image with a time.
+
+    Parameters
+    ----------
+    pixels
+        With ``image`` and ``stem``.
+    images
+        With ``file`` and ``stem``.
+
+    Returns
+    -------
+    Stream
+    """
+    there = np.ones(len(images), bool)
+    times = images.columns.get("time_s")
+    if times is not None and np.isfinite(times).any():
+        there = np.isfinite(times)
+    known = {str(one) for name in ("file", "stem") for one in images.columns[name][there]}
+    strange = np.array(
+        [
+            str(a) not in known and str(b) not in known
+            for a, b in zip(pixels.columns["image"], pixels.columns["stem"], strict=True)
+        ],
+        bool,
+    )
+    use, why = pixels.columns["use"].copy(), pixels.columns["why"].copy()
+    why[strange & (use == 1.0)] = "its image is not there"
+    use[strange] = 0.0
+    return Stream({**pixels.columns, "use": use, "why": why}, pixels.rows, pixels.counted_in)
 
 
 def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
@@ -113,4 +162,4 @@ def stamped_by(images: Stream, triggers: Stream, path: Path) -> Stream:
             field="triggers",
         )
     taken = np.where(match.trigger >= 0, of_record[np.maximum(match.trigger, 0)], np.nan)
-    return Stream({**images.columns, "time_s": taken}, images.rows, images.counted_in)
+    return in_order(Stream({**images.columns, "time_s": taken}, images.rows, images.counted_in))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import unreadable
 from wildlab.flight.readers.frames.frame import file_name
 from wildlab.flight.readers.frames.image import SUFFIXES
-from wildlab.flight.readers.logs.log import RawLog, make_stream
+from wildlab.flight.readers.logs.log import TEXTS, RawLog, Stream, make_stream
 from wildlab.flight.readers.photos import values
 from wildlab.flight.readers.photos.said import images, said_of
 from wildlab.flight.readers.photos.tags import Tags, read_tags, size_of
@@ -142,6 +143,88 @@ def read_photos(folder: Path, zone: str | None = None) -> RawLog:
         lost=tuple(lost + left),
         notes=tuple(notes),
     )
+
+
+def read_tree(folder: Path, zone: str | None = None) -> RawLog:
+    """The images of a folder and of all folders below it, as a card has them: ``100MEDIA``, ``101MEDIA``.
+
+    Parameters
+    ----------
+    folder
+        Of images, or of folders of images.
+    zone
+        As for `read_photos`.
+
+    Returns
+    -------
+    RawLog
+        As of `read_photos`; files of folders below have names with ``/``.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no image.
+    """
+    folders = sorted(
+        (one for one in (folder, *folder.rglob("*")) if not _hidden(one, folder) and is_photos(one)),
+        key=lambda one: natural_key(one.relative_to(folder).as_posix()),
+    )
+    if folders in ([], [folder]):
+        return read_photos(folder, zone)
+    logs = [read_photos(one, zone) for one in folders]
+    streams = [one.parts["photos"] for one in logs]
+    columns: dict[str, Any] = {}
+    for name in dict.fromkeys(name for one in streams for name in one.columns):
+        empty: Any = "" if name in TEXTS else np.nan
+        columns[name] = np.concatenate(
+            [
+                one.columns.get(name, np.full(len(one), empty, object if empty == "" else float))
+                for one in streams
+            ]
+        )
+    prefixes = [one.relative_to(folder).as_posix() for one in folders]
+    names = [
+        name if prefix == "." else f"{prefix}/{name}"
+        for prefix, stream in zip(prefixes, streams, strict=True)
+        for name in stream.columns["file"]
+    ]
+    columns["file"] = np.array(names, dtype=object)
+    makers = {one.vehicle for one in logs}
+    clock = max((one.clock for one in logs if one.clock is not None), key=lambda one: one.pairs, default=None)
+    return RawLog(
+        "photos",
+        {"photos": Stream(columns, np.arange(1, len(names) + 1), "image")},
+        vehicle=makers.pop() if len(makers) == 1 else "",
+        clock=clock,
+        lost=tuple(dict.fromkeys(text for one in logs for text in one.lost)),
+        notes=tuple(dict.fromkeys(text for one in logs for text in one.notes)),
+    )
+
+
+def _hidden(path: Path, folder: Path) -> bool:
+    return path.is_symlink() or any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+
+def of_camera(log: RawLog, camera: str) -> RawLog:
+    """The images of one camera, by its name as ``camera`` has it.
+
+    Parameters
+    ----------
+    log
+        As `read_photos` gives it.
+    camera
+        Its name.
+
+    Returns
+    -------
+    RawLog
+    """
+    stream = log.parts["photos"]
+    rows = np.flatnonzero(stream.columns["camera"] == camera)
+    part = Stream(
+        {name: one[rows] for name, one in stream.columns.items()}, stream.rows[rows], stream.counted_in
+    )
+    return replace(log, parts={**log.parts, "photos": part})
 
 
 def camera_of(log: RawLog) -> dict[str, Any] | None:
