@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,12 +13,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tests.flight.card.cards import MARKS, TAKEN, gpx, write_card, write_photo
+from tests.flight.card.cards import MARKS, TAKEN, geodetic, gpx, write_card, write_photo
 from wildlab.api.points import georeference
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.card.importing import import_card, read_card, recipe_beside
 from wildlab.flight.card.proposal import Wishes
+from wildlab.flight.manifest import CameraPart
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import load_flight
 
@@ -234,3 +237,72 @@ def test_a_focal_length_can_be_stated_alone(tmp_path: Path):
     flight = import_card(card, tmp_path / "flight")
     assert flight.manifest.camera is not None
     assert (flight.manifest.camera.fx_px, flight.manifest.camera.height_px) == (750.0, 512)
+
+
+SUBTITLES = """{n}
+00:00:{n:02d},000 --> 00:00:{m:02d},000
+<font size="28">FrameCnt: {n}, DiffTime: 1000ms
+2026-05-01 10:00:{n:02d}.000
+[iso: 100] [latitude: {lat:.6f}] [longitude: {lon:.6f}] [rel_alt: 80.000 abs_alt: 120.000] </font>
+
+"""
+
+
+def test_a_boat_does_not_take_the_place_of_subtitles_without_a_zone(tmp_path: Path):
+    card = tmp_path / "card"
+    card.mkdir()
+    places = [geodetic(30.0, 2.0 * i) for i in range(20)]
+    lines = [SUBTITLES.format(n=i + 1, m=i + 2, lat=lat, lon=lon) for i, (lat, lon) in enumerate(places)]
+    (card / "DJI_0001.SRT").write_text("".join(lines), encoding="utf-8")
+    (card / "boat.gpx").write_text(gpx([(i, 0.5 * i, 1.0, 40.0) for i in range(-30, 60)]))
+    with pytest.raises(WildlabError) as caught:
+        read_card([card], Wishes("card"), {})
+    assert "the clock of DJI_0001.SRT is local time" in str(caught.value)
+    assert "--zone" in str(caught.value)
+    with_zone = read_card([card], Wishes("card", zone="+02:00", geoid_m=0.0, take_off_m=40.0), {})
+    roles = {one.found.name: one.role for one in with_zone.choices}
+    assert roles == {"DJI_0001.SRT": "own", "boat.gpx": "target"}
+
+
+def test_one_track_and_one_clicked_name_that_are_left_over_are_the_same(tmp_path: Path):
+    write_card(tmp_path / "card")
+    clicks = tmp_path / "card" / "clicks.csv"
+    clicks.write_text(clicks.read_text(encoding="utf-8") + "DJI_0001.JPG,boat,300,200\n", encoding="utf-8")
+    (tmp_path / "card" / "Boot Mörkö <b>.gpx").write_text(gpx([(i, 5.0, 2.0, 40.0) for i in range(-5, 20)]))
+    card = read_card([tmp_path / "card"], Wishes("card", zone="UTC", geoid_m=0.0), {})
+    assert any("Boot-Mörkö-b is taken for what was clicked as boat" in one for one in card.proposal.said)
+    flight = import_card(card, tmp_path / "flight")
+    assert flight.truth is not None
+    assert "boat" in set(flight.truth["target_id"])
+
+
+def test_a_stated_camera_of_another_size_is_not_laid_on_images(tmp_path: Path):
+    write_card(tmp_path / "card", 1)
+    camera = CameraPart(name="c", width_px=1000, height_px=750, fx_px=900, fy_px=900, cx_px=500, cy_px=375)
+    with pytest.raises(WildlabError) as caught:
+        read_card([tmp_path / "card"], Wishes("card", zone="UTC", camera=camera), {})
+    assert "the stated camera has 1000 x 750 px, and they have 640 x 512" in str(caught.value)
+
+
+def test_the_planes_uncertainty_is_that_of_the_surveyed_heights(tmp_path: Path):
+    write_card(tmp_path / "card")
+    marks = tmp_path / "card" / "marks.csv"
+    lines = marks.read_text(encoding="utf-8").splitlines()
+    raised = [line.replace("40.000", f"{40 + 3 * i:.3f}") for i, line in enumerate(lines)]
+    marks.write_text("\n".join(raised), encoding="utf-8")
+    flight = import_card(read_card([tmp_path / "card"], Wishes("card", zone="UTC"), {}), tmp_path / "flight")
+    assert flight.manifest.uncertainty.plane_height_m == pytest.approx(3.0)
+
+
+def test_what_is_not_looked_at_is_told(tmp_path: Path):
+    write_card(tmp_path / "card", 1)
+    for name in ("notes.txt", "DJI_0001.MP4"):
+        (tmp_path / "card" / name).write_text("not a log")
+    result = CliRunner().invoke(wildlab, ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"])
+    assert "not looked at: DJI_0001.MP4, notes.txt" in result.stderr
+
+
+def test_the_command_line_is_there_as_a_module():
+    command = [sys.executable, "-m", "wildlab", "--version"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert run.stdout.startswith("wildlab")

@@ -25,6 +25,7 @@ def log(
     up: float = 0.0,
     climb: float = 0.0,
     vehicle: str = "",
+    gimbal: bool = False,
 ) -> Found:
     """A log that moves east at 1 m/s, so far north, from so many seconds on."""
     t = np.arange(seconds, dtype=float)
@@ -39,6 +40,9 @@ def log(
     if attitude:
         zeros = {f"{axis}_deg": 0 * t for axis in ("roll", "pitch", "yaw")}
         parts["poses"] = make_stream("poses", {**columns, **zeros})
+    if gimbal:
+        looks = {f"{axis}_world_deg": 0 * t for axis in ("roll", "pitch", "yaw")}
+        parts["gimbal"] = make_stream("gimbal", {"time_s": START + begin + t, **looks})
     if part == "marks":
         parts = {
             "marks": make_stream("marks", {"name": ["a"], "latitude_deg": [59.0], "longitude_deg": [10.0]})
@@ -129,4 +133,27 @@ def test_what_climbs_is_own_where_no_log_names_its_vehicle():
 
 def test_logs_that_are_alike_are_said_to_be():
     choices = choose_roles([log("a", attitude=True), log("b", attitude=True, north=80.0)], {})
-    assert "2 logs with an attitude are alike" in choices[0].why
+    assert "which are alike, it is the first: say with --role" in choices[0].why
+
+
+def test_a_log_with_a_gimbal_is_own_beside_longer_tracks():
+    choices = choose_roles([log("boat", seconds=300), log("DJI_0001", north=40.0, gimbal=True)], {})
+    assert [one.role for one in choices] == ["target", "own"]
+    assert "it alone has an attitude" in choices[1].why
+
+
+def test_a_track_of_another_day_is_no_target_of_images():
+    photos = make_stream(
+        "photos",
+        {
+            "file": ["a.jpg"],
+            "time_log_s": [START],
+            "latitude_deg": [59.0],
+            "longitude_deg": [10.0],
+            "height_sea_m": [80.0],
+        },
+    )
+    images = Found("DCIM", 1, "photos", RawLog("photos", {"photos": photos}))
+    choices = choose_roles([images, log("today"), log("yesterday", begin=-30 * 3600.0)], {})
+    assert [one.role for one in choices] == ["images", "target", "nothing"]
+    assert "or a clock is wrong: 30 h lie between it and the images" in choices[2].why

@@ -28,8 +28,10 @@ Array = NDArray[np.float64]
 
 #: Endings of images, in small letters.
 IMAGES = frozenset(SUFFIXES)
-#: What lies on cards and is no log: not worth a sentence.
+#: What lies on cards and is no log: not worth a sentence each.
 KNOWN_OTHERS = frozenset({".mp4", ".mov", ".lrv", ".thm", ".dng", ".lrf", ".toml", ".md", ".txt", ".parm"})
+#: Why such a file is not read.
+OTHER = "is no log by its ending"
 #: More files than any card of a day's flights has.
 MOST_FILES = 200_000
 
@@ -135,7 +137,7 @@ def search(
         if folder or path.suffix.lower() not in KNOWN_OTHERS:
             tell(name)
         found.append(_read_folder(path, name, folder, zone) if folder else _read_file(path, name, zone))
-    return sorted((one for one in found if one is not None), key=lambda one: one.name)
+    return sorted(found, key=lambda one: one.name)
 
 
 def _items(paths: Sequence[Path]) -> Iterator[tuple[Path, str]]:
@@ -195,7 +197,7 @@ def _read_folder(folder: Path, name: str, format_: str, zone: str | None) -> Fou
     return Found(name, size, format_, log)
 
 
-def _read_file(path: Path, name: str, zone: str | None) -> Found | None:
+def _read_file(path: Path, name: str, zone: str | None) -> Found:
     if path.is_symlink() and not path.resolve().is_file():
         return Found(name, 0, problem="a link that leads nowhere")
     size = path.stat().st_size
@@ -206,7 +208,8 @@ def _read_file(path: Path, name: str, zone: str | None) -> Found | None:
         return Found(name, size, problem=f"cannot be opened ({error.strerror})")
     format_ = recognise(head, path.name)
     if format_ is None:
-        return None if path.suffix.lower() in KNOWN_OTHERS else Found(name, size, problem=_unknown(head))
+        known = path.suffix.lower() in KNOWN_OTHERS
+        return Found(name, size, problem=OTHER if known else _unknown(head))
     try:
         return Found(name, size, format_, read_log(path, read_regular(path, RAW_LIMIT), format_, zone))
     except WildlabError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -45,9 +46,11 @@ class ImageClock:
     block: dict[str, Any] = field(default_factory=dict)
 
 
-def one_camera(images: Found, wanted: str = "") -> tuple[Found, str | None, str]:
-    """The images of one camera: of that whose name has what is wanted, else of the thermal one, else of that
-    with the most.
+def one_camera(
+    images: Found, wanted: str = "", stated: CameraPart | None = None
+) -> tuple[Found, str | None, str]:
+    """The images of one camera: of that whose name has what is wanted, else whose images are as large as
+    those of the stated one, else of the thermal one, else of that with the most.
 
     Parameters
     ----------
@@ -55,6 +58,8 @@ def one_camera(images: Found, wanted: str = "") -> tuple[Found, str | None, str]
         With the part ``photos``.
     wanted
         A part of the camera's name, as the user states it.
+    stated
+        The camera, where the user states it.
 
     Returns
     -------
@@ -74,6 +79,10 @@ def one_camera(images: Found, wanted: str = "") -> tuple[Found, str | None, str]
     if not those:
         known = ", ".join(repr(name) for name in named)
         raise WildlabError(f"no camera's name has {wanted!r}", f"there are {known}", field="--role")
+    if stated is not None and not wanted:
+        columns = images.log.parts["photos"].columns
+        fits = (columns["width_px"] == stated.width_px) & (columns["height_px"] == stated.height_px)
+        those = sorted({str(one) for one in columns["camera"][fits]}) or those
     thermal = [name for name in those if "thermal" in name.lower()]
     chosen = max(thermal or those, key=lambda name: named[name])
     others = ", ".join(
@@ -83,7 +92,7 @@ def one_camera(images: Found, wanted: str = "") -> tuple[Found, str | None, str]
     if others:
         said = (
             f"Of {images.shown} the {named[chosen]} images of {chosen or 'no named camera'} are taken"
-            f"{', the thermal one' if thermal and not wanted else ''}; left out are {others}. "
+            f"{', the thermal one' if len(those) > 1 and thermal else ''}; left out are {others}. "
             f"--role {images.name}=images:NAME takes another camera."
         )
     return replace(images, log=of_camera(images.log, chosen)), chosen, said
@@ -107,10 +116,17 @@ def camera_of_images(
     -------
     camera, and a clause
     """
-    if stated is not None:
-        return stated, "as you stated it"
     if images.log is None:
         return None, images.problem
+    if stated is not None:
+        columns = images.log.parts["photos"].columns
+        sizes = np.column_stack([columns["width_px"], columns["height_px"]])
+        sizes = np.unique(sizes[np.isfinite(sizes).all(axis=1)], axis=0)
+        if len(sizes) and (sizes != (stated.width_px, stated.height_px)).any():
+            seen = ", ".join(f"{w:.0f} x {h:.0f}" for w, h in sizes[:4])
+            own = f"{stated.width_px} x {stated.height_px}"
+            return None, f"the stated camera has {own} px, and they have {seen}"
+        return stated, "as you stated it"
     if focal_px is not None:
         return _by_focal_length(images.log.parts["photos"], focal_px)
     try:
@@ -164,6 +180,7 @@ def clock_of_images(
     own: Found | None,
     stated_offset_s: float | None,
     triggers: tuple[str, Stream] | None = None,
+    others: Sequence[Found] = (),
 ) -> ImageClock:
     """How the images meet the vehicle's log.
 
@@ -180,6 +197,8 @@ def clock_of_images(
         What to add to the stamps, where the user states it.
     triggers
         Name of the recipe's table of triggers, and its rows, where there is one.
+    others
+        Tracks of targets: where the vehicle has no log, they say when the flight was.
 
     Returns
     -------
@@ -203,6 +222,9 @@ def clock_of_images(
             "utc", offset, f"The wall clock of the camera is corrected by {offset:g} s, as you said."
         )
     flown = None if own is None else span_of(own)
+    spans = [span for one in others if (span := span_of(one)) is not None]
+    if own is None and spans:
+        flown = min(span[0] for span in spans), max(span[1] for span in spans)
     if flown is None:
         return ImageClock(
             "utc",

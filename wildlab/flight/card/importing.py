@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.flight.card.found import search, source_folder
+from wildlab.flight.card.found import OTHER, search, source_folder
 from wildlab.flight.card.proposal import Proposal, Wishes
 from wildlab.flight.card.recipe import propose
 from wildlab.flight.card.roles import Choice, choose_roles
@@ -63,7 +63,7 @@ def read_card(
     """
     source = source_folder(paths)
     found = search(paths, source, wishes.zone, tell)
-    if not found:
+    if all(one.problem == OTHER for one in found):
         raise WildlabError("nothing in it is a log or an image", "name the folder of the logs", file=source)
     choices = choose_roles(found, roles)
     try:

@@ -10,6 +10,7 @@ from typing import Any
 
 from wildlab.errors import WildlabError
 from wildlab.flight.card.blocks import has_utc, stream_of
+from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.heights import Heights, Key, heights_of
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.manifest import CameraPart
@@ -75,6 +76,8 @@ class Proposal:
             "# Written by wildlab import. To change it: wildlab import THIS --source FOLDER --into FLIGHT"
         ]
         for one in choices:
+            if one.found.problem == OTHER:
+                continue
             role = one.role + (f" {one.target}" if one.target else "")
             lines.append(_comment(f"{one.found.shown}: {role} ({one.why})"))
         lines += [_comment(one) for one in self.said]

@@ -42,23 +42,18 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     by_role: dict[str, list[Choice]] = {}
     for one in choices:
         by_role.setdefault(one.role, []).append(one)
+    _refuse_without_zone(choices)
     own, camera, receiver = (_only(by_role, role) for role in ("own", "camera", "receiver"))
     triggers, clicks = _only(by_role, "triggers"), by_role.get("clicks", [])
     images = _most_images(by_role.get("images", []))
     proposal = Proposal({"name": wishes.name})
     lens: str | None = None
     if images is not None:
-        found, lens, said = one_camera(images.found, images.target)
+        found, lens, said = one_camera(images.found, images.target, wishes.camera)
         images = replace(images, found=found)
         proposal.said += [said] if said else []
     placed = _placed(images)
     if own is None and camera is None and receiver is None and not placed:
-        if any("without a zone" in one.why for one in choices):
-            raise WildlabError(
-                "the only clock is local time, and nothing says its zone",
-                "state it, as --zone Europe/Oslo or --zone +02:00",
-                field="--zone",
-            )
         raise WildlabError(
             "nothing here says where a camera was",
             "name the log of the flight, or say with --role which file it is",
@@ -82,14 +77,15 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
         add_poses(proposal, sources, camera, "camera")
     if images is not None:
         add_frames(proposal, sources, images, lens, own, triggers, by_role, placed)
-    _uncertainty(proposal, streams)
     _mount(proposal, camera is not None or "camera" in data.get("poses", {}))
     add_targets(proposal, sources, by_role)
     add_seen(proposal, sources, clicks, images, by_role)
+    _uncertainty(proposal, streams)
     data["logs"] = sources.logs
     if "poses" not in data and "gnss" not in data:
+        because = next((f" ({one})" for one in proposal.said if one.startswith("The images are left out")), "")
         raise WildlabError(
-            "nothing here says where a camera was" + (f" ({proposal.said[-1]})" if proposal.said else ""),
+            f"nothing here says where a camera was{because}",
             "add the log of the flight, or say with --role which file it is",
         )
     order = (
@@ -107,6 +103,20 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     )
     proposal.data = {key: data[key] for key in order if key in data} | data
     return proposal
+
+
+def _refuse_without_zone(choices: Sequence[Choice]) -> None:
+    """A log whose clock states no zone may be the vehicle's own: none without an attitude takes its place."""
+    if any(one.role == "own" and one.found.part("poses") is not None for one in choices):
+        return
+    for one in choices:
+        if one.role == "nothing" and "without a zone" in one.why:
+            raise WildlabError(
+                f"the clock of {one.found.shown} is local time, and nothing says its zone",
+                "state it, as --zone Europe/Oslo or --zone +02:00; or leave the file out, as "
+                f"--role {one.found.name}=nothing",
+                field="--zone",
+            )
 
 
 def _only(by_role: Mapping[str, Sequence[Choice]], role: str) -> Choice | None:
@@ -157,7 +167,8 @@ def _uncertainty(proposal: Proposal, streams: Mapping[tuple[str, str], Stream]) 
     """How good poses are, where not each of them says so itself."""
     poses = proposal.data.get("poses", {})
     if any("spreads" not in one for one in poses.values()):
-        proposal.data["uncertainty"], said = uncertainty_of(streams)
+        assumed, said = uncertainty_of(streams)
+        proposal.data["uncertainty"] = assumed | proposal.data.get("uncertainty", {})
         proposal.said.append(said)
     if "imu" in proposal.data:
         proposal.said.append(

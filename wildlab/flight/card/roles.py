@@ -88,7 +88,7 @@ def choose_roles(found: Sequence[Found], stated: Mapping[str, str]) -> list[Choi
             choices[own.name + own.format] = Choice(own, "own", why)
     for one in open_:
         if one is not own:
-            choices[one.name + one.format] = _other(one, own)
+            choices[one.name + one.format] = _other(one, own, images)
     return _named([choices[one.name + one.format] for one in found])
 
 
@@ -146,21 +146,18 @@ def _images(found: Sequence[Found], choices: Mapping[str, Choice]) -> Found | No
 
 
 def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, str]:
-    """The vehicle's own log, with the reason: one with an attitude rather than without, that covers the
-    images, and of those the longest."""
-    turned = [one for one in open_ if one.part("poses") is not None]
-    if not turned:
-        placed = images is not None and images.part("photos") is not None and _has_place(images)
-        if placed or not open_:
-            return None, ""
-        longest = max(open_, key=_duration)
-        only = "it is the only log" if len(open_) == 1 else "no log has an attitude, and it is the longest"
-        return longest, only
-    if len(turned) == 1:
-        return turned[0], "it is the only log with an attitude"
+    """The vehicle's own log, with the reason: what turns, covers the images, triggers, flies and climbs, in
+    this order, and of those that are alike the longest. None where the images have poses of their own and no
+    log turns."""
+    turned = [one for one in open_ if any(one.part(part) is not None for part in ("poses", "gimbal"))]
+    if not turned and (not open_ or (images is not None and _has_place(images))):
+        return None, ""
+    if len(open_) == 1:
+        return open_[0], "it is the only log"
     taken = span_of(images, "photos") if images is not None else None
-    left = list(turned)
+    left, among = list(open_), f"of {len(open_)} logs"
     for said, holds in (
+        ("has an attitude", lambda one: one in turned),
         ("covers the images", lambda one: taken is not None and _overlap(span_of(one), taken) > SHARED_S),
         ("has records of a camera's triggers", lambda one: one.part("triggers") is not None),
         ("is of a vehicle that flies", _flies),
@@ -168,12 +165,13 @@ def _own(open_: Sequence[Found], images: Found | None) -> tuple[Found | None, st
     ):
         those = [one for one in left if holds(one)]
         if len(those) == 1:
-            return those[0], f"of the {len(left)} logs with an attitude it alone {said}"
-        left = those or left
+            return those[0], f"{among} it alone {said}"
+        if those:
+            left, among = those, f"of the {len(those)} logs of which each {said}"
     longest = max(left, key=_duration)
     if sum(_duration(one) > _duration(longest) - SHARED_S for one in left) > 1:
-        return longest, f"{len(left)} logs with an attitude are alike, and it is the first: say with --role"
-    return longest, "of the logs with an attitude it is the longest"
+        return longest, f"{among}, which are alike, it is the first: say with --role which is the vehicle's"
+    return longest, f"{among} it is the longest"
 
 
 #: Words of what flies, in what logs say of their vehicle.
@@ -183,7 +181,7 @@ _FLYING = re.compile(
 
 
 def _flies(one: Found) -> bool:
-    return one.log is not None and bool(_FLYING.search(one.log.vehicle))
+    return one.log is not None and bool(_FLYING.search(f"{one.format} {one.log.vehicle}"))
 
 
 def _climb(one: Found) -> float:
@@ -204,9 +202,15 @@ def _has_place(images: Found) -> bool:
     return photos is not None and "latitude_deg" in photos.columns and bool(photos.used.any())
 
 
-def _other(one: Found, own: Found | None) -> Choice:
+def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
     """A log that is not the vehicle's own."""
     if own is None:
+        apart = _apart(span_of(one), None if images is None else _taken(images))
+        if apart > ZONES_S:
+            why = (
+                f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the images"
+            )
+            return Choice(one, "nothing", why)
         return Choice(one, "target", "the images say where the camera was, and this is another's track")
     mine, theirs = way_of(own), way_of(one)
     if theirs is None or not np.isfinite(theirs.times).any():
@@ -216,9 +220,8 @@ def _other(one: Found, own: Found | None) -> Choice:
     shared = _overlap((mine.times[0], mine.times[-1]), (theirs.times[0], theirs.times[-1]))
     if shared < SHARED_S:
         apart = max(mine.times[0] - theirs.times[-1], theirs.times[0] - mine.times[-1])
-        return Choice(
-            one, "nothing", f"it is of another time: {_lasting(apart)} lie between it and the flight"
-        )
+        why = f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the flight"
+        return Choice(one, "nothing", why)
     distance, above = _distance(mine, theirs)
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
     if distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M:
@@ -229,6 +232,27 @@ def _other(one: Found, own: Found | None) -> Choice:
         "target",
         f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight",
     )
+
+
+#: Clocks on Earth differ by no more than this, s: wall clocks state no zone.
+ZONES_S = 14 * 3600.0
+
+
+def _taken(images: Found) -> tuple[float, float] | None:
+    """When images were taken, by UTC or else by the wall clock of their camera."""
+    stream = images.part("photos")
+    for name in ("time_s", "time_log_s"):
+        column = None if stream is None else stream.columns.get(name)
+        times = np.empty(0) if column is None else np.asarray(column, float)
+        times = times[np.isfinite(times)]
+        if len(times):
+            return float(times.min()), float(times.max())
+    return None
+
+
+def _apart(a: tuple[float, float] | None, b: tuple[float, float] | None) -> float:
+    """Seconds between two stretches of time, 0 where they meet or are not known."""
+    return 0.0 if a is None or b is None else max(0.0, a[0] - b[1], b[0] - a[1])
 
 
 def way_of(one: Found) -> Way | None:
@@ -312,7 +336,7 @@ def _named(choices: list[Choice]) -> list[Choice]:
     named = []
     for one in choices:
         if one.role == "target" and not one.target:
-            stem = re.sub(r"[^A-Za-z0-9_-]+", "-", one.found.name.rsplit("/", 1)[-1].rsplit(".", 1)[0])
+            stem = re.sub(r"[^\w-]+", "-", one.found.name.rsplit("/", 1)[-1].rsplit(".", 1)[0])
             name = base = stem.strip("-_")[:60] or "target"
             number = 2
             while name in taken:

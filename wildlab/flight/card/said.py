@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -9,9 +10,10 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.roles import Choice
 from wildlab.flight.files import printable
-from wildlab.flight.readers.logs.log import Stream
+from wildlab.flight.readers.logs.log import Clock, Stream
 
 #: Headings of `rows_of`.
 HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")
@@ -21,7 +23,7 @@ _REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "
 
 def rows_of(choices: Sequence[Choice]) -> list[list[str]]:
     """A row for each thing that was found, under `HEADINGS`."""
-    return [_row(one) for one in choices]
+    return [_row(one) for one in choices if one.found.problem != OTHER]
 
 
 def _row(choice: Choice) -> list[str]:
@@ -69,7 +71,13 @@ def _times(stream: Stream) -> NDArray[np.float64]:
 def sentences_of(choices: Sequence[Choice]) -> list[str]:
     """What of each thing is not used and why, what was lost, and what its reader noted."""
     said = []
+    others = [one.found.shown for one in choices if one.found.problem == OTHER]
+    if others:
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        said.append(f"No logs by their endings, and not looked at: {', '.join(others[:3])}{more}")
     for one in choices:
+        if one.found.problem == OTHER:
+            continue
         name = one.found.shown
         if one.found.log is None:
             said.append(f"{name} is not used: {printable(one.why)}")
@@ -95,15 +103,26 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
         clock = one.found.log.clock
         # Stamps that are UTC already were brought nowhere.
         if clock is not None and clock.pairs > 2 and (clock.rate != 1.0 or clock.spread_s > 0):
-            ppm = 1e6 * (1 / clock.rate - 1)
-            runs = f"it runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}"
             said.append(
-                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): {runs}, and "
-                f"{1000 * clock.spread_s:.0f} ms are left over (largest {1000 * clock.largest_s:.0f} ms)"
+                f"{name}: its clock was brought to UTC by {clock.base} ({clock.pairs} pairs): "
+                f"{_rate(clock)}, and {1000 * clock.spread_s:.0f} ms are left over "
+                f"(largest {1000 * clock.largest_s:.0f} ms)"
             )
     return said
 
 
+def _rate(clock: Clock) -> str:
+    """How a log's clock runs, as far as its pairs of stamps can tell."""
+    ppm, sd = 1e6 * (1 / clock.rate - 1), 1e6 * clock.rate_sd
+    if clock.rate == 1.0 or (not math.isnan(sd) and abs(ppm) < TOLD * sd):
+        bound = f" to better than {TOLD * sd:.0f} ppm" if 0.5 < sd < 1e6 else ""
+        return f"that it runs fast or slow cannot be told from them{bound}"
+    spread = "" if math.isnan(sd) else f" (standard deviation {sd:.0f})"
+    return f"it runs {abs(ppm):.0f} ppm {'fast' if ppm > 0 else 'slow'}{spread}"
+
+
+#: A rate differs from 1 where it is so many of its standard deviations away from it.
+TOLD = 2.0
 #: As MAVLink numbers them, and all readers with it.
 _FIXES = {2: "level", 3: "in space", 4: "differential", 5: "RTK float", 6: "RTK fixed", 7: "static", 8: "PPP"}
 

@@ -13,6 +13,7 @@ from wildlab.flight.card.blocks import angles, has_utc, position, quantity, stre
 from wildlab.flight.card.images import camera_of_images, clock_of_images
 from wildlab.flight.card.proposal import NO_ANGLE, TIMED, USED, UTC, Proposal, Sources
 from wildlab.flight.card.roles import Choice
+from wildlab.flight.files import printable
 from wildlab.flight.readers.logs.log import Stream
 
 
@@ -46,9 +47,15 @@ def add_frames(
         images.found,
         None if own is None else own.found,
         wishes.camera_offset_s,
-        _triggers(sources, own, triggers),
+        records := _triggers(sources, own, triggers),
+        [one.found for one in by_role.get("target", ())],
     )
     proposal.said.append(clock.said)
+    if records is not None and "triggers" not in clock.block and wishes.camera_offset_s is None:
+        proposal.said.append(
+            f"The {int(records[1].used.sum())} records of triggers are not used: which image belongs to "
+            "which of them is not certain."
+        )
     id_ = "stem" if len(set(_stems(photos))) == len(photos) else "file"
     file = sources.table(images, "photos", "images")
     sources.logs[file] |= clock.block | ({} if lens is None else {"camera": lens})
@@ -90,16 +97,38 @@ def _stems(photos: Stream) -> list[str]:
     return [PurePosixPath(str(one)).stem for one in photos.columns["file"]]
 
 
+def named_as_clicked(proposal: Proposal, by_role: Mapping[str, Sequence[Choice]]) -> dict[str, str]:
+    """Names of targets: where one track and one clicked name are left over, they are the same thing."""
+    tracks = [one.target for one in by_role.get("target", ())]
+    marked = {
+        str(name) for one in by_role.get("marks", ()) for name in stream_of(one, "marks").columns["name"]
+    }
+    clicked = {
+        str(name)
+        for one in by_role.get("clicks", ())
+        for name in stream_of(one, "clicks").columns.get("name", ())
+        if str(name)
+    }
+    left, names = [one for one in tracks if one not in clicked], clicked - marked - set(tracks)
+    if len(left) != 1 or len(names) != 1:
+        return {}
+    name = names.pop()
+    said = f"The track {left[0]} is taken for what was clicked as {printable(name)}: no other is left."
+    proposal.said.append(said)
+    return {left[0]: name}
+
+
 def add_targets(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[Choice]]) -> None:
     """Truth: tracks of targets, and points that do not move."""
     truth = []
-    for one in by_role.get("target", ()):
+    names = named_as_clicked(proposal, by_role)
+    for number, one in enumerate(by_role.get("target", ()), 1):
         part = "gnss" if one.found.part("gnss") is not None else "poses"
         stream = stream_of(one, part)
         block: dict[str, Any] = {
-            "file": sources.table(one, part, f"target-{one.target}"),
+            "file": sources.table(one, part, f"target-{number}"),
             "where": USED,
-            "target": one.target,
+            "target": names.get(one.target, one.target),
             "time": UTC,
             "position": position(),
         }
@@ -177,11 +206,23 @@ def _level(proposal: Proposal, sources: Sources, by_role: Mapping[str, Sequence[
     if not heights:
         return _take_off(proposal, sources)
     mean, spread = float(np.mean(heights)), float(np.ptp(heights))
+    if len(heights) > 1 and spread > 0:
+        uncertain_plane(proposal, float(np.std(heights, ddof=1)))
     proposal.said.append(
         f"The ground is taken to be level at the mean height of {len(heights)} surveyed points, which differ "
         f"by {spread:.1f} m. An elevation map does better: --terrain."
     )
     return math.floor(mean * 1000 + 0.5) / 1000
+
+
+#: How far level ground beside a take-off is assumed to be from its height, standard deviation, m.
+TAKE_OFF_SD_M = 5.0
+
+
+def uncertain_plane(proposal: Proposal, sd_m: float) -> None:
+    """The ground's height is as uncertain as that: ellipses know it."""
+    part = proposal.data.setdefault("uncertainty", {})
+    part["plane_height_m"] = round(max(sd_m, 0.01), 3)
 
 
 def _take_off(proposal: Proposal, sources: Sources) -> float | None:
@@ -194,6 +235,7 @@ def _take_off(proposal: Proposal, sources: Sources) -> float | None:
         of_home = (stream.columns[f"height_{chosen.kind}_m"] + chosen.add_m - home)[stream.used]
         of_home = of_home[np.isfinite(of_home)]
         if len(of_home):
+            uncertain_plane(proposal, TAKE_OFF_SD_M)
             proposal.said.append(
                 "The ground is taken to be level and as high as the take-off, since nothing says how high it "
                 "is. An elevation map does better: --terrain."

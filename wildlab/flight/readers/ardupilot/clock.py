@@ -184,4 +184,4 @@ def _stamped(tables: dict[str, Table]) -> tuple[Table, Array] | None:
 def _clock(own: Array, utc: Array) -> Clock:
     fit = fit_steady(own, utc, resolution_s=LOOP_S)
     largest = float(np.abs(fit.residual[fit.used]).max())
-    return Clock("GPS weeks", fit.rate, fit.offset_s, fit.spread_s, largest, int(fit.used.sum()))
+    return Clock("GPS weeks", fit.rate, fit.offset_s, fit.spread_s, largest, int(fit.used.sum()), fit.rate_sd)

@@ -285,4 +285,6 @@ def _fraction(own: Array, whole: Array, base: str, notes: list[str]) -> tuple[Ar
     left = np.concatenate([one.residual[one.used] for one in fits])
     fit = max(fits, key=lambda one: int(one.used.sum()))
     spread = max(one.spread_s for one in fits)
-    return time, Clock(base, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left))
+    return time, Clock(
+        base, fit.rate, fit.offset_s, spread, float(np.abs(left).max()), len(left), fit.rate_sd
+    )

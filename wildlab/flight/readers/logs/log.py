@@ -6,6 +6,7 @@ column of what they count from, and are not converted here; rows that cannot be 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -84,6 +85,8 @@ class Clock(NamedTuple):
         Robust standard deviation and largest absolute value of what is left over.
     pairs
         From how many pairs of stamps.
+    rate_sd
+        Standard deviation of the rate; NaN where it was not estimated, or taken for 1.
     """
 
     base: str
@@ -92,6 +95,7 @@ class Clock(NamedTuple):
     spread_s: float = 0.0
     largest_s: float = 0.0
     pairs: int = 0
+    rate_sd: float = math.nan
 
 
 @dataclass(frozen=True)

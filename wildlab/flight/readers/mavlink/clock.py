@@ -96,7 +96,9 @@ def find_boot(frames: Frames, system: int, component: int) -> Boot | None:
     fit = fits[main]
     left = np.abs(fit.residual[fit.used])
     base = "UTC of the messages SYSTEM_TIME" if from_vehicle[main] else "times of receipt"
-    clock = Clock(base, fit.rate, fit.offset_s, fit.spread_s, float(left.max()), int(fit.used.sum()))
+    clock = Clock(
+        base, fit.rate, fit.offset_s, fit.spread_s, float(left.max()), int(fit.used.sum()), fit.rate_sd
+    )
     late = received - np.array([one.offset_s for one in fits])[_runs(starts, len(own))]
     late = late - np.array([one.rate for one in fits])[_runs(starts, len(own))] * own
     notes = _notes(unix[said], told.received_s[said], believed, len(starts), late, from_vehicle[main])

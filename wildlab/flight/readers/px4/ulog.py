@@ -124,7 +124,7 @@ def _clock(fit: ClockFit | None, topics: dict[str, Topic]) -> Clock | None:
         return Clock("") if topics else None
     left = float(np.abs(fit.residual[fit.used]).max())
     base = "UTC of the receiver"
-    return Clock(base, fit.rate, fit.offset_s, fit.spread_s, left, int(fit.used.sum()))
+    return Clock(base, fit.rate, fit.offset_s, fit.spread_s, left, int(fit.used.sum()), fit.rate_sd)
 
 
 def _vehicle(about: dict[str, object]) -> str:

@@ -94,7 +94,9 @@ def _clock(stream: Stream) -> Clock | None:
         return None
     fit = fit_clock(own, time)
     largest = float(np.nanmax(np.abs(fit.residual)))
-    return Clock("UTC of the log", fit.rate, fit.offset_s, fit.spread_s, largest, int(fit.used.sum()))
+    return Clock(
+        "UTC of the log", fit.rate, fit.offset_s, fit.spread_s, largest, int(fit.used.sum()), fit.rate_sd
+    )
 
 
 def _weeks_through(itow: NDArray[Any]) -> Array:
