@@ -76,7 +76,11 @@ def test_a_twin_by_hand_is_the_one_of_its_seed(tmp_path: Path, monkeypatch: pyte
     assert ours.imu is not None and ours.imu.equals(theirs.imu)
 
 
-OF_FLIGHTS = {"repeat-sightings.ipynb": "gating"}
+OF_FLIGHTS = {
+    "repeat-sightings.ipynb": "gating",
+    "overview.ipynb": "large-ship",
+    "tracking.ipynb": "large-ship",
+}
 
 
 def by_notebook() -> dict[str, StudyEntry]:

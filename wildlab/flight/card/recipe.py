@@ -83,7 +83,8 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     _uncertainty(proposal, streams)
     data["logs"] = sources.logs
     if "poses" not in data and "gnss" not in data:
-        because = next((f" ({one})" for one in proposal.said if one.startswith("The images are left out")), "")
+        left_out = [one for one in proposal.said if one.startswith("The images are left out")]
+        because = f" ({left_out[0]})" if left_out else ""
         raise WildlabError(
             f"nothing here says where a camera was{because}",
             "add the log of the flight, or say with --role which file it is",
