@@ -181,9 +181,10 @@ def test_a_flight_of_which_nothing_can_be_judged_has_its_overview(
     assert outcome.state == "done" and outcome.name == "small-flight-overview"
     said = json.loads((tmp_path / "reports" / outcome.name / "provenance.json").read_text())["parameters"]
     assert said["beside"] == []
-    first, second = said["lacking"]
+    first, second, third = said["lacking"]
     assert first.startswith("georeferencing (it lacks detections of kind pixel and truth")
     assert second.startswith("navigation (it lacks inertial measurements (imu)")
+    assert third.startswith("tracking (")
 
 
 def lacking(flight: Flight) -> str:
