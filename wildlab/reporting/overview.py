@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wildlab.evaluation.vibration import FLOOR_HZ, SMOOTH_HZ
+from wildlab.evaluation.vibration import FLOOR_HZ, HARMFUL, SMOOTH_HZ
 from wildlab.flight.clocks import MAX_GAP_S, USUAL_STEPS
+from wildlab.pipeline.overviews.alarms import APART_M, APART_SD, APART_SHARE, JUMP, JUMP_M, LEANT_DEG
 from wildlab.pipeline.overviews.image_coverage import FLATTEST
-from wildlab.pipeline.overviews.overview import JUMP, JUMP_M, Overview, troubled_for
-from wildlab.pipeline.overviews.worth_fixing import LEVELS, LISTED, MOST, WORTH, Gain, Numbers, verdict_of
+from wildlab.pipeline.overviews.overview import Overview, troubled_for
+from wildlab.pipeline.overviews.worth_fixing import (
+    LEVELS,
+    LISTED,
+    MOST,
+    WORTH,
+    Gain,
+    Numbers,
+    error_measured,
+    possible_gain,
+    verdict_of,
+)
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
 from wildlab.reporting.charts import overview as charts
@@ -43,14 +54,16 @@ def show_overview(
         How many of the other reports there are.
     """
     problems = overview.problems + sum(one.startswith("problem") for one in amiss)
-    worth = sum(gain.share >= WORTH for gain in gains)
-    troubled = len(troubled_for(overview, WORTH))
-    word = verdict_of(problems, worth, troubled, judged)
+    possible = possible_gain(numbers)
+    counts = counts_of(overview, gains, problems, judged, possible)
+    word = verdict_of(**counts)
     shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
-    report.summary(words.summary_sentences(overview, word, gains, problems, lacking), level=LEVELS[word])
+    measured = error_measured(numbers)
+    said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible)
+    report.summary(said, level=LEVELS[word])
     report.tiles(sections.tiles(overview))
-    report.section("Most worth fixing", words.first_of(gains))
+    report.section("Most worth fixing", words.first_of(gains, possible))
     if gains:
         report.points([words.gain_sentence(gain) for gain in gains[:MOST]], ordered=True)
     if overview.problems:
@@ -65,27 +78,37 @@ def show_overview(
     sections.satellites_section(report, overview, clock)
     sections.shaking_section(report, overview, clock)
     sections.clocks_section(report, overview, numbers)
-    record(report, overview, gains, problems, worth, judged)
+    record(report, overview, gains, counts)
     report.limits(limits(overview, lacking))
     report.method(METHOD)
 
 
-def record(
-    report: Report, overview: Overview, gains: Sequence[Gain], problems: int, worth: int, judged: int
-) -> None:
+def counts_of(
+    overview: Overview, gains: Sequence[Gain], problems: int, judged: int, possible: Gain | None
+) -> dict[str, int]:
+    """What the verdict follows from: the arguments of `verdict_of`."""
+    long = troubled_for(overview, WORTH)
+    paused = [one for one in overview.troubles if one.what == "no poses" and one not in long]
+    return {
+        "problems": problems,
+        "worth": sum(gain.share >= WORTH for gain in gains),
+        "troubled": len(long) + len(paused) + (possible is not None),
+        "judged": judged,
+        "broken": sum(one.broken for one in overview.alarms),
+        "alarmed": sum(not one.broken for one in overview.alarms),
+    }
+
+
+def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Mapping[str, int]) -> None:
     """The numbers of the overview, for other tools: comparisons and the list of flights read them."""
 
     def note(name: str, value: float, unit: str, n: int | None = None) -> None:
         if np.isfinite(value):
             report.metric(name, FLIGHT, value, unit, n=n)
 
-    for name, count in (
-        ("problems", problems),
-        ("worth_fixing", worth),
-        ("troubled", len(troubled_for(overview, WORTH))),
-        ("reports_beside", judged),
-    ):
-        note(name, count, "1")
+    named = {"worth": "worth_fixing", "judged": "reports_beside"}
+    for name, count in counts.items():
+        note(named.get(name, name), count, "1")
     note("duration", overview.length_s, "s")
     note("path_length", words.way_of(overview), "m")
     if overview.above is not None and np.isfinite(overview.above[0]).any():
@@ -131,7 +154,12 @@ def limits(overview: Overview, lacking: Sequence[str]) -> list[str]:
 METHOD = f"""
 Stamps are those of the tables, with the offsets of the manifest. A pause is a step longer than
 {MAX_GAP_S:g} s and than {USUAL_STEPS:g} usual steps. Poses jump where a step is off by more than {JUMP:g}
-times the usual difference, and {JUMP_M:g} m, from what the stated speeds before and after it make of it.
+times the usual difference, and {JUMP_M:g} m, from what the stated speeds before and after it make of it;
+without speeds, from both the step before and the step after.
+
+What comes before all gains: jumps; an airframe that leans by more than {LEANT_DEG:g}°; shaking beyond
+{HARMFUL:g} m/s²; poses more than {APART_M:g} m, and {APART_SD:g} stated standard deviations, beside more than
+{100 * APART_SHARE:g} % of the satellite positions.
 
 Shaking is measured as ArduPilot does for its VIBE message: the specific force less its own low pass of
 {FLOOR_HZ:g} Hz, squared, smoothed below {SMOOTH_HZ:g} Hz, and the root of that. By band it is Welch's

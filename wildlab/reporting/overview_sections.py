@@ -7,6 +7,7 @@ import pandas as pd
 
 from wildlab.evaluation.vibration import FINE, HARMFUL
 from wildlab.flight.clocks import gnss_times
+from wildlab.pipeline.overviews.alarms import beside_satellites
 from wildlab.pipeline.overviews.overview import Overview
 from wildlab.pipeline.overviews.worth_fixing import Numbers
 from wildlab.reporting import overview_words as words
@@ -220,13 +221,10 @@ def differences(overview: Overview) -> str:
     path, gnss = overview.path, overview.flight.gnss
     if path is None or not path.who.startswith("nav/") or not path.timed or gnss is None:
         return ""
-    times = gnss_times(overview.flight)
-    place = gnss[["north_m", "east_m", "down_m"]].to_numpy(float)
-    inside = (times >= path.times[0]) & (times <= path.times[-1]) & np.isfinite(place).all(axis=1)
-    if not inside.any():
+    gaps = overview.streams[path.who].gaps
+    _, off, _ = beside_satellites(overview.flight, path.times, path.place, gaps)
+    if not len(off):
         return ""
-    own = np.stack([np.interp(times[inside], path.times, column) for column in path.place.T], axis=1)
-    off = own - place[inside]
     level, up = np.hypot(off[:, 0], off[:, 1]), -off[:, 2]
     if np.median(np.abs(off)) < SAME_M:
         return f"The poses of {charts.path_name(path)} have the positions of the satellites."

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.vibration import FINE, HARMFUL, Vibration
+from wildlab.pipeline.overviews.alarms import Alarm
 from wildlab.pipeline.overviews.image_coverage import Coverage
 from wildlab.pipeline.overviews.overview import Overview, Trouble, troubled_for
-from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
+from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, MOST, SOUND, WORTH, Gain
 from wildlab.reporting.georeferencing_cause import listed, metres
 from wildlab.reporting.text import percent
 
@@ -110,22 +111,91 @@ def gain_sentence(gain: Gain) -> str:
     return f"**{gain_title(gain)}.** {gain_measured(gain)} {_REMEDIES[gain.key]}"
 
 
-def headline(overview: Overview, word: str, gains: Sequence[Gain], problems: int) -> str:
+def alarm_words(alarm: Alarm, overview: Overview) -> str:
+    """One alarm as a clause: how much, and when since the first stamp."""
+    begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
+    at, share = f"{alarm.worst - begin:.0f} s", percent(alarm.share, 1)
+    if alarm.what == "jumps":
+        if alarm.count == 1:
+            return f"the position jumps once, at {at}, by {length_words_fine(alarm.size)}"
+        first = f"first at {alarm.first - begin:.0f} s"
+        size = length_words_fine(alarm.size)
+        return f"the position jumps {alarm.count} times, {first}, by up to {size} at {at}"
+    if alarm.what == "leans":
+        return (
+            f"it leans by {alarm.size:.0f}° at {at} (by more than {alarm.limit:g}° in {share} of the poses)"
+        )
+    if alarm.what == "shakes":
+        return (
+            f"it shakes by {alarm.size:.1f} m/s² at {at} (by more than {alarm.limit:g} m/s² in {share} of "
+            "the samples)"
+        )
+    return (
+        f"the poses contradict {share} of the satellite positions, by up to "
+        f"{length_words_fine(alarm.size)} at {at}"
+    )
+
+
+def length_words_fine(metres: float) -> str:
+    """``6.7 m``, ``113 m``, ``3.4 km``."""
+    return f"{metres:.1f} m" if metres < 100 else length_words(metres)
+
+
+def headline(
+    overview: Overview,
+    word: str,
+    gains: Sequence[Gain],
+    problems: int,
+    measured: bool = True,
+    possible: Gain | None = None,
+) -> str:
     """The first sentence: what the flight comes to."""
+    if word == ALARM:
+        return f"Something went wrong on this flight: {alarm_words(overview.alarms[0], overview)}."
     if word == MEND:
-        some = "one thing" if problems == 1 else f"{problems} things"
+        some = _problem_words(problems)
         return f"Mend this flight first: {some} in it cannot be used or contradict each other."
     if word == FIX:
         worth = [gain for gain in gains if gain.share >= WORTH]
         first = _lower(gain_title(worth[0]))
         more = f", and {len(worth) - 1} more" if len(worth) > 1 else ""
         return f"Something is worth fixing: {first}{more}."
+    if word == LOOK and overview.alarms:
+        return f"Look closer: {alarm_words(overview.alarms[0], overview)}."
     if word == LOOK:
-        longest = troubled_for(overview, WORTH)[0]
-        return f"Look closer: {longest.what} for {trouble_share(overview, longest)} of the time."
+        longest = [
+            *troubled_for(overview, WORTH),
+            *(one for one in overview.troubles if one.what == "no poses"),
+        ]
+        if longest:
+            return f"Look closer: {_lasting(overview, longest[0])}."
+        return f"Look closer: {_possible_words(possible)}." if possible else "Look closer."
+    if word == SOUND and not measured:
+        return (
+            f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its data; how far off "
+            "its positions are was not measured."
+        )
     if word == SOUND:
         return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
     return "This flight is shown, not judged: none of the other reports could be made of it."
+
+
+def _problem_words(problems: int) -> str:
+    return "one thing" if problems == 1 else f"{problems} things"
+
+
+def _lasting(overview: Overview, trouble: Trouble) -> str:
+    share = trouble_share(overview, trouble)
+    if trouble.seconds and share.startswith("0 "):
+        return f"{trouble.what} for {trouble.seconds:.1f} s"
+    return f"{trouble.what} for {share}" + ("" if share == INSTANT else " of the time")
+
+
+def _possible_words(gain: Gain) -> str:
+    return (
+        f"taking a constant error off may gain {metres(gain.value, gain.low, gain.high)} of a mean error of "
+        f"{metres(gain.of)}, which is not certain; the report on the georeferencing says more"
+    )
 
 
 def _lower(text: str) -> str:
@@ -133,18 +203,37 @@ def _lower(text: str) -> str:
 
 
 def summary_sentences(
-    overview: Overview, word: str, gains: Sequence[Gain], problems: int, lacking: Sequence[str]
+    overview: Overview,
+    word: str,
+    gains: Sequence[Gain],
+    problems: int,
+    lacking: Sequence[str],
+    measured: bool = True,
+    possible: Gain | None = None,
 ) -> list[str]:
-    """The summary: the verdict, its measure, and what could not be judged."""
-    said = [headline(overview, word, gains, problems)]
+    """The summary: the verdict, its measure, and what could not be judged.
+
+    ``measured``: whether any report measured how far off positions are; ``possible``: a gain that is not
+    certain.
+    """
+    first = headline(overview, word, gains, problems, measured, possible)
+    said = [first]
+    more = [clause for one in overview.alarms if (clause := alarm_words(one, overview)) not in first]
+    if more:
+        said.append(f"Also: {'; '.join(more)}.")
+    if problems and word != MEND:
+        said.append(f"Besides, {_problem_words(problems)} in it cannot be used or contradict each other.")
     if gains:
-        what = "" if word == FIX else f"The most: {_lower(gain_title(gains[0]))}. "
+        what = "" if word == FIX else f"The most to gain: {_lower(gain_title(gains[0]))}. "
         said.append(f"{what}{gain_measured(gains[0])}")
-    elif word != SOUND:
+    elif word != SOUND and not possible:
         said.append("No gain was measured that mending anything would bring.")
-    if overview.troubles and word != LOOK:
-        longest = max(overview.troubles, key=lambda one: one.seconds)
-        said.append(f"Along the path: {longest.what} for {trouble_share(overview, longest)} of the time.")
+    if possible and _possible_words(possible) not in first:
+        said.append(f"Possible: {_possible_words(possible)}.")
+    # Jumps are instants and have been said.
+    lasting = [one for one in overview.troubles if one.seconds >= 1 and one.what not in first]
+    if lasting:
+        said.append(f"Along the path: {_lasting(overview, max(lasting, key=lambda one: one.seconds))}.")
     if lacking:
         said.append(f"Not judged: {'; '.join(lacking)}.")
     return said
@@ -169,19 +258,39 @@ def _any(values: np.ndarray) -> bool:
 
 
 def path_title(overview: Overview) -> str:
-    """What is wrong along the path, in a line."""
+    """What is wrong along the path, in a line; where nothing is, of what it was looked for."""
+    if not overview.searched:
+        return "What may be wrong along the path was not looked at"
+    jumps = next((one for one in overview.troubles if one.what == "position jumps"), None)
+    if jumps is not None:
+        return "Along the path: " + (
+            "the position jumps" if len(jumps.spells) == 1 else f"{len(jumps.spells)} jumps"
+        )
+    if overview.alarms and not overview.troubles:
+        return f"Along the path: {_SHORT[overview.alarms[0].what]}"
     if not overview.troubles:
-        return "Nothing wrong was found along the path"
+        return f"Nothing wrong was found in {listed(list(overview.searched))}"
     worst = max(overview.troubles, key=lambda one: one.seconds)
     if not np.isfinite(overview.length_s) or overview.length_s <= 0 or worst.seconds < 1:
         return f"Along the path: {worst.what}"
     return f"{trouble_share(overview, worst)} of the time: {worst.what}"
 
 
+#: Alarms in a word or two.
+_SHORT = {
+    "jumps": "the position jumps",
+    "leans": "leans",
+    "apart": "poses beside the satellites",
+    "shakes": "shakes",
+}
+#: What lasts for no time.
+INSTANT = "an instant"
+
+
 def trouble_share(overview: Overview, trouble: Trouble) -> str:
     """Share of the time; an instant has none."""
     if not trouble.seconds or not overview.length_s > 0:
-        return "an instant"
+        return INSTANT
     return percent(min(1.0, trouble.seconds / overview.length_s), 0)
 
 
@@ -274,11 +383,13 @@ def bands_title(found: Vibration) -> str:
     return f"Most of it is between {low:.0f} and {high:.0f} Hz"
 
 
-def first_of(gains: Sequence[Gain]) -> str:
+def first_of(gains: Sequence[Gain], possible: Gain | None = None) -> str:
     """What is said above the list."""
     shown = min(MOST, len(gains))
     if not gains:
-        return "Nothing was measured that would gain metres, or bring back data."
+        if possible:
+            return f"No gain is certain. Possible: {_possible_words(possible)}."
+        return "Nothing was measured that would gain metres for certain, or bring back data."
     of = f" of {len(gains)}" if len(gains) > shown else ""
     order = "by the share of the error or of the data that each would gain"
     return f"{shown}{of}, {order}. Only what was measured is listed."

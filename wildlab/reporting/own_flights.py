@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
+from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
 from wildlab.reporting.overview_words import duration_words
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.text import NOTHING, escape
@@ -15,7 +15,7 @@ from wildlab.reporting.text import NOTHING, escape
 PAGE = "flights.html"
 #: What the verdict follows from, of the overview.
 COUNTS = ("problems", "worth_fixing", "troubled", "reports_beside")
-_PILLS = {MEND: "no", FIX: "part", LOOK: "part", SOUND: "yes", UNJUDGED: ""}
+_PILLS = {ALARM: "no", MEND: "no", FIX: "part", LOOK: "part", SOUND: "yes", UNJUDGED: ""}
 
 
 class OwnReport(NamedTuple):
@@ -76,7 +76,9 @@ class OwnFlight(NamedTuple):
         if any(count is None for count in counts):
             return None
         problems, worth, troubled, judged = (int(count or 0) for count in counts)
-        return verdict_of(problems, worth, troubled, judged)
+        # Overviews of before these were computed do not have them.
+        broken, alarmed = (int(self.value(name, "flight") or 0) for name in ("broken", "alarmed"))
+        return verdict_of(problems, worth, troubled, judged, broken, alarmed)
 
     @property
     def finished(self) -> str:
@@ -135,10 +137,11 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
     if comparison:
         parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
     meanings = {
+        ALARM: "its position jumps, or it leans as nobody flies on purpose",
         MEND: "something in its tables cannot be used or contradicts itself",
         FIX: "a gain was measured that is worth it",
-        LOOK: "something is wrong along the path for long, and what mending it gains was not measured",
-        SOUND: "it was judged, and neither is so",
+        LOOK: "something is wrong along the path, and what mending it gains was not measured for certain",
+        SOUND: "it was judged, and none of these is so",
         UNJUDGED: "no other report could be made of it",
     }
     legend = "; ".join(f"<b>{word}</b>: {meaning}" for word, meaning in meanings.items())

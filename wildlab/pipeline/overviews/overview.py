@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.evaluation.streams import Pace, pace_of, runs_of
@@ -18,13 +17,12 @@ from wildlab.flight.checks.check import Use, find, usable_for
 from wildlab.flight.clocks import frame_times, gnss_times, longest_gap
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import matrix_to_euler, quaternion_to_matrix
+from wildlab.pipeline.overviews.alarms import QUATERNION, VELOCITY, Alarm, alarms_of, jumps_of
 from wildlab.pipeline.overviews.image_coverage import Coverage, cover_images, ground_height
 from wildlab.pipeline.overviews.lost import POSITION, Recovered, detections_of, lost_data, ordered
 
 Array = NDArray[np.float64]
 
-QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
-VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 FORCE = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2"]
 RATE = ["w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
 #: Poses that are shown where nobody names some, best first; any other before the truth of a twin.
@@ -33,9 +31,6 @@ PREFERRED = ("logged", "onboard", "autopilot")
 FEW_SATELLITES = 6
 #: A position that is this many times as uncertain as it usually is.
 UNSURE = 3.0
-#: A step between poses that is off by so many usual differences, and so many metres, from what their speeds
-#: make of it.
-JUMP, JUMP_M = 8.0, 3.0
 #: What may be wrong on a path, worst first.
 TROUBLES = (
     "no poses",
@@ -86,8 +81,12 @@ class Overview:
         From the first to the last stamp of what was carried, s; NaN where there is no time.
     path
         Where it flew, or the nearest to that which is known.
+    alarms
+        What is so wrong that it comes before all else, worst first.
     troubles
         Those of `TROUBLES` that there are.
+    searched
+        Of what troubles were looked for: ``poses``, ``satellites``, ``inertial samples``.
     series
         Over time: ``height``, ``speed``, ``attitude``, ``turning``, each {name: (times, values)}.
     above
@@ -111,7 +110,9 @@ class Overview:
     streams: dict[str, Pace]
     length_s: float
     path: Path | None
+    alarms: tuple[Alarm, ...]
     troubles: tuple[Trouble, ...]
+    searched: tuple[str, ...]
     series: dict[str, dict[str, tuple[Array, Array]]]
     above: tuple[Array, str] | None
     vibration: tuple[Vibration, Array] | None
@@ -189,7 +190,9 @@ def look_over(flight: Flight, source: str | None = None) -> Overview:
         streams=streams,
         length_s=float(length),
         path=path,
+        alarms=tuple(alarms_of(flight, source, streams.get(f"nav/{source}"), vibration)) if timed else (),
         troubles=tuple(_troubles(flight, source, streams, vibration)) if timed else (),
+        searched=_searched(flight, source, streams) if timed else (),
         series=_series(flight) if timed else {},
         above=_above(flight, path),
         vibration=vibration,
@@ -258,7 +261,7 @@ def _troubles(
     nav = flight.nav.get(source) if source is not None else None
     if nav is not None and "frame_id" not in nav:
         found["no poses"] = streams[f"nav/{source}"].gaps
-        found["position jumps"] = _jumps(nav, streams[f"nav/{source}"])
+        found["position jumps"] = jumps_of(nav, streams[f"nav/{source}"])[0]
     if flight.gnss is not None and "gnss" in streams:
         gnss, stamps = flight.gnss, gnss_times(flight)
         found["no satellite positions"] = streams["gnss"].gaps
@@ -276,24 +279,13 @@ def _troubles(
     return [Trouble(what, found[what]) for what in TROUBLES if len(found.get(what, ()))]
 
 
-def _jumps(nav: pd.DataFrame, pace: Pace) -> Array:
-    """Steps between poses that the speeds before and after do not explain."""
-    if not set(VELOCITY) <= set(nav):
-        return np.empty((0, 2))
-    t, values = ordered(nav, nav["time_s"].to_numpy(float), POSITION + VELOCITY)
-    if len(t) < 3:
-        return np.empty((0, 2))
-    step = np.diff(t)[:, None]
-    off = np.linalg.norm(
-        np.diff(values[:, :3], axis=0) - (values[1:, 3:] + values[:-1, 3:]) / 2 * step, axis=1
-    )
-    usual = float(np.median(off))
-    far = (off > max(JUMP * usual, JUMP_M)) & (step[:, 0] <= MOST_STEPS * pace.step_s)
-    return np.stack([t[:-1][far], t[1:][far]], axis=1)
-
-
-#: Steps longer than so many usual ones are pauses, over which speeds explain nothing.
-MOST_STEPS = 3.0
+def _searched(flight: Flight, source: str | None, streams: dict[str, Pace]) -> tuple[str, ...]:
+    """Of what there is enough to look for troubles in."""
+    posed = source is not None and "frame_id" not in flight.nav[source]
+    there = {"poses": posed and streams[f"nav/{source}"].n > 1}
+    for name, of in (("satellites", "gnss"), ("inertial samples", "imu")):
+        there[name] = of in streams and streams[of].n > 1
+    return tuple(name for name, some in there.items() if some)
 
 
 def _series(flight: Flight) -> dict[str, dict[str, tuple[Array, Array]]]:

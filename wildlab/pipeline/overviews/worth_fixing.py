@@ -20,9 +20,9 @@ LISTED, WORTH = 0.005, 0.1
 MOST = 3
 
 #: What a flight comes to, and the colour of it.
-MEND, FIX, LOOK = "mend first", "worth fixing", "look closer"
+ALARM, MEND, FIX, LOOK = "went wrong", "mend first", "worth fixing", "look closer"
 SOUND, UNJUDGED = "sound", "not judged"
-LEVELS = {MEND: "bad", FIX: "warn", LOOK: "warn", SOUND: "good", UNJUDGED: "neutral"}
+LEVELS = {ALARM: "bad", MEND: "bad", FIX: "warn", LOOK: "warn", SOUND: "good", UNJUDGED: "neutral"}
 
 #: Which parameters of a calibration tell which cause, by the names of their metrics.
 CAUSES = {
@@ -136,7 +136,37 @@ def _data(lost: Recovered) -> Gain:
     )
 
 
-def verdict_of(problems: int, worth: int, troubled: int, judged: int) -> str:
+def error_measured(numbers: Numbers) -> bool:
+    """Whether any report beside measured how far off positions on the ground are."""
+    return any(name == "horizontal_error_mean" and _known(one["value"]) for (name, _), one in numbers.items())
+
+
+def possible_gain(numbers: Numbers) -> Gain | None:
+    """What taking a constant error off may gain, where that is not certain; None where it is, or is small.
+
+    Parameters
+    ----------
+    numbers
+        Of the flight's other reports, from `numbers_of`.
+
+    Returns
+    -------
+    Gain or None
+        Of `WORTH` of the mean error as logged, or more.
+    """
+    gain, before = numbers.get(("gain", "winner")), numbers.get(("horizontal_error_mean", "logged-pose"))
+    if gain is None or before is None or not _known(gain["value"], before["value"]):
+        return None
+    if ("horizontal_error_mean", "calibrated-pose") in numbers or gain["value"] < WORTH * before["value"]:
+        return None
+    low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
+    value, of = float(gain["value"]), float(before["value"])
+    return Gain("possible", (), value, low, high, "m", of, "mean error", value / of if of > 0 else 0.0, "")
+
+
+def verdict_of(
+    problems: int, worth: int, troubled: int, judged: int, broken: int = 0, alarmed: int = 0
+) -> str:
     """What a flight comes to, in a word or two.
 
     Parameters
@@ -146,9 +176,12 @@ def verdict_of(problems: int, worth: int, troubled: int, judged: int) -> str:
     worth
         Gains of `WORTH` or more.
     troubled
-        Things that are wrong along the path for that share of the time or more.
+        Things that ask for a closer look: wrong along the path for that share of the time or more, poses
+        that pause, gains that are possible and not certain.
     judged
         Its other reports.
+    broken, alarmed
+        Alarms by which the flight or its poses went wrong for certain, and others.
 
     Returns
     -------
@@ -159,9 +192,15 @@ def verdict_of(problems: int, worth: int, troubled: int, judged: int) -> str:
     --------
     >>> verdict_of(0, 2, 0, 1), verdict_of(1, 0, 0, 0), verdict_of(0, 0, 0, 0)
     ('worth fixing', 'mend first', 'not judged')
+    >>> verdict_of(1, 2, 0, 1, broken=1), verdict_of(0, 2, 0, 1, alarmed=1)
+    ('went wrong', 'look closer')
     """
+    if broken:
+        return ALARM
     if problems:
         return MEND
+    if alarmed:
+        return LOOK
     if worth:
         return FIX
     if troubled:
