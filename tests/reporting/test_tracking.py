@@ -16,7 +16,8 @@ def rows(**changes: object) -> pd.DataFrame:
     """A white and a Schmidt track of one boat."""
     base = {
         "sensor": "radar", "kind": "range-bearing", "target": "boat", "detections": 100, "compared": 100,
-        "rmse": 4.0, "mae": 3.0, "rmse_speed": 0.5, "nees_low": 0.5, "nees_high": 5.0, "nees_worth": 4.0,
+        "used": 100, "wait": 1.0, "without": 0, "rmse_without": np.nan,
+        "rmse": 4.0, "mae": 3.0, "rmse_speed": 0.5, "nees_low": 0.5, "nees_high": 5.0, "nees_worth": 6.0,
         "inside": 0.9, "inside_low": 0.6, "inside_high": 1.0, "nis": 2.0, "nis_low": 1.7, "nis_high": 2.3,
         "nis_worth": 90.0, "nis_verdict": "consistent", "dof": 2.0, "lag1": 0.1, "lag1_bound": 0.2,
         "followed": 1.0,
@@ -71,3 +72,42 @@ def test_what_is_assumed_is_counted() -> None:
     assert words.assumed_sentence(said).startswith("1 of 2 values")
     assert words.assumed_sentence(said[1:]).startswith("All that the filters were told is stated")
     assert words.said_table(said[::-1])["source"].tolist() == ["assumed: rough", "stated"]
+
+
+def test_what_few_values_say_is_neither_green_nor_red() -> None:
+    said, level = words.summary(rows(nees_worth=4.0), [], None)
+    assert "consistent, on few independent values." in said[0] and level == "neutral"
+    said, level = words.summary(rows(nees=5.3, verdict="overconfident"), [], None)
+    assert "overconfident, on few independent values." in said[0] and level == "warn"
+
+
+def test_time_without_the_target_is_a_number_of_its_own() -> None:
+    changes = {"rmse": 9.4, "compared": 263, "without": 1084, "rmse_without": 205.0, "wait": 67.7}
+    said, _ = words.summary(rows(**changes), [], None)
+    assert "is off by 9.4 m (root mean square) where the target is seen, at 263 of 1347 looks" in said[0]
+    assert said[1] == (
+        "Where it is not seen, it is off by 205 m (root mean square); the longest wait is 67.7 s."
+    )
+    table = words.tracks_table(rows(**changes))
+    assert table["compared"].tolist() == [100, 263] and table["rmse_without"].iloc[1] == 205.0
+
+
+def test_a_start_that_nothing_followed_is_a_start() -> None:
+    one = rows().assign(detections=0, used=1, compared=0, verdict="not judged")
+    assert words.summary(one, [], None)[0][0].startswith("One detection started a track, and none followed")
+    none = one.assign(used=0)
+    assert words.summary(none, [], None)[0][0].startswith("No track was started")
+
+
+@pytest.mark.parametrize(
+    ("rmse", "level", "end"), [(261.0, "warn", "as they are told of."), (3.0, "good", "4.0 m.")]
+)
+def test_all_sensors_together_stand_beside_the_best_one(rmse: float, level: str, end: str) -> None:
+    both = pd.concat([rows(), rows(rmse=rmse, nees=900.0, verdict="overconfident").assign(
+        sensor="together", kind="together")])  # fmt: skip
+    said, found = words.summary(both, [], None)
+    assert said[0].startswith("The track of") and "is off by 4.0 m" in said[0] and found == level
+    assert said[1].startswith(
+        f"All sensors together are off by {words.length(rmse)} from boat, radar alone by"
+    )
+    assert said[1].endswith(end)

@@ -113,7 +113,8 @@ def record_errors(
     s = summarise(errors_of(scored))
     record_summary(report, subject, s, intervals)
     if scored["inside_90"].notna().any():
-        report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=s.n)
+        known = int(scored["inside_90"].notna().sum())
+        report.metric("ellipse_coverage_90", subject, scored["inside_90"].mean(), "1", n=known)
     return s
 
 

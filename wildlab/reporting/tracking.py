@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 
 from wildlab.pipeline.following.beliefs import Said
-from wildlab.pipeline.following.follow import Followed
+from wildlab.pipeline.following.follow import TOGETHER, Followed
 from wildlab.pipeline.following.judged import (
     CAUTIOUS,
     CONSISTENT,
     FEW_INDEPENDENT,
+    FEWEST,
     OVERCONFIDENT,
     UNKNOWN,
     Apart,
@@ -80,17 +81,31 @@ def size_words(nees: float) -> str:
     return "about as large as stated"
 
 
+#: What is said of a verdict by a mean of few independent values.
+FEW = "on few independent values"
+
+
+def on_few(row: pd.Series, what: str = "nees") -> bool:
+    """Whether a verdict stands on so few independent values that it may be by chance."""
+    if not row[what] > 0:
+        return False
+    if row["verdict" if what == "nees" else "nis_verdict"] == CONSISTENT:
+        return bool(row[f"{what}_worth"] < FEWEST)
+    outside = max(row[what] / row[f"{what}_high"], row[f"{what}_low"] / row[what])
+    # The band is too narrow where its width is a guess; what is far outside is outside all the same.
+    return bool(row[f"{what}_worth"] < FEW_INDEPENDENT and 1 < outside < NEAR_THE_BAND)
+
+
 def verdict_words(row: pd.Series, what: str = "nees") -> str:
     """The verdict with its band, and whether it stands on few independent values."""
     said = str(row["verdict" if what == "nees" else "nis_verdict"])
-    outside = max(row[what] / row[f"{what}_high"], row[f"{what}_low"] / row[what]) if row[what] > 0 else 1.0
-    # The band is too narrow where its width is a guess; what is far outside is outside all the same.
-    few = row[f"{what}_worth"] < FEW_INDEPENDENT and 1 < outside < NEAR_THE_BAND
-    return said + (", on few independent values" if few else "")
+    return said + (f", {FEW}" if on_few(row, what) else "")
 
 
 def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> tuple[list[str], str]:
     """The first sentences of the page, and its level."""
+    if not (rows["detections"] > 0).any() and (rows["used"] > 0).any():
+        return ["One detection started a track, and none followed: nothing can be judged."], "bad"
     if not (rows["detections"] > 0).any():
         return (
             ["No track was started: no detection gives a place to start from near a target."],
@@ -110,6 +125,8 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
 
 
 def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
+    alone = rows[rows["kind"] != TOGETHER]
+    together, rows = rows[rows["kind"] == TOGETHER], alone if len(alone) else rows
     filters = list(dict.fromkeys(rows["filter"]))
     said = []
     by_name = {name: rows[rows["filter"] == name] for name in filters}
@@ -117,10 +134,23 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     mine, white = by_name[best], by_name.get("ekf")
     what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
     are = "is" if len(mine) == 1 else "are"
+    looks = int(mine["compared"].sum() + mine["without"].sum())
     said.append(
-        f"{what} of the filter with {filter_words(best)} {are} off by {_far(mine)}, and the errors are "
+        f"{what} of the filter with {filter_words(best)} {are} off by {_far(mine)} where the target is seen, "
+        f"at {int(mine['compared'].sum())} of {looks} looks, and the errors there are "
         f"{size_words(float(mine['nees'].median()))}: {_counts(mine)}."
     )
+    unseen = mine[mine["without"] > 0]
+    if len(unseen):
+        wait = f"; the longest wait is {unseen['wait'].max():.1f} s" if unseen["wait"].notna().any() else ""
+        said.append(
+            f"Where it is not seen, {'it is' if len(mine) == 1 else 'they are'} off by "
+            f"{_far(unseen, 'rmse_without')}{wait}."
+        )
+    worse = None
+    if len(together) and len(alone):
+        sentence, worse = _together(together[together["filter"] == best], mine)
+        said += [sentence] if sentence else []
     if white is not None and best != "ekf":
         keys = ["sensor", "target"]
         pairs = mine.merge(white, on=keys, suffixes=("", "_white"))
@@ -135,9 +165,30 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
         said.append(
             f"These are {len(mine)} of {pairs_in_all} tracks: the others' detections cannot go through it."
         )
+    few = mine.apply(on_few, axis=1)
     good = (mine["verdict"] == CONSISTENT).all()
-    none = not (mine["verdict"] == CONSISTENT).any()
-    return said, "good" if good else "bad" if none and (mine["verdict"] == OVERCONFIDENT).all() else "warn"
+    bad = (mine["verdict"] == OVERCONFIDENT).all()
+    if worse:
+        return said, "bad" if bad and not few.any() else "warn"
+    if good or (mine["verdict"] == UNKNOWN).all():
+        return said, "neutral" if few.any() or not good else "good"
+    return said, "bad" if bad and not few.any() else "warn"
+
+
+def _together(together: pd.DataFrame, alone: pd.DataFrame) -> tuple[str, bool]:
+    """All sensors beside the best one alone, of the target where that is worst; whether they are worse."""
+    best = alone.loc[alone.groupby("target")["rmse"].idxmin().dropna()].set_index("target")
+    both = together[together["target"].isin(best.index) & together["rmse"].notna()].set_index("target")
+    if not len(both):
+        return "", False
+    ratio = both["rmse"] / best["rmse"].reindex(both.index)
+    target = ratio.idxmax()
+    worse = bool(ratio[target] > ALIKE)
+    said = (
+        f"All sensors together are off by {length(float(both.loc[target, 'rmse']))} from {target}, "
+        f"{best.loc[target, 'sensor']} alone by {length(float(best.loc[target, 'rmse']))}"
+    )
+    return said + ("; do not use them together as they are told of." if worse else "."), worse
 
 
 def leading(filters: Sequence[str]) -> str:
@@ -145,9 +196,9 @@ def leading(filters: Sequence[str]) -> str:
     return next((name for name in filters if name != "ekf" and not name.endswith("-smoothed")), "ekf")
 
 
-def _far(rows: pd.DataFrame) -> str:
+def _far(rows: pd.DataFrame, column: str = "rmse") -> str:
     """Root mean square errors: of one track its own, of several the middle one's and their range."""
-    values = rows["rmse"]
+    values = rows[column]
     if len(rows) == 1:
         return f"{length(float(values.iloc[0]))} (root mean square)"
     low, high = length(float(values.min())), length(float(values.max()))
@@ -163,10 +214,16 @@ def _error_change(ratio: float) -> str:
 
 def _counts(rows: pd.DataFrame, column: str = "verdict") -> str:
     order = (CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN)
-    counts = {name: int((rows[column] == name).sum()) for name in order}
+    what = "nees" if column == "verdict" else "nis"
+    counts = {name: rows[rows[column] == name] for name in order}
     if len(rows) == 1:
-        return next(name for name, count in counts.items() if count)
-    return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return verdict_words(rows.iloc[0], what)
+    said = []
+    for name, some in counts.items():
+        few = int(some.apply(on_few, axis=1, args=(what,)).sum()) if len(some) else 0
+        caveat = "" if not few else f" ({FEW})" if few == len(some) else f" ({few} {FEW})"
+        said += [f"{len(some)} {name}{caveat}"] if len(some) else []
+    return ", ".join(said)
 
 
 def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str], str]:
@@ -227,7 +284,9 @@ def tracks_table(rows: pd.DataFrame) -> pd.DataFrame:
                 low, high = 100 * row["inside_low"], 100 * row["inside_high"]
                 inside = f"{100 * row['inside']:.0f} ({low:.0f} to {high:.0f})"
             one |= {
+                "compared": row["compared"],
                 "rmse": row["rmse"],
+                "rmse_without": row["rmse_without"],
                 "nees": band(row, "nees"),
                 "inside": inside,
             }
@@ -240,7 +299,9 @@ HEADINGS = {
     "track": "target, sensor",
     "filter": "filter",
     "verdict": "verdict",
+    "compared": "looks compared",
     "rmse": "RMS error (m)",
+    "rmse_without": "RMS unseen (m)",
     "nees": "mean NEES (band)",
     "inside": "inside (%)",
     "nis": "mean NIS (band)",
@@ -279,6 +340,7 @@ def record(report: Report, rows: pd.DataFrame) -> None:
         subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
         for name, unit, low, high, n in (
             ("rmse", "m", None, None, "compared"),
+            ("rmse_without", "m", None, None, "without"),
             ("nees", "1", "nees_low", "nees_high", "compared"),
             ("nis", "1", "nis_low", "nis_high", "detections"),
             ("fraction_nees_inside", "1", "inside_low", "inside_high", "compared"),

@@ -46,14 +46,15 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
     report.section("Every track", intro)
     table = words.tracks_table(rows)
     truth = (
-        " Inside: share of looks whose NEES is in the band of single values, with its interval."
+        " Compared, with RMS, NEES and inside: looks at which the target was seen; unseen: the others. "
+        "Inside: share of looks whose NEES is in the band of single values, with its interval."
         if followed.truth
         else ""
     )
     report.table(
         table,
         columns=words.columns_of(table),
-        digits={"rmse": 2, "lag1": 2},
+        digits={"compared": 0, "rmse": 2, "rmse_without": 2, "lag1": 2},
         caption="Bands: where the mean of a consistent filter lies with 95 %. Lag 1: autocorrelation of "
         "innovations from one detection to the next, of the element where it is largest; near zero is right. "
         f"Used: detections.{truth}",
@@ -155,7 +156,10 @@ def end_section(report: Report, followed: Followed) -> None:
         "new at every look, H (3.5) and (3.7); the one for coloured noise works on differences of "
         "positions, H 7.2.2; the Schmidt filter considers errors that last without estimating them, H "
         "7.4. Smoothed estimates know later detections too.\n\n"
-        "NEES is of the position, truth minus estimate, the truth's own variance added to the filter's. A "
+        "Errors are judged at looks at which the target was seen: where a detection is its own by name, "
+        "lies within reach of its true place, or was taken. The others say how fast a track strays; their "
+        "error is a number of its own. Fewer than five detections are not judged. NEES is of the position, "
+        "truth minus estimate, the truth's own variance added to the filter's. A "
         "mean is consistent inside of the 95 % interval of the mean of as many independent values as its "
         "correlated ones are worth, overconfident above and too cautious below; an error that is the same "
         "throughout is one value. Shares have Wilson's interval for as many. Innovations are whitened by "

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from wildlab.evaluation.consistency import (
     Average,
@@ -25,12 +26,14 @@ from wildlab.pipeline.following.sensor_tracks import SensorTrack
 
 #: Fewer independent values than this, estimated from the values themselves, make an interval too narrow.
 FEW_INDEPENDENT = 30.0
+#: Of fewer values than this nothing is judged: nearly any filter would pass.
+FEWEST = 5
 CONSISTENT, OVERCONFIDENT, CAUTIOUS, UNKNOWN = "consistent", "overconfident", "too cautious", "not judged"
 
 
 def verdict(mean: Average) -> str:
     """Whether a filter is consistent, by the 95 % band of its mean NEES or NIS."""
-    if not mean.n:
+    if mean.n < FEWEST:
         return UNKNOWN
     return CONSISTENT if mean.inside else OVERCONFIDENT if mean.mean > mean.high else CAUTIOUS
 
@@ -69,8 +72,10 @@ def worth_of_errors(errors: Array, covariances: Array) -> float:
 def judged(followed: Followed) -> pd.DataFrame:
     """One row for each track.
 
-    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used; ``rmse``, ``mae`` and ``rmse_speed``
-    beside the truth, of ``compared`` looks; ``nees`` with ``nees_low``, ``nees_high`` and ``nees_worth``
+    ``sensor``, ``kind``, ``target``, ``filter``; ``detections`` used after the start, and ``used`` with it;
+    ``wait``, s: the longest from one to the next; ``rmse``, ``mae`` and ``rmse_speed`` beside the truth, of
+    ``compared`` looks at which the target was seen, and ``rmse_without`` of the ``without`` others; of those
+    seen: ``nees`` with ``nees_low``, ``nees_high`` and ``nees_worth``
     independent values, its ``verdict``; ``inside``, the share of looks in the band of single values, with
     ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and ``nis_verdict``;
     ``lag1``: the largest autocorrelation of an element of the whitened innovations from one detection to the
@@ -86,13 +91,16 @@ def kind_of(followed: Followed, sensor: str) -> str:
 
 
 def _row(one: SensorTrack, kind: str) -> dict[str, object]:
-    summary = summarise_track(track_errors(one.estimate + one.error, one.estimate))
-    m = one.dof
-    of_nees, of_nis = mean_of(one.nees, 2), mean_of(one.nis, m)
+    looked, used = seen_of(one), used_of(one)
+    summary = summarise_track(track_errors((one.estimate + one.error)[looked], one.estimate[looked]))
+    away = np.hypot(*one.error[~looked, :2].T)
+    away = away[np.isfinite(away)]
+    m, squares = one.dof, one.nees[looked]
+    of_nees, of_nis = mean_of(squares, 2), mean_of(one.nis, m)
     if of_nees.n:
-        independent = worth_of_errors(one.error[:, :2], one.covariance[:, :2, :2])
-        of_nees = average(one.nees, 2, min(of_nees.worth, independent))
-    inside = share_inside(one.nees, chi_square_interval(2))
+        independent = worth_of_errors(one.error[looked, :2], one.covariance[looked, :2, :2])
+        of_nees = average(squares, 2, min(of_nees.worth, independent))
+    inside = share_inside(squares, chi_square_interval(2))
     band = (np.nan, np.nan)
     if of_nees.n and of_nees.worth >= 1:
         band = share_interval(inside * of_nees.worth, of_nees.worth)[1:]
@@ -104,15 +112,19 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
         "target": one.target,
         "filter": one.filter,
         "detections": int(np.isfinite(one.nis).sum()),
+        "used": int(used.sum()),
+        "wait": float(np.diff(one.times[used]).max()) if used.sum() > 1 else np.nan,
         "compared": of_nees.n,
         "rmse": summary.rmse,
+        "without": len(away),
+        "rmse_without": float(np.sqrt(np.mean(away**2))) if len(away) else np.nan,
         "mae": summary.mae,
         "rmse_speed": summary.rmse_speed,
         "nees": of_nees.mean,
         "nees_low": of_nees.low,
         "nees_high": of_nees.high,
         "nees_worth": of_nees.worth,
-        "verdict": verdict(of_nees),
+        "verdict": verdict(of_nees) if used.sum() >= FEWEST else UNKNOWN,
         "inside": inside,
         "inside_low": band[0],
         "inside_high": band[1],
@@ -128,6 +140,16 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
         if one.known.any()
         else np.nan,
     }
+
+
+def used_of(one: SensorTrack) -> NDArray[np.bool_]:
+    """(N,) looks whose detection a track took, that of its start among them."""
+    return np.isfinite(one.nis) | (one.detection != "" if len(one.detection) else False)
+
+
+def seen_of(one: SensorTrack) -> NDArray[np.bool_]:
+    """(N,) looks at which the target was seen, whether or not its track took the detection."""
+    return one.near | used_of(one)
 
 
 def whitened(one: SensorTrack) -> Array:

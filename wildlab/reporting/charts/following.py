@@ -175,7 +175,12 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     alt = (
         f"Distance from the truth over time of {first.target} by {first.sensor}; root mean squares: {words}."
     )
-    return fig, slug("error", first.sensor, first.target), alt, "Dotted: the standard deviation stated."
+    return (
+        fig,
+        slug("error", first.sensor, first.target),
+        alt,
+        "Dotted: the standard deviation stated. Means: of looks with the target seen.",
+    )
 
 
 def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> Shown | None:
