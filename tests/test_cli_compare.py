@@ -129,6 +129,22 @@ def test_one_of_several_tracks_does_not_stand_for_all(reports: Path) -> None:
     assert table.loc["monday", "track_rmse_m_why"] == "several tracks, none of which stands for all"
 
 
+def test_a_crash_is_not_sound_and_the_attitude_is_that_of_the_page(tmp_path: Path) -> None:
+    """Of the receiver's noise as found, where the page on the navigation speaks of it."""
+    crash = counts(0, 0, 0, 1) | {("broken", "flight"): (1, None, None, None)}
+    leave(tmp_path, "monday", numbers=crash)
+    yaws = (("mekf", 12.1), ("mekf-receiver", 6.8))
+    leave(tmp_path, "tuesday", numbers=counts(0, 0, 0, 1))
+    leave(
+        tmp_path, "tuesday", "-navigation", numbers={("rms_yaw", w): (v, None, None, None) for w, v in yaws}
+    )
+    from wildlab.reporting.comparison import flights_table
+
+    table = flights_table(own_flights(tmp_path, ())).set_index("flight")
+    assert table.loc["monday", "verdict"] == "went wrong" and table.loc["tuesday", "verdict"] == "sound"
+    assert table.loc["tuesday", "yaw_deg"] == 6.8
+
+
 def test_into_another_folder_has_no_links_that_lead_nowhere(
     capsys: pytest.CaptureFixture[str], reports: Path, tmp_path: Path
 ) -> None:

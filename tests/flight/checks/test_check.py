@@ -14,6 +14,7 @@ from wildlab.flight.checks.inertial_data import FORCE, RATE
 from wildlab.flight.manifest import IMU_NOISE, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
+from wildlab.simulation.twins import simulate_twin
 
 ASSUMED = {
     "pixel_px": 3.0,
@@ -415,3 +416,11 @@ def test_navigation_says_what_a_report_on_it_lacks(make_flight: Callable[..., Fl
     flight.manifest = replace_in_manifest(flight.manifest, {"imu": figures})
     use = {one.purpose: one for one in usable_for(flight)}["navigation"]
     assert use.usable and use.why == "imu and gnss are there"
+
+
+def test_detections_that_are_not_there_are_not_called_broken() -> None:
+    twin = simulate_twin("large-ship", 1)
+    tables = {name: table for name, table in twin.tables.items() if name != "detections"}
+    flight = Flight(twin.manifest, dict(twin.nav), tables)
+    (tracking,) = [use for use in usable_for(flight) if use.purpose == "tracking"]
+    assert (tracking.usable, tracking.why) == (False, "it lacks detections")

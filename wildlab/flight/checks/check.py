@@ -123,8 +123,11 @@ def usable_for(flight: Flight) -> list[Use]:
     times = flight.manifest.time.kind == "utc"
     if not times:
         tracking = "the photos carry no time, and a track is over time"
-    elif not kinds or "detections" in broken or "frames" in broken:
-        tracking = "it lacks detections without a problem"
+    elif not kinds and "detections" not in broken:
+        tracking = "it lacks detections"
+    elif "detections" in broken or "frames" in broken:
+        what = _and([name for name in ("detections", "frames") if name in broken])
+        tracking = f"it lacks {what} without a problem"
     elif kinds == {"pixel"} and not good_nav:
         tracking = "pixels need poses, and there are none without a problem"
     else:

@@ -79,6 +79,13 @@ def path_chart(path: Path, troubles: Sequence[Trouble], title: str) -> Figure:
         ax.add_collection(
             LineCollection(pieces, colors=color, lw=3, linestyles=":" if broken else "-", zorder=3)
         )
+        if trouble.what == "position jumps":
+            # Too short for a line, and not to be missed.
+            at = trouble.spells.mean(axis=1)
+            ax.plot(
+                np.interp(at, path.times, east), np.interp(at, path.times, north), "x", color=color, ms=11,
+                mew=2.5, zorder=6,
+            )  # fmt: skip
         label = f"{trouble.what}, {_spell_words(trouble)}"
         handles.insert(0, Line2D([], [], color=color, lw=3, ls=":" if broken else "-", label=label))
     ax.plot(east[0], north[0], "o", mfc="white", mec=INK, ms=7, mew=1.5, zorder=4)
