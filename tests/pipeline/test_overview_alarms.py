@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 
 from tests.pipeline.test_overview import georeferenced, level_images, page_of, values
+from wildlab.flight.checks.sense.seen import seen
 from wildlab.flight.store import Flight
 from wildlab.pipeline.overviews.overview import look_over
 from wildlab.pipeline.overviews.worth_fixing import numbers_of
@@ -152,3 +154,18 @@ def test_where_nothing_was_looked_for_nothing_is_said_to_be_right() -> None:
     twin.tables.pop("imu", None)
     twin.tables.pop("gnss", None)
     assert path_title(look_over(twin)) == "Nothing wrong was found in poses"
+
+
+def test_no_mistake_is_named_that_makes_it_worse() -> None:
+    """A leap of half a kilometre is no unit, and what a cause brings is nearer than before."""
+    twin = simulate_twin("fast-vessel", 3)
+    nav = twin.nav["autopilot"].drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"])
+    nav.loc[2700:, "east_m"] += 500.0
+    tables = {name: table for name, table in twin.tables.items() if name not in ("gnss", "imu")}
+    flight = Flight(twin.manifest, {"autopilot": nav}, tables)
+    for one in seen(flight):
+        assert "says ft" not in one.sentence
+        for before, after in re.findall(r"from ([0-9.]+) m to ([0-9.]+) m", one.sentence):
+            assert float(after) < float(before), one.sentence
+    (jump,) = look_over(flight).alarms
+    assert jump.what == "jumps" and jump.size == pytest.approx(500, abs=2)

@@ -61,6 +61,8 @@ def seen(flight: Flight) -> Iterator[Finding]:
 def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
     """The findings about one nav source."""
     named = explain(misfit, given, camera_mistakes(flight, given), glance)
+    # Misfits are in units of what is expected, which a mistake may change too: metres have to fall as well.
+    named = [one for one in named if _nearer(given, one.undone)]
     if named:
         yield _finding(given, named)
         given = named[0].undone
@@ -121,10 +123,20 @@ def _points(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sigh
     return change
 
 
+def _plain(given: Sightings, undone: Sightings) -> bool:
+    """Whether the distance falls by far with nothing else taken off."""
+    return metres(undone) * FAR_BETTER <= metres(given)
+
+
+def _nearer(given: Sightings, undone: Sightings) -> bool:
+    """Whether the distance that is told of falls."""
+    return _plain(given, undone) or metres_left(undone) < metres_left(given)
+
+
 def _finding(given: Sightings, named: list[Named[Sightings]]) -> Finding:
     first, *others = named
     # Where other small errors hide what is gained, it is the distance without these that shows it.
-    plain = metres(first.undone) * FAR_BETTER <= metres(given)
+    plain = _plain(given, first.undone)
     far = metres if plain else metres_left
     said = (
         f"{first.mistake.said}: that brings the distance by which rays pass known points"
