@@ -202,7 +202,7 @@ def from_nadir(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
 
     Examples
     --------
-    >>> [round(one, 6) for one in from_nadir(0.0, 60.0, 45.0)]
+    >>> [round(one, 6) + 0.0 for one in from_nadir(0.0, 60.0, 45.0)]
     [0.0, -30.0, 45.0]
     """
     # Ahead of the optical axis' frame is down of the other.
