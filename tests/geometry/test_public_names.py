@@ -36,8 +36,8 @@ def test_every_argument_and_result_is_described(name):
 
 
 def test_all_that_is_public_is_offered():
-    """But for what F names as frames does, clocks of cameras, which `wildlab clock` and the pipeline offer, and
-    what is inside: compiled loops, compiling, and checks."""
+    """But for what F names as frames does, clocks of cameras, which the pipeline offers, and what is inside:
+    compiled loops, compiling, and checks."""
     beside = {"flodell.camera_rotation", "georeference.matching"}
     beside |= {f"{name}.{name}" for name in ("clock_by_points", "clock_by_motion")}
     offered = {f"{one.__module__.rpartition('.')[2]}.{one.__name__}" for one in FUNCTIONS.values()}
