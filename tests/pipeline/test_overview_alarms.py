@@ -46,7 +46,7 @@ def test_a_leap_is_found_without_speeds() -> None:
     twin = simulate_twin("large-ship", 1)
     jump = look_over(leapt(twin, speeds=False)).alarms[0]
     nav = twin.nav["autopilot"]
-    assert (jump.what, jump.count) == ("jumps", 1) and jump.size == pytest.approx(40, abs=1)
+    assert (jump.what, jump.often) == ("jumps", 1) and jump.size == pytest.approx(40, abs=1)
     assert jump.first == pytest.approx(nav["time_s"].iloc[199])
     bare = nav.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"])
     whole = Flight(twin.manifest, {"autopilot": bare}, dict(twin.tables))
@@ -97,7 +97,7 @@ def test_poses_that_contradict_the_satellites_are_an_alarm(make_flight: Callable
     assert not look_over(flight).alarms
     gnss.loc[:9, "north_m"] += 12.0
     (apart,) = look_over(flight).alarms
-    assert (apart.what, apart.count) == ("apart", 10) and apart.size == pytest.approx(12, abs=1e-6)
+    assert (apart.what, apart.often) == ("apart", 10) and apart.size == pytest.approx(12, abs=1e-6)
     assert apart.share == pytest.approx(10 / len(t))
     # What the receiver itself says it does not know is no contradiction.
     flight.tables["gnss"] = gnss.assign(sd_horizontal_m=6.0)

@@ -116,11 +116,11 @@ def alarm_words(alarm: Alarm, overview: Overview) -> str:
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
     at, share = f"{alarm.worst - begin:.0f} s", percent(alarm.share, 1)
     if alarm.what == "jumps":
-        if alarm.count == 1:
+        if alarm.often == 1:
             return f"the position jumps once, at {at}, by {length_words_fine(alarm.size)}"
         first = f"first at {alarm.first - begin:.0f} s"
         size = length_words_fine(alarm.size)
-        return f"the position jumps {alarm.count} times, {first}, by up to {size} at {at}"
+        return f"the position jumps {alarm.often} times, {first}, by up to {size} at {at}"
     if alarm.what == "leans":
         return (
             f"it leans by {alarm.size:.0f}° at {at} (by more than {alarm.limit:g}° in {share} of the poses)"

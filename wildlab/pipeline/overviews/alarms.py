@@ -42,7 +42,7 @@ class Alarm(NamedTuple):
     ----------
     what
         A key of `ALARMS`.
-    count
+    often
         How often: jumps, spells, or satellite positions that are contradicted.
     first, worst
         Stamps of the first time and of the worst one, s.
@@ -53,7 +53,7 @@ class Alarm(NamedTuple):
     """
 
     what: str
-    count: int
+    often: int
     first: float
     worst: float
     size: float
