@@ -181,12 +181,12 @@ def _together(together: pd.DataFrame, alone: pd.DataFrame) -> tuple[str, bool]:
     both = together[together["target"].isin(best.index) & together["rmse"].notna()].set_index("target")
     if not len(both):
         return "", False
-    ratio = both["rmse"] / best["rmse"].reindex(both.index)
-    target = ratio.idxmax()
-    worse = bool(ratio[target] > ALIKE)
+    own, least = both["rmse"].to_numpy(float), best["rmse"].reindex(both.index).to_numpy(float)
+    worst = int(np.argmax(own / least))
+    target, worse = str(both.index[worst]), bool(own[worst] > ALIKE * least[worst])
     said = (
-        f"All sensors together are off by {length(float(both.loc[target, 'rmse']))} from {target}, "
-        f"{best.loc[target, 'sensor']} alone by {length(float(best.loc[target, 'rmse']))}"
+        f"All sensors together are off by {length(float(own[worst]))} from {target}, "
+        f"{best.loc[target, 'sensor']} alone by {length(float(least[worst]))}"
     )
     return said + ("; do not use them together as they are told of." if worse else "."), worse
 
