@@ -7,7 +7,10 @@ import json
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def write_atomic(path: Path, content: str | bytes) -> None:
@@ -37,3 +40,17 @@ def sha256(path: Path) -> str:
     """SHA-256 of a file, as 64 hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_csv(path: Path, table: pd.DataFrame, float_format: str | None = None) -> None:
+    """A table as CSV, atomically. Names that a spreadsheet would take for a formula begin with an apostrophe:
+    what things are called comes from files of strangers."""
+    safe = table.copy()
+    for name in safe.columns:
+        if safe[name].dtype == object:
+            safe[name] = [_no_formula(cell) for cell in safe[name]]
+    write_atomic(path, safe.to_csv(index=False, float_format=float_format))
+
+
+def _no_formula(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import write_atomic, write_csv
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import ned_to_geodetic
 from wildlab.geometry.uncertainty import ellipse_axes
@@ -72,7 +72,7 @@ def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str =
         flight=flight.name,
     )
     if path.suffix == ".csv":
-        write_atomic(path, table.to_csv(index=False, float_format="%.3f"))
+        write_csv(path, table, "%.3f")
     elif path.suffix == ".geojson":
         write_atomic(path, json.dumps(_geojson(flight, table), allow_nan=False))
     elif path.suffix == ".gpkg":

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from wildlab.errors import WildlabError
-from wildlab.files import write_atomic
+from wildlab.files import write_atomic, write_csv
 from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.reporting.comparison import comparison_page, flights_table
@@ -88,7 +88,7 @@ def compare_flights(
     target.mkdir(parents=True, exist_ok=True)
     near = target.resolve().parent == reports.resolve()
     page = comparison_page(chosen, links="../" if near else "", index="../flights.html" if near else "")
-    write_atomic(target / "flights.csv", flights_table(chosen).to_csv(index=False))
+    write_csv(target / "flights.csv", flights_table(chosen))
     write_atomic(target / "report.html", page)
     build_ledger(reports, studies)
     return target / "report.html"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from wildlab.files import write_csv
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.scans import Scans
 
@@ -71,4 +72,4 @@ def _of(one: SensorTrack, scans: dict[str, Scans]) -> pd.DataFrame:
 def write_estimates(table: pd.DataFrame, folder: Path) -> None:
     """Write ``estimates.parquet`` and ``estimates.csv`` into a folder; metres, no place on Earth."""
     table.to_parquet(folder / "estimates.parquet", index=False)
-    table.to_csv(folder / "estimates.csv", index=False, float_format="%.9g")
+    write_csv(folder / "estimates.csv", table, "%.9g")
