@@ -97,7 +97,8 @@ def sentences_of(choices: Sequence[Choice]) -> list[str]:
         elif one.why:
             said.append(f"{name} is taken for {_article(one)}: {one.why}")
         for part, stream in one.found.log.parts.items():
-            if not stream.used.all():
+            # An image without a place is one all the same, and its reader says what it lacks.
+            if part != "photos" and not stream.used.all():
                 said.append(f"{name}: {_unused(part, stream)}")
         said += [f"{name}: {printable(text)}" for text in (*one.found.log.lost, *one.found.log.notes)]
         clock = one.found.log.clock
