@@ -157,10 +157,11 @@ def test_commands_work_from_any_folder(installed: Installed) -> None:
     assert installed.wildlab("simulate", "static-antenna", "--into", "flights/antenna") == "flights/antenna\n"
     assert "georeferencing accuracy: yes" in installed.wildlab("check", "flights/antenna")
     said = installed.wildlab("evaluate", "flights/antenna", "--source", "autopilot")
-    assert said == "reports/static-antenna-1/report.html\n"
+    names = ("static-antenna-1-overview", "static-antenna-1", "static-antenna-1-tracking")
+    assert said == "".join(f"reports/{name}/report.html\n" for name in names)
     assert installed.wildlab("run", "sensitivity") == "reports/index.html\n"
 
-    for name in ("static-antenna-1", "sensitivity"):
+    for name in (*names, "sensitivity"):
         report = installed.here / "reports" / name
         assert json.loads((report / "metrics.json").read_text(encoding="utf-8"))["metrics"]
         origin = json.loads((report / "provenance.json").read_text(encoding="utf-8"))
