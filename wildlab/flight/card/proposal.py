@@ -48,8 +48,6 @@ class Wishes:
         When the clock of a log that does not know UTC stood at zero.
     zone
         Of wall clocks that carry none.
-    sensitivity
-        Of the places.
     """
 
     name: str
@@ -60,7 +58,6 @@ class Wishes:
     take_off_m: float | None = None
     start: datetime | None = None
     zone: str | None = None
-    sensitivity: str = "withheld"
 
 
 @dataclass

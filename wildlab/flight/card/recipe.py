@@ -36,8 +36,7 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     Raises
     ------
     WildlabError
-        Where nothing says where a camera was, two things have a role that only one can have, no time is
-        known, or heights cannot be brought together.
+        Where nothing says where a camera was, no time is known, or heights cannot be brought together.
     """
     by_role: dict[str, list[Choice]] = {}
     for one in choices:
@@ -47,6 +46,13 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     triggers, clicks = _only(by_role, "triggers"), by_role.get("clicks", [])
     images = _most_images(by_role.get("images", []))
     proposal = Proposal({"name": wishes.name})
+    for taken in (own, camera, receiver, triggers):
+        for one in by_role.get(taken.role, ()) if taken is not None else ():
+            if taken is not None and one is not taken:
+                left = (
+                    f"{one.found.shown} is left out: {taken.found.shown} has more rows, and a flight has one"
+                )
+                proposal.said.append(f"{left} of that role ({one.role}).")
     lens: str | None = None
     if images is not None:
         found, lens, said = one_camera(images.found, images.target, wishes.camera)
@@ -65,7 +71,7 @@ def propose(choices: Sequence[Choice], wishes: Wishes) -> Proposal:
     vehicle = own.found.log.vehicle if own is not None and own.found.log is not None else ""
     data = proposal.data
     data["description"] = f"Logged by {vehicle}." if vehicle else ""
-    data["locations"] = {"sensitivity": wishes.sensitivity}
+    data["locations"] = {"sensitivity": "withheld"}
     data["platform"] = {"name": vehicle or "not stated"}
     data["vertical"] = {"reference": sources.heights.reference, "note": " ".join(sources.heights.said)}
     data["time"] = {"kind": "utc"} | ({"epoch": wishes.start} if wishes.start is not None else {})

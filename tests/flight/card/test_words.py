@@ -1,0 +1,50 @@
+"""What is said of clocks follows from their numbers, and stamps move by what is stated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.flight.card.test_roles import log
+from wildlab.flight.card.found import Found
+from wildlab.flight.card.proposal import Wishes
+from wildlab.flight.card.recipe import propose
+from wildlab.flight.card.roles import Choice, choose_roles
+from wildlab.flight.card.said import sentences_of
+from wildlab.flight.readers.logs.log import Clock, RawLog, make_stream
+from wildlab.flight.readers.logs.parts import stream_of
+from wildlab.flight.recipe.series import LogTable
+
+
+@pytest.mark.parametrize(
+    ("rate", "sd", "said"),
+    [
+        (1 - 1e-4, 1e-6, "it runs 100 ppm fast (standard deviation 1)"),
+        (1 + 1e-4, 1e-6, "it runs 100 ppm slow (standard deviation 1)"),
+        (1 + 1e-4, 1e-4, "cannot be told from them to better than 200 ppm"),
+        (1.0, np.nan, "that it runs fast or slow cannot be told"),
+    ],
+)
+def test_how_a_clock_runs(rate: float, sd: float, said: str):
+    """A second of a fast clock is less than one of UTC."""
+    stream = make_stream("gnss", {"time_s": [1.0, 2.0]})
+    clock = Clock("GPS weeks", rate, 0.0, 0.001, 0.002, 10, sd)
+    found = Found("a.bin", 1, "dataflash", RawLog("dataflash", {"gnss": stream}, clock=clock))
+    assert any(said in one for one in sentences_of([Choice(found, "own", "why")]))
+
+
+def test_stamps_of_a_log_without_utc_count_from_what_is_stated():
+    stream = make_stream("gnss", {"time_s": [np.nan, np.nan], "time_log_s": [0.5, 2.0]})
+    wanted = LogTable(file="a.srt", format="dji-srt", part="gnss", offset_s=1000.0)
+    found = stream_of(RawLog("dji-srt", {"gnss": stream}), wanted, Path("a.srt"))
+    assert found.columns["time_s"].tolist() == [1000.5, 1002.0]
+
+
+def test_a_second_receiver_is_not_left_out_in_silence():
+    choices = choose_roles(
+        [log("drone", attitude=True), log("one", north=1.0, seconds=90), log("two", north=2.0)], {}
+    )
+    said = propose(choices, Wishes("x")).said
+    assert any(one.startswith("one is left out: two has more rows") for one in said)
