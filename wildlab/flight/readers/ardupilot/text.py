@@ -60,16 +60,30 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     WildlabError
         Where no message of it can be read, or PX4 wrote it.
     """
-    lines = data.decode("utf-8", errors="replace").split("\n")
-    if not lines[-1].strip():
-        lines = lines[:-1]
-    known = _definitions(lines)
-    tables, lost = _tables(lines, known)
+    lines = _lines(data)
+    tables, lost = _tables(lines, _definitions(lines))
     if not set(tables) - {"FMT"}:
         problem = "holds no message of an ArduPilot log that can be read"
         raise WildlabError(problem, "copy it again, or take the .bin", file=path)
     title = next((line for line in lines[:20] if "V" in line and "," not in line), "")
     return ardupilot.raw_log(path, "dataflash-text", tables, lost, "line", title)
+
+
+def read_messages(data: bytes) -> dict[str, Table]:
+    """All messages of a log as text, by name: the counterpart of `records.read_records`.
+
+    Parameters
+    ----------
+    data
+        The whole file.
+    """
+    lines = _lines(data)
+    return _tables(lines, _definitions(lines))[0]
+
+
+def _lines(data: bytes) -> list[str]:
+    lines = data.decode("utf-8", errors="replace").split("\n")
+    return lines if lines[-1].strip() else lines[:-1]
 
 
 def _definitions(lines: list[str]) -> dict[str, _Definition]:
