@@ -32,17 +32,20 @@ class Linear(NamedTuple):
     Attributes
     ----------
     J, r
-        (N, 2, P) derivatives and (N, 2) residuals, whitened.
+        (M, 2, P) derivatives and (M, 2) residuals, whitened, of the points it is estimated from.
     values
         (P,) the estimate.
     place
         Takes P parameters and gives the errors (N, 2) m, north-east; NaN where a ray misses the ground.
+    used
+        (N,) which points these M are; all where left out.
     """
 
     J: Array
     r: Array
     values: Array
     place: Callable[[Array], Array]
+    used: NDArray[np.bool_] | None = None
 
 
 def draw_folds(blocks: Labels, rng: np.random.Generator, folds: int = FOLDS) -> Labels:
@@ -56,7 +59,7 @@ def held_out(model: Linear, rounds: Sequence[Labels]) -> Array:
     """Errors (R, N, 2) of every point, each placed by parameters that its fold had no part in.
 
     The fits are steps from the estimate of all points with its derivatives, for these hardly move; the points
-    are then placed without linearising.
+    are then placed without linearising. Points that no estimate rests on are placed like the others.
 
     Parameters
     ----------
@@ -78,11 +81,13 @@ def held_out(model: Linear, rounds: Sequence[Labels]) -> Array:
     """
     if not model.J.shape[-1]:
         return np.repeat(model.place(model.values)[None], len(rounds), axis=0)
-    out = np.empty((len(rounds), len(model.r), 2))
+    out = np.empty((len(rounds), len(rounds[0]), 2))
+    used = np.ones(out.shape[1], bool) if model.used is None else model.used
     for i, folds in enumerate(rounds):
         for fold in np.unique(folds):
             unseen = folds == fold
-            step = fit_linear(model.J[~unseen], model.r[~unseen]).x
+            seen = ~unseen[used]
+            step = fit_linear(model.J[seen], model.r[seen]).x
             out[i, unseen] = model.place(model.values + step)[unseen]
     return out
 

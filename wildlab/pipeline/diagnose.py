@@ -4,6 +4,10 @@ The models are constant errors of the position, the height, the boresight, the c
 and their sums as far as the data tell these apart: see `wildlab.evaluation.causes` for how they are compared.
 Where the one that wins gains something for certain, it is tried once more with only those of its parameters
 that are told from zero.
+
+What is far out is kept out of the search, or a few wrong clicks would look like a cause: it is looked for
+with all parameters that the data determine taken off, so that no constant error passes for outliers, and
+once more with what was found. Gains are of the points that are left; that of all points stands beside.
 """
 
 from __future__ import annotations
@@ -63,6 +67,12 @@ FEWEST_IMAGES = 6
 STEP_S = 0.1
 #: Causes of one model at most.
 MOST_CAUSES = 4
+#: Searches at most: another where, with the cause taken off, other points are far out than were kept out.
+SEARCHES = 3
+#: Beyond this share of points far out no cause is certain: who is out depends on who is believed.
+MANY_OUT = 0.25
+#: Poses at shifted stamps that are kept: the clocks that every fit with one is begun from, and their steps.
+_SHIFTS = 64
 
 
 @dataclass(frozen=True)
@@ -78,13 +88,16 @@ class Model:
     held
         (R, N, 2) m, held-out errors of R rounds.
     gain
-        Over the poses as logged.
+        Over the poses as logged, of the points that are not far out.
+    gain_of_all
+        The same of all points.
     """
 
     causes: tuple[str, ...]
     fit: Fit
     held: Array
     gain: Gain
+    gain_of_all: Gain
 
     @property
     def name(self) -> str:
@@ -113,7 +126,8 @@ class Diagnosis:
     alike
         Pairs of causes that these data cannot tell apart.
     outliers
-        Photos, marks and clicks that are far out once the winner is taken off.
+        Photos, marks and clicks that are far out once the winner is taken off, where it is certain. No model
+        was fitted to them or ranked by them.
     inliers
         (N,) bool, the points that are in none of these.
     """
@@ -139,8 +153,15 @@ class Diagnosis:
 
     @property
     def counts(self) -> bool:
-        """Whether taking the winner off gained something for certain, and a parameter of it is not zero."""
-        return _certain(self.winner, self.calibration)
+        """Whether taking the winner off gained something for certain, and a parameter of it is not zero;
+        never where more points are far out than :data:`MANY_OUT`."""
+        return _certain(self.winner, self.calibration) and not self.too_many_out
+
+    @property
+    def too_many_out(self) -> bool:
+        """Whether so many points are far out, or so few images are left, that no cause is certain."""
+        few = _images(self.scored, self.inliers) < FEWEST_IMAGES
+        return few or bool((~self.inliers).mean() > MANY_OUT)
 
     @property
     def shown(self) -> Model:
@@ -149,7 +170,7 @@ class Diagnosis:
 
     def neighbours(self) -> Neighbours:
         """How alike images that follow each other are once what is shown is taken off."""
-        return _neighbours(self.shown, self.scored)
+        return _neighbours(self.shown, self.scored, self.inliers)
 
     def held_summary(self, rows: NDArray[np.bool_] | None = None) -> ErrorSummary:
         """Held-out errors of what is shown, each figure the mean over the rounds; of rows (N,) or all."""
@@ -212,37 +233,60 @@ def diagnose(
         ground = georeference_calibrated(trial, poses_at, chosen.uv, known[:, 2])
         return np.asarray(ground[:, :2] - known[:, :2])
 
-    logged = place((), np.zeros(0))
+    logged, every = place((), np.zeros(0)), np.ones(len(scored), bool)
+    images_of, marks = (scored[name].to_numpy(str) for name in ("frame_id", "truth_id"))
+    whitening = np.linalg.inv(np.linalg.cholesky(whiten))
 
-    def model(causes: tuple[str, ...], only: tuple[str, ...] = ()) -> Model:
-        wanted = only or [name for cause in causes for name in CAUSES[cause]]
-        fit = fit_points(poses_at, chosen.uv, known, wanted, whiten)
-        held = held_out(Linear(fit.J, fit.r, fit.values, partial(place, fit.names)), folds)
-        return Model(causes, fit, held, gain_of(logged, held, blocks))
+    def far_out(fit: Fit) -> tuple[tuple[Outlier, ...], NDArray[np.bool_]]:
+        metres = place(fit.names, fit.values)
+        # A ray that a correction tips over the horizon is out in any case.
+        metres = np.where(np.isfinite(metres), metres, np.where(np.isfinite(logged), logged, 0.0))
+        return find_outliers(np.einsum("nij,nj->ni", whitening, metres), metres, images_of, marks)
+
+    def search(inliers: NDArray[np.bool_]) -> Diagnosis:
+        kept = np.where(inliers[:, None, None], whiten, np.nan)  # what has no covariance is not fitted to
+
+        def model(causes: tuple[str, ...], only: tuple[str, ...] = ()) -> Model:
+            wanted = only or [name for cause in causes for name in CAUSES[cause]]
+            fit = fit_points(poses_at, chosen.uv, known, wanted, kept)
+            held = held_out(Linear(fit.J, fit.r, fit.values, partial(place, fit.names), fit.usable), folds)
+            of = gain_of(logged[inliers], held[:, inliers], blocks[inliers])
+            return Model(causes, fit, held, of, gain_of(logged, held, blocks))
+
+        models, alike = _search(model, causes, blocks, inliers)
+        best = models[_rank(models, blocks, inliers).winner]
+        # Only where the whole of it gained something: the best parameter of a chance gain would look certain.
+        told = with_covariance(best.fit, images_of, blocks) if best.gain.counts else None
+        if told is not None and (only := _told_from_zero(told)):
+            models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
+        ranked = _rank(models, blocks, inliers)
+        winner = models[ranked.winner]
+        calibration = with_covariance(winner.fit, images_of, blocks)
+        # Blocks whose images stay wrong alike are fewer than they are.
+        wider = _neighbours(winner, scored, inliers).widening(len(np.unique(blocks[inliers])))
+        calibration = replace(calibration, covariance=wider**2 * calibration.covariance)
+        gains = winner.gain.widened(wider), winner.gain_of_all.widened(wider)
+        models[ranked.winner] = replace(winner, gain=gains[0], gain_of_all=gains[1])
+        return Diagnosis(scored, blocks, tuple(models), ranked, calibration, tuple(alike), (), inliers)
 
     timed = flight.manifest.time.kind == "utc" and "frame_id" not in flight.pose_source(source)[1]
     causes = [cause for cause in CAUSES if timed or cause != "clock"]
-    models, alike = _search(model, causes, blocks)
-    best = models[_rank(models, blocks).winner]
-    # Only where the whole of it gained something: the best parameter of a chance gain would look certain.
-    told = with_covariance(best.fit, scored["frame_id"].to_numpy(), blocks) if best.gain.counts else None
-    if told is not None and (only := _told_from_zero(told)):
-        models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
-    ranked = _rank(models, blocks)
-    winner = models[ranked.winner]
-    calibration = with_covariance(winner.fit, scored["frame_id"].to_numpy(), blocks)
-    # Blocks whose images stay wrong alike are fewer than they are.
-    alike_images = _neighbours(winner, scored)
-    wider = alike_images.widening(len(np.unique(blocks)))
-    calibration = replace(calibration, covariance=wider**2 * calibration.covariance)
-    winner = replace(winner, gain=winner.gain.widened(wider))
-    models[ranked.winner] = winner
-    # What is far out is looked for with the winner taken off, where that gained something for certain.
-    shown = winner if _certain(winner, calibration) else models[0]
-    marks = scored["truth_id"].to_numpy(str)
-    metres = place(shown.fit.names, shown.fit.values)
-    outliers, inliers = find_outliers(shown.fit.r, metres, scored["frame_id"].to_numpy(str), marks)
-    return Diagnosis(scored, blocks, tuple(models), ranked, calibration, tuple(alike), outliers, inliers)
+    largest = {name for cause in causes for name in CAUSES[cause]}
+    outliers, inliers = far_out(fit_points(poses_at, chosen.uv, known, tuple(largest), whiten))
+    for _ in range(SEARCHES):
+        if _images(scored, inliers) < FEWEST_IMAGES:
+            # Too few to search by without what is far out: that is said, and no cause is certain.
+            return replace(search(every), outliers=outliers, inliers=inliers)
+        found, said = search(inliers), outliers
+        outliers, rest = far_out(found.shown.fit)
+        if (rest == inliers).all():
+            return replace(found, outliers=outliers)
+        inliers = rest
+    return replace(found, outliers=said)
+
+
+def _images(scored: pd.DataFrame, rows: NDArray[np.bool_]) -> int:
+    return int(scored.loc[rows, "frame_id"].nunique())
 
 
 def _poses(
@@ -255,7 +299,7 @@ def _poses(
     """
     named = chosen.table.assign(target_id=targets)
 
-    @lru_cache(maxsize=4)
+    @lru_cache(maxsize=_SHIFTS)
     def at(shift: float) -> CameraPoses:
         if shift == 0:
             return chosen.poses
@@ -275,7 +319,7 @@ def _poses(
 
 
 def _search(
-    model: Callable[[tuple[str, ...]], Model], causes: list[str], blocks: Labels
+    model: Callable[[tuple[str, ...]], Model], causes: list[str], blocks: Labels, rows: NDArray[np.bool_]
 ) -> tuple[list[Model], list[tuple[str, str]]]:
     """All single causes, all pairs, and larger sums as long as the largest so far wins."""
     models = [model(())]
@@ -303,7 +347,7 @@ def _search(
 
     add(combinations(causes, 2))
     for size in range(2, MOST_CAUSES):
-        winner = models[_rank(models, blocks).winner]
+        winner = models[_rank(models, blocks, rows).winner]
         if len(winner.causes) < size:
             break
         more = [cause for cause in causes if cause not in winner.causes]
@@ -328,11 +372,11 @@ def _told_from_zero(calibration: Calibration) -> tuple[str, ...]:
     return told if 0 < len(told) < len(calibration.names) else ()
 
 
-def _neighbours(model: Model, scored: pd.DataFrame) -> Neighbours:
+def _neighbours(model: Model, scored: pd.DataFrame, rows: NDArray[np.bool_]) -> Neighbours:
     """How alike the held-out errors of images are that follow each other."""
     whiten = np.linalg.inv(np.linalg.cholesky(covariances_of(scored)))
     left = np.einsum("nij,nj->ni", whiten, model.held.mean(axis=0))
-    return compare_neighbours(left, scored["time_s"])
+    return compare_neighbours(left[rows], scored["time_s"].to_numpy()[rows])
 
 
 def _undetermined_alone(models: list[Model], causes: tuple[str, ...]) -> set[str]:
@@ -341,7 +385,6 @@ def _undetermined_alone(models: list[Model], causes: tuple[str, ...]) -> set[str
     return {name for cause in causes if cause in single for name in single[cause].fit.undetermined}
 
 
-def _rank(models: list[Model], blocks: Labels) -> Ranked:
-    return rank_models(
-        [distances(one.held) for one in models], [frozenset(one.fit.names) for one in models], blocks
-    )
+def _rank(models: list[Model], blocks: Labels, rows: NDArray[np.bool_]) -> Ranked:
+    held = [distances(one.held[:, rows]) for one in models]
+    return rank_models(held, [frozenset(one.fit.names) for one in models], blocks[rows])
