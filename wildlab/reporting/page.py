@@ -13,13 +13,20 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri
 #: What each kind of report is called.
 TAGS = {"logged": "logged flight", "twin": "simulated flight (twin)", "computed": "computed, no flight"}
 
-# System fonts only: a font file would be a request, or a megabyte. The status colours hold 4.5:1 on white.
-STYLE = """:root { --ink: #18222d; --dim: #55626f; --line: #dce1e6; --soft: #f4f6f8; --blue: #0072b2;
-  --link: #00598c; --good: #0b7a4b; --warn: #a85b00; --bad: #b3261e; --gap: 1.6rem;
+# System fonts only: a font file would be a request, or a megabyte. Words hold 4.5:1 against what lies behind
+# them, by day and by night (a test computes it); `--on` is written on the status colours, `--plate` lies
+# behind pictures, whose ink is dark.
+STYLE = """:root { color-scheme: light dark; --ink: #18222d; --dim: #55626f; --line: #dce1e6; --bg: #ffffff;
+  --soft: #f4f6f8; --blue: #0072b2; --band: #9cc7e0; --link: #00598c; --good: #0b7a4b; --warn: #9a5200;
+  --bad: #b3261e; --on: #ffffff; --plate: #ffffff; --shade: #18222d33; --gap: 1.6rem;
   --mono: ui-monospace, Menlo, Consolas, "DejaVu Sans Mono", monospace }
+/* Of the screen alone: paper is white. */
+@media screen and (prefers-color-scheme: dark) { :root { --ink: #e6ebf0; --dim: #a7b2bd; --line: #323d48;
+  --bg: #11171d; --soft: #1a222a; --blue: #4aa8e0; --band: #2c5878; --link: #82c4f2; --good: #4fc98f;
+  --warn: #f0ab55; --bad: #ff9188; --on: #11171d; --shade: #000000b3 } }
 * { box-sizing: border-box }
 html { -webkit-text-size-adjust: 100%; text-size-adjust: 100% }
-body { margin: 0 auto; max-width: 58rem; padding: 1.75rem 1.25rem 3.5rem; color: var(--ink); background: #fff;
+body { margin: 0 auto; max-width: 58rem; padding: 1.75rem 1.25rem 3.5rem; color: var(--ink); background: var(--bg);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif;
   overflow-wrap: break-word }
 h1 { font-size: 1.9rem; line-height: 1.18; letter-spacing: -.012em; margin: .15rem 0 .45rem;
@@ -57,13 +64,14 @@ figure { margin: var(--gap) 0 }
 figure.table { margin: .8rem 0 var(--gap) }
 .row { display: flex; flex-wrap: wrap; gap: 0 1.5rem }
 .row figure { flex: 1 1 20rem; min-width: 0; margin: .8rem 0 }
-figure img { display: block; width: 100%; height: auto }
+figure img { display: block; width: 100%; height: auto; background: var(--plate); border-radius: .25rem }
 figcaption, .note { color: var(--dim); font-size: .88rem; line-height: 1.45; margin-top: .45rem;
   max-width: 46rem }
 /* Shadows at the sides say that there is more; white patches that move along cover them at the ends. */
-.scroll { overflow-x: auto; max-width: 100%; background-color: #fff; background-repeat: no-repeat;
-  background-image: linear-gradient(to right, #fff 30%, #fff0), linear-gradient(to left, #fff 30%, #fff0),
-  linear-gradient(to right, #18222d33, #fff0), linear-gradient(to left, #18222d33, #fff0);
+.scroll { overflow-x: auto; max-width: 100%; background-color: var(--bg); background-repeat: no-repeat;
+  background-image: linear-gradient(to right, var(--bg) 30%, transparent),
+  linear-gradient(to left, var(--bg) 30%, transparent),
+  linear-gradient(to right, var(--shade), transparent), linear-gradient(to left, var(--shade), transparent);
   background-position: left, right, left, right; background-size: 40px 100%, 40px 100%, 12px 100%, 12px 100%;
   background-attachment: local, local, scroll, scroll }
 .scroll:focus-visible, a:focus-visible, summary:focus-visible { outline: 2px solid var(--blue);
@@ -89,7 +97,7 @@ details[open] > summary { margin-bottom: .5rem }
 footer { margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: .6rem; color: var(--dim);
   font-size: .82rem }
 footer p { margin: .25rem 0; max-width: none }
-.pill { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .82rem; color: #fff;
+.pill { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .82rem; color: var(--on);
   background: var(--dim); white-space: nowrap }
 .pill.yes { background: var(--good) }
 .pill.part { background: var(--warn) }
@@ -98,9 +106,9 @@ footer p { margin: .25rem 0; max-width: none }
 .key { white-space: nowrap; font-weight: 400 }
 .key i { display: inline-block; vertical-align: -1px; margin: 0 .25rem 0 .6rem }
 .hollow, .full { width: 9px; height: 9px; border-radius: 50% }
-.hollow { border: 1.6px solid #18222d }
+.hollow { border: 1.6px solid var(--ink) }
 .full { background: var(--blue) }
-.band { width: 18px; height: 6px; border-radius: 3px; background: #9cc7e0 }
+.band { width: 18px; height: 6px; border-radius: 3px; background: var(--band) }
 @media screen and (max-width: 36rem) {
   body { padding: 1.1rem .9rem 2.5rem; font-size: 15.5px }
   h1 { font-size: 1.5rem }
