@@ -26,7 +26,8 @@ STYLE = """:root { color-scheme: light dark; --ink: #18222d; --dim: #55626f; --l
   --warn: #f0ab55; --bad: #ff9188; --on: #11171d; --shade: #000000b3 } }
 * { box-sizing: border-box }
 html { -webkit-text-size-adjust: 100%; text-size-adjust: 100% }
-body { margin: 0 auto; max-width: 58rem; padding: 1.75rem 1.25rem 3.5rem; color: var(--ink); background: var(--bg);
+body { margin: 0 auto; max-width: 58rem; padding: 1.75rem 1.25rem 3.5rem; color: var(--ink);
+  background: var(--bg);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif;
   overflow-wrap: break-word }
 h1 { font-size: 1.9rem; line-height: 1.18; letter-spacing: -.012em; margin: .15rem 0 .45rem;
@@ -97,7 +98,8 @@ details[open] > summary { margin-bottom: .5rem }
 footer { margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: .6rem; color: var(--dim);
   font-size: .82rem }
 footer p { margin: .25rem 0; max-width: none }
-.pill { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .82rem; color: var(--on);
+.pill { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .82rem;
+  color: var(--on);
   background: var(--dim); white-space: nowrap }
 .pill.yes { background: var(--good) }
 .pill.part { background: var(--warn) }
