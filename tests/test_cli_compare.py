@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from bs4 import BeautifulSoup
 
 from wildlab.cli import main
 from wildlab.flight.store import save_flight
@@ -151,7 +152,10 @@ def test_into_another_folder_has_no_links_that_lead_nowhere(
     folders = [reports / "monday", reports / "tuesday-overview"]
     code, out, _ = call(capsys, "compare", *folders, "--out", reports, "--into", tmp_path / "a" / "b")
     assert code == 0 and out.strip().endswith("a/b/report.html")
-    assert "href" not in (tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8")
+    soup = BeautifulSoup((tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8"), "html.parser")
+    links = [str(link["href"]) for link in soup.find_all("a")]
+    assert any(link.startswith("data:text/csv") for link in links)
+    assert all(link.startswith(("#", "data:text/csv")) for link in links)
 
 
 @pytest.mark.parametrize(

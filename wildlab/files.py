@@ -43,13 +43,19 @@ def sha256(path: Path) -> str:
 
 
 def write_csv(path: Path, table: pd.DataFrame, float_format: str | None = None) -> None:
-    """A table as CSV, atomically. Names that a spreadsheet would take for a formula begin with an apostrophe:
-    what things are called comes from files of strangers."""
+    """A table as CSV (`csv_text`), atomically."""
+    write_atomic(path, csv_text(table, float_format))
+
+
+def csv_text(table: pd.DataFrame, float_format: str | None = None) -> str:
+    """A table as CSV. Names that a spreadsheet would take for a formula begin with an apostrophe: what things
+    are called comes from files of strangers."""
     safe = table.copy()
     for name in safe.columns:
         if safe[name].dtype == object:
             safe[name] = [_no_formula(cell) for cell in safe[name]]
-    write_atomic(path, safe.to_csv(index=False, float_format=float_format))
+    safe.columns = [_no_formula(name) for name in safe.columns]
+    return str(safe.to_csv(index=False, float_format=float_format))
 
 
 def _no_formula(cell: Any) -> Any:

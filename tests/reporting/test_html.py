@@ -27,7 +27,8 @@ def hostile_report() -> Report:
     """Everything a report can show, with a name that tries to break out of every part of it."""
     report = open_report(study="test", kind="logged", flight=HOSTILE, seed=1)
     report.head(f"Title {HOSTILE}", HOSTILE)
-    report.summary([HOSTILE, HOSTILE], level="warn")
+    report.summary([HOSTILE, HOSTILE], level="warn", verdict=(HOSTILE, HOSTILE))
+    report.alert(HOSTILE, [HOSTILE] * 5)
     report.tiles([(HOSTILE, HOSTILE)] * 4)
     report.section(HOSTILE, HOSTILE)
     report.subsection(HOSTILE)

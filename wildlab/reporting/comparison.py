@@ -8,13 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LEVELS, LOOK, MEND, SOUND, UNJUDGED
+from wildlab.reporting.arrange import LIMITS, arranged
 from wildlab.reporting.charts.comparison import dots_chart
-from wildlab.reporting.georeferencing_cause import metres
+from wildlab.reporting.georeferencing_cause import listed, metres
+from wildlab.reporting.glossary import with_glossary
+from wildlab.reporting.html import examine
 from wildlab.reporting.overview_words import area_words, duration_words, length_words
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.reporting.page import TAGS, page
 from wildlab.reporting.report import open_report
-from wildlab.reporting.text import NOTHING, escape, number, percent
+from wildlab.reporting.tables import csv_link
+from wildlab.reporting.text import NOTHING, number, percent
 
 #: Rounding errors of what is zero.
 NO_MORE = 1e-9
@@ -299,27 +304,24 @@ def flights_table(flights: Sequence[OwnFlight]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def comparison_page(
-    flights: Sequence[OwnFlight], *, links: str = "../", index: str = "../flights.html"
-) -> str:
+def comparison_page(flights: Sequence[OwnFlight]) -> str:
     """The whole page.
 
     Parameters
     ----------
     flights
         Two or more.
-    links
-        What leads from the page to the folders of the reports; "" where they cannot be reached from it.
-    index
-        Address of the page of all flights; "" where it cannot be reached.
 
     Returns
     -------
     str
-        HTML.
+        HTML. Other reports are named, not linked: the page is mailed alone.
     """
     report = open_report(study="comparison", kind="computed")
-    report.section("Side by side", _counted(flights))
+    report.head(f"{len(flights)} flights compared", ", ".join(flight.name for flight in flights))
+    worst, level = _worst(flights)
+    report.summary([_counted(flights)], level=level, verdict=worst)
+    report.section("Side by side")
     report.table(
         _aligned(flights),
         columns={"quantity": "", **{f"flight{k}": flight.name for k, flight in enumerate(flights)}},
@@ -332,24 +334,28 @@ def comparison_page(
             report.figures(figures[k : k + 2])
     reasons = _reasons(flights)
     if reasons:
-        report.section("What was not measured, and why")
+        report.section("What was not measured, and why", part=LIMITS)
         report.points(reasons)
-    names = ", ".join(flight.name for flight in flights)
-    head = f'<header><h1>{len(flights)} flights compared</h1><p class="sub">{escape(names)}</p></header>'
-    way = f'<a href="{escape(index)}">flights</a> › comparison' if index else "wildlab › comparison"
-    about = "".join(
-        f"<li>{escape(flight.name)}: "
-        + ", ".join(
-            f'<a href="{escape(links)}{escape(one.folder)}/report.html">{escape(one.about)}</a>'
-            for one in flight.reports
-        )
-        + "</li>"
-        for flight in flights
-    )
-    listed = f"<h2>Their reports</h2><ul>{about}</ul>" if links else ""
-    footer = "<p>The same numbers, a row for each flight, are in flights.csv beside this page.</p>"
-    body = "\n".join([head, *report.parts, listed])
-    return page(title="Flights compared", body=body, kicker=way, footer=footer)
+    report.section("Their reports")
+    report.points(f"{flight.name}: {', '.join(one.about for one in flight.reports)}" for flight in flights)
+    link = csv_link(flights_table(flights), "flights", "All numbers, a row for each flight, as CSV")
+    footer = f"<p>{link or 'All numbers, a row for each flight, are in flights.csv beside this page'}.</p>"
+    body = with_glossary(arranged("\n".join(report.parts)))
+    whole = page(title="Flights compared", body=body, kicker="wildlab › flights › comparison", footer=footer)
+    examine(whole, "comparison")
+    return whole
+
+
+#: Verdicts, the one that presses most first.
+_PRESSING = (ALARM, MEND, FIX, LOOK, UNJUDGED, SOUND)
+
+
+def _worst(flights: Sequence[OwnFlight]) -> tuple[tuple[str, str], str]:
+    """The verdict that presses most, whose it is, and its colour."""
+    words = [flight.verdict or UNJUDGED for flight in flights]
+    word = min(words, key=_PRESSING.index)
+    whose = [flight.name for flight, one in zip(flights, words, strict=True) if one == word]
+    return (word, f"So is {listed(whose)}, and nothing here presses more."), LEVELS[word]
 
 
 def _counted(flights: Sequence[OwnFlight]) -> str:

@@ -64,16 +64,15 @@ def failure_page(
         "and its last cells show what was being computed.",
     ]
     body = (
-        f"<header><h1>{inline(title)}</h1>"
-        '<p class="sub"><span class="pill no">did not finish</span></p></header>\n'
+        f"<header><h1>{inline(title)}</h1></header>\n"
         '<section class="summary bad" aria-label="Summary"><p>'
-        "<b>This study failed, so there are no results to show.</b> "
-        f"{inline(status['reason'])}</p></section>\n<p>{after}</p>\n"
+        "<b>This study failed, so there are no results to show.</b></p>"
+        f'<p class="verdict"><span class="pill no">did not finish</span> {inline(status["reason"])}</p>'
+        f"</section>\n<p>{after}</p>\n"
         f"<h2>What to do</h2>\n<ol>{''.join(f'<li>{inline(step)}</li>' for step in steps)}</ol>\n"
     )
     if details.strip():
         body += (
             f"<details><summary>Technical details</summary><pre>{escape(details.strip())}</pre></details>\n"
         )
-    way = f'<a href="../index.html">wildlab ledger</a> › {escape(study)}'
-    return page(title=f"Failed: {title}", body=body, kicker=way, footer=footer)
+    return page(title=f"Failed: {title}", body=body, kicker=f"wildlab › {escape(study)}", footer=footer)

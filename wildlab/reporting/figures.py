@@ -18,10 +18,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from cycler import cycler
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
@@ -33,6 +35,8 @@ DPI = 144
 QUICK = "WILDLAB_QUICK_FIGURES"
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
 FULL_SIZE, LEAST_SIZE = 116, 58
+#: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
+LEAST_TEXT = 11.0
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
 MOST_POINTS = 3000
 #: Okabe and Ito's colours, which colour-blind readers can tell apart; their yellow is too faint for lines
@@ -317,6 +321,28 @@ def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: A
     """Write a line's name at its end, in its colour: easier to read than a legend."""
     settings: dict[str, Any] = {"va": "center", "fontsize": 9.5, "annotation_clip": False} | annotate
     ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
+
+
+def least_size(figure: Figure) -> float:
+    """CSS pixels per inch at which the smallest text of a figure still has `LEAST_TEXT` pixels.
+
+    Parameters
+    ----------
+    figure
+        With everything on it.
+
+    Returns
+    -------
+    float
+        `LEAST_SIZE` where it has no text.
+    """
+    sizes = [text.get_fontsize() for text in figure.findobj(Text) if _is_seen(text)]
+    return 72.0 * LEAST_TEXT / min(sizes) if sizes else float(LEAST_SIZE)
+
+
+def _is_seen(artist: Artist) -> bool:
+    """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
+    return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
 
 
 def thinned(count: int) -> slice:

@@ -6,13 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting.ground import ground_height_words
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import percent
 
 
 def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = ()) -> None:
@@ -42,21 +45,59 @@ def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: S
     first = cause.amiss_sentence(amiss)
     if first:
         said, level = [first, *said], "bad"
-    report.summary([one for one in said if one], level=level)
+    verdict = verdict_words(logged, found.lost, found.ellipses, diagnosis, amiss)
+    report.summary([one for one in said if one], level=level, verdict=verdict)
     if applied:
         report.text(applied)
+
+
+def verdict_words(
+    logged: ErrorSummary, lost: int, ellipses: EllipseVerdict, diagnosis: Diagnosis | None,
+    amiss: Sequence[str] = (),
+) -> tuple[str, str]:  # fmt: skip
+    """The word that goes with `wildlab.reporting.georeferencing_cause.verdict_level`, and its reason.
+
+    Parameters
+    ----------
+    logged, lost, ellipses, diagnosis
+        As there.
+    amiss
+        As for `summary_section`.
+    """
+    total, contradictions = logged.n + lost, sum(one.startswith("problem") for one in amiss)
+    if contradictions:
+        count = "1 finding" if contradictions == 1 else f"{contradictions} findings"
+        return MEND, f"The logs contradict each other: {count}."
+    if not logged.n:
+        return "no positions", f"None of the {total} points has one."
+    if lost > cause.MANY_LOST * total:
+        return "too many lost", f"{lost} of {total} points have no position."
+    said = []
+    gain = cause.gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
+    if gain >= cause.SMALL:
+        said.append(f"a constant error is {percent(gain, 0)} of the mean error")
+    if diagnosis is not None and diagnosis.outliers:
+        count = len(diagnosis.outliers)
+        said.append("1 thing is far out" if count == 1 else f"{count} things are far out")
+    if ellipses.word == "too small":
+        said.append("the stated uncertainty is too small")
+    if logged.n < words.FEW:
+        said.append(f"{logged.n} points are few")
+    if said:
+        reason = "; ".join(said)
+        return FIX if gain >= cause.SMALL else LOOK, f"{reason[0].upper()}{reason[1:]}."
+    if diagnosis is None:
+        return UNJUDGED, "Nobody could look for a cause: there are too few images with known points."
+    return SOUND, f"No constant error worth taking off, nothing far out; the ellipses are {ellipses.word}."
 
 
 def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
     """What does not fit together in the flight; only how much where its locations are not open."""
     if not amiss:
         return
-    report.section("What does not fit together")
-    if shown:
-        report.points(list(amiss))
-    else:
-        count = "1 finding" if len(amiss) == 1 else f"{len(amiss)} findings"
-        report.text(f"{count}: `wildlab check` on the flight's folder says which.")
+    count = "1 finding" if len(amiss) == 1 else f"{len(amiss)} findings"
+    said = list(amiss) if shown else [f"{count}: `wildlab check` on the flight's folder says which."]
+    report.alert("What does not fit together", said)
 
 
 def cause_section(report: Report, found: Accuracy) -> None:

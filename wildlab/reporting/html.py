@@ -17,6 +17,8 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from traitlets.config import Config
 
 from wildlab.errors import WildlabError
+from wildlab.reporting.arrange import VERDICT, arranged
+from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.notebook_file import nbformat
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape, maths
@@ -55,6 +57,8 @@ THESES = {
     "master's thesis, Linköping University, 2016",
 }
 _CITED = re.compile(r"\b([HF])\s(?:\(?\d|(?:section|chapter|example|equation|table|figure)s?\s\(?\d)")
+#: How the address begins of a file within a link: a table or points, which no browser runs.
+HANDED_OVER = ("data:text/csv;base64,", "data:application/geo+json;base64,")
 _FETCHING = ("src", "srcset", "poster", "background", "data", "xlink:href", "action", "formaction", "ping")
 _CSS_REQUEST = re.compile(r"@import|url\s*\(\s*['\"]?(?!data:)", re.I)
 
@@ -145,8 +149,9 @@ def report_page(
     *,
     study: str,
     footer: str = "",
-    ledger: str = "../index.html",
     notice: str = "",
+    title: str = "",
+    made: str = "",
 ) -> str:
     """The whole page of a report, examined.
 
@@ -154,29 +159,45 @@ def report_page(
     ----------
     footer
         HTML of the provenance line (`wildlab.runner.record.provenance.footer`).
-    ledger
-        Where the page of all studies lies, seen from the report; "" leaves the link out.
     notice
-        HTML that stands above everything else.
+        HTML of a paragraph that says that this is a first look. Nothing is claimed of one: it takes the place
+        of the verdict.
+    title
+        Of the study, in place of the heading that the notebook has.
+    made
+        When, as ISO 8601; the day is shown.
 
     Raises
     ------
     WildlabError
         If the page would break one of the promises in `examine`.
     """
-    body = notebook_body(notebook)
-    soup = BeautifulSoup(body, "html.parser")
+    soup = BeautifulSoup(notebook_body(notebook), "html.parser")
+    if title and soup.header is not None and soup.h1 is not None:
+        soup.h1.string = title
+    if notice:
+        _first_look(soup, notice)
+    cited = cited_theses(soup.get_text(" "))
+    body = with_glossary(arranged(str(soup)))
     heading = soup.h1
-    title = heading.get_text(" ", strip=True) if heading else study
-    way = f'<a href="{escape(ledger)}">wildlab ledger</a> › {escape(study)}' if ledger else escape(study)
+    # A page that is mailed alone has nothing beside it: the way to the ledger is words, not a link.
     whole = page(
-        title=title,
-        body=f"{notice}\n{body}" if notice else body,
-        kicker=way,
-        footer=footer + cited_theses(soup.get_text(" ")),
+        title=heading.get_text(" ", strip=True) if heading else study,
+        body=body,
+        kicker=" · ".join(filter(None, [f"wildlab › {escape(study)}", escape(made[:10])])),
+        footer=footer + cited,
     )
     examine(whole, study)
     return whole
+
+
+def _first_look(soup: BeautifulSoup, notice: str) -> None:
+    for one in soup.find_all(attrs={"data-part": VERDICT}):
+        one.decompose()
+    said = BeautifulSoup(notice, "html.parser")
+    if soup.find("section", class_="summary") is not None and said.p is not None:
+        said.p.attrs = {"class": "verdict", "data-part": VERDICT, "data-level": "warn"}
+    soup.append(said)
 
 
 def cited_theses(text: str) -> str:
@@ -201,7 +222,7 @@ def examine(whole: str, name: str) -> None:
     ------
     WildlabError
         If the page is above 5 MB, has something that runs, asks the network or sends, an image without alt
-        text, or headings that are out of order.
+        text, headings that are out of order, or a link that leads nowhere once the page is mailed alone.
     """
     file = f"{name}/report.html"
     size = len(whole.encode("utf-8"))
@@ -242,10 +263,32 @@ def _examine_attributes(tag: Tag, file: str) -> None:
             raise WildlabError(
                 f"a <{tag.name}> asks for {text[:60]!r}", "put the picture into the page itself", file=file
             )
-        if name.lower() == "href" and re.match(r"\s*(javascript|data|vbscript):", text, re.I):
-            raise WildlabError(f"a link runs {text[:60]!r}", "link to a page", file=file)
+        if name.lower() == "href":
+            _examine_link(tag, text, file)
         if name.lower() == "style" and _CSS_REQUEST.search(text):
             raise WildlabError("a style asks the network for something", "take the url() out", file=file)
+
+
+def _examine_link(tag: Tag, to: str, file: str) -> None:
+    """A page is mailed alone: a link leads to a place in it, hands over a file within, or to the web."""
+    if re.match(r"\s*(javascript|vbscript):", to, re.I):
+        raise WildlabError(f"a link runs {to[:60]!r}", "link to a page", file=file)
+    if re.match(r"\s*data:", to, re.I):
+        if tag.get("download") is None or not to.startswith(HANDED_OVER):
+            raise WildlabError(
+                f"a link runs {to[:60]!r}", "hand over tables only, by wildlab.reporting.tables", file=file
+            )
+        return
+    if to.startswith("#"):
+        root = tag.find_parent("html") or tag
+        if len(to) < 2 or root.find(id=to[1:]) is None:
+            raise WildlabError(f"a link leads to {to!r}, which is not on the page", "mend it", file=file)
+    elif not to.startswith("https://"):
+        raise WildlabError(
+            f"a link leads to {to[:60]!r}, which is missing where the page is mailed alone",
+            "say it in words",
+            file=file,
+        )
 
 
 def _examine_headings(levels: list[int], file: str) -> None:

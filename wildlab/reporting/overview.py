@@ -24,6 +24,7 @@ from wildlab.pipeline.overviews.worth_fixing import (
 )
 from wildlab.reporting import overview_sections as sections
 from wildlab.reporting import overview_words as words
+from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.charts import overview as charts
 from wildlab.reporting.georeferencing_sections import amiss_section
 from wildlab.reporting.report import Report
@@ -61,14 +62,14 @@ def show_overview(
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
     measured = error_measured(numbers)
     said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible)
-    report.summary(said, level=LEVELS[word])
+    report.summary(said, level=LEVELS[word], verdict=(word, words.reason_words(**counts)))
     report.tiles(sections.tiles(overview))
-    report.section("Most worth fixing", words.first_of(gains, possible))
+    report.section("Most worth fixing", words.first_of(gains, possible), part=ADVICE)
     if gains:
         report.points([words.gain_sentence(gain) for gain in gains[:MOST]], ordered=True)
     if overview.problems:
         count = "One problem" if overview.problems == 1 else f"{overview.problems} problems"
-        report.text(f"{count} in its tables: `wildlab check` on the flight's folder says which.")
+        report.alert(f"{count} in its tables", ["`wildlab check` on the flight's folder says which."])
     amiss_section(report, amiss, shown=shown)
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)
     clock = charts.Clock(begin, overview.length_s)

@@ -111,6 +111,26 @@ def gain_sentence(gain: Gain) -> str:
     return f"**{gain_title(gain)}.** {gain_measured(gain)} {_REMEDIES[gain.key]}"
 
 
+def reason_words(problems: int, worth: int, troubled: int, judged: int, broken: int, alarmed: int) -> str:
+    """Why the verdict is what it is: what was counted, most pressing first; parameters of `verdict_of`."""
+    said = [
+        f"{count} {one if count == 1 else many}"
+        for count, one, many in (
+            (broken, "alarm", "alarms"),
+            (problems, "problem in its tables", "problems in its tables"),
+            (alarmed, "thing to look at before all else", "things to look at before all else"),
+            (worth, f"gain of {percent(WORTH, 0)} or more", f"gains of {percent(WORTH, 0)} or more"),
+            (troubled, "thing amiss whose gain is not known", "things amiss whose gain is not known"),
+        )
+        if count
+    ]
+    if said:
+        return f"{', '.join(said)}."
+    if not judged:
+        return "No other report could be made of this flight."
+    return f"{judged} other {'report' if judged == 1 else 'reports'} on it, and nothing in them worth fixing."
+
+
 def alarm_words(alarm: Alarm, overview: Overview) -> str:
     """One alarm as a clause: how much, and when since the first stamp."""
     begin = min((pace.begin for pace in overview.streams.values() if pace.n), default=0.0)

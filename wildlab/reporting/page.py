@@ -56,6 +56,18 @@ pre { font: .8rem/1.45 var(--mono); background: var(--soft); padding: .8rem 1rem
 .summary.warn { border-color: var(--warn) }
 .summary.bad { border-color: var(--bad) }
 .summary p { margin: 0; font-size: 1.08rem; max-width: none }
+.summary p.verdict { margin-top: .55rem; font-size: 1rem }
+.verdict .pill { margin-right: .3rem; font-weight: 600; white-space: normal; overflow-wrap: anywhere }
+.alert { border: 1px solid var(--bad); border-left-width: 6px; padding: .6rem 1.1rem; margin: 1rem 0 }
+.alert ul, .alert p { margin: .25rem 0; max-width: none }
+a.word { color: inherit; text-decoration: underline dotted; text-underline-offset: .18em }
+.words { margin: .6rem 0; max-width: 46rem; display: grid; grid-template-columns: max-content 1fr;
+  gap: .35rem 1.2rem; font-size: .93rem }
+.words dt { font-weight: 600; max-width: 12rem }
+.words dd { margin: 0 }
+.words dt:target, .words dt:target + dd { background: var(--soft) }
+.get { white-space: nowrap }
+.paper { display: none }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: .75rem;
   margin: 1.3rem 0; padding: 0; list-style: none; max-width: none }
 .tiles li { border: 1px solid var(--line); border-radius: .4rem; padding: .65rem .85rem; margin: 0 }
@@ -122,23 +134,47 @@ footer p { margin: .25rem 0; max-width: none }
   thead th { font-size: .76rem }
   th.text, td.text { min-width: 4.6rem }
   th.wide { min-width: 8rem }
+  .words { grid-template-columns: 1fr; gap: .1rem }
+  .words dd { margin-bottom: .5rem }
+  /* A row of many columns becomes a card: each cell below the other, after the name of its column. */
+  table.many, table.many > tbody, table.many > tbody > tr { display: block }
+  table.many > thead { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%) }
+  table.many > tbody > tr { border-bottom: 1px solid var(--line); padding: .45rem 0 }
+  table.many > tbody > tr > * { display: flex; gap: 1rem; justify-content: space-between; border: 0;
+    padding: .1rem 0; text-align: right; white-space: normal; max-width: none; overflow-wrap: anywhere }
+  table.many > tbody > tr > *::before { content: attr(data-label); color: var(--dim); text-align: left;
+    font-weight: 400; flex: 0 1 11rem }
+  table.many > tbody > tr > th { font-weight: 600 }
+  table.many > tbody > tr > :first-child { text-align: left; justify-content: flex-start }
+  /* A figure whose letters would be too small to read is wider than the screen, and says so. */
+  .slides::before { content: "wider than the screen: push it sideways \\2192"; display: block;
+    position: sticky; left: 0; width: max-content; color: var(--dim); font-size: .8rem;
+    padding-bottom: .2rem }
 }
-@page { size: A4; margin: 16mm 15mm }
+@page { size: A4; margin: 16mm 15mm 18mm; @bottom-right { content: counter(page) " / " counter(pages);
+  font: 8pt system-ui, sans-serif } }
 @media print {
-  body { max-width: none; padding: 0; font-size: 10.2pt; line-height: 1.42 }
+  body { max-width: none; padding: 0; font-size: 10.2pt; line-height: 1.42; orphans: 3; widows: 3 }
   h1 { font-size: 17pt }
   h2 { font-size: 12.5pt; margin-top: 1.5rem }
   h1, h2, h3 { break-after: avoid }
-  figure:not(.long), tr, .summary, .tiles, .formula { break-inside: avoid }
+  figure:not(.table), tr, .summary, .alert, .tiles, .formula, .words > * { break-inside: avoid }
   figcaption { break-before: avoid }
-  /* Paper cannot be unfolded. */
-  details::details-content { content-visibility: visible; display: block }
-  figure img { max-height: 120mm; width: auto; max-width: 100% !important; min-width: 0 !important }
+  /* Paper cannot be unfolded, nor can every browser unfold by style: what is folded is printed as a copy. */
+  details { display: none }
+  .paper { display: block }
+  .paper > p:first-of-type { margin-top: 1rem }
+  .row { gap: 0 5mm }
+  .row figure { flex: 1 1 80mm }
+  /* Lower than half a page: what has no room leaves less than that empty. */
+  figure img { max-height: 88mm; width: auto; max-width: 100% !important; min-width: 0 !important }
   .summary, .tag, .pill, .band, .full { print-color-adjust: exact; -webkit-print-color-adjust: exact }
   .scroll { overflow: visible; background: none }
   table { font-size: 8.4pt }
   th, td { padding: .22rem .45rem; white-space: normal }
   a { color: inherit; text-decoration: none }
+  a.word { text-decoration: none }
+  .get { display: none }
 }"""
 
 
@@ -158,6 +194,43 @@ def first_look_notice(look: str, again: str) -> str:
     )
 
 
+def paper_copies(body: str) -> str:
+    """What is folded away in ``body``, once more for paper: shown there alone, at the end.
+
+    Parameters
+    ----------
+    body
+        HTML.
+
+    Returns
+    -------
+    str
+        HTML; "" where nothing is folded.
+    """
+    if "<details" not in body:
+        return ""
+    from bs4 import BeautifulSoup  # takes a while, and most that import this module write no page
+
+    soup = BeautifulSoup(body, "html.parser")
+    copies = []
+    for folded in soup.find_all("details"):
+        if folded.find_parent("details") is not None:
+            continue
+        title = folded.summary.extract().decode_contents() if folded.summary is not None else ""
+        for inner in folded.find_all("details"):
+            inner.unwrap()
+        for inner in folded.find_all("summary"):
+            inner.name = "p"
+        for named in folded.find_all(id=True):
+            del named["id"]
+        for box in folded.find_all(tabindex=True):
+            box.attrs = {key: box[key] for key in box.attrs if key not in ("tabindex", "role", "aria-label")}
+        for link in folded.find_all("a", class_="data"):
+            link.decompose()
+        copies.append(f"<p><b>{title}</b></p>{folded.decode_contents()}")
+    return f'\n<section class="paper" aria-hidden="true">{"".join(copies)}</section>'
+
+
 def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: str = "") -> str:
     """A whole HTML document.
 
@@ -170,6 +243,7 @@ def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: st
     style
         CSS that this page has besides `STYLE`.
     """
+    body += paper_copies(body)
     above = f'<p class="kicker">{kicker}</p>\n' if kicker else ""
     below = f"<footer>{footer}</footer>\n" if footer else ""
     rules = f"{STYLE}\n{style}" if style else STYLE

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wildlab.pipeline.overviews.worth_fixing import MEND, UNJUDGED
 from wildlab.pipeline.repeats import Repeats
 from wildlab.reporting.georeferencing import short_length
 from wildlab.reporting.georeferencing_cause import MANY_LOST, amiss_sentence, lost_sentence
@@ -74,6 +75,17 @@ def level(found: Repeats, amiss: Sequence[str] = ()) -> str:
     Bad where many points are lost, or where the flight contradicts itself (``amiss``).
     """
     return "bad" if found.lost > MANY_LOST * len(found.points) or amiss_sentence(amiss) else "neutral"
+
+
+def verdict(found: Repeats, amiss: Sequence[str] = ()) -> tuple[str, str]:
+    """The word that goes with `level`, and its reason."""
+    contradictions, total = sum(one.startswith("problem") for one in amiss), len(found.points)
+    if contradictions:
+        count = "1 finding" if contradictions == 1 else f"{contradictions} findings"
+        return MEND, f"The logs contradict each other: {count}."
+    if found.lost > MANY_LOST * total:
+        return "too many lost", f"{found.lost} of {total} points have no position."
+    return UNJUDGED, "Without points whose place is known, errors stay unknown."
 
 
 def limits(found: Repeats) -> list[str]:

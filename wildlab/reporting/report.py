@@ -15,7 +15,6 @@ escaped; ``**bold**`` and a code span in backquotes are the only marks (`wildlab
 
 from __future__ import annotations
 
-import base64
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,12 +26,21 @@ from matplotlib.figure import Figure
 
 from wildlab.errors import WildlabError
 from wildlab.reporting import metrics as schema
-from wildlab.reporting.figures import FULL_SIZE, LEAST_SIZE, png_bytes, save_figure
+from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
+from wildlab.reporting.figures import png_bytes, save_figure
 from wildlab.reporting.page import TAGS
+from wildlab.reporting.pictures import figure_html
 from wildlab.reporting.published import published_rows
-from wildlab.reporting.text import NOTHING, escape, inline, maths, number, prose, slug
+from wildlab.reporting.standing import Standing, standing
+from wildlab.reporting.tables import csv_link, table_html
+from wildlab.reporting.text import escape, inline, maths, prose, slug
+from wildlab.reporting.verdicts import judge
 
 LEVELS = ("good", "warn", "bad", "neutral")
+#: The pill that goes with a bar's colour.
+PILLS = {"good": "yes", "warn": "part", "bad": "no", "neutral": ""}
+#: Points of an alert that are shown at once: what comes below must not leave the screen.
+ALERTS_SHOWN = 3
 
 #: Rows of a table that is still kept on one page of paper.
 LONGEST_UNBROKEN = 15
@@ -115,6 +123,7 @@ class Report:
         self._claims: list[dict[str, Any]] = []
         self._figures: set[str] = set()
         self._tables = 0
+        self._judged = False
         self._published = {(row["name"], row["subject"]): row for row in published_rows(study)}
 
     # -- the parts of a page
@@ -128,24 +137,54 @@ class Report:
             f"<header><h1>{inline(title)}</h1>", f'<p class="sub">{about}{tag}{inline(subtitle)}</p></header>'
         )
 
-    def summary(self, sentences: Sequence[str], level: str = "neutral") -> None:
-        """The plain-language summary, three sentences at best; the first is set bold."""
+    def summary(
+        self, sentences: Sequence[str], level: str = "neutral", verdict: tuple[str, str] | None = None
+    ) -> None:
+        """The plain-language summary, three sentences at best; the first is set bold.
+
+        Parameters
+        ----------
+        sentences
+            The answer first.
+        level
+            The colour of the bar: one of `LEVELS`.
+        verdict
+            The word that the colour means, and its reason in a sentence. Without one, `save` says how the
+            numbers and claims of the study stand to the printed ones.
+        """
         if level not in LEVELS:
             raise WildlabError(f"the level {level!r} is unknown", f"use one of: {', '.join(LEVELS)}")
+        if verdict is None and level != "neutral":
+            raise WildlabError(f"the colour {level!r} has no word", "give the verdict and its reason")
         if not sentences:
             raise WildlabError("the summary is empty", "give it a sentence")
         first, *others = [inline(sentence) for sentence in sentences]
         text = " ".join([f"<b>{first.replace('<b>', '').replace('</b>', '')}</b>", *others])
         self._show(f'<section class="summary {level}" aria-label="Summary"><p>{text}</p></section>')
+        self._judged = verdict is not None
+        if verdict is not None:
+            self._verdict(*verdict, level)
+
+    def alert(self, title: str, points: Sequence[str]) -> None:
+        """What must be known before anything else; beyond `ALERTS_SHOWN` points, the others are folded."""
+        first, others = points[:ALERTS_SHOWN], points[ALERTS_SHOWN:]
+        html = f"<p><b>{inline(title)}</b></p>{_list(first)}"
+        if others:
+            html += f"<details><summary>{len(others)} more</summary>{_list(others)}</details>"
+        label = f'aria-label="{escape(title)}"'
+        self._show(f'<section class="alert" data-part="{ALERT}" {label}>{html}</section>')
 
     def tiles(self, tiles: Sequence[tuple[str, str]]) -> None:
         """The few numbers to remember: ``[("2.9 m", "mean error"), ...]``."""
         items = [f"<li><b>{inline(value)}</b><span>{inline(label)}</span></li>" for value, label in tiles]
         self._show(f'<ul class="tiles">{"".join(items)}</ul>')
 
-    def section(self, title: str, intro: str = "") -> None:
-        """``<h2>`` and, if given, a paragraph."""
-        self._show(f'<h2 id="{slug(title)}">{inline(title)}</h2>', f"<p>{inline(intro)}</p>" if intro else "")
+    def section(self, title: str, intro: str = "", part: str = "") -> None:
+        """``<h2>`` and, if given, a paragraph. ``part`` is one of `wildlab.reporting.arrange`: what to do
+        (`ADVICE`) stands before all other sections, wherever it was shown."""
+        marked = f' data-part="{part}"' if part else ""
+        heading = f'<h2 id="{slug(title)}"{marked}>{inline(title)}</h2>'
+        self._show(heading, f"<p>{inline(intro)}</p>" if intro else "")
 
     def subsection(self, title: str, intro: str = "") -> None:
         """``<h3>`` and, if given, a paragraph."""
@@ -157,10 +196,9 @@ class Report:
 
     def points(self, points: Iterable[str], *, ordered: bool = False) -> None:
         """A list."""
-        tag = "ol" if ordered else "ul"
-        self._show(f"<{tag}>{''.join(f'<li>{inline(point)}</li>' for point in points)}</{tag}>")
+        self._show(_list(points, "ol" if ordered else "ul"))
 
-    def figure(self, fig: Figure, *, name: str, alt: str, caption: str = "") -> None:
+    def figure(self, fig: Figure, *, name: str, alt: str, caption: str = "", main: bool = False) -> None:
         """Show a figure, and write it as ``figures/<name>.pdf`` and ``.png``.
 
         Parameters
@@ -169,8 +207,11 @@ class Report:
             The thesis figure it answers to (``fig-5-04a``), or what it shows.
         alt
             What a reader who cannot see it should know; never empty.
+        main
+            Whether it is the page's main picture, which stands right below the summary. Without one, the
+            first figure is.
         """
-        self._show(self._figure(fig, name, alt, caption))
+        self._show(self._figure(fig, name, alt, caption, main=main))
 
     def figures(self, row: Sequence[tuple[Figure, str, str, str]]) -> None:
         """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone."""
@@ -204,11 +245,13 @@ class Report:
                 )
             frame = frame[list(columns)]
         self._tables += 1
+        body = table_html(frame, columns or {}, digits)
         label = f"<b>Table {self._tables}.</b> {inline(caption)}" if caption else ""
-        body = _table(frame, columns or {}, digits)
+        if link := csv_link(frame, f"{self.study}-table-{self._tables}", f"Table {self._tables} as CSV"):
+            label += f' <span class="get">{link}</span>'
         described = f' aria-label="{escape(caption or fold or f"Table {self._tables}")}"'
         long = " long" if len(frame) > LONGEST_UNBROKEN else ""
-        box = f'<div class="scroll" role="region" tabindex="0"{described}>{body}</div>'
+        box = f'<div class="scroll" role="group" tabindex="0"{described}>{body}</div>'
         html = f'<figure class="table{long}">{box}'
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
@@ -219,12 +262,15 @@ class Report:
 
     def limits(self, points: Iterable[str]) -> None:
         """What this report does not tell."""
-        self.section("What this does not tell you")
+        self.section("What this does not tell you", part=LIMITS)
         self.points(points)
 
     def method(self, paragraphs: str) -> None:
         """How it was computed, folded away at the end; ``$latex$`` is set as maths."""
-        self._show(f"<details><summary>How it was computed</summary>{prose(paragraphs)}</details>")
+        self._show(
+            f'<details class="method" data-part="{METHOD}"><summary>How it was computed</summary>'
+            f"{prose(paragraphs)}</details>"
+        )
 
     # -- the numbers
     # --------------------------------------------------------------------------------------------
@@ -297,8 +343,21 @@ class Report:
         """What is published for a number: a row of `wildlab.reporting.published.load_published`, or None."""
         return self._published.get((name, subject))
 
+    @property
+    def standing(self) -> Standing:
+        """How the numbers and claims recorded so far stand to those that are printed."""
+        recorded, printed = self.recorded, self.published
+        rows = [row for row in self._published.values() if not row["again"]]
+        compared = [judge(row, recorded, printed) for row in rows]
+        return standing(
+            [one.verdict for one in compared if one is not None], [one["verdict"] for one in self._claims]
+        )
+
     def save(self) -> None:
-        """Write ``metrics.json`` into the report's folder; where there is none, only check the numbers."""
+        """Say how the numbers stand, unless the summary did, and write ``metrics.json`` into the report's
+        folder; where there is none, only check the numbers."""
+        if not self._judged:
+            self._verdict(*self.standing)
         content = schema.document(
             study=self.study,
             flight=self.flight,
@@ -314,7 +373,12 @@ class Report:
     # -- inside
     # -------------------------------------------------------------------------------------------------
 
-    def _figure(self, fig: Figure, name: str, alt: str, caption: str = "") -> str:
+    def _verdict(self, word: str, reason: str, level: str) -> None:
+        pill = f'<span class="pill {PILLS[level]}">{inline(word)}</span>'
+        marks = f'data-part="{VERDICT}" data-level="{level}"'
+        self._show(f'<p class="verdict" {marks}>{pill} {inline(reason)}</p>')
+
+    def _figure(self, fig: Figure, name: str, alt: str, caption: str = "", *, main: bool = False) -> str:
         if not _FILE_NAME.fullmatch(name):
             raise WildlabError(f"the figure name {name!r} is not made of a-z, 0-9 and -", "rename it")
         if name in self._figures:
@@ -324,19 +388,9 @@ class Report:
         self._figures.add(name)
         ordinal = len(self._figures)
         png = save_figure(fig, self.out / "figures", name) if self.out is not None else png_bytes(fig)
-        width_in, height_in = fig.get_size_inches()
+        html = figure_html(fig, png, ordinal=ordinal, alt=alt, caption=caption, main=main)
         _close(fig)
-        data = base64.b64encode(png).decode("ascii")
-        # The size in pixels lets a browser keep the place before it has decoded the picture.
-        width, height = round(width_in * FULL_SIZE), round(height_in * FULL_SIZE)
-        image = (
-            f'<img alt="{escape(alt)}" width="{width}" height="{height}" '
-            f'style="max-width:{width}px;min-width:{round(width_in * LEAST_SIZE)}px" '
-            f'src="data:image/png;base64,{data}">'
-        )
-        image = f'<div class="scroll" role="region" tabindex="0" aria-label="Figure {ordinal}">{image}</div>'
-        label = f"<figcaption><b>Figure {ordinal}.</b> {inline(caption)}</figcaption>" if caption else ""
-        return f"<figure>{image}{label}</figure>"
+        return html
 
     def _show(self, *html: str) -> None:
         content = "\n".join(part for part in html if part)
@@ -350,39 +404,8 @@ class Report:
                 display({"text/html": content, "text/plain": plain}, raw=True)
 
 
-def _table(frame: pd.DataFrame, headings: Mapping[str, str], digits: Mapping[str, int] | int | None) -> str:
-    cells: list[list[str]] = []
-    classes: list[str] = []
-    for name in frame:
-        column = frame[name]
-        numeric = pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_bool_dtype(column)
-        decimals = digits if isinstance(digits, int) else (digits or {}).get(str(name))
-        if decimals is None and pd.api.types.is_integer_dtype(column):
-            decimals = 0
-        classes.append("" if numeric else ' class="text"')
-        cells.append([number(value, decimals) if numeric else _words(value) for value in column])
-    head = "".join(
-        f'<th scope="col"{style}>{inline(headings.get(str(name), str(name)))}</th>'
-        for name, style in zip(frame, classes, strict=True)
-    )
-    rows = "".join(
-        "<tr>"
-        + "".join(
-            f'<th scope="row"{style}>{cell}</th>' if index == 0 else f"<td{style}>{cell}</td>"
-            for index, (cell, style) in enumerate(zip(row, classes, strict=True))
-        )
-        + "</tr>"
-        for row in zip(*cells, strict=True)
-    )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-
-
-def _words(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if value is None or (isinstance(value, float) and value != value) or value is pd.NaT or value is pd.NA:
-        return NOTHING
-    return inline(value)
+def _list(points: Iterable[str], tag: str = "ul") -> str:
+    return f"<{tag}>{''.join(f'<li>{inline(point)}</li>' for point in points)}</{tag}>"
 
 
 def _close(fig: Figure) -> None:

@@ -124,6 +124,37 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     return said, level
 
 
+#: What the colour of the summary means.
+_WORDS = {"good": "consistent", "bad": "overconfident", "warn": "look closer", "neutral": "undecided"}
+
+
+def verdict_of(rows: pd.DataFrame, level: str) -> tuple[str, str]:
+    """The word that goes with the level of `summary`, and its reason: what the tracks were found to be.
+
+    Parameters
+    ----------
+    rows
+        As for `summary`.
+    level
+        From it.
+
+    Returns
+    -------
+    (str, str)
+    """
+    followed = rows[rows["detections"] > 0]
+    if not len(followed):
+        return "no track", "No detection was followed by a second one."
+    known = followed[followed["compared"] > 0]
+    mine = known if len(known) else followed
+    mine = mine[mine["filter"] == leading(list(dict.fromkeys(mine["filter"])))]
+    column, of = (
+        ("verdict", "errors") if len(known) else ("nis_verdict", "distances from where it was expected")
+    )
+    what = "track" if len(mine) == 1 else "tracks"
+    return _WORDS[level], f"{len(mine)} {what}, by the size of their {of}: {_counts(mine, column)}."
+
+
 def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     alone = rows[rows["kind"] != TOGETHER]
     together, rows = rows[rows["kind"] == TOGETHER], alone if len(alone) else rows

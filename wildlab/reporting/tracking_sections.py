@@ -30,7 +30,7 @@ def head_section(
     ways = "" if sensors == 1 else ", each alone and all together"
     report.head(title, f"{of} followed by {by}{ways}")
     said, level = words.summary(rows, pairs, tuned)
-    report.summary(said, level=level)
+    report.summary(said, level=level, verdict=words.verdict_of(rows, level))
     if followed.notes:
         report.points(followed.notes)
 

@@ -68,7 +68,7 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
         # What scrolls sideways must be reached without a mouse.
         block.attrs |= {"tabindex": "0", "role": "region", "aria-label": f"Code or output {i}"}
     title = soup.h1.get_text(" ", strip=True) if soup.h1 else name
-    way = f'<a href="../index.html">wildlab ledger</a> › tutorials › {escape(name)}'
+    way = f"wildlab › tutorials › {escape(name)}"
     whole = page(title=title, body=str(soup), kicker=way, footer=footer, style=STYLE)
     examine(whole, name)
     return whole

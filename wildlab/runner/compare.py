@@ -86,8 +86,7 @@ def compare_flights(
         chosen.append(found)
     target = reports / COMPARISON if into is None else into
     target.mkdir(parents=True, exist_ok=True)
-    near = target.resolve().parent == reports.resolve()
-    page = comparison_page(chosen, links="../" if near else "", index="../flights.html" if near else "")
+    page = comparison_page(chosen)
     write_csv(target / "flights.csv", flights_table(chosen))
     write_atomic(target / "report.html", page)
     build_ledger(reports, studies)

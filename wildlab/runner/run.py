@@ -82,6 +82,8 @@ def make_job(
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])
     seed = study.seed if seed is None else seed
     reports = reports.resolve()
+    # Reports on somebody's own flight ask what the notebook asks; a study is called the same everywhere.
+    heading = study.title if name is None else ""
     name = name or study.name
     own = flight is None
     work = _seed_work(study, name, seed, flight, reports, parameters)
@@ -93,6 +95,7 @@ def make_job(
     return Job(
         name=name,
         title=study.title,
+        heading=heading,
         notebook=str(notebook.resolve()),
         work=str(reports / f".{name}.{os.getpid()}.part"),
         runtime=str(socket_folder() / f"wl{os.getpid()}-{os.urandom(4).hex()}"),

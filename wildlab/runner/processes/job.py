@@ -20,6 +20,8 @@ class Job:
     runtime: str
     reports: str
     seed: int = 1
+    #: The page's main heading; "" leaves the notebook's.
+    heading: str = ""
     flight: str = ""
     #: What it calls itself: its folder's name may tell more than it wants to.
     flight_name: str = ""

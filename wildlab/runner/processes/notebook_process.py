@@ -142,7 +142,14 @@ def _work(pipe: connection.Connection, job: Job) -> None:
     write_json(folder / "provenance.json", origin)
     look = look_words(job.first_look)
     notice = first_look_notice(look, job.again) if look else ""
-    page = html.report_page(cleaned, study=job.name, footer=provenance.footer(origin), notice=notice)
+    page = html.report_page(
+        cleaned,
+        study=job.name,
+        footer=provenance.footer(origin),
+        notice=notice,
+        title=job.heading,
+        made=str(origin["made"]),
+    )
     write_atomic(folder / "report.html", page)
 
 

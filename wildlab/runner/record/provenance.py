@@ -169,7 +169,8 @@ def footer(
         )
     parts.append(f"made {escape(provenance['made'].replace('T', ' ').replace('+00:00', ' UTC'))}")
     line = f"<p>{' · '.join(parts)}.</p>"
-    links = " and ".join(f'<a href="{escape(name)}">{escape(name)}</a>' for name in beside)
+    # Words, not links: the page is passed on alone.
+    links = " and ".join(f"<code>{escape(name)}</code>" for name in beside)
     if not links:
         return line
     return f"{line}<p>Code, parameters and all hashes (SHA-256) are in {links} beside this page.</p>"

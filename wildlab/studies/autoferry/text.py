@@ -131,11 +131,6 @@ def use_words(use: pd.DataFrame) -> str:
     return f"The {who} {alone} of no use for locating boats: with its best filter, {counts}."
 
 
-def level_of(found: pd.DataFrame) -> str:
-    """``good`` where more than half of the tracks stay and have their mean NEES in its band, or ``warn``."""
-    return "good" if 2 * int(found["inside"].sum()) > len(found) else "warn"
-
-
 def tiles(found: pd.DataFrame) -> list[tuple[str, str]]:
     """The numbers to remember."""
     if found.empty:

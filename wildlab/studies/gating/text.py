@@ -104,13 +104,6 @@ def summary_sentences(outcomes: Mapping[str, Outcome], published: Mapping[str, f
     ]
 
 
-def level_of(rates: Array, published: Mapping[str, float], within: Mapping[str, float]) -> str:
-    """``good`` where each form's mean is within its stated tolerance of the published rate, or ``warn``."""
-    mean = mean_rates(rates)
-    near = all(abs(mean[form] - published[form]) <= within[form] for form in FORMS)
-    return "good" if near else "warn"
-
-
 def tiles(rates: Array, published: Mapping[str, float]) -> list[tuple[str, str]]:
     """The rate of each form with the published one, and of both gates with what they gain over the better."""
     mean = mean_rates(rates)

@@ -34,8 +34,10 @@ def middle_flight(spread: pd.DataFrame) -> dict[str, float]:
     return {name: float(spread["mekf", name].median()) for name in names}
 
 
-def summary(found: Mapping[str, float], part: str, true: bool, flights: int = 1) -> tuple[list[str], str]:
-    """Three sentences on how far off the filter's attitude is, and the colour that goes with them.
+def summary(
+    found: Mapping[str, float], part: str, true: bool, flights: int = 1
+) -> tuple[list[str], str, tuple[str, str] | None]:
+    """Three sentences on how far off the filter's attitude is, the colour, and the word that it means.
 
     Parameters
     ----------
@@ -50,8 +52,9 @@ def summary(found: Mapping[str, float], part: str, true: bool, flights: int = 1)
 
     Returns
     -------
-    list of str, str
-        The sentences, and ``"warn"`` or ``"neutral"``.
+    list of str, str, (str, str) or None
+        The sentences; ``"warn"`` or ``"neutral"``; the verdict and its reason. Of many flights it is None:
+        what they come to is how they stand to the printed numbers.
     """
     off, stated = (float(np.linalg.norm([found[f"{of}_{axis}"] for axis in AXES])) for of in _PAIR)
     aside = HEIGHT * np.radians(np.hypot(found["rms_roll"], found["rms_pitch"]))
@@ -70,7 +73,13 @@ def summary(found: Mapping[str, float], part: str, true: bool, flights: int = 1)
         f"{aside:.1f} metres.",
         last,
     ]
-    return sentences, "warn" if too_sure else "neutral"
+    if flights > 1:
+        return sentences, "neutral", None
+    against = "the truth" if true else "the attitude found on board"
+    reason = f"From {against} it differs by {off / stated:.1f} times what it states."
+    if too_sure:
+        return sentences, "warn", ("too sure of itself", reason)
+    return sentences, "neutral", ("within what it states" if true else "not contradicted", reason)
 
 
 _PAIR = ("rms", "mean_sd")

@@ -111,8 +111,8 @@ def image_words(over_image: Mapping[str, Array], middle: Mapping[str, float]) ->
     return title, said, alt
 
 
-def printed_words(differences: Array, agree: int) -> tuple[str, str]:
-    """How many of the thesis's numbers come out, and what colour the summary has for it.
+def printed_words(differences: Array, agree: int) -> str:
+    """How many of the thesis's numbers come out.
 
     Parameters
     ----------
@@ -123,12 +123,11 @@ def printed_words(differences: Array, agree: int) -> tuple[str, str]:
 
     Returns
     -------
-    tuple of str
-        The sentence, and ``"good"`` where all agree, else ``"warn"``.
+    str
     """
     n = len(differences)
     who = "all" if agree == n else str(agree)
     said = f"The thesis prints {n} such numbers; {who} of them come out here to the last printed digit"
     if agree == n:
-        return f"{said}.", "good"
-    return f"{said}, the others within {np.abs(differences).max():.2f} metres.", "warn"
+        return f"{said}."
+    return f"{said}, the others within {np.abs(differences).max():.2f} metres."
