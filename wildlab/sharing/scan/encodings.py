@@ -1,0 +1,142 @@
+"""How a place can be written as two or three numbers, and what those numbers are for the true places."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pymap3d
+from numpy.typing import NDArray
+from pyproj import CRS, Transformer
+
+from wildlab.sharing.scan.secrets import Array
+
+#: Metres per degree of latitude, for how near is near.
+DEGREE_M = 111_320.0
+EARTH_M = 6_371_000.0
+#: Zones of UTM to either side of the own: Norway counts from zone 31 to 36 in zone 33.
+ZONES = 3
+
+
+class Axis(NamedTuple):
+    """One of the numbers.
+
+    Attributes
+    ----------
+    name
+        ``"latitude"``.
+    values
+        (N,) of the places, without their sign, in the order of the places.
+    per_metre
+        (N,) how much a metre on the ground changes it.
+    decimals
+        How many decimals a single one of them needs to count, or None: alone it says too little.
+    """
+
+    name: str
+    values: Array
+    per_metre: Array
+    decimals: int | None = None
+
+
+class Encoding(NamedTuple):
+    """One way of writing places.
+
+    Attributes
+    ----------
+    name
+        ``"decimal degrees"``.
+    axes
+        Two or three.
+    decimals
+        How many decimals each of two together needs to count.
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    decimals: int
+
+
+def encodings_of(places: Array) -> list[Encoding]:
+    """Every way of writing places as numbers that is looked for.
+
+    Parameters
+    ----------
+    places
+        (N, 3) as `Secrets` has them.
+    """
+    if not len(places):
+        return []
+    latitude, longitude = places[:, 0], places[:, 1]
+    height = np.nan_to_num(places[:, 2])
+    across = DEGREE_M * np.maximum(np.cos(np.radians(latitude)), 0.01)
+    found = []
+    for name, unit, pair, alone in (
+        ("decimal degrees", 1.0, 2, 5),
+        ("radians", np.pi / 180, 4, 7),
+        ("degrees times 1e7", 1e7, 0, 0),
+        ("degrees times 1e6", 1e6, 0, 0),
+        ("milliarcseconds", 3.6e6, 0, 0),
+        ("arcseconds", 3600.0, 0, 3),
+        ("arcminutes", 60.0, 2, 4),
+        ("gradians", 10 / 9, 3, 5),
+    ):
+        around = np.where(longitude < 0, longitude + 360, longitude)
+        for east in (longitude, around) if (longitude < 0).any() else (longitude,):
+            axes = (
+                Axis("latitude", np.abs(latitude) * unit, unit / DEGREE_M + 0 * latitude, alone),
+                Axis("longitude", np.abs(east) * unit, unit / across, alone),
+            )
+            found.append(Encoding(name, axes, pair))
+    x, y, z = pymap3d.geodetic2ecef(latitude, longitude, height)
+    one = np.ones(len(places))
+    for name, unit in (("ECEF in metres", 1.0), ("ECEF in kilometres", 1e-3), ("ECEF in centimetres", 100.0)):
+        axes = tuple(
+            Axis(axis, np.abs(values) * unit, one * unit, 1 if unit == 1 else 4 if unit < 1 else 0)
+            for axis, values in (("x", x), ("y", y), ("z", z))
+        )
+        found.append(Encoding(name, axes, 0 if unit >= 1 else 1))
+    return found + _grids(latitude, longitude)
+
+
+def _grids(latitude: Array, longitude: Array) -> list[Encoding]:
+    """Eastings and northings: UTM of the zones around, Web Mercator, and other common grids."""
+    zones = {int(zone) for zone in np.floor((longitude + 180) / 6).astype(int) % 60 + 1}
+    around = sorted({(zone - 1 + shift) % 60 + 1 for zone in zones for shift in range(-ZONES, ZONES + 1)})
+    grids: list[tuple[str, str, bool]] = [
+        (
+            f"UTM zone {zone}{' counted from the south' if south else ''}",
+            f"+proj=utm +zone={zone} +ellps=WGS84{' +south' if south else ''}",
+            zone in zones,
+        )
+        for zone in around
+        for south in (False, True)
+    ]
+    # A zone of three degrees: Gauss-Krueger writes its number before the easting, South Africa's Lo nothing.
+    for middle in sorted({int(m) for m in np.round(longitude / 3)}):
+        grids.append(
+            (
+                f"Gauss-Krueger zone {middle}",
+                f"+proj=tmerc +lon_0={3 * middle} +k=1 +x_0={middle * 1_000_000 + 500_000} +ellps=bessel",
+                False,
+            )
+        )
+    for middle in sorted({int(2 * np.floor(m / 2) + 1) for m in longitude}):
+        grids.append((f"Lo{middle}", f"+proj=tmerc +lon_0={middle} +k=1 +ellps=WGS84", False))
+    grids.append(("Web Mercator", "EPSG:3857", True))
+    grids.append(("World Mercator", "EPSG:3395", True))
+    grids.append(("ETRS89 LAEA", "EPSG:3035", False))
+    found = []
+    for name, definition, own in grids:
+        transform = Transformer.from_crs(CRS("EPSG:4326"), CRS(definition), always_xy=True)
+        east, north = (np.asarray(v, float) for v in transform.transform(longitude, latitude))
+        good: NDArray[np.bool_] = np.isfinite(east) & np.isfinite(north) & (np.abs(east) < 1e8)
+        if not good.any():
+            continue
+        stretch = np.maximum(1 / np.maximum(np.cos(np.radians(latitude)), 0.05), 1) if "Mercator" in name else 1.0
+        axes = tuple(
+            Axis(axis, np.where(good, np.abs(values), np.inf), np.full(len(east), stretch), decimals)
+            for axis, values, decimals in (("easting", east, 2 if own else None), ("northing", north, 1 if own else None))
+        )
+        found.append(Encoding(name, axes, 0))
+    return found

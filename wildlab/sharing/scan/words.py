@@ -1,0 +1,160 @@
+"""Names: of flights, people, machines, files and folders, however they are written."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import cache
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import wildlab
+from wildlab.sharing.scan.hits import Hit
+
+#: Shorter names are only found where they stand alone.
+LONG = 4
+#: At most so many of one word are listed.
+MOST = 20
+#: Shorter than this, or of digits only, they are everywhere.
+SHORTEST = 3
+#: What has no letters of the Latin alphabet to stand for it when signs above letters are lost.
+_PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "đ": "d", "ð": "d", "þ": "th"})
+
+_PARTS = re.compile(r"[^\W_]+")
+
+
+class Needles(NamedTuple):
+    """What is looked for, and what is not.
+
+    Attributes
+    ----------
+    phrases
+        Words in lower case, in their parts: ``("nordre", "fjell")``.
+    skipped
+        Words that cannot be looked for, and why, as sentences.
+    """
+
+    phrases: tuple[tuple[str, ...], ...]
+    skipped: tuple[str, ...]
+
+
+def parts_of(word: str) -> tuple[str, ...]:
+    """The parts of a word, in small letters: ``("nordre", "fjell")`` of ``"Nordre_Fjell"``."""
+    return tuple(_PARTS.findall(unicodedata.normalize("NFKC", word).casefold()))
+
+
+def plain(text: str) -> str:
+    """Without the signs above letters: ``"bjornoya"``."""
+    if text.isascii():
+        return text
+    apart = unicodedata.normalize("NFKD", text.translate(_PLAIN))
+    return "".join(letter for letter in apart if not unicodedata.combining(letter))
+
+
+@cache
+def own_text() -> str:
+    """All words of wildlab's own sources, in order: that they stand in a report says nothing of a flight."""
+    root = Path(wildlab.__file__).parent
+    files = [*root.rglob("*.py"), *root.parent.glob("notebooks/*.ipynb")]
+    texts = (path.read_text(encoding="utf-8", errors="replace").casefold() for path in sorted(files))
+    return " ".join(("", *(word for text in texts for word in _PARTS.findall(text)), ""))
+
+
+@cache
+def own_words() -> frozenset[str]:
+    """The different ones among them."""
+    return frozenset(own_text().split())
+
+
+def needles_of(words: Iterable[str]) -> Needles:
+    """What can be looked for of some words.
+
+    Parameters
+    ----------
+    words
+        Names as they are: paths are taken apart, and so are names with blanks, - and _.
+    """
+    wanted: dict[tuple[str, ...], None] = {}
+    skipped = []
+    for word in dict.fromkeys(words):
+        for piece in dict.fromkeys(piece for piece in re.split(r"[/\\]", word) if piece.strip()):
+            stem = piece.rpartition(".")[0] or piece
+            for one in dict.fromkeys((piece, stem)):
+                phrase = parts_of(one)
+                reason = _useless(phrase)
+                if not reason:
+                    wanted[phrase] = None
+                elif one == piece and phrase:
+                    skipped.append(f"{one!r} is not looked for: {reason}")
+            known = own_words()
+            telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
+            wanted.update({(part,): None for part in telling if part not in known})
+    return Needles(tuple(wanted), tuple(dict.fromkeys(skipped)))
+
+
+def _useless(phrase: tuple[str, ...]) -> str:
+    """Why a phrase cannot be looked for; nothing where it can."""
+    if not phrase:
+        return "it has no letters"
+    joined = "".join(phrase)
+    if len(joined) < SHORTEST:
+        return f"it has fewer than {SHORTEST} letters, and stands everywhere"
+    if joined.isdigit() and len(joined) < 6:
+        return "it is a short number, and stands everywhere"
+    if phrase[0] in own_words() and f" {' '.join(phrase)} " in own_text():
+        return "wildlab's own reports use it"
+    return ""
+
+
+class Words:
+    """Looks for names in texts."""
+
+    def __init__(self, words: Iterable[str]) -> None:
+        self.needles = needles_of(words)
+        spelt = {phrase: None for phrase in self.needles.phrases}
+        spelt |= {tuple(plain(part) for part in phrase): None for phrase in spelt}
+        # As the bytes of UTF-8 look where they are read as Latin-1.
+        mangled = {
+            parts_of("".join(phrase).encode().decode("latin-1")): None
+            for phrase in self.needles.phrases
+            if not "".join(phrase).isascii()
+        }
+        self.phrases = list(spelt | mangled)
+
+    def found_in(self, text: str) -> list[Hit]:
+        """Where names stand in a text; the places are near enough where letters are not ASCII.
+
+        Parameters
+        ----------
+        text
+            As it is: letters large or small.
+        """
+        if not self.phrases:
+            return []
+        small = unicodedata.normalize("NFKC", text).casefold()
+        hits = self._found(small)
+        if not small.isascii():
+            hits += self._found(plain(small))
+        return hits
+
+    def _found(self, small: str) -> list[Hit]:
+        distinct = set(_PARTS.findall(small))
+        haystack = "\n".join(distinct)
+        hits = []
+        for phrase in self.phrases:
+            if not self._may_be_there(phrase, distinct, haystack):
+                continue
+            body = r"[\W_]{0,3}".join(re.escape(part) for part in phrase)
+            pattern = rf"(?<![^\W_]){body}(?![^\W_])" if len("".join(phrase)) < LONG else body
+            matches = islice(re.finditer(pattern, small), MOST)
+            hits += [Hit(match.start(), match.end(), "name", "a name") for match in matches]
+        return hits
+
+    @staticmethod
+    def _may_be_there(phrase: tuple[str, ...], distinct: set[str], haystack: str) -> bool:
+        if len(phrase) == 1 and len(phrase[0]) < LONG:
+            return phrase[0] in distinct
+        # In one word, or in several: each of its parts is at the edge of some word.
+        return all(part in haystack for part in phrase)
