@@ -1,1 +1,1 @@
-"""Copies that are safe to send."""
+"""Copies of reports that are safe to send: what is generalised, drawn again, packed and looked through."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from datetime import UTC, date, datetime, timedelta
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.numbers import Bytes, Ints, Numbers, Runs
-from wildlab.sharing.scan.secrets import Secrets
+from wildlab.sharing.scan.secrets import MayStay, Secrets
 
 #: Months by number, as English, German, Norwegian, Swedish and Danish begin to write them.
 MONTHS = (
@@ -20,6 +20,8 @@ MONTHS = (
 )  # fmt: skip
 #: A date elsewhere on Earth may be the day before or after the one in UTC.
 BEHIND, AHEAD = timedelta(hours=12), timedelta(hours=14)
+#: So many namings of one month are looked at.
+MOST_NAMES = 20_000
 GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
 #: GPS runs ahead of UTC by this at most, and by nothing at first, s.
 LEAP_S = 20
@@ -54,7 +56,9 @@ def dates_in(data: Bytes, text: str, runs: Runs, numbers: Numbers, secrets: Secr
     if not secrets.moments or secrets.may_stay == "all":
         return []
     days = days_of(secrets.moments)
-    hits = _numeric(data, runs, days) + _compact(runs, days) + _named(text, days, secrets)
+    hits: list[Hit] = []
+    if secrets.may_stay != "day":
+        hits += _numeric(data, runs, days) + _compact(runs, days) + _named(text, days, secrets)
     hits += _clock_times(data, runs, secrets.moments)
     hits += _counted(numbers, secrets.moments) + _gps(numbers, secrets.moments)
     if secrets.may_stay in ("nothing", "year"):
@@ -121,22 +125,25 @@ def _named(text: str, days: set[date], secrets: Secrets) -> list[Hit]:
     hits = []
     for year, month in sorted({(day.year, day.month) for day in days}):
         name = rf"(?:{'|'.join(MONTHS[month - 1])})[^\W\d_]{{0,8}}"
-        if not re.search(name, text, re.IGNORECASE):
-            continue
-        numbers = "|".join(
-            rf"0?{day.day}" for day in sorted(days) if (day.year, day.month) == (year, month)
-        )
-        day, gap = rf"(?<!\d)(?:{numbers})(?!\d)(?:st|nd|rd|th|\.)?", r"[\s,._/-]{0,3}(?:of |de )?"
-        years = rf"(?:{year}|'?{year % 100:02d}(?!\d))"
-        spelt = [rf"{day}{gap}{name}", rf"(?<![^\W_]){name}{gap}{day}{gap}{years}", rf"{years}{gap}{name}{gap}{day}"]
-        if secrets.may_stay in ("nothing", "year"):
-            spelt.append(rf"(?<![^\W_]){name}{gap}{years}")
-        for pattern in spelt:
-            hits += [
-                Hit(m.start(), m.end(), "date", "a date with the month in letters")
-                for m in re.finditer(pattern, text, re.IGNORECASE)
-            ]
+        spelt = re.compile("|".join(_spellings(name, year, month, days, secrets.may_stay)), re.IGNORECASE)
+        begins = re.finditer(rf"(?<![^\W\d_]){name}", text, re.IGNORECASE)
+        for begin in islice(begins, MOST_NAMES):
+            # A long text is looked at only where the month is named.
+            match = spelt.search(text[max(begin.start() - 16, 0) : begin.end() + 16])
+            if match:
+                start = max(begin.start() - 16, 0) + match.start()
+                end = start + len(match[0])
+                hits.append(Hit(start, end, "date", "a date with the month in letters"))
     return hits
+
+
+def _spellings(name: str, year: int, month: int, days: set[date], may_stay: MayStay) -> list[str]:
+    """Patterns of the days of a month."""
+    numbers = "|".join(rf"0?{day.day}" for day in sorted(days) if (day.year, day.month) == (year, month))
+    day, gap = rf"(?<!\d)(?:{numbers})(?!\d)(?:st|nd|rd|th|\.)?", r"[\s,._/-]{0,3}(?:of |de )?"
+    years = rf"(?:{year}|'?{year % 100:02d}(?!\d))"
+    spelt = [rf"{day}{gap}{name}", rf"{name}{gap}{day}{gap}{years}", rf"{years}{gap}{name}{gap}{day}"]
+    return spelt + ([rf"{name}{gap}{years}"] if may_stay in ("nothing", "year") else [])
 
 
 def _clock_times(data: Bytes, runs: Runs, moments: Sequence[datetime]) -> list[Hit]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MayStay = Literal["nothing", "year", "month", "all"]
+MayStay = Literal["nothing", "year", "month", "day", "all"]
 
 
 @dataclass(frozen=True)

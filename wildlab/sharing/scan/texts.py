@@ -11,21 +11,22 @@ import numpy as np
 from wildlab.sharing.scan.numbers import Bytes
 
 #: Signs that stand for others in numbers: minus, primes, thin blanks, ordinals for degrees.
-_ALIKE = str.maketrans(
-    {
-        **dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\ufe63\uff0d", "-"),
-        **dict.fromkeys("\u2032\u2018\u2019\u02b9\u00b4", "'"),
-        **dict.fromkeys("\u2033\u201c\u201d\u02ba", '"'),
-        **dict.fromkeys("\u00a0\u2007\u2008\u2009\u200a\u202f\u2060", " "),
-        **dict.fromkeys("\u00ba\u02da\u2070", "\u00b0"),
-        **dict.fromkeys("\u200b\u200c\u200d\ufeff\u00ad", None),
-        "\u066b": ".", "\u066c": ",", "\uff0e": ".",
-    }
-)  # fmt: skip
+_ALIKE = {
+    **dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\ufe63\uff0d", "-"),
+    **dict.fromkeys("\u2032\u2018\u2019\u02b9\u00b4", "'"),
+    **dict.fromkeys("\u2033\u201c\u201d\u02ba", '"'),
+    **dict.fromkeys("\u00a0\u2007\u2008\u2009\u200a\u202f\u2060", " "),
+    **dict.fromkeys("\u00ba\u02da\u2070", "\u00b0"),
+    **dict.fromkeys("\u200b\u200c\u200d\ufeff\u00ad", ""),
+    "\u066b": ".", "\u066c": ",", "\uff0e": ".",
+}  # fmt: skip
 _OTHER_DIGIT = re.compile(r"(?![0-9])\d")
 _JSON_ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|([0-7]{3})|([nrtbf/\"'\\()]))")
 _PLAIN_ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
 _TAG = re.compile(r"<(?:!--|-->|/?[A-Za-z][^<>]{0,2000}>)")
+#: What can be read among bytes that are no text; the same with zeros between the letters.
+_PRINTED = re.compile(rb"[\t\n\r\x20-\x7e]{5,}")
+_WIDE = re.compile(rb"(?:[\x20-\x7e]\x00{1,3}){4,}[\x20-\x7e]?")
 #: Escapes may stand inside of escapes: a page in a notebook.
 DEEPEST = 3
 
@@ -43,7 +44,7 @@ def texts_of(data: bytes) -> list[str]:
     Parameters
     ----------
     data
-        Any bytes; of what is no text, the letters in it are read as Latin-1.
+        Any bytes; of what is no text, what can be read in it.
 
     Returns
     -------
@@ -60,11 +61,9 @@ def texts_of(data: bytes) -> list[str]:
         except UnicodeDecodeError:
             base.append(data.decode("latin-1"))
     else:
-        base.append(data.decode("latin-1"))
+        base.append("\n".join(run.decode("ascii") for run in _PRINTED.findall(data)))
         if b"\x00" in data:
-            # Letters with zeros between them, in any of the wide encodings, at any place.
-            narrow = re.findall(rb"(?:[\x20-\x7e\xa0-\xff]\x00{1,3}){3,}[\x20-\x7e\xa0-\xff]?", data)
-            base.append("\n".join(run.replace(b"\x00", b"").decode("latin-1") for run in narrow))
+            base.append("\n".join(run.replace(b"\x00", b"").decode("ascii") for run in _WIDE.findall(data)))
     found: list[str] = []
     for text in base:
         found += _readings(text)
@@ -130,6 +129,7 @@ def as_bytes(text: str) -> tuple[str, Bytes]:
         Any; what is not Latin-1 becomes a question mark, digits of all scripts become ours.
     """
     if not text.isascii():
-        text = text.translate(_ALIKE)
+        for sign in set(text) & _ALIKE.keys():
+            text = text.replace(sign, _ALIKE[sign])
         text = _OTHER_DIGIT.sub(lambda digit: str(int(digit[0])) if digit[0].isdecimal() else "?", text)
     return text, np.frombuffer(text.encode("latin-1", "replace"), np.uint8)

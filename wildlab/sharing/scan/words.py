@@ -20,7 +20,8 @@ MOST = 20
 #: Shorter than this, or of digits only, they are everywhere.
 SHORTEST = 3
 #: What has no letters of the Latin alphabet to stand for it when signs above letters are lost.
-_PLAIN = str.maketrans({"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "đ": "d", "ð": "d", "þ": "th"})
+_PLAIN = {"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "đ": "d", "ð": "d", "þ": "th"}
+_SIGNS = re.compile("[\u0300-\u036f]")
 
 _PARTS = re.compile(r"[^\W_]+")
 
@@ -49,8 +50,9 @@ def plain(text: str) -> str:
     """Without the signs above letters: ``"bjornoya"``."""
     if text.isascii():
         return text
-    apart = unicodedata.normalize("NFKD", text.translate(_PLAIN))
-    return "".join(letter for letter in apart if not unicodedata.combining(letter))
+    for letter, letters in _PLAIN.items():
+        text = text.replace(letter, letters)
+    return _SIGNS.sub("", unicodedata.normalize("NFKD", text))
 
 
 @cache
@@ -115,13 +117,28 @@ class Words:
         self.needles = needles_of(words)
         spelt = {phrase: None for phrase in self.needles.phrases}
         spelt |= {tuple(plain(part) for part in phrase): None for phrase in spelt}
-        # As the bytes of UTF-8 look where they are read as Latin-1.
-        mangled = {
-            parts_of("".join(phrase).encode().decode("latin-1")): None
-            for phrase in self.needles.phrases
-            if not "".join(phrase).isascii()
-        }
-        self.phrases = list(spelt | mangled)
+        self.phrases = list(spelt)
+
+    def found_in_bytes(self, data: bytes) -> list[Hit]:
+        """Where names with other letters than ASCII's stand among bytes that are no text.
+
+        Parameters
+        ----------
+        data
+            Any bytes.
+        """
+        hits = []
+        for phrase in self.phrases:
+            word = " ".join(phrase)
+            if word.isascii() or len(word) < LONG:
+                continue
+            for spelt in {word, word.title(), word.upper(), word.capitalize()}:
+                for encoding in ("utf-8", "latin-1", "utf-16-le", "utf-16-be"):
+                    needle = spelt.encode(encoding, "ignore")
+                    at = data.find(needle) if len(needle) >= LONG else -1
+                    if at >= 0:
+                        hits.append(Hit(at, at + len(needle), "name", "a name"))
+        return hits
 
     def found_in(self, text: str) -> list[Hit]:
         """Where names stand in a text; the places are near enough where letters are not ASCII.
