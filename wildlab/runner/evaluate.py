@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
+
+#: What is judged beside the overview, by how long it takes on a flight of 25 minutes.
+LONGEST_FIRST = ("navigation.ipynb", "tracking.ipynb", "georeferencing.ipynb", "repeat-sightings.ipynb")
 
 
 def evaluate_flight(
@@ -130,8 +134,21 @@ def evaluate_flight(
     reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": source or ""}
     prepare(f"{flight.name}-overview", "overview.ipynb", about, again)
-    outcomes = run_all([jobs[:-1], jobs[-1:]], skipped, studies, reports, console)
-    return sorted(outcomes, key=lambda one: one.name != jobs[-1].name)
+    passes = [longest_first(jobs[:-1]), jobs[-1:]]
+    outcomes = run_all(passes, skipped, studies, reports, console, parallel=cores())
+    order = [jobs[-1].name, *beside]
+    return sorted(outcomes, key=lambda one: order.index(one.name) if one.name in order else len(order))
+
+
+def longest_first(jobs: Sequence[Job]) -> list[Job]:
+    """The jobs in the order that leaves the last one waiting least, where there are fewer cores than jobs."""
+    return sorted(jobs, key=lambda job: LONGEST_FIRST.index(Path(job.notebook).name))
+
+
+def cores() -> int:
+    """How many cores there are for this process."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
 
 
 def refuse_other_flight(folder: Path, report: Path) -> None:
