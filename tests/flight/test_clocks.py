@@ -19,6 +19,7 @@ from wildlab.flight.clocks import (
     frame_times,
     gimbal_angles,
     longest_gap,
+    pose_finder,
     poses_at,
     truth_at,
 )
@@ -170,3 +171,26 @@ def test_a_slow_log_is_bridged_at_its_own_rate_but_not_over_a_missing_sample() -
     assert longest_gap(stamps) == 3.0
     assert longest_gap(np.arange(0, 5, 0.1)) == MAX_GAP_S
     assert np.isnan(truth_at(truth, [1.0], max_gap_s=1.0)[1]).all()
+
+
+@given(vectors, vectors, vectors, st.lists(st.floats(-1.0, 7.0), min_size=1, max_size=5))
+def test_a_finder_finds_what_is_found_at_once(
+    rate: Array, velocity: Array, start: Array, times: list[float]
+) -> None:
+    nav = _turning(rate, velocity, np.array([0.0, 0.5, 1.0, 3.0, 3.5, 6.0]), start)
+    nav.loc[1, "q_x"] = np.nan
+    for longest in (None, 2.5):
+        p, R = pose_finder(nav, max_gap_s=longest)(times)
+        p_once, R_once, _ = poses_at(nav, times, max_gap_s=longest)
+        np.testing.assert_array_equal(p, p_once)
+        np.testing.assert_array_equal(R, R_once)
+
+
+def test_a_finder_of_frames_does_not_look_at_times_and_refuses_what_poses_at_refuses() -> None:
+    nav = _turning(np.zeros(3), np.ones(3), np.arange(3.0), np.zeros(3)).assign(frame_id=["a", "b", "c"])
+    p, _ = pose_finder(nav, ["c", "x", "a"])(np.zeros(3))
+    np.testing.assert_array_equal(p[:, 0], [7.0, np.nan, 5.0])
+    with pytest.raises(WildlabError, match="empty"):
+        pose_finder(nav.iloc[:0])
+    with pytest.raises(WildlabError, match="do not increase"):
+        pose_finder(nav.iloc[[0, 0, 1]])

@@ -5,17 +5,17 @@ A clock's offset is what to add to its stamps to get flight time (`[clocks]` of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import quaternion_to_matrix
+from wildlab.geometry.turns import between_attitudes
 
 Array = NDArray[np.float64]
 
@@ -139,10 +139,52 @@ def poses_at(
         )
     before, after, share = _neighbours(nav["time_s"].to_numpy(float), times, max_gap_s, "nav")
     p = _between(position, before, after, share)
-    turn = _between_attitudes(attitude, before, after, share)
+    turn = between_attitudes(attitude, before, after, share)
     if covariance is None:
         return p, turn, None
     return p, turn, _between(covariance.reshape(-1, 36), before, after, share).reshape(-1, 6, 6)
+
+
+def pose_finder(
+    nav: pd.DataFrame, frame_ids: Sequence[str] | pd.Series | None = None, max_gap_s: float | None = None
+) -> Callable[[ArrayLike], tuple[Array, Array]]:
+    """`poses_at` of one table for whoever asks over and over: what does not hang on the times is done once.
+
+    Parameters
+    ----------
+    nav, frame_ids, max_gap_s
+        As for `poses_at`.
+
+    Returns
+    -------
+    From times (N,) to positions (N, 3) and rotations (N, 3, 3), as of `poses_at`.
+
+    Raises
+    ------
+    WildlabError
+        As `poses_at`.
+
+    Examples
+    --------
+    >>> from wildlab.simulation.twins import simulate_twin
+    >>> flight = simulate_twin("large-ship", 1)
+    >>> nav, times = flight.nav["autopilot"], frame_times(flight)
+    >>> bool((pose_finder(nav)(times)[0] == poses_at(nav, times)[0]).all())
+    True
+    """
+    if len(nav) == 0 or (frame_ids is not None and "frame_id" in nav):
+        p, R, _ = poses_at(nav, None, frame_ids)
+        return lambda _: (p, R)
+    stamps = nav["time_s"].to_numpy(float)
+    position = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
+    attitude = np.ascontiguousarray(nav[["q_w", "q_x", "q_y", "q_z"]].to_numpy(float))
+    longest = _longest(stamps, max_gap_s, "nav")
+
+    def find(times: ArrayLike) -> tuple[Array, Array]:
+        rows = _rows_about(stamps, times, longest)
+        return _between(position, *rows), between_attitudes(attitude, *rows)
+
+    return find
 
 
 def frame_poses(
@@ -322,7 +364,11 @@ def _neighbours(
     stamps: Array, times: ArrayLike, max_gap_s: float | None, what: str
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows before and after each time, and how far between them (0..1); NaN where there is no answer."""
-    at = np.atleast_1d(np.asarray(times, float))
+    return _rows_about(stamps, times, _longest(stamps, max_gap_s, what))
+
+
+def _longest(stamps: Array, max_gap_s: float | None, what: str) -> float:
+    """The longest gap that is bridged between stamps, which must increase; ``what`` is for messages."""
     if not (np.diff(stamps) > 0).all():
         raise WildlabError(
             "the timestamps do not increase",
@@ -332,7 +378,14 @@ def _neighbours(
         )
     if len(stamps) == 0:
         raise WildlabError("the table is empty", "give it rows", file=what)
-    longest = longest_gap(stamps) if max_gap_s is None else max_gap_s
+    return longest_gap(stamps) if max_gap_s is None else max_gap_s
+
+
+def _rows_about(
+    stamps: Array, times: ArrayLike, longest: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """As `_neighbours`, of stamps that were looked at."""
+    at = np.atleast_1d(np.asarray(times, float))
     after = np.clip(np.searchsorted(stamps, at, side="left"), 0, len(stamps) - 1)
     exact = stamps[after] == at
     before = np.where(exact, after, np.maximum(after - 1, 0))
@@ -345,15 +398,3 @@ def _neighbours(
 def _between(values: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
     # A time that falls on a stamp takes that row alone, whatever stands in the next.
     return np.asarray(values[before] + share[:, None] * (values[after] - values[before]))
-
-
-def _between_attitudes(q: Array, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> Array:
-    R = np.full((len(share), 3, 3), np.nan)
-    good = np.isfinite(q).all(axis=1) & (np.linalg.norm(q, axis=1) > 0)
-    rows = np.flatnonzero(np.isfinite(share) & good[before] & good[after])
-    if len(rows):
-        start = Rotation.from_quat(q[before[rows]], scalar_first=True)
-        end = Rotation.from_quat(q[after[rows]], scalar_first=True)
-        turn = (start.inv() * end).as_rotvec()
-        R[rows] = (start * Rotation.from_rotvec(share[rows, None] * turn)).as_matrix()
-    return R

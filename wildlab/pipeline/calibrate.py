@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from wildlab.pipeline.georeference import (
     georeference,
     observe,
     pose_errors,
-    shifted_poses,
+    shifting_poses,
 )
 
 Array = NDArray[np.float64]
@@ -56,7 +55,7 @@ def fit_flight(
     ids = observations.table["detection_id"]
     weights = covariances_of(scored.set_index("detection_id").loc[ids].reset_index())
     return calibrate(
-        partial(shifted_poses, flight, source, observations),
+        shifting_poses(flight, source, observations),
         observations.uv,
         known,
         observations.table["frame_id"].to_numpy(),

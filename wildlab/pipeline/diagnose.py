@@ -46,7 +46,7 @@ from wildlab.geometry.calibration import (
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.pipeline.evaluate import blocks_of, known_points
-from wildlab.pipeline.georeference import Observations, covariances_of, shifted_poses, truth_of
+from wildlab.pipeline.georeference import Observations, covariances_of, shifting_poses, truth_of
 
 Array = NDArray[np.float64]
 
@@ -298,16 +298,17 @@ def _poses(
     position stays added.
     """
     named = chosen.table.assign(target_id=targets)
+    shifted = shifting_poses(flight, source, chosen)
 
     @lru_cache(maxsize=_SHIFTS)
     def at(shift: float) -> CameraPoses:
         if shift == 0:
             return chosen.poses
-        poses = shifted_poses(flight, source, chosen, shift)
+        poses = shifted(shift)
         place = poses.p_nb + added
         return replace(poses, p_nb=place - shift * velocity)
 
-    added = chosen.poses.p_nb - shifted_poses(flight, source, chosen, 0.0).p_nb
+    added = chosen.poses.p_nb - shifted(0.0).p_nb
     velocity = np.zeros_like(added)
     if flight.truth is not None and flight.truth["time_s"].notna().any():
         after, before = (

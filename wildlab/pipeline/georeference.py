@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
+from wildlab.flight.clocks import frame_times, gimbal_angles, pose_finder, poses_at, truth_at
 from wildlab.flight.store import Flight
-from wildlab.geometry.calibration import Calibration, calibrated_poses
+from wildlab.geometry.calibration import Calibration, PosesAt, calibrated_poses
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.georeference import georeference_pixels
@@ -168,16 +168,20 @@ def _grounded(observations: Observations) -> Observations:
     return replace(o, plane_down=pixels_to_terrain(o.poses, o.uv, o.terrain).points[:, 2])
 
 
-def shifted_poses(
-    flight: Flight, source: str | None, observations: Observations, shift: float
-) -> CameraPoses:
-    """The poses of observations whose camera stamps are ``shift`` seconds later.
+def shifting_poses(flight: Flight, source: str | None, observations: Observations) -> PosesAt:
+    """From seconds to the poses of observations whose camera stamps are so much later; the last few are kept.
 
     A moving gimbal keeps the angles it had at the unshifted stamps, and the poses their covariance.
     """
-    times = observations.table["time_s"].to_numpy(float) + shift
-    p_nb, R_nb, _ = poses_at(flight.pose_source(source)[1], times, observations.table["frame_id"])
-    return replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
+    times = observations.table["time_s"].to_numpy(float)
+    find = pose_finder(flight.pose_source(source)[1], observations.table["frame_id"])
+
+    @lru_cache(maxsize=4)
+    def at(shift: float) -> CameraPoses:
+        p_nb, R_nb = find(times + shift)
+        return replace(observations.poses, p_nb=p_nb, R_nb=R_nb)
+
+    return at
 
 
 def heights_left_in(flight: Flight, observations: Observations) -> Observations:
@@ -205,7 +209,7 @@ def calibrated(
     flight: Flight, source: str | None, observations: Observations, calibration: Calibration
 ) -> Observations:
     """The observations with an estimated calibration applied to mount, camera, position, and their times."""
-    poses = calibrated_poses(calibration, partial(shifted_poses, flight, source, observations))
+    poses = calibrated_poses(calibration, shifting_poses(flight, source, observations))
     times = observations.table["time_s"] + calibration.value("clock")
     return _grounded(replace(observations, table=observations.table.assign(time_s=times), poses=poses))
 

@@ -1,0 +1,50 @@
+"""The reports of a flight: which are made at once, in which order, and in which order they are told."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.pipeline.robots import robot_flight
+from wildlab.flight.store import save_flight
+from wildlab.paths import NOTEBOOKS
+from wildlab.runner import evaluate
+from wildlab.runner.processes.job import Job
+from wildlab.runner.processes.scheduling import Outcome
+
+
+def test_long_ones_begin_first_and_the_overview_waits_for_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save_flight(robot_flight(1, heading_sd_deg=1.0), tmp_path / "flight")
+    ran: list[tuple[list[str], int]] = []
+
+    def run_all(
+        passes: Sequence[Sequence[Job]], skipped: list[Outcome], *_: Any, parallel: int
+    ) -> list[Outcome]:
+        ran.extend(([Path(job.notebook).stem for job in jobs], parallel) for jobs in passes)
+        return [Outcome(job.name, "done", 1.0) for jobs in passes for job in jobs] + skipped
+
+    monkeypatch.setattr(evaluate, "run_all", run_all)
+    monkeypatch.setattr(evaluate, "cores", lambda: 2)
+    monkeypatch.setattr(evaluate, "lacking_for_navigation", lambda *_: "")
+    told = [one.name for one in evaluate.evaluate_flight(tmp_path / "flight", reports=tmp_path / "reports")]
+    assert ran[0][0][0] == "navigation" and set(ran[0][0][1:]) >= {"tracking"}
+    assert ran[1:] == [(["overview"], 2)] and ran[0][1] == 2
+    assert told[0] == "robot-overview" and told[-1] == "robot-tracking"
+
+
+def test_every_notebook_of_a_flight_has_its_place() -> None:
+    assert all((NOTEBOOKS / name).is_file() for name in evaluate.LONGEST_FIRST)
+
+
+def test_cores_are_those_that_this_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
+    assert evaluate.cores() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert evaluate.cores() == 1
