@@ -3,12 +3,23 @@
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import floating, long_flight, navigation, pixel_to_plane, simulation, terrain, tracking, turns, warm
+from benchmarks import (
+    floating,
+    long_flight,
+    navigation,
+    pixel_to_plane,
+    simulation,
+    terrain,
+    tracking,
+    turns,
+    warm,
+)
 
 
 def main() -> None:
     console = Console()
-    for benchmark in (pixel_to_plane, turns, terrain, navigation, tracking, simulation, warm, floating, long_flight):
+    every = (pixel_to_plane, turns, terrain, navigation, tracking, simulation, warm, floating, long_flight)
+    for benchmark in every:
         title, rows = benchmark.run()
         table = Table("what", "time (ms)", "ratio", "wanted", title=title)
         for what, seconds, ratio, wanted in rows:
