@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import chi2
 
 from wildlab.brief import Brief, Summary
 from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.flight.store import Flight
+from wildlab.geometry.quantiles import chi2_quantile
 from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import covariances_of, observe
 from wildlab.pipeline.georeference import georeference as to_ground
@@ -39,7 +39,7 @@ class Points(Brief):
         known = np.isfinite(P).all(axis=(1, 2))
         rows = [("poses", self.source), ("on the ground", f"{placed} of {len(self.table)} detections")]
         if known.any():
-            half = np.sqrt(np.linalg.eigvalsh(P[known])[:, 1] * chi2.ppf(0.9, 2))
+            half = np.sqrt(np.linalg.eigvalsh(P[known])[:, 1] * chi2_quantile(0.9, 2))
             rows.append(("longer half axis of the 90 % ellipse", f"{np.median(half):.2f} m (median)"))
         if "ray" in self.table:
             counts = self.table["ray"].value_counts()

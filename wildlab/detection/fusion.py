@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
 
 from wildlab.detection.detections import Detections
 from wildlab.detection.ground import Located
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.quantiles import chi2_quantile
 
 Index = NDArray[np.intp]
 
@@ -104,7 +104,7 @@ def fuse_points(
         if apart.size
         else np.zeros((len(a), len(b)))
     )
-    limit = float(chi2.ppf(gate, 2))
+    limit = chi2_quantile(gate, 2)
     allowed = distance2 <= limit
     # Of all joinings with the most pairs the likeliest: a pair costs its distance, and the size of the
     # ellipse that it has to lie in; one that is not allowed costs more than all the others.

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm, t
 
 from wildlab.evaluation.runs import Interval
+from wildlab.geometry.quantiles import normal_quantile, student_quantile
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -86,7 +86,7 @@ def block_mean(values: ArrayLike, blocks: ArrayLike, probability: float = PROBAB
     mean, count = float(x.mean()), int(group.max()) + 1
     if count < 2:
         return Interval(mean, np.nan, np.nan)
-    half = float(t.ppf((1 + probability) / 2, count - 1)) * standard_error(x, group)
+    half = float(student_quantile((1 + probability) / 2, count - 1)) * standard_error(x, group)
     return Interval(mean, mean - half, mean + half)
 
 
@@ -117,7 +117,7 @@ class Neighbours(NamedTuple):
     @property
     def alike(self) -> bool:
         """Whether independent images would be so alike once in twenty flights at most."""
-        return bool(self.correlation > norm.ppf(0.95) / np.sqrt(max(self.images, 1)))
+        return bool(self.correlation > normal_quantile(0.95) / np.sqrt(max(self.images, 1)))
 
     @property
     def worth(self) -> float:
@@ -135,7 +135,9 @@ class Neighbours(NamedTuple):
         if not self.alike or worth >= blocks or blocks < 2:
             return 1.0
         upper = (1 + probability) / 2
-        return float(np.sqrt(blocks / worth) * t.ppf(upper, worth - 1) / t.ppf(upper, blocks - 1))
+        return float(
+            np.sqrt(blocks / worth) * student_quantile(upper, worth - 1) / student_quantile(upper, blocks - 1)
+        )
 
 
 def compare_neighbours(errors: ArrayLike, order: ArrayLike) -> Neighbours:
@@ -231,7 +233,7 @@ def compare_halves(values: ArrayLike, blocks: ArrayLike, probability: float = 0.
     errors = [standard_error(part, of) for part, of in zip(parts, blocks_of, strict=True)]
     freedom = min(len(np.unique(of)) for of in blocks_of) - 1
     half = (
-        float(t.ppf((1 + probability) / 2, freedom) * np.hypot(errors[0], errors[1]))
+        float(student_quantile((1 + probability) / 2, freedom) * np.hypot(errors[0], errors[1]))
         if freedom > 0
         else float("nan")
     )

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from filterpy.common import Q_discrete_white_noise
-from filterpy.kalman import KalmanFilter
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.quantiles import chi2_quantile
 
 Array = NDArray[np.float64]
 
@@ -56,7 +54,7 @@ def chi_square_interval(dof: float, probability: float = 0.95, runs: float = 1) 
             "give at least one of each, and a probability between 0 and 1",
         )
     tail = (1 - probability) / 2
-    return float(chi2.ppf(tail, dof * runs) / runs), float(chi2.ppf(1 - tail, dof * runs) / runs)
+    return float(chi2_quantile(tail, dof * runs) / runs), float(chi2_quantile(1 - tail, dof * runs) / runs)
 
 
 def whiten(errors: ArrayLike, covariances: ArrayLike) -> Array:
@@ -288,6 +286,10 @@ def simulate_filter_runs(
     acceleration_m_s2, measurement_m
         Standard deviations of the process noise (constant over a step) and of each measured coordinate.
     """
+    # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
+    from filterpy.common import Q_discrete_white_noise
+    from filterpy.kalman import KalmanFilter
+
     F = np.kron(np.array([[1.0, interval_s], [0.0, 1.0]]), np.eye(2))
     # The order of the state is north, east, velocity north, velocity east.
     Q = np.kron(Q_discrete_white_noise(2, dt=interval_s, var=acceleration_m_s2**2), np.eye(2))

@@ -6,10 +6,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from wildlab.evaluation.blocks import FEWEST, PROBABILITY, block_mean
 from wildlab.evaluation.runs import Interval
+from wildlab.geometry.quantiles import chi2_quantile
 
 Array = NDArray[np.float64]
 Word = Literal["honest", "too small", "too large", "undecided", "too few"]
@@ -93,7 +93,7 @@ def judge_ellipses(
         return EllipseVerdict("too few", Interval(nan, nan, nan), Interval(nan, nan, nan), stated, 0)
     e, P, group = e[keep], P[keep], np.unique(np.asarray(blocks)[keep], return_inverse=True)[1]
     squared = np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0])
-    bound = float(chi2.ppf(stated, 2))
+    bound = chi2_quantile(stated, 2)
     held = block_mean((squared <= bound).astype(float), group)
     # Student's interval does not know that a share ends at one.
     coverage = Interval(held.estimate, max(held.low, 0.0), min(held.high, 1.0))

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm, t
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.quantiles import normal_quantile, student_quantile
 
 
 class Interval(NamedTuple):
@@ -54,7 +54,9 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
             "give two runs or more, and a probability between 0 and 1",
         )
     mean = float(known.mean())
-    half = float(t.ppf((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known)))
+    half = float(
+        student_quantile((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known))
+    )
     return Interval(mean, mean - half, mean + half)
 
 
@@ -119,7 +121,7 @@ def share_interval(count: float, runs: float, probability: float = 0.95) -> Inte
             f"no interval for {count} of {runs} runs with probability {probability}",
             "give at least one run, no more than all of them, and a probability between 0 and 1",
         )
-    share, z2 = count / runs, float(norm.ppf((1 + probability) / 2)) ** 2
+    share, z2 = count / runs, float(normal_quantile((1 + probability) / 2)) ** 2
     centre = (share + z2 / (2 * runs)) / (1 + z2 / runs)
     half = np.sqrt(z2 * (share * (1 - share) / runs + z2 / (4 * runs**2))) / (1 + z2 / runs)
     return Interval(share, max(0.0, float(centre - half)), min(1.0, float(centre + half)))

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter, welch
 
 Array = NDArray[np.float64]
 
@@ -86,6 +85,8 @@ def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Vibration | None:
     >>> round(float(np.median(found.worst)), 1)
     6.5
     """
+    from scipy.signal import welch  # brings scipy.stats along, which takes long
+
     t, f = np.asarray(stamps, float), np.asarray(force, float)
     if len(t) < FEWEST:
         return None
@@ -110,6 +111,8 @@ def vibration_of(stamps: ArrayLike, force: ArrayLike) -> Vibration | None:
 
 def _smoothed(values: Array, cut_hz: float, rate_hz: float) -> Array:
     """First-order low pass, as autopilots have it, begun at the first value."""
+    from scipy.signal import lfilter  # brings scipy.stats along, which takes long
+
     delay = 1 / (2 * np.pi * cut_hz)
     a = 1 / (1 + delay * rate_hz)
     out, _ = lfilter([a], [1, a - 1], values, axis=0, zi=(1 - a) * values[:1])

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2, norm
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.quantiles import chi2_beyond, normal_quantile
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def white_bound(n: int, level: float = 0.95) -> float:
     -------
     float
     """
-    return float(norm.ppf((1 + level) / 2) / np.sqrt(n))
+    return float(normal_quantile((1 + level) / 2) / np.sqrt(n))
 
 
 def effective_sample_size(series: ArrayLike, max_lag: int) -> float:
@@ -160,4 +160,4 @@ def portmanteau(series: ArrayLike, lags: int) -> tuple[float, float]:
     for lag in range(1, lags + 1):
         C = x[lag:].T @ x[: T - lag] / T
         statistic += T**2 / (T - lag) * float(np.trace(C.T @ inverse @ C @ inverse))
-    return statistic, float(chi2.sf(statistic, m * m * lags))
+    return statistic, chi2_beyond(statistic, m * m * lags)

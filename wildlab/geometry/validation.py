@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
+from wildlab.geometry.quantiles import chi2_quantile
 
 #: Eigenvalues as far below zero as this share of the largest are rounding, and so is as much asymmetry.
 ROUNDING = 1e-9
@@ -45,7 +45,7 @@ def gate_threshold(gate_probability: float, m: int) -> float:
             "give the probability that a target's own measurement is let in, above 0 and at most 1 (no gate)",
             field="gate_probability",
         )
-    return float(chi2.ppf(gate_probability, m))
+    return chi2_quantile(gate_probability, m)
 
 
 def check_covariance(P: Array, field: str) -> None:

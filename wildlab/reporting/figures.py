@@ -26,9 +26,9 @@ from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
+from wildlab.geometry.quantiles import chi2_quantile
 from wildlab.reporting.letters import shapes_alone
 
 DPI = 144
@@ -258,7 +258,7 @@ def ellipse(
     if not (np.isfinite(centre).all() and np.isfinite(matrix).all()):
         return None
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
-    half_axes = np.sqrt(np.clip(values, 0, None) * chi2.ppf(probability, 2))
+    half_axes = np.sqrt(np.clip(values, 0, None) * chi2_quantile(probability, 2))
     angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
     patch = {"lw": 1.6, "edgecolor": color, "facecolor": color if fill else "none"} | patch
     if fill:

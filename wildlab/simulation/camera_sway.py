@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from wildlab.geometry.frames import Array
 from wildlab.simulation import kernels
@@ -52,6 +51,8 @@ def recent_change(values: ArrayLike, step: float, memory: float) -> Array:
     >>> recent_change([0.0, 0.0, 1.0], 0.1, 10.0)[:2]
     array([0., 0.])
     """
+    from scipy.signal import lfilter  # brings scipy.stats along, which takes long
+
     if not (step > 0 and memory > 0):
         raise ValueError("step and memory must be positive")
     x = np.asarray(values, float)

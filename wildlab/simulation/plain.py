@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import PPoly
-from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from wildlab.geometry.frames import Array, euler_to_matrix
@@ -110,6 +109,8 @@ def felt_on_earth(R: Array, p: Array, v: Array, a: Array, earth: Earth, rate: Ar
 
 def gauss_markov(draws: Array, sd: Array, kept: Array) -> Array:
     """(N, K), in the stationary distribution from the first on."""
+    from scipy.signal import lfilter  # brings scipy.stats along, which takes long
+
     drive = draws * sd
     drive[1:] *= np.sqrt(1 - kept**2)
     columns = [lfilter([1.0], [1.0, -a], column) for a, column in zip(kept, drive.T, strict=True)]

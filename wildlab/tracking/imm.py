@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from filterpy.kalman import IMMEstimator
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
@@ -143,6 +142,9 @@ def run_imm(
     rates = np.tile(1 / stay[:, None] / (K - 1), (1, K))
     np.fill_diagonal(rates, -1 / stay)
     modes = [_Mode(np.asarray(start.x, float), np.asarray(start.P, float)) for _ in motions]
+    # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
+    from filterpy.kalman import IMMEstimator
+
     weights = np.full(K, 1 / K)
     probabilities = np.full((len(given.times), K), np.nan)
     if start.row >= 0:

@@ -7,7 +7,6 @@ pose widen the noise of the measurement.
 from __future__ import annotations
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from numpy.typing import ArrayLike
 
 from wildlab.geometry.frames import Array
@@ -73,6 +72,9 @@ def run_unscented(
     numpy.linalg.LinAlgError
         For a covariance that is not positive definite: a start without variance in some direction.
     """
+    # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
+    from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+
     given = single_detection(checked(times, measurements, R, gate_probability, output_times, sensor.sizes))
     check_start(start)
     check_rows(sensor.rows, len(given.times), "sensor")

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import t as student
 
 from wildlab.detection.floating import find_objects
 from wildlab.detection.flow import Features, filled_outlines, find_features, match_features
@@ -21,6 +20,7 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.evaluation.whiteness import effective_sample_size
 from wildlab.flight.store import Flight
+from wildlab.geometry.quantiles import student_quantile
 from wildlab.pipeline.flow import FramePair, Reading, pair_velocities
 from wildlab.pipeline.rendered import Photographer
 from wildlab.simulation.scene.flights import Look, SceneFlight, corner_of
@@ -212,7 +212,7 @@ def half_of_mean(values: ArrayLike) -> float:
     worth = float(np.clip(effective_sample_size(v, len(v) - 1), 1.0, len(v)))
     if worth < 2:
         return np.nan
-    return float(student.ppf(0.975, worth - 1) * v.std(ddof=1) / np.sqrt(worth))
+    return float(student_quantile(0.975, worth - 1) * v.std(ddof=1) / np.sqrt(worth))
 
 
 def mean_decided(spread: pd.DataFrame) -> NDArray[np.bool_]:
