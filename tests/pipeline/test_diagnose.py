@@ -132,3 +132,37 @@ def test_too_few_images_are_refused():
     with pytest.raises(WildlabError, match="known in 5 images") as caught:
         diagnosed(simulate(Survey(images=5)))
     assert "at least 6 images" in caught.value.fix
+
+
+def with_wrong_clicks(flight, count, seed):
+    """The flight with so many clicks 300 pixels off, each in a direction of its own."""
+    rng = np.random.default_rng(seed)
+    clicks = flight.tables["detections"]
+    rows = rng.choice(len(clicks), count, replace=False)
+    turn = rng.uniform(0, 2 * np.pi, count)
+    clicks.loc[rows, "u_px"] += 300 * np.cos(turn)
+    clicks.loc[rows, "v_px"] += 300 * np.sin(turn)
+    return flight, set(clicks["detection_id"][rows])
+
+
+def test_wrong_clicks_are_kept_out_of_the_search_and_counted():
+    flight, wrong = with_wrong_clicks(simulate(Survey(images=16, tilt_deg=3.0)), 8, 1)
+    found = diagnosed(flight)
+    assert wrong <= set(found.scored["detection_id"][~found.inliers])
+    assert found.counts and found.winner.causes == ("boresight",)
+    assert found.calibration.n_points == found.inliers.sum()
+    # What is quoted is the mean over the others, and that of all stands beside.
+    off = np.hypot(*found.winner.held.mean(axis=0).T)
+    assert found.winner.gain.with_ == pytest.approx(
+        np.hypot(found.winner.held[..., 0], found.winner.held[..., 1])[:, found.inliers].mean()
+    )
+    assert found.winner.gain_of_all.with_ > found.winner.gain.with_ + 0.05 * off[~found.inliers].mean()
+
+
+def test_nothing_is_certain_where_too_many_clicks_are_wrong():
+    found = diagnosed(simulate(Survey(images=8, tilt_deg=5.0)))
+    assert found.counts and not found.too_many_out
+    many = replace(found, inliers=np.arange(len(found.inliers)) % 3 > 0)
+    assert many.too_many_out and not many.counts
+    few = replace(found, inliers=found.scored["frame_id"].isin(["I000", "I001"]).to_numpy())
+    assert few.too_many_out and few.shown is few.models[0]

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from wildlab.evaluation.axes import AlongAxis
@@ -31,10 +32,11 @@ def model(causes, without=10.0, with_=10.0, half=0.5, undetermined=None):
         causes=tuple(causes), name=" and ".join(causes) or "nothing",
         fit=SimpleNamespace(names=names, undetermined=undetermined or {}),
         gain=Gain(without, with_, Interval(gain, gain - half, gain + half)), held=np.zeros((2, 4, 2)),
+        gain_of_all=Gain(without, with_, Interval(gain, gain - 20.0, gain + 20.0)),
     )  # fmt: skip
 
 
-def diagnosis(winner, *others, outliers=(), alike=(), rivals=()):
+def diagnosis(winner, *others, outliers=(), alike=(), rivals=(), out=0):
     """A diagnosis whose winner is given; its properties are those of the real one."""
     models = (model(()), winner, *others) if winner.causes else (winner, *others)
     place = models.index(winner)
@@ -44,7 +46,8 @@ def diagnosis(winner, *others, outliers=(), alike=(), rivals=()):
     )  # fmt: skip
     names = winner.fit.names
     told = Calibration(names, np.ones(len(names)), 0.01 * np.eye(len(names)), {}, 4, 4, 10)
-    return Diagnosis(None, np.zeros(4, int), models, ranked, told, alike, outliers, np.ones(4, bool))
+    scored = pd.DataFrame({"frame_id": np.arange(20)})
+    return Diagnosis(scored, np.zeros(20, int), models, ranked, told, alike, outliers, np.arange(20) >= out)
 
 
 def verdict(word, factor=1.0, low=0.9, high=1.1, coverage=0.9):
@@ -289,15 +292,32 @@ def test_outliers_are_counted_by_kind_with_the_figures_without_them():
     assert table["photo"].tolist() == ["several", "P1"]
 
 
-def test_what_is_left_is_sorted_and_says_what_was_taken_off():
-    scatter = Scatter(0.1, 0.3, 0.6, np.array([3.0, 4.0]), np.array([0.6, 0.8]))
-    parts = cause.remaining_parts(scatter, ("height",))
-    assert ["Single" in parts[0], "pose" in parts[1], "all images" in parts[2]] == [True] * 3
-    assert "left with the height taken off" in parts[1] and "5.0 m" in parts[1]
-    assert "taken off" not in " ".join(cause.remaining_parts(scatter, ()))
+def test_a_gain_says_what_it_leaves_out_and_what_it_is_with_that():
+    said = cause.cause_sentence(diagnosis(MOST, out=3))
+    assert "(gain 7.5 to 8.5 m; without the 3 points that are far out, with them -12.00 to 28.00 m)" in said
+    assert "far out" not in cause.cause_sentence(diagnosis(MOST))
+
+
+def test_no_cause_is_certain_where_a_third_is_far_out():
+    found = diagnosis(MOST, out=6)
+    assert diagnosis(MOST, out=5).counts and not found.counts
+    assert cause.cause_sentence(found).startswith("No cause is certain: 6 of 20 points are far out")
+
+
+def test_what_is_left_is_sorted_and_in_one_unit():
+    image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
+    scatter = Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]))
+    parts = cause.remaining_parts(scatter)
+    assert ["Single" in parts[0], "all images" in parts[1], "pose" in parts[2]] == [True] * 3
+    assert ["5.0 m" in parts[0], "2.0 m" in parts[1], "1.0 m" in parts[2]] == [True] * 3
+    said = cause.remaining_sentence(scatter, ("height",))
+    assert f"{np.sqrt(1 + 4 + 25):.1f} m (root mean square) with the height taken off" in said
+    assert "taken off" not in cause.remaining_sentence(scatter, ())
+    assert "%" not in " ".join([said, *parts])
     assert not any(word in " ".join(parts) for word in ("halve", "calibration", "flown"))
     nan = np.full(2, np.nan)
-    assert cause.remaining_parts(Scatter(np.nan, np.nan, np.nan, nan, nan), ()) == []
+    unknown = Scatter(np.nan, np.nan, np.nan, nan, nan, nan)
+    assert cause.remaining_parts(unknown) == [] and cause.remaining_sentence(unknown, ()) == ""
 
 
 def test_an_axis_is_constant_by_its_interval():

@@ -82,8 +82,8 @@ def mean_summary(rounds: ArrayLike) -> ErrorSummary:
 class Scatter(NamedTuple):
     """Mean squared horizontal error split into what is constant, per image, and within images.
 
-    Shares add up to one (up to the noise of the estimate of the middle one); ``between_sd`` and ``within_sd``
-    are metres per axis (north, east).
+    Shares add up to one (up to the noise of the estimate of the middle one); ``between_sd``, ``within_sd``
+    and ``bias``, the mean, are metres per axis (north, east).
     """
 
     bias_share: float
@@ -91,6 +91,19 @@ class Scatter(NamedTuple):
     within_share: float
     between_sd: Array
     within_sd: Array
+    bias: Array
+
+    @property
+    def parts_m(self) -> tuple[float, float, float]:
+        """Root mean squares of the constant part, that of images and that within them: m, horizontal. The
+        shares are those of their squares."""
+        bias, image, within = (float(np.hypot(*of)) for of in (self.bias, self.between_sd, self.within_sd))
+        return bias, image, within
+
+    @property
+    def whole_m(self) -> float:
+        """Root mean square of all: the squares of `parts_m` add up to its square."""
+        return float(np.linalg.norm(self.parts_m))
 
 
 def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
@@ -119,14 +132,14 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
     if n <= k or k < 2:
         nan = np.full(2, np.nan)
-        return Scatter(float("nan"), float("nan"), float("nan"), nan, nan)
+        return Scatter(float("nan"), float("nan"), float("nan"), nan, nan, nan)
     within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
     mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
     usual = (n - (count**2).sum() / n) / (k - 1)
     between = np.maximum((mean_square - within) / usual, 0.0)
     parts = np.array([(mean**2).sum(), between.sum(), within.sum()])
     bias, image_share, within_share = (float(x) for x in parts / parts.sum())
-    return Scatter(bias, image_share, within_share, np.sqrt(between), np.sqrt(within))
+    return Scatter(bias, image_share, within_share, np.sqrt(between), np.sqrt(within), mean)
 
 
 def bootstrap_interval(

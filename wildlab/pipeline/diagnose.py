@@ -160,8 +160,9 @@ class Diagnosis:
     @property
     def too_many_out(self) -> bool:
         """Whether so many points are far out, or so few images are left, that no cause is certain."""
-        few = _images(self.scored, self.inliers) < FEWEST_IMAGES
-        return few or bool((~self.inliers).mean() > MANY_OUT)
+        if self.inliers.all():
+            return False
+        return bool((~self.inliers).mean() > MANY_OUT) or _images(self.scored, self.inliers) < FEWEST_IMAGES
 
     @property
     def shown(self) -> Model:

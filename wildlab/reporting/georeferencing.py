@@ -49,7 +49,11 @@ Where images that follow each other are correlated with it taken off, blocks are
 A sum of which the data cannot tell the parts (correlation beyond 0.99, or known no better than one would
 guess) is not tried. Intervals of parameters: 95 %, from leaving out one block at a time.
 
-Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks.
+Far out: more than 4.5 times the robust spread of its like, marks first, then photos, then clicks. It is
+looked for before the cause, with every parameter taken off that the data determine, and kept out of what
+models are fitted to and ranked by; then once more with the cause taken off, and where other points are far
+out then, the search is repeated without these. Where more than a quarter of the points is far out no cause is
+certain.
 
 Ellipses: the factor is the root of the 90 % quantile of the normalised squared error over that of chi-square;
 its interval from drawing blocks with replacement. No draw holds a larger error than was seen, so its high end
@@ -148,8 +152,13 @@ def record_accuracy(
     diagnosis = found.diagnosis
     if diagnosis is not None:
         gain = diagnosis.winner.gain.gain
-        n = len(diagnosis.scored)
+        n = int(diagnosis.inliers.sum())
         report.metric("gain", "winner", gain.estimate, "m", n=n, low=gain.low, high=gain.high)
+        if diagnosis.outliers:
+            gain, n = diagnosis.winner.gain_of_all.gain, len(diagnosis.inliers)
+            report.metric(
+                "gain", "winner/with-far-out", gain.estimate, "m", n=n, low=gain.low, high=gain.high
+            )
         if diagnosis.counts:
             record_summary(report, "calibrated-pose", diagnosis.held_summary())
     if diagnosis and diagnosis.outliers and diagnosis.inliers.any():

@@ -120,6 +120,11 @@ def lost_sentence(lost: int, total: int) -> str:
 def cause_sentence(diagnosis: Diagnosis) -> str:
     """What taking a constant error off gained on images it was not estimated from."""
     winner, gain = diagnosis.winner, diagnosis.winner.gain
+    if diagnosis.too_many_out:
+        return (
+            f"No cause is certain: {int((~diagnosis.inliers).sum())} of {len(diagnosis.inliers)} points are "
+            "far out, and which ones are depends on which are believed. Look at these first."
+        )
     if not winner.causes:
         certain = [model for model in diagnosis.models if model.causes and model.gain.counts]
         if certain:
@@ -145,7 +150,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     low, high = f"{gain.gain.low:.{digits}f}", f"{gain.gain.high:.{digits}f}"
     figures = (
         f"with {it} taken off, the mean error goes from {gain.without:.{digits}f} to "
-        f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m)"
+        f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m"
+        f"{_with_far_out(diagnosis)})"
     )
     if not diagnosis.counts and gained_share(gain) < SMALL:
         return f"No constant error explains it. The nearest is one of {what}: {figures}."
@@ -157,6 +163,16 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     if share >= SMALL:
         return f"Part of it is a constant error of {what}: {figures}."
     return f"A constant error of {what} is certain and small: {figures}."
+
+
+def _with_far_out(diagnosis: Diagnosis) -> str:
+    """How many points a gain leaves out, and what it is with them; nothing where it leaves none out."""
+    out = int((~diagnosis.inliers).sum())
+    if not out:
+        return ""
+    one = diagnosis.winner.gain_of_all.gain
+    points = f"the {out} points that are" if out > 1 else "the one point that is"
+    return f"; without {points} far out, with {'them' if out > 1 else 'it'} {one.low:.2f} to {one.high:.2f} m"
 
 
 def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
@@ -372,27 +388,34 @@ def averaging_sentence(averaged: Averaged | None) -> str:
     return f"{tried}." if averaged.helps else f"{tried}, which is no certain gain."
 
 
-def remaining_parts(scatter: Scatter, taken_off: Sequence[str]) -> list[str]:
-    """What the rest of the squared error is made of, largest first; nothing where it cannot be told."""
-    if not np.isfinite(scatter.image_share):
+def remaining_sentence(scatter: Scatter, taken_off: Sequence[str]) -> str:
+    """In which unit the parts of the error are given, and how large it is; nothing where it has none."""
+    if not np.isfinite(scatter.whole_m):
+        return ""
+    off = f" with {causes_in_words(taken_off)} taken off" if taken_off else ""
+    return (
+        f"Points are off by {metres(scatter.whole_m)} (root mean square){off}. The parts are root mean "
+        "squares in metres too, and their squares add up to its square."
+    )
+
+
+def remaining_parts(scatter: Scatter) -> list[str]:
+    """What the rest of the error is made of, in metres, largest first; nothing where it cannot be told."""
+    if not np.isfinite(scatter.whole_m):
         return []
-    between, within = np.hypot(*scatter.between_sd), np.hypot(*scatter.within_sd)
-    off = f" left with {causes_in_words(taken_off)} taken off" if taken_off else ""
+    bias, image, within = scatter.parts_m
     parts = [
         (
-            scatter.image_share,
-            f"**The pose of each image**, {100 * scatter.image_share:.0f} % of the squared error{off}: "
-            f"{metres(between)} that all points of an image share and the next image does not.",
+            image,
+            f"**The pose of each image**, {metres(image)}, that all points of an image share and the next "
+            "image does not.",
         ),
         (
-            scatter.within_share,
-            f"**Single points**, {100 * scatter.within_share:.0f} %: {metres(within)} that differs from "
-            "point to point within an image: marking, lens, uneven ground.",
+            within,
+            f"**Single points**, {metres(within)}, that differs from point to point in an image: marking, "
+            "lens, uneven ground.",
         ),
-        (
-            scatter.bias_share,
-            f"**The same in north and east for all images**, {100 * scatter.bias_share:.0f} %.",
-        ),
+        (bias, f"**The same in north and east for all images**, {metres(bias)}."),
     ]
     return [text for _, text in sorted(parts, key=lambda part: -part[0])]
 

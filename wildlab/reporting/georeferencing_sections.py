@@ -118,7 +118,8 @@ def cause_section(report: Report, found: Accuracy) -> None:
         },
         digits={"parameters": 0, "error": 2, "gain": 2},
         caption="Mean error on images that the parameters were not estimated from, over "
-        f"{len(diagnosis.winner.held)} rounds of {diagnosis.blocks.max() + 1} blocks. Bold: the simplest "
+        f"{len(diagnosis.winner.held)} rounds of {diagnosis.blocks.max() + 1} blocks"
+        f"{', without what is far out' if diagnosis.outliers else ''}. Bold: the simplest "
         "within one standard error of the best.",
     )
     if diagnosis.winner.causes:
@@ -131,7 +132,8 @@ def cause_section(report: Report, found: Accuracy) -> None:
                 "verdict": "verdict",
             },
             digits={"value": 2},
-            caption=f"From all {diagnosis.calibration.n_images} images with a known point.",
+            caption=f"From {diagnosis.calibration.n_points} points in {diagnosis.calibration.n_images} images"
+            f"{', without what is far out' if diagnosis.outliers else ''}.",
         )
     if alike := cause.alike_sentences(diagnosis):
         report.points(alike)
@@ -166,7 +168,8 @@ def _far_out(report: Report, diagnosis: Diagnosis) -> None:
         cause.outliers_table(diagnosis.outliers),
         columns={"kind": "what", "photo": "photo", "mark": "mark", "points": "points", "off": "off by (m)"},
         digits={"points": 0, "off": 1},
-        caption="Farther off than its like, the cause above taken off where it is certain.",
+        caption="Farther off than its like, the cause above taken off where it is certain. No cause was "
+        "estimated from these points, or chosen by them.",
     )
 
 
@@ -174,9 +177,12 @@ def left_section(report: Report, found: Accuracy, more: Sequence[str] = ()) -> N
     """What the errors are made of once the cause is taken off, what averaging gained, and ``more``."""
     diagnosis = found.diagnosis
     taken = diagnosis.winner.causes if diagnosis is not None and diagnosis.counts else ()
-    parts = [*(cause.remaining_parts(found.remaining, taken) if found.summary.n else []), *more]
+    said, parts = cause.averaging_sentence(found.averaged), list(more)
+    if found.summary.n:
+        said = " ".join(filter(None, (cause.remaining_sentence(found.remaining, taken), said)))
+        parts = [*cause.remaining_parts(found.remaining), *parts]
     if parts:
-        report.section("What is left", cause.averaging_sentence(found.averaged))
+        report.section("What is left", said)
         report.points(parts, ordered=True)
 
 

@@ -11,6 +11,7 @@ from wildlab.flight.checks.sense.felt import forces
 from wildlab.flight.checks.sense.field import field
 from wildlab.flight.checks.sense.ground import ground
 from wildlab.flight.checks.sense.heading import heading
+from wildlab.flight.checks.sense.leaps import told_from_leaps
 from wildlab.flight.checks.sense.motion import motion
 from wildlab.flight.checks.sense.origin import origin, together
 from wildlab.flight.checks.sense.positions import positions
@@ -44,18 +45,18 @@ def sense(flight: Flight) -> Iterator[Finding]:
     if not apart and not late:
         moving = list(motion(flight))
         yield from moving
-        yield from positions(flight)
+        yield from told_from_leaps(positions, flight)
         felt = list(forces(flight))
         yield from felt
         yield from field(flight)
         if not moving and not felt:
             yield from heading(flight)
     yield from lens(flight)
-    scanned = list(scans(flight))
+    scanned = list(told_from_leaps(scans, flight))
     yield from scanned
     if not scanned:
         yield from targets(flight)
-    found = list(seen(flight))
+    found = list(told_from_leaps(seen, flight))
     yield from found
     if not found:
         yield from ground(flight)
