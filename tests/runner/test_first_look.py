@@ -209,7 +209,7 @@ class Studies:
         monkeypatch.setattr(running, "run_jobs", self.run_jobs)
 
     def ledger(self) -> str:
-        return (self.reports / "index.html").read_text(encoding="utf-8")
+        return (self.reports / "ledger.html").read_text(encoding="utf-8")
 
     def run_jobs(self, given: Sequence[Job], *, listen: Any, **_: Any) -> list[Outcome]:
         self.passes.append([])

@@ -46,7 +46,7 @@ def page(folder: Path, study: str) -> str:
 
 
 def ledger(folder: Path) -> str:
-    return (folder / "reports" / "index.html").read_text(encoding="utf-8")
+    return (folder / "reports" / "ledger.html").read_text(encoding="utf-8")
 
 
 LOOK = {"seeds": [FIRST_LOOK_SEEDS, SEEDS]}

@@ -242,7 +242,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
             a_study(name="never", dataset="d", recipe="r.toml", title="<script>alert(1)</script>"), tmp_path
         ),
     ]
-    whole = ledger_page(statuses, [("tuesday", "tuesday")])
+    whole = ledger_page(statuses)
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
     assert "25 % of 20 flights" in whole
     assert "published 7.90, here 21.900, ratio 2.77, lowest to highest 5.000 to 23.000" in whole
@@ -263,8 +263,10 @@ def test_long_tables_fold_behind_a_line_that_sums_them_up(tmp_path: Path) -> Non
 
 def test_build_ledger_works_before_anything_has_run(tmp_path: Path) -> None:
     path = build_ledger(tmp_path / "reports", load_studies())
-    assert "not run yet" in path.read_text(encoding="utf-8")
-    assert {one.name for one in path.parent.iterdir()} == {"index.html", "flights.html"}
+    assert "not run yet" in (path.parent / "ledger.html").read_text(encoding="utf-8")
+    assert {one.name for one in path.parent.iterdir()} == {
+        *("index.html", "ledger.html", "numbers.html", "flights.html", "partners.html")
+    }
 
 
 def test_a_spread_without_width_can_be_drawn(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from wildlab.paths import REPORTS
 from wildlab.reporting.html import examine
 
-PAGES = sorted(REPORTS.glob("*/report.html")) + sorted(REPORTS.glob("index.html"))
+PAGES = sorted(REPORTS.glob("*/report.html")) + sorted(REPORTS.glob("*.html"))
 
 
 @pytest.mark.skipif(not PAGES, reason="no reports here: make reports")

@@ -399,6 +399,9 @@ def test_slow_vessel_over_a_few_flights(reports: Path, faults: Faults) -> None:
 
 
 def test_the_ledger_of_all_of_them(reports: Path, faults: Faults) -> None:
-    page = reports / "index.html"
+    page = reports / "ledger.html"
     assert "42 published numbers: 34 agree, 8 differ" in page.read_text(encoding="utf-8")
     assert faults(page) == []
+    front = reports / "index.html"
+    assert "34 of 42 printed numbers agree, 8 differ" in front.read_text(encoding="utf-8")
+    assert faults(front) == []

@@ -1,10 +1,11 @@
-"""The ledger, ``reports/index.html``: every published number and claim, and what became of it here."""
+"""The ledger, ``reports/ledger.html``: every published number and claim, and what became of it here."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from urllib.parse import quote
 
 from wildlab.evaluation.printed import (
     AGREES,
@@ -18,8 +19,7 @@ from wildlab.evaluation.printed import (
 )
 from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS, expected_wrong
 from wildlab.reporting.cases import Case
-from wildlab.reporting.ledger_tables import claims_table, flights_of, numbers_table
-from wildlab.reporting.own_flights import PAGE
+from wildlab.reporting.ledger_tables import claims_table, flights_of, numbers_table, summed_up
 from wildlab.reporting.page import TAGS, first_look_notice, page
 from wildlab.reporting.published import CALCULATED
 from wildlab.reporting.status import FIRST_LOOK, MISSING, Number, StudyStatus
@@ -55,57 +55,63 @@ until the full ones are in.
 The flights of the theses were never published. A **twin** is a simulated flight built from what the thesis
 prints about the real one; a **logged** flight is a real one from a public source.
 """
+_STYLE = """.contents{columns:2 22rem;column-gap:2.4rem;max-width:none;font-size:.92rem}
+.contents li{break-inside:avoid}.contents span{display:block;font-size:.85rem}
+@media print{.contents{columns:2}}"""
 _JUDGED = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS)
 _ORDER = (*_JUDGED, NOT_JUDGED)
 
 
-def ledger_page(
-    studies: Iterable[StudyStatus],
-    flights: Iterable[tuple[str, str]] = (),
-    *,
-    learn: Iterable[tuple[str, str]] = (),
-    code: str = "",
-    cases: Sequence[Case] = (),
-) -> str:
+def ledger_page(studies: Iterable[StudyStatus], *, code: str = "", cases: Sequence[Case] = ()) -> str:
     """The whole page.
 
     Parameters
     ----------
-    flights
-        Reports besides the studies, as (folder, flight).
-    learn
-        Tutorials and reference, as (title, address).
+    studies
+        All of them, run or not.
     code
         Which code it was put together by, as HTML.
     cases
         Those of the theses, studied here or not.
     """
-    studies, flights = list(studies), list(flights)
+    studies = list(studies)
     body = [
         "<header><h1>Ledger</h1>",
         '<p class="sub">Published numbers and claims of the two theses, and what became of them here.</p>',
         "</header>",
         _tiles(studies),
+        _contents(studies),
         _coverage(studies, cases),
         *(_section(one) for one in studies),
+        _explanation(),
     ]
-    if flights:
-        items = [
-            f'<li><a href="{escape(folder)}/report.html">{escape(folder)}</a>'
-            + (f' <span class="dim">flight {escape(flight)}</span>' if flight != folder else "")
-            + "</li>"
-            for folder, flight in flights
-        ]
-        more = f'<p><a href="{PAGE}">All of them, with their verdicts</a></p>'
-        body.append(f"<h2>Flights evaluated here</h2><ul>{''.join(items)}</ul>{more}")
-    links = [f'<li><a href="{escape(page)}">{escape(title)}</a></li>' for title, page in learn]
-    if links:
-        body.append(f"<h2>Learn</h2><ul>{''.join(links)}</ul>")
-    body.append(_explanation())
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     made += f", {code}" if code else ""
     footer = f"<p>Put together {made}. Each report says which code and data it came from.</p>"
-    return page(title="wildlab ledger", body="\n".join(body), kicker="wildlab", footer=footer)
+    way = '<a href="index.html">wildlab</a> › ledger'
+    return page(title="wildlab ledger", body="\n".join(body), kicker=way, footer=footer, style=_STYLE)
+
+
+def _contents(studies: list[StudyStatus]) -> str:
+    """Each study, and what became of it in a line."""
+    items = "".join(
+        f'<li><a href="#{escape(quote(one.study.name))}">{escape(one.study.title)}</a> '
+        f'<span class="dim">{escape(_in_short(one))}</span></li>'
+        for one in studies
+    )
+    return (
+        f'<nav aria-label="Contents"><h2>Contents</h2><ul class="contents">{items}</ul></nav>'
+        if items
+        else ""
+    )
+
+
+def _in_short(one: StudyStatus) -> str:
+    if not one.ran or one.state == FIRST_LOOK:
+        return one.state
+    return (
+        summed_up(one) if one.counted else f"{len(one.claims)} claims" if one.claims else "no number in print"
+    )
 
 
 def _tiles(studies: list[StudyStatus]) -> str:

@@ -1,17 +1,20 @@
-"""Writing ``reports/index.html``, the ledger, from what runs have left behind, and ``flights.html``."""
+"""Writing ``reports/index.html``, the front page, and the pages beside it from what runs have left behind."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
-from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.paths import NOTEBOOKS, REPORTS, ROOT
 from wildlab.reporting.cases import load_cases
+from wildlab.reporting.front.cards import flight_card, study_card
+from wildlab.reporting.front.flight import load_front_flight
+from wildlab.reporting.front.glimpse import read_glimpse
+from wildlab.reporting.front.index import MOST_FLIGHTS, PARTNERS, Learn, front_page
+from wildlab.reporting.front.numbers import LEDGER, POSTER, poster_page
+from wildlab.reporting.front.partners import partners_page
 from wildlab.reporting.ledger import ledger_page
-from wildlab.reporting.metrics import read_metrics
 from wildlab.reporting.notebook_file import read_notebook
 from wildlab.reporting.own_flights import PAGE, flights_page
 from wildlab.reporting.text import escape
@@ -27,34 +30,58 @@ COMPARISON = "comparison"
 def build_ledger(reports: Path, studies: Mapping[str, StudyEntry]) -> Path:
     """Write ``index.html`` and return its path. Works whichever of the studies have been run.
 
-    The page of all flights that somebody evaluated, ``flights.html``, is written with it.
+    The pages that it leads to are written with it: the ledger, every number on a sheet, the flights that
+    somebody evaluated, and how to share.
     """
     statuses = [study_status(study, reports) for study in studies.values()]
     git = git_state()
     code = f"commit <code>{git['commit'][:10]}</code>" if git["commit"] else escape(git["note"])
-    path = reports / "index.html"
     reports.mkdir(parents=True, exist_ok=True)
     compared = f"{COMPARISON}/report.html"
     own = own_flights(reports, studies)
     write_atomic(reports / PAGE, flights_page(own, compared if (reports / compared).is_file() else ""))
-    learn = [*tutorial_links(reports), *_reference_link(reports)]
-    others = _other_reports(reports, studies)
-    write_atomic(path, ledger_page(statuses, others, learn=learn, code=code, cases=load_cases()))
+    cases = load_cases()
+    write_atomic(reports / LEDGER, ledger_page(statuses, code=code, cases=cases))
+    write_atomic(reports / POSTER, poster_page(statuses))
+    newest = sorted(own, key=lambda flight: flight.finished, reverse=True)
+    shared = [flight.reports[0].folder for flight in newest if flight.reports[0].state == "done"]
+    write_atomic(reports / PARTNERS, partners_page(shared))
+    path = reports / "index.html"
+    whole = front_page(
+        statuses,
+        load_front_flight(),
+        study_cards=[
+            study_card(one, read_glimpse(reports / one.study.name / "report.html"))
+            for one in statuses
+            if one.state != "not run"
+        ],
+        flight_cards=[
+            flight_card(flight, read_glimpse(reports / flight.reports[0].folder / "report.html"))
+            for flight in newest[:MOST_FLIGHTS]
+        ],
+        flights=len(own),
+        cases=len(cases),
+        learn=_learn(reports),
+        again="`make tutorials` runs the tutorials, `make docs` writes the reference; they are then "
+        "linked here."
+        if ROOT
+        else "`python -m wildlab.runner.tutorials` runs the tutorials; they are then linked here.",
+        code=code,
+    )
+    write_atomic(path, whole)
     return path
 
 
-def _other_reports(reports: Path, studies: Mapping[str, StudyEntry]) -> list[tuple[str, str]]:
-    """Reports of flights that somebody evaluated: (folder, flight)."""
-    found: list[tuple[str, str]] = []
-    for path in sorted(reports.glob("*/status.json")) if reports.is_dir() else []:
-        folder = path.parent
-        if folder.name in studies or folder.name.startswith(".") or not (folder / "report.html").is_file():
-            continue
-        try:
-            content: dict[str, Any] = read_metrics(folder / "metrics.json")
-        except WildlabError:
-            continue
-        found.append((folder.name, str(content["flight"]) or folder.name))
+def _learn(reports: Path) -> list[Learn]:
+    """Tutorials and reference, with an address where the page is there."""
+    there = dict(tutorial_links(reports))
+    titles = [title_of(notebook) for notebook in tutorial_notebooks()]
+    reference = "reference/index.html"
+    found = [Learn(title, there.get(title, "")) for title in titles]
+    if ROOT or (reports / reference).is_file():
+        found.append(
+            Learn("Reference of all functions", reference if (reports / reference).is_file() else "")
+        )
     return found
 
 
@@ -76,8 +103,3 @@ def tutorial_links(reports: Path = REPORTS, notebooks: Path = NOTEBOOKS) -> list
     """Title and address, as seen from ``reports``, of each tutorial whose page is there."""
     pages = [(path, f"tutorials/{path.stem}.html") for path in tutorial_notebooks(notebooks)]
     return [(title_of(path), page) for path, page in pages if (reports / page).is_file()]
-
-
-def _reference_link(reports: Path) -> list[tuple[str, str]]:
-    page = "reference/index.html"
-    return [("Reference of all functions", page)] if (reports / page).is_file() else []
