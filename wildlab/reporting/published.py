@@ -40,6 +40,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from decimal import Decimal
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -209,8 +210,8 @@ def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
     for path in sorted(folder.glob("*.toml")):
         try:
-            # Decimals, so that 7.90 keeps its second digit: it says how far the print can be trusted.
-            content = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
+            state = path.stat()
+            content = _content(path, state.st_mtime_ns, state.st_size)
         except (OSError, ValueError) as error:
             raise WildlabError(f"it cannot be read ({error})", "mend the file", file=path.name) from error
         unknown = set(content) - set(_REQUIRED) - set(_OF_FILE)
@@ -223,8 +224,16 @@ def _entries(kind: str, folder: Path) -> list[dict[str, Any]]:
             _check_word(key, value, path.name, key)
         for index, entry in enumerate(content.get(kind, []), 1):
             _check_entry(entry, kind, f"[[{kind}]] {index}", path.name)
-            entries.append(of_file | entry if kind == "number" else entry)
+            entries.append(of_file | entry if kind == "number" else dict(entry))
     return entries
+
+
+@lru_cache(maxsize=128)
+def _content(path: Path, changed: int, size: int) -> dict[str, Any]:
+    """A file, read once as long as it stays the same: each study asks for all of them, twice, each time the
+    front page is put together."""
+    # Decimals, so that 7.90 keeps its second digit: it says how far the print can be trusted.
+    return tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
 
 
 def _check_word(key: str, value: Any, file: str, where: str) -> None:

@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 from urllib.parse import quote
 
-from wildlab.evaluation.printed import AGREES, DIFFERS, POSSIBLE, TOO_VAGUE
-from wildlab.evaluation.shares import HOLDS, MOSTLY, SHARE_VERDICTS
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.ratios import drawable, plot, ticks
 from wildlab.reporting.own_flights import OwnFlight, verdict_pill
 from wildlab.reporting.page import TAGS
+from wildlab.reporting.report import PILLS
+from wildlab.reporting.standing import Standing, standing
 from wildlab.reporting.status import FIRST_LOOK, Number, StudyStatus
 from wildlab.reporting.text import escape, inline
-
-#: Verdicts that a printed number is judged by.
-JUDGED = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS)
 
 STYLE = """.wall{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(17.5rem,100%),1fr));
 gap:1.1rem;
@@ -31,10 +28,18 @@ border-bottom:1px solid var(--line);padding:.35rem}
 .card h3 a:focus-visible{outline:0}.card:focus-within{outline:2px solid var(--blue);outline-offset:2px}
 .card p{margin:0 1rem .5rem;font-size:.94rem;line-height:1.42}
 .card .strip{margin:auto .8rem 0}.card .strip .ticks{font-size:.72rem}
-.card .verd{display:flex;flex-wrap:wrap;justify-content:space-between;gap:.1rem .8rem;
-margin:.5rem 1rem .85rem;
-font-size:.88rem}.card .verd b{font-weight:600}.card .verd span{color:var(--dim)}
-.card .verd .pill{color:var(--on)}.card .rest a{position:relative;z-index:1}.card .rest{margin-top:auto;color:var(--dim);font-size:.88rem}"""
+.card .verd{margin:.5rem 1rem 0;font-size:.88rem}
+.card .verd .pill{font-weight:600;margin-right:.45rem}.card .tag-line{margin:.2rem 1rem .8rem;
+color:var(--dim);
+font-size:.82rem}
+.card .rest a{position:relative;z-index:1}.card .rest{margin-top:auto;color:var(--dim);font-size:.88rem}
+@media screen and (max-width:36rem){.card{display:grid;grid-template-columns:7.5rem minmax(0,1fr)}
+.card>*{grid-column:1/-1}.card>.thumb{grid-column:1;height:100%;aspect-ratio:auto;min-height:5.5rem;
+max-height:8rem;border:0}.card>.thumb+h3{grid-column:2;margin-left:.6rem}
+.card p:first-of-type{margin-top:.3rem}}
+@media print{.wall{display:block}.card{display:inline-flex;width:31.6%;margin:0 .6% 3mm;vertical-align:top;
+break-inside:avoid}.card .thumb{padding:1mm}.card h3{font-size:9.5pt}.card p,.card .verd{font-size:8pt}
+.card .tag-line{font-size:7.5pt}.card .ticks .near{display:none}}"""
 
 
 class Card(NamedTuple):
@@ -80,13 +85,17 @@ def study_card(one: StudyStatus, glimpse: Glimpse) -> Card:
         folder=study.name if one.has_report else "",
         verdict=_pill("failed" if one.state == "failed" else one.state, "no")
         if failed
-        else f"<b>{escape(verdict_words(one))}</b>",
+        else _said(verdict_words(one)),
         tag=study_tag(one),
         numbers=() if failed else drawable(one.counted),
         picture="" if failed else glimpse.picture,
         alt=glimpse.alt,
         rest="" if failed else _without_strip(one),
     )
+
+
+def _said(word: Standing) -> str:
+    return f"{_pill(word.word, PILLS[word.level])}<span>{escape(word.reason)}</span>"
 
 
 def _pill(words: str, kind: str) -> str:
@@ -101,24 +110,11 @@ def study_tag(one: StudyStatus) -> str:
     return "logged flight" if kind == "logged" else TAGS["computed"]
 
 
-def verdict_words(one: StudyStatus) -> str:
-    """What became of a study's printed numbers, or where it has none of its claims; what was not run or not
-    judged is in no count."""
+def verdict_words(one: StudyStatus) -> Standing:
+    """What a study's numbers and claims come to, as its report says it; a first look comes to nothing yet."""
     if one.state == FIRST_LOOK:
-        return f"first look, {one.first_look}: not counted yet"
-    judged = [n for n in one.counted if n.verdict in JUDGED]
-    if judged:
-        agree, differ = one.count(AGREES), one.count(DIFFERS)
-        all_ = len(judged)
-        words = f"{agree} of {all_} printed number{'s' * (all_ > 1)} agree{'s' * (all_ == 1 == agree)}"
-        return f"{words}, {differ} differ{'s' * (differ == 1)}" if differ and all_ > 1 else words
-    decided = [c for c in one.claims if c.verdict in SHARE_VERDICTS and not c.own]
-    if decided:
-        hold = sum(c.verdict in (HOLDS, MOSTLY) for c in decided)
-        return f"{hold} of {len(decided)} claim{'s' * (len(decided) > 1)} of the thesis hold"
-    if one.counted:
-        return f"{len(one.counted)} printed number{'s' * (len(one.counted) > 1)}, none judged"
-    return "nothing printed to hold it against"
+        return Standing("first look", f"{one.first_look}: not counted yet.", "warn")
+    return standing((n.verdict for n in one.counted), (c.verdict for c in one.claims))
 
 
 def _without_strip(one: StudyStatus) -> str:
@@ -173,7 +169,7 @@ def card_html(card: Card) -> str:
     parts = []
     if card.picture:
         alt = card.alt or f"The first picture of: {card.title}"
-        parts.append(f'<img class="thumb" alt="{escape(alt)}" src="{card.picture}" loading="lazy">')
+        parts.append(f'<img class="thumb" alt="{escape(alt)}" src="{card.picture}">')
     parts.append(f"<h3>{title}</h3>")
     if card.sentence:
         parts.append(f"<p>{inline(card.sentence)}</p>")
@@ -183,7 +179,7 @@ def card_html(card: Card) -> str:
         )
     elif card.rest:
         parts.append(f'<p class="rest">{card.rest}</p>')
-    parts.append(f'<p class="verd">{card.verdict}<span>{escape(card.tag)}</span></p>')
+    parts.append(f'<p class="verd">{card.verdict}</p><p class="tag-line">{escape(card.tag)}</p>')
     return f'<article class="card">{"".join(parts)}</article>'
 
 

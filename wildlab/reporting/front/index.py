@@ -42,8 +42,7 @@ padding:.85rem 1rem;text-decoration:none;color:var(--ink);background:var(--soft)
 {PAUSE_STYLE}
 @media(max-width:46rem){{.top{{grid-template-columns:minmax(0,1fr);gap:1rem}}.top h1{{font-size:1.65rem}}
 .doors{{grid-template-columns:1fr 1fr}}}}
-@media print{{.top{{grid-template-columns:1fr 1fr}}.wall{{grid-template-columns:1fr 1fr 1fr}}.card,.doors a
-{{break-inside:avoid}}.doors{{grid-template-columns:repeat(4,1fr)}}.card p{{font-size:8.6pt}}}}"""
+@media print{{.top{{grid-template-columns:1fr 1fr}}.doors a{{break-inside:avoid}}.doors{{grid-template-columns:repeat(4,1fr)}}}}"""
 
 
 class Learn(NamedTuple):
@@ -125,7 +124,7 @@ def _top(flight: FrontFlight) -> str:
     )
     drawn = pausable(animated_flight(flight.shown, alt=alt, probability=PROBABILITY, most_bytes=MOST_MOVING))
     return (
-        '<header class="top"><div><h1>Where on the ground was what the drone saw, and how sure is that?</h1>'
+        '<header class="top"><div><h1>Seen from the air: where is it, and how far off may that be?</h1>'
         '<p class="lead">A small aircraft films boats or animals from the air. wildlab works out '
         "where they were, "
         "says how far off that may be, and checks itself against flights where the answer is known.</p></div>"

@@ -7,17 +7,20 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from urllib.parse import quote
 
+from wildlab.evaluation.printed import NOT_JUDGED
 from wildlab.reporting.front import ratios
 from wildlab.reporting.front.cards import verdict_words
 from wildlab.reporting.front.counts import WORDS, Counts, counted
 from wildlab.reporting.page import page
-from wildlab.reporting.status import StudyStatus
+from wildlab.reporting.status import FIRST_LOOK, StudyStatus
 from wildlab.reporting.text import escape
 
+_TALLY = WORDS | {NOT_JUDGED: "not judged"}
 #: The pages beside the front page.
 LEDGER, POSTER = "ledger.html", "numbers.html"
 
-STYLE = """.count{display:flex;flex-wrap:wrap;gap:.2rem 1.6rem;margin:.7rem 0 0;padding:0;list-style:none;
+STYLE = """.count{display:flex;flex-wrap:wrap;align-items:baseline;gap:.2rem 1.6rem;margin:.7rem 0 0;
+padding:0;list-style:none;
 max-width:none}
 .count li{margin:0}.count b{font-size:1.35rem;margin-right:.3rem;font-variant-numeric:tabular-nums}
 .row-of{display:grid;grid-template-columns:14.5rem minmax(0,1fr) 8.5rem;gap:0 1rem;align-items:center;
@@ -56,18 +59,25 @@ def number_rows(studies: Sequence[StudyStatus]) -> str:
         if not shown:
             continue
         undrawn = sum(n.here is not None for n in one.counted) - len(shown)
-        said = f"{len(shown)} shown" + (f", {undrawn} without a ratio" if undrawn else "")
+        said = _tally(one) + (f"; {undrawn} without a ratio" if undrawn else "")
         name = one.study.name.replace("-", " ")
         link = f'<a href="{LEDGER}#{escape(quote(one.study.name))}">{escape(name)}</a>'
-        alt = f"{name}: {len(shown)} numbers; {verdict_words(one)}"
+        alt = f"{name}: {len(shown)} numbers; {_words(one)}"
         rows.append(
             f'<div class="row-of"><span class="name">{link}</span>'
-            f'{ratios.plot(shown, alt=alt, width=480.0)}<span class="said">{said}</span></div>'
+            f'{ratios.plot(shown, alt=alt, width=480.0, most_levels=7)}<span class="said">{said}</span></div>'
         )
     if not rows:
         return ""
     axis = f'<div class="row-of"><span></span>{ratios.ticks()}<span></span></div>'
     return f"{axis}{''.join(rows)}{axis}"
+
+
+def _tally(one: StudyStatus) -> str:
+    """Verdicts of a study in figures."""
+    if one.state == FIRST_LOOK:
+        return f"first look: {sum(n.here is not None for n in one.counted)}"
+    return ", ".join(f"{one.count(verdict)} {word}" for verdict, word in _TALLY.items() if one.count(verdict))
 
 
 def count_list(counts: Counts) -> str:
@@ -136,9 +146,10 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     width = (AXIS_END - NAMES_END) / scale
     notes = [line for said in _notes(counts) for line in textwrap.wrap(said, 118)]
     top, bottom = 42.0, SHEET_HIGH - 12 - 3.6 * len(notes)
-    levels = [ratios.levels_for(shown, width, 7) for _, shown in rows]
-    unit = min((bottom - top) / sum(one + 0.8 for one in levels), 5.2)
-    parts = [_text(0, 10, "Every printed number of two theses, and what came out here", 7.2, weight=650)]
+    ranks = [ratios.levels_for(shown, width, 7) for _, shown in rows]
+    levels = [max(one + 0.8, 2.2) for one in ranks]
+    unit = min((bottom - top) / sum(levels), 5.2)
+    parts = [_text(0, 10, "Every printed number of two theses, beside ours", 6.4, weight=650)]
     judged = " · ".join(f"{n} {WORDS[verdict]}" for verdict, n in counts.judged.items() if n)
     lead = f"{judged}, of {counts.of} that were judged." if counts.of else "None is judged yet."
     parts.append(_text(0, 18.5, lead, 4.4))
@@ -152,12 +163,10 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
         )
     )
     parts.append(_key([n.verdict for _, shown in rows for n in shown]))
-    parts += [
-        _tick_words(width, scale, y) for y in (top - 2.2, top + unit * sum(one + 0.8 for one in levels) + 4.4)
-    ]
+    parts += [_tick_words(width, scale, y) for y in (top - 2.2, top + unit * sum(levels) + 4.4)]
     y = top
-    for (one, shown), rank in zip(rows, levels, strict=True):
-        high = unit * (rank + 0.8)
+    for (one, shown), rank, tall in zip(rows, ranks, levels, strict=True):
+        high = unit * tall
         middle = y + high / 2
         parts.append(_text(NAMES_END - 3, middle + 1.1, one.study.name.replace("-", " "), 3.1, anchor="end"))
         marks = ratios.arranged(shown, width, rank)
@@ -168,7 +177,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
             f"{ratios.backdrop(width, high / scale)}</g>"
             f'<g transform="translate({NAMES_END} {middle:.2f}) scale({scale})">{drawn}</g>'
         )
-        parts.append(_text(AXIS_END + 3, middle + 1, _short(one), 2.7, dim=True))
+        parts.append(_text(AXIS_END + 3, middle + 1, verdict_words(one).word, 2.9))
         y += high
         parts.append(f'<path class="between" d="M0 {y:.2f}H{SHEET_WIDE}"/>')
     parts += [_text(0, bottom + 13 + 3.6 * k, line, 2.7, dim=True) for k, line in enumerate(notes)]
@@ -184,13 +193,9 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     )
 
 
-def _short(one: StudyStatus) -> str:
-    words = verdict_words(one)
-    return (
-        "first look"
-        if words.startswith("first look")
-        else words.replace(" printed numbers", "").replace(" printed number", "")
-    )
+def _words(one: StudyStatus) -> str:
+    found = verdict_words(one)
+    return f"{found.word}: {found.reason}"
 
 
 def _key(verdicts: Sequence[str]) -> str:

@@ -162,7 +162,9 @@ def ticks(few: bool = False) -> str:
     """
     left_out = (1 / 4, 4.0) if few else ()
     spans = "".join(
-        f'<span style="left:{place(ratio, 320.0) / 3.2:.2f}%">{words}</span>'
+        f"<span{' class=near' if ratio in (1 / 2, 2.0) else ''} "
+        f'style="left:{place(ratio, 320.0) / 3.2:.2f}%">'
+        f"{words}</span>"
         for ratio, words in TICKS.items()
         if ratio not in left_out
     )
