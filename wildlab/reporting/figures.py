@@ -18,31 +18,26 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from cycler import cycler
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
-from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.quantiles import chi2_quantile
+from wildlab.reporting.figure_text import FULL_SIZE, fit_titles
 from wildlab.reporting.letters import shapes_alone
 
 DPI = 144
 #: Set in the environment of a first look, whose figures are soon replaced.
 QUICK = "WILDLAB_QUICK_FIGURES"
-#: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
-FULL_SIZE, LEAST_SIZE = 116, 58
-#: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
-LEAST_TEXT = 11.0
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
 MOST_POINTS = 3000
-#: Okabe and Ito's colours, which colour-blind readers can tell apart; their yellow is too faint for lines
-#: on white.
-ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
+#: Okabe and Ito's colours, which colour-blind readers can tell apart, their orange and sky blue darkened
+#: until a line of them has a contrast of 3:1 to white (WCAG 2.2, 1.4.11); yellow is left out.
+ORANGE, SKY, GREEN, BLUE = "#BF8400", "#3A96D0", "#009E73", "#0072B2"
 VERMILLION, PURPLE, GREY, INK = "#D55E00", "#CC79A7", "#6B7480", "#18222D"
 
 #: Seven colours and more subjects: sources of a pose, tracking filters and judged poses are three families,
@@ -54,7 +49,7 @@ COLOURS = {
     # sources of a pose
     "autopilot": ORANGE,
     "observer": GREEN,
-    "mekf": SKY,
+    "mekf": BLUE,
     # tracking filters
     "kf": BLUE,
     "ekf": VERMILLION,
@@ -324,28 +319,6 @@ def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: A
     ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
 
 
-def least_size(figure: Figure) -> float:
-    """CSS pixels per inch at which the smallest text of a figure still has `LEAST_TEXT` pixels.
-
-    Parameters
-    ----------
-    figure
-        With everything on it.
-
-    Returns
-    -------
-    float
-        `LEAST_SIZE` where it has no text.
-    """
-    sizes = [text.get_fontsize() for text in figure.findobj(Text) if _is_seen(text)]
-    return 72.0 * LEAST_TEXT / min(sizes) if sizes else float(LEAST_SIZE)
-
-
-def _is_seen(artist: Artist) -> bool:
-    """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
-    return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
-
-
 def thinned(count: int) -> slice:
     """Which of ``count`` points a line keeps, evenly, so that there are no more than `MOST_POINTS`."""
     return slice(None, None, max(1, -(-count // MOST_POINTS)))
@@ -369,6 +342,7 @@ def png_bytes(figure: Figure) -> bytes:
     b'PNG'
     """
     buffer = io.BytesIO()
+    fit_titles(figure)
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
 

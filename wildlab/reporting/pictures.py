@@ -6,7 +6,7 @@ import base64
 
 from matplotlib.figure import Figure
 
-from wildlab.reporting.figures import FULL_SIZE, least_size
+from wildlab.reporting.figure_text import FULL_SIZE, least_size
 from wildlab.reporting.text import escape, inline
 
 #: CSS pixels that a phone of 390 has for a figure.

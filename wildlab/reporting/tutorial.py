@@ -9,7 +9,7 @@ import nbformat
 from bs4 import BeautifulSoup, Tag
 
 from wildlab.errors import WildlabError
-from wildlab.reporting.figures import FULL_SIZE, LEAST_SIZE
+from wildlab.reporting.figure_text import FULL_SIZE, LEAST_SIZE
 from wildlab.reporting.html import examine, notebook_body
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape

@@ -114,7 +114,7 @@ def error_bands(
             reach = max(reach, float(np.nanmax(two, initial=0.0)))
         for name, error in errors.items():
             e = np.asarray(error, float)[keep, i]
-            ax.plot(t[keep], e, lw=0.9, color=_ink(name), label=NAMES.get(name, name))
+            ax.plot(t[keep], e, lw=0.9, color=colour(name), label=NAMES.get(name, name))
             reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
         ax.axhline(0, color=GREY, lw=0.6)
         if reach > 0:
@@ -208,7 +208,11 @@ def speed_chart(sources: Mapping[str, tuple[ArrayLike, ArrayLike]], title: str) 
         speed = np.linalg.norm(np.asarray(velocity, float), axis=1)
         keep = thinned(len(speed))
         ax.plot(
-            np.asarray(times, float)[keep], speed[keep], lw=1.0, color=_ink(name), label=NAMES.get(name, name)
+            np.asarray(times, float)[keep],
+            speed[keep],
+            lw=1.0,
+            color=colour(name),
+            label=NAMES.get(name, name),
         )
     ax.set_ylim(0, None)
     ax.set_ylabel("speed over ground (m/s)")
@@ -236,10 +240,6 @@ def velocities_of(nav: pd.DataFrame) -> tuple[Array, Array]:
 
 def _short(source: str) -> str:
     return source.replace("second position", "2nd antenna")
-
-
-def _ink(name: str) -> str:
-    return BLUE if name == "mekf" else colour(name)
 
 
 def _finished(fig: Figure, axes: Sequence[Axes], title: str, xlabel: str | None = "time (s)") -> Figure:

@@ -1,0 +1,73 @@
+"""The letters of a figure: how large they are on a phone, and titles broken where they do not fit."""
+
+from __future__ import annotations
+
+import textwrap
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+#: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
+FULL_SIZE, LEAST_SIZE = 116, 58
+#: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
+LEAST_TEXT = 11.0
+#: Width of a narrow letter of a title as a share of its height: what is shorter than that surely fits.
+_NARROW = 0.5
+
+
+def least_size(figure: Figure) -> float:
+    """CSS pixels per inch at which the smallest text of a figure still has `LEAST_TEXT` pixels.
+
+    Parameters
+    ----------
+    figure
+        With everything on it.
+
+    Returns
+    -------
+    float
+        `LEAST_SIZE` where it has no text.
+    """
+    sizes = [text.get_fontsize() for text in figure.findobj(Text) if _is_seen(text)]
+    return 72.0 * LEAST_TEXT / min(sizes) if sizes else float(LEAST_SIZE)
+
+
+def _is_seen(artist: Artist) -> bool:
+    """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
+    return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
+
+
+def fit_titles(figure: Figure) -> None:
+    """Break titles that are wider than their place onto more lines; they come out of data, too.
+
+    Parameters
+    ----------
+    figure
+        With everything on it. A title may go on to the figure's edge, or, where another panel stands to the
+        right, to the end of its own.
+    """
+    long = [
+        (axes, title)
+        for axes in figure.get_axes()
+        for where in ("left", "center", "right")
+        if (title := axes.title if where == "center" else getattr(axes, f"_{where}_title")).get_text()
+        and len(title.get_text()) * _NARROW * title.get_fontsize()
+        > 72 * figure.get_size_inches()[0] / _columns(axes)
+    ]
+    for axes, title in long:
+        figure.draw_without_rendering()
+        box = title.get_window_extent()
+        beside = _columns(axes) > 1
+        end = axes.get_window_extent().x1 if beside else figure.bbox.x1 - 4
+        room = end - (box.x0 if title.get_horizontalalignment() == "left" else figure.bbox.x0)
+        if box.width > room:
+            letters = max(12, int(len(title.get_text()) * room / box.width))
+            title.set_text("\n".join(textwrap.wrap(title.get_text(), letters)))
+
+
+def _columns(axes: Axes) -> int:
+    """How many panels stand side by side where the axes are."""
+    spec = axes.get_subplotspec()
+    return 1 if spec is None else int(spec.get_gridspec().ncols)
