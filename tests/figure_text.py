@@ -83,8 +83,10 @@ def seen_figures(into: dict[str, list[str]]) -> Iterator[None]:
     original = Report._figure
 
     def look(self: Report, fig: Figure, name: str, *rest: Any, **more: Any) -> str:
+        shown = original(self, fig, name, *rest, **more)
+        # As it was saved: titles and legends have been fitted.
         into[name] = overlapping(fig)
-        return original(self, fig, name, *rest, **more)
+        return shown
 
     patch.setattr(Report, "_figure", look)
     try:

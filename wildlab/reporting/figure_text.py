@@ -7,10 +7,11 @@ import textwrap
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
-FULL_SIZE, LEAST_SIZE = 116, 58
+FULL_SIZE, LEAST_SIZE = 128, 80
 #: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
 LEAST_TEXT = 11.0
 #: Width of a narrow letter of a title as a share of its height: what is shorter than that surely fits.
@@ -37,6 +38,38 @@ def least_size(figure: Figure) -> float:
 def _is_seen(artist: Artist) -> bool:
     """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
     return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
+
+
+def fit_legends(figure: Figure) -> None:
+    """Set legends beside the axes that are wider than the figure in fewer columns.
+
+    Parameters
+    ----------
+    figure
+        With everything on it.
+    """
+    places = {code: name for name, code in Legend.codes.items()}
+    for legend in list(figure.legends):
+        columns = legend._ncols  # type: ignore[attr-defined]
+        outside = getattr(legend, "_outside_loc", None)
+        while columns > 1:
+            figure.draw_without_rendering()
+            if legend.get_window_extent().width <= figure.bbox.width:
+                break
+            columns -= 1
+            place = places[legend._loc_real]  # type: ignore[attr-defined]
+            texts = [text.get_text() for text in legend.get_texts()]
+            handles = list(legend.legend_handles)
+            legend.remove()
+            legend = figure.legend(handles, texts, loc=_place(place, outside), ncols=columns)
+
+
+def _place(place: str, outside: str | None) -> str:
+    """Where a legend was asked to be: ``lower right``, ``outside lower right`` or ``outside right lower``."""
+    if outside is None:
+        return place
+    vertical = place.split()[0]
+    return f"outside {outside} {vertical}" if outside in ("left", "right") else f"outside {place}"
 
 
 def fit_titles(figure: Figure) -> None:

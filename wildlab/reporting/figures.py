@@ -27,10 +27,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.quantiles import chi2_quantile
-from wildlab.reporting.figure_text import FULL_SIZE, fit_titles
+from wildlab.reporting.figure_text import FULL_SIZE, fit_legends, fit_titles
 from wildlab.reporting.letters import shapes_alone
 
-DPI = 144
+DPI = 190
+#: What a figure has of the inches that a chart asks for: letters of 10 points then have 11 pixels on a phone,
+#: where 6 inches asked for are 361 pixels.
+WIDTH, HEIGHT = 0.76, 0.82
 #: Set in the environment of a first look, whose figures are soon replaced.
 QUICK = "WILDLAB_QUICK_FIGURES"
 #: Points of a line beyond which a figure only grows: more than a screen has columns.
@@ -88,8 +91,8 @@ _STYLE: dict[str, Any] = {
     "axes.prop_cycle": cycler(color=[BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, GREY]),
     "grid.color": "#E3E7EB",
     "grid.linewidth": 0.8,
-    "xtick.labelsize": 9.5,
-    "ytick.labelsize": 9.5,
+    "xtick.labelsize": 10.0,
+    "ytick.labelsize": 10.0,
     "xtick.color": GREY,
     "ytick.color": GREY,
     "xtick.labelcolor": INK,
@@ -98,7 +101,7 @@ _STYLE: dict[str, Any] = {
     "lines.markersize": 4.5,
     "text.color": INK,
     "legend.frameon": False,
-    "legend.fontsize": 9.5,
+    "legend.fontsize": 10.0,
     "pdf.compression": 9,
 }
 
@@ -138,7 +141,8 @@ def new_figure(
     Parameters
     ----------
     width, height
-        Inches. Above 6 inches a phone shows the figure in a box that scrolls sideways.
+        Inches on a desk, drawn at `WIDTH` and `HEIGHT` of them, so that letters are as large as a phone asks
+        for. Above 6 inches a phone shows the figure in a box that scrolls sideways.
     rows
         Of axes.
     columns
@@ -157,7 +161,7 @@ def new_figure(
     (2,)
     """
     house_style()
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH * width, HEIGHT * height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, figure.subplots(rows, columns, **subplots)
 
@@ -204,7 +208,7 @@ def map_axes(ax: Axes, *, scale_bar: bool = True, east: str = "east (m)", north:
         xycoords="axes fraction",
         ha="center",
         va="center",
-        fontsize=9.5,
+        fontsize=10,
         arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.0},
     )
 
@@ -297,7 +301,7 @@ def log_band(ax: Axes, low: float, high: float, label: str = "95 % band", *, col
         ha="left",
         va="center",
         rotation=270,
-        fontsize=9,
+        fontsize=10,
         color="#00664B",
         annotation_clip=False,
     )
@@ -315,7 +319,7 @@ def mark_gaps(ax: Axes, times: ArrayLike, longest_s: float) -> int:
 
 def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: Any) -> None:
     """Write a line's name at its end, in its colour: easier to read than a legend."""
-    settings: dict[str, Any] = {"va": "center", "fontsize": 9.5, "annotation_clip": False} | annotate
+    settings: dict[str, Any] = {"va": "center", "fontsize": 10, "annotation_clip": False} | annotate
     ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
 
 
@@ -325,7 +329,7 @@ def thinned(count: int) -> slice:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG at 144 dpi, without a date or the name of a program.
+    """The figure as PNG at 190 dpi, without a date or the name of a program.
 
     Parameters
     ----------
@@ -342,6 +346,7 @@ def png_bytes(figure: Figure) -> bytes:
     b'PNG'
     """
     buffer = io.BytesIO()
+    fit_legends(figure)
     fit_titles(figure)
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()

@@ -136,16 +136,15 @@ footer p { margin: .25rem 0; max-width: none }
   th.wide { min-width: 8rem }
   .words { grid-template-columns: 1fr; gap: .1rem }
   .words dd { margin-bottom: .5rem }
-  /* A row of many columns becomes a card: each cell below the other, after the name of its column. */
+  /* A row of many columns becomes an entry of a list: each cell after the name of its column. */
   table.many, table.many > tbody, table.many > tbody > tr { display: block }
   table.many > thead { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%) }
   table.many > tbody > tr { border-bottom: 1px solid var(--line); padding: .45rem 0 }
-  table.many > tbody > tr > * { display: flex; gap: 1rem; justify-content: space-between; border: 0;
-    padding: .1rem 0; text-align: right; white-space: normal; max-width: none; overflow-wrap: anywhere }
-  table.many > tbody > tr > *::before { content: attr(data-label); color: var(--dim); text-align: left;
-    font-weight: 400; flex: 0 1 11rem }
-  table.many > tbody > tr > th { font-weight: 600 }
-  table.many > tbody > tr > :first-child { text-align: left; justify-content: flex-start }
+  table.many > tbody > tr > * { display: inline-block; border: 0; padding: 0; margin: 0 1rem .1rem 0;
+    text-align: left; white-space: normal; min-width: 0; max-width: 100%; overflow-wrap: anywhere }
+  table.many > tbody > tr > td::before { content: attr(data-label) "\\a0 "; color: var(--dim);
+    font-size: .8rem }
+  table.many > tbody > tr > th { display: block; font-weight: 600 }
   /* A figure whose letters would be too small to read is wider than the screen, and says so. */
   .slides::before { content: "wider than the screen: push it sideways \\2192"; display: block;
     position: sticky; left: 0; width: max-content; color: var(--dim); font-size: .8rem;

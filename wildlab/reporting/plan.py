@@ -235,7 +235,7 @@ def _draw_area(ax: Axes, area: Area, name: str) -> None:
         xy=(float(middle[1]), float(middle[0])),
         ha="center",
         va="center",
-        fontsize=9,
+        fontsize=10,
         color=INK,
         zorder=6,
         bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.75},

@@ -44,7 +44,7 @@ def dots_chart(
     rows = np.arange(len(names))
     if goal is not None:
         ax.axvline(goal, color=GREY, lw=1, ls=(0, (4, 3)))
-        ax.annotate(f"ideal {goal:g}" if goal else "none", (goal, 1.0), (3, -2), fontsize=9, va="top",
+        ax.annotate(f"ideal {goal:g}" if goal else "none", (goal, 1.0), (3, -2), fontsize=10, va="top",
                     xycoords=("data", "axes fraction"), textcoords="offset points")  # fmt: skip
     for row, a, b in zip(rows, left, right, strict=True):
         if np.isfinite(a + b):

@@ -44,7 +44,7 @@ def error_scatter(errors: ArrayLike, title: str, color: str = BLUE, reach: float
     ax.plot(*e.mean(axis=0)[::-1], "o", mfc="white", mec=color, ms=7, mew=1.6)
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-reach, reach)
-    ax.annotate("truth", (0, 0), (8, -14), textcoords="offset points", fontsize=9, color=INK)
+    ax.annotate("truth", (0, 0), (8, -14), textcoords="offset points", fontsize=10, color=INK)
     ax.set_title(title)
     map_axes(ax, east="error, east (m)", north="error, north (m)")
     return fig
@@ -100,7 +100,7 @@ def path_map(nav: pd.DataFrame, times: ArrayLike, title: str, target: str = "tar
     ax.plot(nav["east_m"], nav["north_m"], color=GREY, lw=0.7)
     ax.plot(nav["east_m"].to_numpy()[at], nav["north_m"].to_numpy()[at], ".", color=ORANGE, ms=4)
     ax.plot(0, 0, "k+", ms=13, mew=2)
-    ax.annotate(target, (0, 0), (10, -4), textcoords="offset points", fontsize=9.5)
+    ax.annotate(target, (0, 0), (10, -4), textcoords="offset points", fontsize=10)
     ax.set_title(title)
     map_axes(ax)
     return fig
@@ -120,7 +120,7 @@ def aircraft_map(
         below[-1, ::-1],
         (6, 6),
         textcoords="offset points",
-        fontsize=9.5,
+        fontsize=10,
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
     )
     ax.set_title(title)

@@ -150,7 +150,7 @@ def deviation_chart(
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.yaxis.set_minor_formatter(NullFormatter())
         ax.set_ylabel(f"SD ({unit})")
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8.5)
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=10)
     axes[0].set_title(title, pad=26)
     axes[-1].set_xlabel("time (s)")
     return fig

@@ -97,7 +97,7 @@ def path_chart(path: Path, troubles: Sequence[Trouble], title: str) -> Figure:
     _room(ax, east, north)
     ax.set_title(title)
     map_axes(ax)
-    fig.legend(handles=handles, loc="outside lower left", ncols=1 if len(handles) > 3 else 3, fontsize=9)
+    fig.legend(handles=handles, loc="outside lower left", ncols=1 if len(handles) > 3 else 3, fontsize=10)
     return fig
 
 
@@ -299,7 +299,7 @@ def shaking_chart(found: Vibration, times: Array, clock: Clock, title: str) -> F
     for limit, words in ((FINE, "may harm"), (HARMFUL, "nearly always harms")):
         if limit < 1.5 * top:
             ax.axhline(limit, color=GREY, lw=1, ls=(0, (4, 3)))
-            ax.annotate(f"{words}, above {limit:g}", (0.01, limit), (0, 3), fontsize=9, color=INK,
+            ax.annotate(f"{words}, above {limit:g}", (0.01, limit), (0, 3), fontsize=10, color=INK,
                         xycoords=("axes fraction", "data"), textcoords="offset points")  # fmt: skip
             top = max(top, 1.15 * limit)
     ax.set_ylim(0, top)

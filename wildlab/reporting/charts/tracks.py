@@ -43,7 +43,7 @@ _TRUTH = {"color": colour("truth"), "lw": 1.1, "ls": (0, (4, 2)), "label": "trut
 #: Single measurements, and values at single detections.
 _DOTS = {"ls": "none", "marker": ".", "mec": "none", "rasterized": True}
 #: Room that a legend's entry takes besides its text, and each of its letters, inches.
-_ENTRY, _LETTER = 0.63, 0.073
+_ENTRY, _LETTER = 0.66, 0.077
 
 
 def track_map(
@@ -288,7 +288,7 @@ def _mark_start(ax: Axes, way: Array) -> None:
         textcoords="offset points",
         ha="center",
         va="top" if northward else "bottom",
-        fontsize=9,
+        fontsize=10,
         color=INK,
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
     )

@@ -130,7 +130,7 @@ def mean_nees_shown(tracks: pd.DataFrame, found: pd.DataFrame, fixed: str) -> Sh
         xycoords=("axes fraction", "data"),
         textcoords="offset points",
         ha="right",
-        fontsize=9,
+        fontsize=10,
     )
     ax.set_yscale("log")
     ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -181,7 +181,7 @@ def track_map(flight: Flight, followed: Sequence[SensorTrack], title: str) -> Fi
         own = name == "own ship"
         ax.plot(east, north, "o", color=GREY if own else "black", ms=5, zorder=4)
         place = (6, -14) if own else (6, 5)
-        ax.annotate(name, (east, north), place, textcoords="offset points", fontsize=9.5, zorder=5)
+        ax.annotate(name, (east, north), place, textcoords="offset points", fontsize=10, zorder=5)
     for limit, column in ((ax.set_xlim, "east_m"), (ax.set_ylim, "north_m")):
         values = np.concatenate([truth[column].to_numpy(), nav[column].to_numpy()])
         limit(values.min() - MARGIN_M, values.max() + MARGIN_M)

@@ -98,7 +98,7 @@ def right_wrong_shown(one: Gated) -> Shown:
     for row, form in enumerate(FORMS):
         right = one.right[row, 0]
         ax.plot(np.arange(len(right)) + 1, 2 * row + right, ".", color=_COLOURS[form], ms=4)
-        ax.annotate(NAMES[form], (1, 2 * row + 0.5), fontsize=9.5, va="center", color=_COLOURS[form])
+        ax.annotate(NAMES[form], (1, 2 * row + 0.5), fontsize=10, va="center", color=_COLOURS[form])
     ax.set_yticks(range(2 * len(FORMS)), ["wrong", "right"] * len(FORMS))
     title = words.mistakes_title(one)
     ax.set(xlabel="image", ylim=(-0.4, 5.5), title=title.replace(", by angles", ",\nby angles"))

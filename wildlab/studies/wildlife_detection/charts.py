@@ -62,7 +62,7 @@ def above(picture: Picture, thresholds: Warm) -> NDArray[np.uint8]:
 
 def _panel(ax: Axes, image: NDArray[Any], title: str) -> None:
     ax.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
-    ax.set_title(title, fontsize=9)
+    ax.set_title(title, fontsize=10)
     ax.set(xticks=[], yticks=[])
     ax.grid(False)
 
@@ -94,7 +94,7 @@ def methods_shown(picture: Picture, name: str, when: str) -> Shown:
     for ax, method in zip(axes.flat[1:], methods, strict=True):
         _panel(ax, above(picture, METHODS[method]), "")
         said[method] = _said(_boxes(ax, picture, METHODS[method]))
-        ax.set_title(f"{_SHORT[method]}\n{said[method]}", fontsize=8.5)
+        ax.set_title(f"{_SHORT[method]}\n{said[method]}", fontsize=10)
     every = "; ".join(f"{_SHORT[method]}: {one}" for method, one in said.items())
     return (
         fig, name, f"The same rendered image, {when}, through five methods. {every}.",
@@ -113,7 +113,7 @@ def sequence_shown(before: Picture, after: Picture) -> Shown:
             ax = axes[row, column]
             _panel(ax, above(picture, METHODS[method]), "")
             one = _said(_boxes(ax, picture, METHODS[method]))
-            ax.set_title(f"{_SHORT[method]}\n{one}", fontsize=8.5)
+            ax.set_title(f"{_SHORT[method]}\n{one}", fontsize=10)
             said.append(f"{_SHORT[method]}, {when}: {one}")
     return (
         fig, "sequence", f"The same place under clouds and with the sun out. {'; '.join(said)}.",
@@ -133,7 +133,7 @@ def blocks_shown(picture: Picture, kind: Literal["floor", "offset"], level: floa
         judged = _boxes(ax, picture, thresholds, frame=False)
         count = len(judged.rows[number])
         one = f"{count} detection{'s' * (count != 1)} of it"
-        ax.set_title(f"{_SHORT[method]}: {one}", fontsize=9)
+        ax.set_title(f"{_SHORT[method]}: {one}", fontsize=10)
         middle, half = np.array([np.mean(u), np.mean(v)]), 0.9 * max(float(np.ptp(u)), float(np.ptp(v)), 40.0)
         ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] + half, middle[1] - half))
         said.append(f"{_SHORT[method]}: {one}")
