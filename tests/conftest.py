@@ -79,18 +79,22 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def faults(browser: Any) -> Callable[[Path], list[str]]:
-    """``faults(page.html)`` opens a page offline, wide and narrow, and lists what is wrong with it."""
+    """``faults(page.html)`` opens a page offline, wide and narrow, bright and dark, and lists its faults."""
 
     def look(path: Path) -> list[str]:
         found = [] if path.stat().st_size <= 5_000_000 else ["larger than 5 MB"]
-        return found + [fault for width in (1200, 360) for fault in _faults_at(browser, path.as_uri(), width)]
+        for width, scheme in ((1200, "light"), (360, "light"), (1200, "dark"), (390, "dark")):
+            found += _faults_at(browser, path.as_uri(), width, scheme)
+        return found
 
     return look
 
 
-def _faults_at(browser: Any, address: str, width: int) -> list[str]:
+def _faults_at(browser: Any, address: str, width: int, scheme: str) -> list[str]:
     found: list[str] = []
-    context = browser.new_context(viewport={"width": width, "height": 800}, offline=True)
+    context = browser.new_context(
+        viewport={"width": width, "height": 844}, offline=True, color_scheme=scheme, bypass_csp=True
+    )
     page = context.new_page()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
@@ -107,5 +111,31 @@ def _faults_at(browser: Any, address: str, width: int) -> list[str]:
         found.append("a picture without alt text, or broken")
     if page.evaluate("document.documentElement.lang") != "en":
         found.append("no language")
+    if width == 390 and (top := page.evaluate(_FIRST_PICTURE)) > 2 * 844:
+        found.append(f"the first picture is {top:.0f} px down on a phone")
+    found += [f"a link to {to[:60]}, which is missing where the page is mailed alone" for to in _dead(page)]
+    found += _axe(page)
     context.close()
     return found
+
+
+_FIRST_PICTURE = """(() => { const one = document.querySelector('figure img');
+  return one ? one.getBoundingClientRect().top + window.scrollY : 0 })()"""
+_LINKS = "[...document.querySelectorAll('[href], [src]')].map(one => one.getAttribute('href') ?? one.src)"
+
+
+def _dead(page: Any) -> list[str]:
+    """Links that lead neither into the page, nor to a file within it, nor to the web."""
+    return [
+        to
+        for to in page.evaluate(_LINKS)
+        if not to.startswith(("data:", "https://"))
+        and not (to.startswith("#") and page.evaluate("id => !!document.getElementById(id)", to[1:]))
+    ]
+
+
+def _axe(page: Any) -> list[str]:
+    """What axe finds against the rules for readers with other eyes, hands and ears."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (the extra `dev`)")
+    found = axe.Axe().run(page).response["violations"]
+    return [f"axe: {one['id']}: {one['nodes'][0]['html'][:160]} ({len(one['nodes'])})" for one in found]

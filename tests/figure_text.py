@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
@@ -25,11 +24,11 @@ def written(figure: Figure) -> list[tuple[str, Bbox]]:
     """Every text that is seen, with its box in points."""
     renderer: Any = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     figure.draw(renderer)
-    hidden = {id(text) for text in figure.findobj(Text) if not _shown(figure, text)}
+    hidden = _not_drawn(figure)
     found = []
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
-        if id(text) in hidden or not text.get_text().strip():
+        if id(text) in hidden or not text.get_visible() or not text.get_text().strip():
             continue
         # Of an annotation, the words without the arrow.
         box = (
@@ -42,21 +41,18 @@ def written(figure: Figure) -> list[tuple[str, Bbox]]:
     return found
 
 
-def _shown(figure: Figure, text: Text) -> bool:
-    """Whether a text is drawn: labels of ticks beyond the ends of an axis are there, and are not."""
-    if not text.get_visible():
-        return False
+def _not_drawn(figure: Figure) -> set[int]:
+    """Texts that are there and are not drawn: labels of ticks beyond the ends of an axis, and hidden axes."""
+    hidden: set[int] = set()
     for axes in figure.get_axes():
-        if not axes.get_visible() and text in axes.findobj(Text):
-            return False
+        if not axes.get_visible():
+            hidden |= {id(text) for text in axes.findobj(Text)}
         for axis in (axes.xaxis, axes.yaxis):
-            assert isinstance(axis, Axis)
-            labels = [*axis.get_majorticklabels(), *axis.get_minorticklabels()]
-            if any(label is text for label in labels):
-                ticks = axis._update_ticks()  # type: ignore[attr-defined]
-                drawn = [one for tick in ticks for one in (tick.label1, tick.label2) if one.get_visible()]
-                return axes.axison and axis.get_visible() and any(one is text for one in drawn)
-    return True
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            drawn = axis._update_ticks() if axes.axison and axis.get_visible() else []  # type: ignore[attr-defined]
+            hidden |= {id(label) for tick in ticks for label in (tick.label1, tick.label2)}
+            hidden -= {id(label) for tick in drawn for label in (tick.label1, tick.label2)}
+    return hidden
 
 
 def overlapping(figure: Figure) -> list[str]:

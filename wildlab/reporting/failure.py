@@ -73,6 +73,7 @@ def failure_page(
     )
     if details.strip():
         body += (
-            f"<details><summary>Technical details</summary><pre>{escape(details.strip())}</pre></details>\n"
+            '<details><summary>Technical details</summary><pre tabindex="0" role="group" '
+            f'aria-label="Traceback">{escape(details.strip())}</pre></details>\n'
         )
     return page(title=f"Failed: {title}", body=body, kicker=f"wildlab › {escape(study)}", footer=footer)

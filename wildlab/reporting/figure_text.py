@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import textwrap
+from itertools import pairwise
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 
 #: CSS pixels per inch of a figure: full size on a desk, and the least at which its 10-point text can be read.
 FULL_SIZE, LEAST_SIZE = 128, 80
 #: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
 LEAST_TEXT = 11.0
+#: What stands beside a title, points.
+_BESIDE = 60.0
+#: What marks a line's name at its end.
+END_LABEL = "end-label"
 #: Width of a narrow letter of a title as a share of its height: what is shorter than that surely fits.
 _NARROW = 0.5
 
@@ -38,6 +43,47 @@ def least_size(figure: Figure) -> float:
 def _is_seen(artist: Artist) -> bool:
     """Whether a text is on the figure: it says something, and neither it nor what holds it is hidden."""
     return isinstance(artist, Text) and bool(artist.get_text().strip()) and artist.get_visible()
+
+
+def fit_text(figure: Figure) -> None:
+    """Make a figure's letters fit, whatever its data are: legends, titles, names at the ends of lines.
+
+    Parameters
+    ----------
+    figure
+        With everything on it.
+    """
+    fit_legends(figure)
+    fit_titles(figure)
+    for axes in figure.get_axes():
+        names = [text for text in axes.texts if text.get_gid() == END_LABEL and isinstance(text, Annotation)]
+        if len(names) > 1:
+            figure.draw_without_rendering()
+            _apart(names, 72.0 / figure.dpi)
+
+
+def _apart(names: list[Annotation], points: float) -> None:
+    """Move names up and down until none lies on another, in the order in which their lines end."""
+    boxes = {id(name): Text.get_window_extent(name) for name in names}
+    places = {id(name): (boxes[id(name)].y0 + boxes[id(name)].y1) / 2 for name in names}
+    names = sorted(names, key=lambda name: places[id(name)])
+    wanted = [places[id(name)] for name in names]
+    for _ in range(100):
+        off = False
+        for low, high in pairwise(names):
+            least = (boxes[id(low)].height + boxes[id(high)].height) / 2
+            lack = least - (places[id(high)] - places[id(low)])
+            if lack > 0.5:
+                places[id(low)], places[id(high)], off = (
+                    places[id(low)] - lack / 2,
+                    places[id(high)] + lack / 2,
+                    True,
+                )
+        if not off:
+            break
+    for name, before in zip(names, wanted, strict=True):
+        right, up = name.xyann
+        name.xyann = (right, up + (places[id(name)] - before) * points)
 
 
 def fit_legends(figure: Figure) -> None:
@@ -87,7 +133,7 @@ def fit_titles(figure: Figure) -> None:
         for where in ("left", "center", "right")
         if (title := axes.title if where == "center" else getattr(axes, f"_{where}_title")).get_text()
         and len(title.get_text()) * _NARROW * title.get_fontsize()
-        > 72 * figure.get_size_inches()[0] / _columns(axes)
+        > 72 * figure.get_size_inches()[0] / _columns(axes) - _BESIDE
     ]
     for axes, title in long:
         figure.draw_without_rendering()

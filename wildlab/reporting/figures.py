@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.quantiles import chi2_quantile
-from wildlab.reporting.figure_text import FULL_SIZE, fit_legends, fit_titles
+from wildlab.reporting.figure_text import END_LABEL, FULL_SIZE, fit_text
 from wildlab.reporting.letters import shapes_alone
 
 DPI = 190
@@ -318,9 +318,12 @@ def mark_gaps(ax: Axes, times: ArrayLike, longest_s: float) -> int:
 
 
 def end_label(ax: Axes, x: float, y: float, text: str, color: str, **annotate: Any) -> None:
-    """Write a line's name at its end, in its colour: easier to read than a legend."""
+    """Write a line's name at its end, in its colour: easier to read than a legend. Those of
+    one panel are moved apart where the figure is saved."""
     settings: dict[str, Any] = {"va": "center", "fontsize": 10, "annotation_clip": False} | annotate
-    ax.annotate(text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, **settings)
+    ax.annotate(
+        text, xy=(x, y), xytext=(5, 0), textcoords="offset points", color=color, gid=END_LABEL, **settings
+    )
 
 
 def thinned(count: int) -> slice:
@@ -346,8 +349,7 @@ def png_bytes(figure: Figure) -> bytes:
     b'PNG'
     """
     buffer = io.BytesIO()
-    fit_legends(figure)
-    fit_titles(figure)
+    fit_text(figure)
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()
 

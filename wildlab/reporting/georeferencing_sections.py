@@ -13,6 +13,7 @@ from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.ground import ground_height_words
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import percent
@@ -182,7 +183,7 @@ def left_section(report: Report, found: Accuracy, more: Sequence[str] = ()) -> N
         said = " ".join(filter(None, (cause.remaining_sentence(found.remaining, taken), said)))
         parts = [*cause.remaining_parts(found.remaining), *parts]
     if parts:
-        report.section("What is left", said)
+        report.section("What is left", said, part=ADVICE)
         report.points(parts, ordered=True)
 
 

@@ -252,5 +252,5 @@ def page(*, title: str, body: str, kicker: str = "", footer: str = "", style: st
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="referrer" content="no-referrer">\n'
         f"<title>{escape(title)}</title>\n<style>\n{rules}\n</style>\n</head>\n<body>\n"
-        f"{above}<main>\n{body}\n</main>\n{below}</body>\n</html>\n"
+        f"<main>\n{above}{body}\n</main>\n{below}</body>\n</html>\n"
     )

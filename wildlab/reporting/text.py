@@ -65,7 +65,9 @@ def maths(latex: str, *, block: bool = False) -> str:
     # The converter does not escape what stands in \\text{}.
     if re.search("[<>]", _MATHML_TAG.sub("", mathml)):
         raise WildlabError(f"the formula {latex.strip()!r} has a bare < or > in text", "use \\lt or \\gt")
-    return f'<div class="scroll formula">{mathml}</div>' if block else mathml
+    # What may scroll sideways must be reached without a mouse.
+    box = 'class="scroll formula" role="group" tabindex="0" aria-label="Formula"'
+    return f"<div {box}>{mathml}</div>" if block else mathml
 
 
 def prose(text: str) -> str:
