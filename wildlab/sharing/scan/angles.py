@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wildlab.sharing.scan.numbers import Bytes, Ints, Numbers, Runs, nothing
+from wildlab.sharing.scan.numbers import Bytes, Ints, Numbers, Runs, is_one_of, nothing
 
 #: Between degrees and minutes at most so many characters: "60 deg 07", "60&deg; 07" is one by then.
 GAP = 12
+#: What stands behind degrees: their sign, d, or what it becomes where signs are lost.
+MARKS = b"\xb0\xbadD?*\xc2"
 
 
 def angles_of(data: Bytes, runs: Runs, numbers: Numbers) -> dict[str, Numbers]:
@@ -49,11 +51,9 @@ def _last(numbers: Numbers, runs: Runs) -> Ints:
 
 def _marked(data: Bytes, at: Ints) -> NDArray[np.bool_]:
     """Whether what follows a number says degrees: the sign, d, or what stands for it where signs were lost."""
-    marks = np.frombuffer(b"\xb0\xbadD?*\xc2:", np.uint8)
     last = len(data) - 1
-    return np.isin(data[np.minimum(at, last)], marks) | (
-        (data[np.minimum(at, last)] == 32) & np.isin(data[np.minimum(at + 1, last)], marks)
-    )
+    one, two = data[np.minimum(at, last)], data[np.minimum(at + 1, last)]
+    return is_one_of(one, MARKS) | ((one == 32) & is_one_of(two, MARKS))
 
 
 def _apart(data: Bytes, runs: Runs, numbers: Numbers, *, seconds: bool) -> Numbers:
@@ -105,7 +105,7 @@ def _packed(data: Bytes, numbers: Numbers, whole: float) -> Numbers:
         good = (minutes < 60) & (seconds < 60) & (n.value >= 1000)
         value, more = degrees + minutes / 60 + seconds / 3600, 3
     # A letter behind it says what it is: 6007N 01015E.
-    letter = np.isin(data[np.minimum(n.end, len(data) - 1)], np.frombuffer(b"NSEWnsew", np.uint8))
+    letter = is_one_of(data[np.minimum(n.end, len(data) - 1)], b"NSEWnsew")
     fine = n.decimals + more + letter
     half = n.half / (60 if whole == 100.0 else 3600)
     return Numbers(n.start, n.end, value, fine, n.digits, half).take(good)

@@ -10,7 +10,7 @@ from itertools import islice, product
 import numpy as np
 
 from wildlab.sharing.scan.hits import Hit
-from wildlab.sharing.scan.numbers import Bytes, Ints, Numbers, Runs
+from wildlab.sharing.scan.numbers import Bytes, Ints, Numbers, Runs, is_one_of
 from wildlab.sharing.scan.secrets import MayStay, Secrets
 
 #: Months by number, as English, German, Norwegian, Swedish and Danish begin to write them.
@@ -73,7 +73,7 @@ def _apart(data: Bytes, runs: Runs, i: Ints, signs: bytes) -> np.ndarray[tuple[i
     last = len(data) - 1
     one, two = data[np.minimum(runs.end[i], last)], data[np.minimum(runs.end[i + 1], last)]
     close = (runs.start[i + 1] - runs.end[i] == 1) & (runs.start[i + 2] - runs.end[i + 1] == 1)
-    return np.asarray(close & np.isin(one, np.frombuffer(signs, np.uint8)) & (one == two))
+    return np.asarray(close & is_one_of(one, signs) & (one == two))
 
 
 def _numeric(data: Bytes, runs: Runs, days: set[date]) -> list[Hit]:
@@ -161,7 +161,8 @@ def _clock_times(data: Bytes, runs: Runs, moments: Sequence[datetime]) -> list[H
         # 00:00:00 is no time of day but the lack of one.
         fits = (clock == true) & (true != 0) & apart
         hits += [
-            Hit(int(runs.start[k]), int(runs.end[k + 2]), "date", "a time of day, to the second") for k in i[fits]
+            Hit(int(runs.start[k]), int(runs.end[k + 2]), "date", "a time of day, to the second")
+            for k in i[fits]
         ]
     return hits
 
@@ -222,7 +223,7 @@ def _months(data: Bytes, runs: Runs, days: set[date]) -> list[Hit]:
         return []
     i = np.arange(n)
     sign = data[np.minimum(runs.end[:n], len(data) - 1)]
-    apart = (runs.start[1:] - runs.end[:-1] == 1) & np.isin(sign, np.frombuffer(b"-/.:_", np.uint8))
+    apart = (runs.start[1:] - runs.end[:-1] == 1) & is_one_of(sign, b"-/.:_")
     a, b, two = runs.value[:-1], runs.value[1:], (runs.length[:-1] == 2, runs.length[1:] == 2)
     hits = []
     for year, month in sorted({(day.year, day.month) for day in days}):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pymap3d
 from numpy.typing import NDArray
-from pyproj import CRS, Transformer
+from pyproj import Proj
 
 from wildlab.sharing.scan.secrets import Array
 
@@ -123,20 +123,26 @@ def _grids(latitude: Array, longitude: Array) -> list[Encoding]:
         )
     for middle in sorted({int(2 * np.floor(m / 2) + 1) for m in longitude}):
         grids.append((f"Lo{middle}", f"+proj=tmerc +lon_0={middle} +k=1 +ellps=WGS84", False))
-    grids.append(("Web Mercator", "EPSG:3857", True))
-    grids.append(("World Mercator", "EPSG:3395", True))
-    grids.append(("ETRS89 LAEA", "EPSG:3035", False))
+    grids.append(("Web Mercator", "+proj=webmerc +datum=WGS84", True))
+    grids.append(("World Mercator", "+proj=merc +datum=WGS84", True))
+    grids.append(
+        ("ETRS89 LAEA", "+proj=laea +lat_0=52 +lon_0=10 +x_0=4321000 +y_0=3210000 +ellps=GRS80", False)
+    )
     found = []
     for name, definition, own in grids:
-        transform = Transformer.from_crs(CRS("EPSG:4326"), CRS(definition), always_xy=True)
-        east, north = (np.asarray(v, float) for v in transform.transform(longitude, latitude))
+        east, north = (np.asarray(metres, float) for metres in Proj(definition)(longitude, latitude))
         good: NDArray[np.bool_] = np.isfinite(east) & np.isfinite(north) & (np.abs(east) < 1e8)
         if not good.any():
             continue
-        stretch = np.maximum(1 / np.maximum(np.cos(np.radians(latitude)), 0.05), 1) if "Mercator" in name else 1.0
+        stretch = (
+            np.maximum(1 / np.maximum(np.cos(np.radians(latitude)), 0.05), 1) if "Mercator" in name else 1.0
+        )
         axes = tuple(
             Axis(axis, np.where(good, np.abs(values), np.inf), np.full(len(east), stretch), decimals)
-            for axis, values, decimals in (("easting", east, 2 if own else None), ("northing", north, 1 if own else None))
+            for axis, values, decimals in (
+                ("easting", east, 2 if own else None),
+                ("northing", north, 1 if own else None),
+            )
         )
         found.append(Encoding(name, axes, 0))
     return found

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from datetime import UTC, datetime
 from pathlib import Path
+from typing import cast
 
 from wildlab.errors import WildlabError, system_error
-from wildlab.sharing.scan.findings import MOST_OF_A_KIND, Finding
+from wildlab.sharing.scan.findings import MOST_OF_A_KIND, Finding, Kind
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.look import Look, excerpt
 from wildlab.sharing.scan.parts import Budget, Part
 from wildlab.sharing.scan.secrets import Secrets
-from wildlab.sharing.scan.texts import texts_of
-from wildlab.sharing.scan.unpack import unpacked
+from wildlab.sharing.scan.texts import is_text, texts_of
+from wildlab.sharing.scan.inside.kinds import unpacked
 from wildlab.sharing.scan.words import needles_of
 
 
@@ -94,9 +94,7 @@ def _files(paths: list[Path]) -> Iterator[tuple[Path, str]]:
 
 
 def _named(look: Look, name: str) -> list[Finding]:
-    return [
-        Finding(name, "the name of the file", hit.kind, hit.written, name) for hit in look.in_text(name)
-    ]
+    return [Finding(name, "the name of the file", hit.kind, hit.written, name) for hit in look.in_text(name)]
 
 
 def _in_file(look: Look, name: str, data: bytes) -> list[Finding]:
@@ -115,15 +113,26 @@ def _in_file(look: Look, name: str, data: bytes) -> list[Finding]:
 
 
 def _in_part(look: Look, name: str, part: Part) -> Iterator[Finding]:
+    where = part.where or "the whole file"
     if part.trouble:
-        yield Finding(name, part.where or "the whole file", "unreadable", part.trouble)
+        yield Finding(name, where, "unreadable", part.trouble)
+    for moment, written in part.moments:
+        if look.is_secret(moment):
+            yield Finding(name, where, "date", written, moment.isoformat())
+    for said in look.in_columns(part.columns):
+        kind, _, written = said.partition(": ")
+        yield Finding(name, where, cast(Kind, kind), written)
     seen = set()
     for text in texts_of(part.data):
         for hit in look.in_text(text, drawn=part.drawn):
-            said = (hit.kind, hit.written, text[hit.start : hit.end])
-            if said not in seen:  # the same in another reading
-                seen.add(said)
+            said_so = (hit.kind, hit.written, text[hit.start : hit.end])
+            if said_so not in seen:  # the same in another reading
+                seen.add(said_so)
                 yield Finding(name, _where(part, text, hit), hit.kind, hit.written, excerpt(text, hit))
+    if not is_text(part.data):
+        for hit in look.in_bytes(part.data):
+            found = part.data[hit.start : hit.end].hex()
+            yield Finding(name, f"{where}, byte {hit.start}", hit.kind, hit.written, found)
 
 
 def _where(part: Part, text: str, hit: Hit) -> str:

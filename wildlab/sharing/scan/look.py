@@ -1,20 +1,25 @@
-"""Everything that is looked for in a text, in columns of numbers, and in plain bytes."""
+"""Everything that is looked for, in a text, in columns of numbers, in plain bytes and in times."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
+from datetime import datetime
 
 import numpy as np
 
 from wildlab.sharing.scan.angles import angles_of
-from wildlab.sharing.scan.dates import dates_in
-from wildlab.sharing.scan.encodings import Encoding, encodings_of
+from wildlab.sharing.scan.binary import Binary
+from wildlab.sharing.scan.codes import Codes
+from wildlab.sharing.scan.columns import in_columns
+from wildlab.sharing.scan.dates import dates_in, days_of
+from wildlab.sharing.scan.derived import derived_numbers
+from wildlab.sharing.scan.encodings import encodings_of
 from wildlab.sharing.scan.hits import Hit
-from wildlab.sharing.scan.near import Sorted, alone, pairs
-from wildlab.sharing.scan.numbers import numbers_of, runs_of
+from wildlab.sharing.scan.near import Sorted, alone, pairs, reach, within
+from wildlab.sharing.scan.numbers import Numbers, numbers_of, runs_of
 from wildlab.sharing.scan.scalars import scalars_in
-from wildlab.sharing.scan.secrets import Secrets
+from wildlab.sharing.scan.secrets import Array, Secrets
 from wildlab.sharing.scan.texts import as_bytes
 from wildlab.sharing.scan.words import Words
 
@@ -26,9 +31,18 @@ class Look:
     """What is looked for, prepared once for all files."""
 
     def __init__(self, secrets: Secrets) -> None:
+        places = np.asarray(secrets.places, float).reshape(-1, 3)
         self.secrets = secrets
         self.words = Words(secrets.words)
-        self.encodings = encodings_of(np.asarray(secrets.places, float).reshape(-1, 3))
+        self.codes = Codes(places, secrets.near_m)
+        self.encodings = encodings_of(places)
+        self.degrees = [encoding for encoding in self.encodings if encoding.name == "decimal degrees"]
+        self.reach = reach(self.encodings, secrets.near_m)
+        self.reach_of_angles = reach(self.degrees, secrets.near_m)
+        self.numbers = (*secrets.numbers, *derived_numbers(places))
+        moments = secrets.moments if secrets.may_stay != "all" else ()
+        self.days = days_of(moments) if secrets.may_stay != "day" else set()
+        self.binary = Binary(self.encodings, secrets.near_m, self.numbers, moments)
 
     def in_text(self, text: str, *, drawn: bool = False) -> list[Hit]:
         """What is in a text.
@@ -47,41 +61,79 @@ class Look:
             hits += [hit._replace(start=hit.start + begin, end=hit.end + begin) for hit in found]
         return list(dict.fromkeys(hits))
 
-    def _in_piece(self, text: str, *, drawn: bool) -> list[Hit]:
-        hits = self.words.found_in(text)
+    def _in_piece(self, text: str, *, drawn: bool) -> Iterator[Hit]:
+        yield from self.words.found_in(text)
         text, data = as_bytes(text)
         runs = runs_of(data)
         if not len(runs.start):
-            return hits
+            return
+        yield from self.codes.found_in(text)
         numbers = numbers_of(data, runs)
-        hits += dates_in(data, text, runs, numbers, self.secrets)
+        yield from dates_in(data, text, runs, numbers, self.secrets)
         if not drawn:
-            hits += scalars_in(text, numbers, self.secrets.numbers)
+            yield from scalars_in(text, numbers, self.numbers)
         if not self.encodings:
-            return hits
-        ordered = Sorted(numbers)
+            return
         near_m, cell = self.secrets.near_m, self.secrets.cell_deg
-        for encoding in self.encodings:
+        ordered = self._reached(numbers, self.reach)
+        for encoding in self.encodings if ordered else ():
             own = cell if encoding.name == "decimal degrees" else 0.0
-            hits += pairs(ordered, encoding, near_m, own)
+            yield from pairs(ordered, encoding, near_m, own)
             if not drawn:
-                hits += alone(ordered, encoding, own)
+                yield from alone(ordered, encoding, own)
         for name, angles in angles_of(data, runs, numbers).items():
-            if not len(angles.start):
-                continue
-            ordered = Sorted(angles)
-            for encoding in self._degrees():
+            ordered = self._reached(angles, self.reach_of_angles)
+            for encoding in self.degrees if ordered else ():
                 spelt = encoding._replace(name=name)
-                hits += pairs(ordered, spelt, near_m)
+                yield from pairs(ordered, spelt, near_m)
                 if not drawn:
-                    hits += alone(ordered, spelt)
-        return hits
+                    yield from alone(ordered, spelt)
 
-    def _degrees(self) -> Sequence[Encoding]:
-        return [encoding for encoding in self.encodings if encoding.name == "decimal degrees"]
+    @staticmethod
+    def _reached(numbers: Numbers, ranges: tuple[Array, Array]) -> Sorted | None:
+        some = within(numbers.value, *ranges)
+        return Sorted(numbers.take(some)) if some.any() else None
+
+    def in_columns(self, columns: Iterable[tuple[str, Array]]) -> list[str]:
+        """What is in columns of numbers, in words.
+
+        Parameters
+        ----------
+        columns
+            As a `Part` has them.
+        """
+        return in_columns(list(columns), self.encodings, self.secrets, self.numbers)
+
+    def in_bytes(self, data: bytes) -> list[Hit]:
+        """What is in plain bytes, as binary numbers, and names with letters beyond ASCII.
+
+        Parameters
+        ----------
+        data
+            Any.
+        """
+        return [*self.binary.found_in(data), *self.words.found_in_bytes(data)]
+
+    def is_secret(self, moment: datetime) -> bool:
+        """Whether a time says when it was.
+
+        Parameters
+        ----------
+        moment
+            With a zone.
+        """
+        return moment.date() in self.days
 
 
 def excerpt(text: str, hit: Hit, around: int = 12) -> str:
-    """What was found, with a little of what stands around it, on one line."""
+    """What was found, with a little of what stands around it, on one line.
+
+    Parameters
+    ----------
+    text, hit
+        Where it was found, and what.
+    around
+        How many characters before and behind it.
+    """
     piece = text[max(hit.start - around, 0) : min(hit.end, hit.start + 120) + around]
     return re.sub(r"\s+", " ", piece)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,15 +31,25 @@ class Sorted:
     def within(self, centres: Array, tolerance: Array) -> Ints:
         """Which are within a tolerance of any centre, in the order of the text."""
         good = np.isfinite(centres)
-        low, high = _merged(centres[good] - tolerance[good], centres[good] + tolerance[good])
+        low, high = merged(centres[good] - tolerance[good], centres[good] + tolerance[good])
         first = np.searchsorted(self.values, low, "left")
         last = np.searchsorted(self.values, high, "right")
         found = [self.order[a:b] for a, b in zip(first, last, strict=True) if b > a]
         return np.sort(np.concatenate(found)) if found else np.empty(0, np.int64)
 
 
-def _merged(low: Array, high: Array) -> tuple[Array, Array]:
-    """Ranges, those that overlap as one."""
+def merged(low: Array, high: Array) -> tuple[Array, Array]:
+    """Ranges in order, those that overlap as one.
+
+    Parameters
+    ----------
+    low, high
+        (N,) where each begins and ends.
+
+    Returns
+    -------
+    (low, high), (M,) each.
+    """
     if not len(low):
         return low, high
     order = np.argsort(low)
@@ -45,6 +57,50 @@ def _merged(low: Array, high: Array) -> tuple[Array, Array]:
     new = np.concatenate(([True], low[1:] > high[:-1]))
     ends = np.concatenate((np.flatnonzero(new)[1:] - 1, [len(low) - 1]))
     return low[new], high[ends]
+
+
+def within(values: Array, low: Array, high: Array) -> NDArray[np.bool_]:
+    """Whether numbers lie in any of some ranges.
+
+    Parameters
+    ----------
+    values
+        (N,), in any order.
+    low, high
+        (M,) as of :func:`merged`.
+
+    Returns
+    -------
+    (N,) bool.
+    """
+    if not len(low):
+        return np.zeros(len(values), bool)
+    index = np.searchsorted(low, values, "right") - 1
+    return np.asarray((index >= 0) & (values <= high[np.maximum(index, 0)]))
+
+
+def reach(encodings: Sequence[Encoding], near_m: float) -> tuple[Array, Array]:
+    """The ranges outside of which a number is none of a place in any encoding.
+
+    Parameters
+    ----------
+    encodings
+        How places may be written.
+    near_m
+        How near to a place is a leak.
+
+    Returns
+    -------
+    (low, high), as of :func:`merged`.
+    """
+    values, tolerance = [np.empty(0)], [np.empty(0)]
+    for encoding in encodings:
+        for axis in encoding.axes:
+            good = np.isfinite(axis.values)
+            values.append(axis.values[good])
+            tolerance.append((near_m * axis.per_metre + 0.5 * 10.0**-encoding.decimals)[good])
+    centres, around = np.concatenate(values), np.concatenate(tolerance)
+    return merged(centres - around, centres + around)
 
 
 def pairs(numbers: Sorted, encoding: Encoding, near_m: float, cell: float = 0.0) -> list[Hit]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +56,26 @@ class Numbers(NamedTuple):
         return Numbers(*(field[which] for field in self))
 
 
+def is_one_of(data: Bytes, signs: bytes) -> NDArray[np.bool_]:
+    """Whether bytes are among some.
+
+    Parameters
+    ----------
+    data
+        (N,) uint8.
+    signs
+        Which.
+    """
+    return _among(signs)[data]
+
+
+@cache
+def _among(signs: bytes) -> NDArray[np.bool_]:
+    table = np.zeros(256, bool)
+    table[list(signs)] = True
+    return table
+
+
 def nothing() -> Numbers:
     """No numbers."""
     none, real = np.empty(0, np.int64), np.empty(0)
@@ -104,9 +125,13 @@ def numbers_of(data: Bytes, runs: Runs) -> Numbers:
     joined = apart & ((between == ord(".")) | (between == ord(",")))
     found.append(_with_decimals(runs, np.flatnonzero(joined), runs.value.astype(float), runs.start))
     # Thousands apart: 6 656 123.4, 6,656,123, 6'656'123.
-    spaced = np.isin(between, np.frombuffer(b" ,'_", np.uint8)) & apart & (runs.length[1:] == 3)
-    first = runs.length[:-1] <= 3
-    two = np.flatnonzero(spaced & first & (runs.value[:-1] > 0))
+    spaced = is_one_of(between, b" ,'_") & apart & (runs.length[1:] == 3)
+    # Not out of the middle of a list of numbers of three digits.
+    begins = (runs.length[:-1] <= 3) & (runs.value[:-1] > 0)
+    begins[1:] &= ~(spaced[:-1] & (runs.length[:-2] <= 3))
+    chain = np.concatenate((spaced, [False, False, False]))
+    begins &= ~(chain[:-3] & chain[1:-2] & chain[2:-1])
+    two = np.flatnonzero(spaced & begins)
     found += _grouped(runs, two, runs.value[two] * 1000 + runs.value[two + 1], two + 1, joined)
     three = two[two + 2 < len(length)]
     three = three[spaced[three + 1]]
@@ -121,7 +146,7 @@ def numbers_of(data: Bytes, runs: Runs) -> Numbers:
 def _number(start: Ints, end: Ints, value: Array, decimals: Ints) -> Numbers:
     size = np.floor(np.log10(np.maximum(value, 1e-300)) + 1e-12).astype(np.int64) + 1
     digits = np.maximum(np.where(value > 0, size, 1) + decimals, 1)
-    return Numbers(start, end, value, decimals, digits, 0.5 * 10.0**-decimals.astype(float))
+    return Numbers(start, end, value, decimals, digits, 0.5 * 10.0 ** -decimals.astype(float))
 
 
 def _with_decimals(runs: Runs, which: Ints, before: Array, begins: Ints) -> Numbers:

@@ -3,34 +3,82 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
+
+from wildlab.sharing.scan.secrets import Array
+
+
+class TooMuch(Exception):
+    """It unpacks to more than may be unpacked."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """Bytes out of a file.
+    """Something out of a file.
 
     Attributes
     ----------
     where
-        What they are inside of, from the outside in; empty for the file itself.
+        What it is inside of, from the outside in; empty for the file itself.
     data
-        The bytes, as they are once unpacked.
+        Bytes, as they are once unpacked.
+    whole
+        Nothing more can be unpacked from it.
     drawn
-        They are mostly coordinates of lines on paper.
+        Its numbers are mostly the coordinates of lines on paper.
+    columns
+        Numbers by the name of their column, (N,) each; those of equal length belong together row by row.
+    moments
+        Times that stand there in a form of their own, and what they are.
     trouble
-        Why they could not be looked into; empty where they could.
+        Why it could not be looked into; empty where it could.
     """
 
     where: str
-    data: bytes
+    data: bytes = b""
+    whole: bool = False
     drawn: bool = False
+    columns: tuple[tuple[str, Array], ...] = ()
+    moments: tuple[tuple[datetime, str], ...] = ()
     trouble: str = ""
 
 
 @dataclass
 class Budget:
-    """How much one file may unpack to, so that a small file cannot fill the memory."""
+    """How much one file may unpack to, so that a small file cannot fill the memory.
+
+    Attributes
+    ----------
+    left
+        Bytes that may still be unpacked, all parts together.
+    at_once
+        Bytes of one part.
+    parts
+        How many parts may still come.
+    deepest
+        How many times one may be inside of another.
+    """
 
     left: int = 1_000_000_000
-    most_at_once: int = 256_000_000
+    at_once: int = 256_000_000
+    parts: int = 20_000
     deepest: int = 12
+
+    @property
+    def most(self) -> int:
+        """Bytes that the next part may have."""
+        return max(min(self.left, self.at_once), 0)
+
+    def spend(self, data: bytes) -> bytes:
+        """What was unpacked, taken off what is left.
+
+        Raises
+        ------
+        TooMuch
+            Where nothing was left for it.
+        """
+        self.left -= len(data)
+        self.parts -= 1
+        if self.left < 0 or self.parts < 0:
+            raise TooMuch
+        return data

@@ -1,0 +1,1 @@
+"""What is inside of files: one file per family of formats."""
