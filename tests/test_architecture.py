@@ -38,6 +38,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reporting": BELOW_PIPELINE | {"pipeline"},
     "studies": BELOW_PIPELINE | {"pipeline", "reporting"},
     "runner": BELOW_PIPELINE | {"pipeline", "reporting", "studies"},
+    "sharing": BELOW_PIPELINE | {"pipeline", "reporting"},
     # What `import wildlab` offers; nothing of wildlab imports it.
     "api": BELOW_PIPELINE | {"pipeline", "reporting"},
     "commands": BELOW_PIPELINE | {"pipeline", "reporting", "studies", "runner", "terminal"},

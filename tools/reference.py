@@ -28,6 +28,7 @@ ROOMS = (
     *("api", "geometry", "flight", "navigation", "tracking", "simulation", "detection"),
     *("planning", "evaluation", "pipeline"),
     "reporting",
+    "sharing.edition",
 )
 
 

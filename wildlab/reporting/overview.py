@@ -129,16 +129,37 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
     if overview.coverage is not None and overview.coverage.placed.any():
         note("area_seen", overview.coverage.area_m2, "m^2", int(overview.coverage.placed.sum()))
         note("images_per_place", overview.coverage.looks, "1")
-    if overview.detections[0]:
-        note("detections", overview.detections[0], "1", overview.detections[0])
+    seen, images, placed = overview.detections
+    if seen:
+        note("detections", seen, "1", seen)
+        note("detections_placed", placed, "1", seen)
+        if frames is not None and len(frames):
+            note("images_with_detections", images, "1", len(frames))
+        things = things_named(overview)
+        if things:
+            note("things_named", things, "1", seen)
     if overview.vibration is not None:
         found = overview.vibration[0]
         note("shaking_median", float(np.median(found.worst)), "m/s^2", len(found.worst))
         note("shaking_max", float(found.worst.max()), "m/s^2", len(found.worst))
     for trouble in overview.troubles:
         report.metric("trouble", trouble.what.replace(" ", "-"), trouble.seconds, "s", n=len(trouble.spells))
+    units = {"jumps": "m", "leans": "deg", "apart": "m", "shakes": "m/s^2"}
+    for alarm in overview.alarms:
+        report.metric("alarm", alarm.what, alarm.size, units[alarm.what], n=alarm.often)
     for gain in gains:
         report.metric("gain_share", gain.key, gain.share, "1")
+    for lost in overview.lost:
+        report.metric("lost", lost.key, lost.lost, "1", n=lost.of)
+
+
+def things_named(overview: Overview) -> int:
+    """How many different things the detections name; 0 where one of them names none."""
+    detections = overview.flight.detections
+    if detections is None or "target_id" not in detections:
+        return 0
+    names = detections["target_id"].fillna("").astype(str)
+    return 0 if (names == "").any() else int(names.nunique())
 
 
 def limits(overview: Overview, lacking: Sequence[str]) -> list[str]:

@@ -1,0 +1,93 @@
+"""From the numbers that reports recorded to plain values."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from tests.sharing.edition.flights import flight, overview, report
+from wildlab.sharing.edition.facts import Alarm, Gain, facts_of
+
+ERROR = {
+    ("horizontal_error_median", "logged-pose"): {"value": 3.0, "n": 40},
+    ("horizontal_error_p90", "logged-pose"): {"value": 8.0, "n": 40},
+    ("horizontal_error_mean", "logged-pose"): {"value": 4.0, "n": 40},
+}
+
+
+def test_nothing_is_known_of_no_report() -> None:
+    facts = facts_of(flight())
+    assert facts.verdict is None and not facts.gains and not facts.alarms and not facts.failed
+    assert math.isnan(facts.error_median) and facts.compared == 0
+    assert facts.lacking == ("georeferencing", "tracking", "navigation")
+
+
+def test_errors_and_gains() -> None:
+    places = report("georeferencing", {
+        **ERROR,
+        ("gain", "winner"): {"value": 1.5, "n": 40, "low": 1.0, "high": 2.0},
+        ("horizontal_error_mean", "calibrated-pose"): {"value": 2.5, "n": 40},
+        ("clock_offset", "calibration"): {"value": 0.2},
+    })  # fmt: skip
+    seen = overview(
+        {"worth_fixing": 2}, gain_share__cause={"value": 0.375},
+        gain_share__images_without_pose={"value": 0.5}, lost__images_without_pose={"value": 10, "n": 20},
+        detections={"value": 60}, duration={"value": 100.0},
+    )  # fmt: skip
+    facts = facts_of(flight(seen, places))
+    assert (facts.error_median, facts.error_p90, facts.compared) == (3.0, 8.0, 40)
+    assert facts.gains == (
+        Gain("images_without_pose", (), 10.0, 20.0, 0.5),
+        Gain("cause", ("camera's clock",), 1.5, 4.0, 0.375),
+    )
+    assert facts.verdict == "worth fixing" and facts.seen == 60 and math.isnan(facts.things)
+    assert facts.possible is None and facts.lacking == ("tracking", "navigation")
+
+
+def test_a_gain_that_is_not_certain_is_possible() -> None:
+    places = report("georeferencing", {**ERROR, ("gain", "winner"): {"value": 1.0, "low": -0.5, "high": 2.0}})
+    facts = facts_of(flight(overview({"troubled": 1}), places))
+    assert facts.possible is not None and (facts.possible.value, facts.possible.of) == (1.0, 4.0)
+    assert facts.verdict == "look closer"
+
+
+def test_alarms_stand_in_order_and_troubles_by_time() -> None:
+    facts = facts_of(flight(overview(
+        {"broken": 1}, alarm__shakes={"value": 70.0, "n": 1}, alarm__jumps={"value": 9.0, "n": 2},
+        **{"trouble__no-poses": {"value": 3.0}, "trouble__fewer-than-6-satellites": {"value": 30.0}},
+    )))  # fmt: skip
+    assert facts.alarms == (Alarm("jumps", 9.0, 2), Alarm("shakes", 70.0, 1))
+    assert facts.troubles == (("few_satellites", 30.0), ("poses", 3.0))
+    assert facts.verdict == "went wrong"
+
+
+def test_what_failed_is_told_apart_from_what_is_not_there() -> None:
+    facts = facts_of(flight(report("overview", state="failed"), report("georeferencing", state="broken off")))
+    assert facts.failed == ("overview", "georeferencing") and facts.lacking == ("tracking", "navigation")
+    assert facts.verdict is None
+
+
+def test_tracks_of_the_filter_that_is_spoken_of() -> None:
+    """Of two filters the first that is not the white one; the median over its tracks."""
+
+    def track(sensor: str, name: str, rmse: float, nees: float) -> dict[tuple[str, str], dict[str, float]]:
+        subject = f"{sensor}/boat/{name}"
+        return {
+            ("rmse", subject): {"value": rmse},
+            ("nees", subject): {"value": nees, "low": 1.0, "high": 4.0},
+        }
+
+    tracking = report("tracking", {
+        **track("a", "ekf", 99.0, 99.0), **track("a", "schmidt", 2.0, 2.0),
+        **track("b", "schmidt", 6.0, 20.0),
+    })  # fmt: skip
+    facts = facts_of(flight(overview(), tracking))
+    assert (facts.tracks, facts.track_error) == (2, 4.0)
+    assert facts.track_sure == pytest.approx((0.5 + 5.0) / 2)
+
+
+def test_a_number_that_could_not_be_computed_is_not_known() -> None:
+    places = report("georeferencing", {("horizontal_error_median", "logged-pose"): {"value": None, "n": 0}})
+    facts = facts_of(flight(overview(detections={"value": 5}), places))
+    assert math.isnan(facts.error_median) and facts.compared == 0 and facts.possible is None

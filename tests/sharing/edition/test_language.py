@@ -1,0 +1,169 @@
+"""Texts: every file whole, with the English placeholders; numbers and dates as the language has them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.sharing.edition.language import FOLDER, languages, load_language, placeholders, say
+from wildlab.sharing.edition.said import Day, Quantity, Said, duration, length, number, share
+
+ENGLISH = FOLDER / "en.toml"
+SPACE = "\u00a0"
+
+
+def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
+def whole(path: Path) -> dict[str, Any]:
+    return dict(leaves(tomllib.loads(path.read_text(encoding="utf-8"))))
+
+
+def test_all_files_have_the_same_keys_and_placeholders() -> None:
+    english = whole(ENGLISH)
+    assert languages()[0] == "en" and {"nb", "sv"} <= set(languages())
+    for code in languages():
+        other = whole(FOLDER / f"{code}.toml")
+        assert set(other) == set(english), code
+        for key, text in english.items():
+            if isinstance(text, str):
+                assert sorted(placeholders(other[key])) == sorted(placeholders(text)), f"{code}: {key}"
+        assert load_language(code).missing == ()
+        assert load_language(code).code == code
+
+
+def test_translations_are_translated() -> None:
+    """Only signs, numbers and what is the same word may be as in English."""
+    english = whole(ENGLISH)
+    for code in languages()[1:]:
+        other = whole(FOLDER / f"{code}.toml")
+        words = {key: text for key, text in english.items() if not str(text).startswith("{first}")}
+        same = {key for key, text in words.items() if other[key] == text}
+        assert {key.partition(".")[0] for key in same} <= {"format", "unit"}, code
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "shown"),
+    [
+        ("en", length(6.42), "6.4 metres"),
+        ("nb", length(6.42), "6,4 meter"),
+        ("en", length(0.4), "40 cm"),
+        ("sv", length(1234.0), "1,2 km"),
+        ("en", length(999.6), "1000 metres"),
+        ("en", length(1.04), "1.0 metre"),
+        ("en", number(9876.0), "9876"),
+        ("en", number(1234567.0), "1,234,567"),
+        ("nb", number(12345.0), "12\u00a0345"),
+        ("en", duration(62.0), "62 seconds"),
+        ("sv", duration(1510.0), "25 minuter"),
+        ("nb", duration(9000.0), "2,5 timer"),
+        ("en", share(0.9999), "99%"),
+        ("en", share(0.001), "1%"),
+        ("nb", share(1.0), "100 %"),
+        ("en", share(0.0), "0%"),
+        ("en", share(1.34), "134%"),
+        ("en", Quantity("area", 3.4e5), "34 hectares"),
+        ("sv", Quantity("area", 2.5e6), "2,5 km²"),
+        ("en", Quantity("angle", 3.141592653589793), "180 degrees"),
+        ("en", Quantity("number", -12.0), "−12"),
+        ("en", Day(date(2026, 3, 14), True), "14 March 2026"),
+        ("nb", Day(date(2026, 3, 14), True), "14. mars 2026"),
+        ("sv", Day(date(2026, 3, 14), False), "mars 2026"),
+    ],
+)  # fmt: skip
+def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
+    text = say(load_language(code), said)
+    assert text.replace(SPACE, " ") == shown.replace(SPACE, " ")
+    if isinstance(said, Quantity):
+        assert " " not in text, "a number and its unit must not be parted at the end of a line"
+
+
+@given(st.floats(-1e9, 1e9), st.sampled_from(["length", "number", "area", "duration"]))
+def test_no_number_is_shown_with_a_minus_and_nothing(value: float, kind: str) -> None:
+    text = say(load_language("sv"), Quantity(kind, abs(value) if kind != "number" else value))
+    assert text.strip() and not text.startswith("−0 ") and text != "−0"
+
+
+def test_one_and_many() -> None:
+    nb = load_language("nb")
+    assert say(nb, Said("steps.some", {}, 1)) == "omtrent ett skritt"
+    assert say(nb, Said("steps.some", {}, 4)) == "omtrent 4 skritt"
+    assert say(nb, (Said("cause.height"), Said("cause.lens"))) == "høyden i opptaket og det en vet om linsen"
+    three = say(load_language(), (Said("cause.any"),) * 3)
+    assert three == "something, something and something"
+
+
+def test_a_value_is_no_template() -> None:
+    """A name that looks like a placeholder stays a name."""
+    shown = say(load_language(), Said("page.title", {"name": "{name} {n} **x**"}))
+    assert "{name} {n} **x**" in shown
+
+
+def partners(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "sw.toml"
+    path.write_text(f'[language]\ncode = "sw"\nname = "Kiswahili"\n{text}', encoding="utf-8")
+    return path
+
+
+def test_a_partner_adds_a_language(tmp_path: Path) -> None:
+    path = partners(tmp_path, '[verdict]\nsound = "Hakuna kosa"\n')
+    own = load_language(path)
+    assert own.code == "sw" and own.name == "Kiswahili"
+    assert say(own, Said("verdict.sound")) == "Hakuna kosa"
+    assert say(own, Said("verdict.look")) == say(load_language(), Said("verdict.look"))
+    assert "verdict.look" in own.missing and "verdict.sound" not in own.missing
+    assert load_language(str(path)) == own
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "problem"),
+    [
+        ('[tile]\nnobody = "x"', "tile.nobody", "no text has this name"),
+        ('[alarm]\nleans = "It leans."', "alarm.leans", "other placeholders than the English one"),
+        ('[alarm]\nleans = "{size} {where}"', "alarm.leans", r"Use \{size\}"),
+        ("[tile]\nseen = 3", "tile.seen", "this is int, and not text"),
+        ('[steps]\nsome = "{n}"', "steps.some", "depends on how many"),
+        ('[steps]\nsome = {one = "x", many = "y"}', "steps.some", "other placeholders"),
+        ('[format]\nmonths = ["x"]', "format.months", "not a list of 12 texts"),
+        ('[tile]\nseen = "' + "x" * 401 + '"', "tile.seen", "401 characters"),
+    ],
+)
+def test_a_text_that_cannot_be_used_is_named(tmp_path: Path, text: str, field: str, problem: str) -> None:
+    path = partners(tmp_path, text)
+    with pytest.raises(WildlabError, match=problem) as raised:
+        load_language(path)
+    assert raised.value.field == field and raised.value.file == str(path)
+
+
+def test_a_language_that_is_not_there() -> None:
+    with pytest.raises(WildlabError, match=r"there is no language 'xx'. Choose one of en, nb, sv"):
+        load_language("xx")
+    with pytest.raises(WildlabError, match="there is no language"):
+        load_language("../edition/en")
+
+
+@pytest.mark.parametrize(
+    ("head", "problem"),
+    [
+        ('[language]\ncode = "no/way"\nname = "x"', "has the code 'no/way'"),
+        ('[language]\ncode = "sw"', "has no name"),
+    ],
+)
+def test_a_language_has_a_code_and_a_name(tmp_path: Path, head: str, problem: str) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text(head, encoding="utf-8")
+    with pytest.raises(WildlabError, match=problem):
+        load_language(path)

@@ -1,0 +1,186 @@
+"""The page: safe, on one sheet of A4 and on a phone in every language, readable by everybody."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from tests.sharing.edition.flights import EMPTY, WHOLE
+from wildlab.reporting.page import POLICY
+from wildlab.sharing.edition import edition
+from wildlab.sharing.edition.edition import Place, edition_html
+from wildlab.sharing.edition.facts import Alarm
+from wildlab.sharing.edition.language import Language, languages, load_language
+from wildlab.sharing.edition.picture import MapPicture
+from wildlab.sharing.edition.said import Day, Said, length, number
+from wildlab.sharing.edition.sentences import Story
+
+MAP = MapPicture(
+    np.array([[0.0, 0.0], [0.0, 400.0], [300.0, 400.0], [300.0, 0.0]]),
+    np.random.default_rng(1).normal(150, 9, (60, 2)),
+    np.array([[150.0, 150.0]]),
+)
+CASES = {
+    "whole": (WHOLE, MAP),
+    "circles": (WHOLE._replace(verdict="sound", gains=(), twin=True), None),
+    "alarm": (WHOLE._replace(verdict="went wrong", alarms=(Alarm("leans", 120.0, 1),)), MAP),
+    "look": (WHOLE._replace(verdict="look closer", gains=(), alarms=(Alarm("shakes", 70.0, 1),)), None),
+    "empty": (EMPTY._replace(failed=("georeferencing",)), None),
+}
+
+
+def longest(language: Language, *begins: str) -> tuple[Said, ...]:
+    """The three longest texts of some kinds, with values that are as long as they come."""
+    sized = []
+    for key, text in language.texts.items():
+        if key.startswith(begins):
+            forms = [text] if isinstance(text, str) else list(text.values())  # type: ignore[union-attr]
+            sized.append((max(map(len, forms)), key))
+    values = dict.fromkeys(re.findall(r"{(\w+)}", str(dict(language.texts))), length(88.8))
+    values |= {"n": number(88888), "of": length(888.8), "first": Said("cause.height")}  # type: ignore[dict-item]
+    found = []
+    for _, key in sorted(sized, reverse=True)[:3]:
+        count = None if isinstance(language.texts[key], str) else 88888
+        found.append(Said(key, values, count))
+    return tuple(found)
+
+
+def longest_story(language: Language) -> Story:
+    why = longest(language, "lost.cause", "why.", "alarm.")[0]
+    tiles = longest(language, "tile.")
+    return Story(
+        longest(language, "verdict.")[0], why, longest(language, "next.")[0], False,
+        tuple((length(8888.8), one) for one in (*tiles, tiles[0])), longest(language, "measured."),
+        longest(language, "alarm.", "trouble.", "lost.", "wrong."), longest(language, "do."),
+        longest(language, "unknown."),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def pages(browser: Any, tmp_path: Path) -> Iterator[Any]:
+    """``pages(html, width)`` opens a page offline."""
+    contexts = []
+
+    def opened(html: str, width: int = 1200, **options: Any) -> Any:
+        path = tmp_path / "page.html"
+        path.write_text(html, encoding="utf-8")
+        context = browser.new_context(viewport={"width": width, "height": 844}, offline=True, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.goto(path.as_uri())
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+
+
+def sheets(page: Any) -> int:
+    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", languages())
+def test_the_longest_texts_of_a_language_fit_one_sheet(
+    code: str, pages: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    language = load_language(code)
+    monkeypatch.setattr(edition, "tell", lambda _: longest_story(language))
+    facts = WHOLE._replace(twin=True, verdict="went wrong")
+    for picture in (MAP, None):
+        html = edition_html(
+            facts, name="a-flight-with-a-long-name", place=Place("generalised", 11_100.0, "x" * 120),
+            day=Day(date(2026, 9, 30), True), picture=picture, language=language,
+        )  # fmt: skip
+        assert sheets(pages(html)) == 1
+    # The count can be another: twice as much does not fit.
+    assert sheets(pages(html.replace("</main>", "<p>x</p>" * 60 + "</main>"))) > 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_seen_by_everybody(case: str, pages: Any) -> None:
+    facts, picture = CASES[case]
+    html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
+    for options in ({}, {"color_scheme": "dark"}):
+        page = pages(html, 1200, **options)
+        assert [one["id"] for one in Axe().run(page).response["violations"]] == []
+    phone = pages(html, 390)
+    assert phone.evaluate("document.documentElement.scrollWidth") <= 390
+    small = phone.evaluate(
+        """[...document.querySelectorAll('svg text')].map(one => {
+          const box = one.ownerSVGElement.getBoundingClientRect()
+          const units = one.ownerSVGElement.viewBox.baseVal.width
+          return parseFloat(getComputedStyle(one).fontSize) * box.width / units
+        })"""
+    )
+    assert all(size >= 11 for size in small)
+    inside = phone.evaluate(
+        """[...document.querySelectorAll('svg text')].every(one => {
+          const box = one.ownerSVGElement.getBoundingClientRect(), text = one.getBoundingClientRect()
+          return text.left >= box.left && text.right <= box.right && text.bottom <= box.bottom })"""
+    )
+    assert inside
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", languages())
+def test_labels_of_the_picture_lie_inside_it_in_every_language(code: str, pages: Any) -> None:
+    html = edition_html(WHOLE, name="f", place=Place("withheld"), language=code)
+    page = pages(html, 390)
+    assert page.evaluate(
+        """[...document.querySelectorAll('svg text')].every(one =>
+          one.getBoundingClientRect().right <= one.ownerSVGElement.getBoundingClientRect().right)"""
+    )
+    assert page.evaluate("document.documentElement.lang") == code
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_asks_nobody_and_runs_nothing(case: str) -> None:
+    facts, picture = CASES[case]
+    html = edition_html(facts, name="f", place=Place("withheld"), picture=picture)
+    assert POLICY in html and "<script" not in html and "http" not in html.replace("http-equiv", "")
+    assert len(html) < 200_000
+
+
+def test_names_are_harmless() -> None:
+    html = edition_html(
+        WHOLE, name="<script>x</script>{p90}", place=Place("generalised", 1600.0, '<img src="x">')
+    )
+    assert "<script" not in html and "<img" not in html and "&lt;script&gt;x&lt;/script&gt;{p90}" in html
+
+
+def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
+    told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded."))
+    assert "within 1.6\u00a0km" in told and "Rounded." in told and "2026" not in told
+    month = edition_html(WHOLE, name="f", place=Place("withheld"), day=Day(date(2026, 3, 14), False))
+    assert (
+        "March 2026" in month
+        and "14" not in re.sub(r"<style>.*?</style>", "", month, flags=re.S).split("<h1>")[0]
+    )
+    assert "left out on purpose" in month
+
+
+def test_what_is_not_translated_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "sw.toml"
+    path.write_text(
+        '[language]\ncode = "sw"\nname = "Kiswahili"\n[verdict]\nfix = "Rekebisha"\n', encoding="utf-8"
+    )
+    html = edition_html(WHOLE, name="f", place=Place("withheld"), language=path)
+    lacking = len(load_language(path).missing)
+    assert '<html lang="sw">' in html and "Rekebisha" in html
+    assert f"{lacking} texts are not translated yet" in html
+    assert "not translated" not in edition_html(WHOLE, name="f", place=Place("withheld"))
+
+
+def test_a_twin_is_said_to_be_one() -> None:
+    twin = edition_html(WHOLE._replace(twin=True), name="f", place=Place("withheld"))
+    assert "Nobody flew this flight" in twin
+    assert "Nobody flew" not in edition_html(WHOLE, name="f", place=Place("withheld"))

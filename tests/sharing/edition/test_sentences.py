@@ -1,0 +1,149 @@
+"""Which texts follow from which facts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
+from wildlab.pipeline.overviews.alarms import ALARMS
+from wildlab.pipeline.overviews.worth_fixing import CAUSES, LEVELS
+from wildlab.sharing.edition.facts import _TROUBLES, PARTS, Alarm, Facts, Gain
+from wildlab.sharing.edition.language import languages, load_language, say
+from wildlab.sharing.edition.said import Said
+from wildlab.sharing.edition.sentences import STEP_M, Story, steps_of, tell
+
+KEYS = [
+    "cause", "far_out", "images_without_pose", "images_without_gimbal", "detections_off_ground",
+    "detections_without_truth", "inertial_samples", "time_without_poses", "time_without_satellites",
+    "time_without_inertial",
+]  # fmt: skip
+
+
+def keys(items: tuple[Said, ...]) -> list[str]:
+    return [one.key for one in items]
+
+
+def test_a_flight_of_which_all_is_known() -> None:
+    story = tell(WHOLE)
+    assert keys(story.measured) == ["measured.error_steps", "measured.track", "measured.things"]
+    assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose"]
+    assert keys(story.wrong) == ["trouble.few_satellites", "lost.images_without_pose"]
+    assert story.trusted and story.verdict.key == "verdict.fix" and story.next.key == "next.fix_error"
+    english = load_language()
+    assert "3.5 metres (about 5 steps)" in say(english, story.measured[0]).replace("\u00a0", " ")
+    assert "39%" in say(english, story.next) and "120 of 812" in say(english, story.wrong[1])
+
+
+def test_a_flight_of_which_nothing_is_known() -> None:
+    story = tell(EMPTY)
+    assert keys(story.measured) == ["measured.nothing"] and keys(story.wrong) == ["wrong.unlooked"]
+    assert keys(story.unknown) == ["unknown.error", "unknown.seen"] and not story.tiles
+    assert keys(story.advice) == ["do.known_places"] and story.verdict.key == "verdict.unjudged"
+
+
+def test_an_alarm_comes_before_every_gain_and_takes_the_trust() -> None:
+    story = tell(WHOLE._replace(verdict="went wrong", alarms=(Alarm("jumps", 12.0, 2),)))
+    assert story.why == Said("alarm.jumps", story.why.values, 2) and story.advice[0].key == "do.jumps"
+    assert not story.trusted and story.advice[1].key == "do.cause_boresight"
+
+
+def test_a_part_that_failed_is_not_known_and_asked_for_again() -> None:
+    story = tell(EMPTY._replace(failed=("overview", "georeferencing")))
+    assert keys(story.unknown) == ["unknown.failed_overview", "unknown.failed_georeferencing", "unknown.seen"]
+    assert story.advice == (Said("do.failed", {}, 2),) and story.why.key == "why.failed"
+
+
+def test_few_points_say_nothing_of_accuracy() -> None:
+    story = tell(WHOLE._replace(compared=9))
+    assert "measured.error_steps" not in keys(story.measured) and "unknown.few" in keys(story.unknown)
+    assert all(label.key != "tile.error" for _, label in story.tiles)
+    assert "do.more_places" in keys(story.advice)
+
+
+def test_without_truth_sightings_are_held_against_each_other() -> None:
+    story = tell(EMPTY._replace(verdict="sound", scatter=2.0, sightings=30, seen=40.0, placed=38.0))
+    assert keys(story.measured) == ["measured.scatter", "measured.seen"]
+    assert "2.4" in say(load_language(), story.measured[0]), (
+        "2 m along each axis is 2.35 m of median distance"
+    )
+    assert "unknown.error" in keys(story.unknown) and story.why.key == "why.sound_unmeasured"
+
+
+def test_what_the_verdict_says_is_not_said_twice() -> None:
+    gains = (Gain("images_without_pose", (), 400.0, 812.0, 0.49), *WHOLE.gains[:1])
+    story = tell(WHOLE._replace(gains=gains, troubles=()))
+    assert story.next.key == "next.fix_data" and keys(story.wrong) == ["lost.cause"]
+    assert story.advice[0].key == "do.images_without_pose"
+
+
+@pytest.mark.parametrize(("sure", "said"), [(1.6, True), (1.4, False), (NAN, False)])
+def test_tracks_that_are_too_sure(sure: float, said: bool) -> None:
+    """As in the report on tracks: what may be so by chance, where few values are independent, is not said."""
+    assert ("wrong.too_sure" in keys(tell(WHOLE._replace(track_sure=sure, troubles=())).wrong)) is said
+
+
+@pytest.mark.parametrize(
+    ("facts", "key"),
+    [
+        (WHOLE._replace(troubles=(("unsure", 200.0),)), "trouble.unsure"),
+        (WHOLE._replace(troubles=(("poses", 2.0),)), "trouble.poses"),
+        (WHOLE._replace(troubles=(), possible=Gain("possible", (), 1.0, 4.0, 0.25)), "why.possible"),
+        (WHOLE._replace(troubles=(("few_satellites", 62.0),)), "why.alarm"),
+        (WHOLE._replace(alarms=(Alarm("apart", 9.0, 40),)), "alarm.apart"),
+    ],
+)
+def test_why_to_look_closer(facts: Facts, key: str) -> None:
+    """A trouble that is too short for the verdict is not given as its reason."""
+    assert tell(facts._replace(verdict="look closer", gains=())).why.key == key
+
+
+@given(st.floats(0.0, 400.0))
+def test_steps_are_near_the_length(metres: float) -> None:
+    said = steps_of(metres)
+    if said is None:
+        assert metres > 200 * STEP_M
+    elif said.key == "steps.none":
+        assert metres < STEP_M
+    else:
+        assert said.count is not None
+        assert abs(said.count * STEP_M - metres) <= max(0.5 * STEP_M, 0.13 * metres) + 1e-9
+
+
+def said_of(story: Story) -> list[Any]:
+    return [
+        *(story.verdict, story.why, story.next), *story.measured, *story.wrong, *story.advice, *story.unknown,
+        *(value for tile in story.tiles for value in tile),
+    ]  # fmt: skip
+
+
+maybe = st.one_of(st.just(NAN), st.floats(0, 1e6))
+gains = st.builds(
+    Gain, st.sampled_from(KEYS), st.lists(st.sampled_from(list(CAUSES)), unique=True).map(tuple),
+    st.one_of(st.just(NAN), st.floats(1, 1e3)), st.floats(1e3, 1e4), st.floats(0.005, 1),
+)  # fmt: skip
+alarms = st.builds(Alarm, st.sampled_from(list(ALARMS)), st.floats(1, 99), st.integers(1, 3))
+troubles = st.tuples(st.sampled_from(list(_TROUBLES.values())), st.floats(0, 1e4))
+facts = st.builds(
+    Facts, twin=st.booleans(), verdict=st.sampled_from([*LEVELS, None]), problems=st.integers(0, 3),
+    length_s=maybe, height_m=maybe, area_m2=maybe, seen=maybe, things=maybe, placed=maybe, error_median=maybe,
+    error_p90=maybe, compared=st.integers(0, 30), scatter=maybe, sightings=st.integers(0, 9),
+    tracks=st.integers(0, 3), track_error=maybe, track_sure=maybe,
+    alarms=st.lists(alarms, max_size=4).map(tuple), troubles=st.lists(troubles, max_size=3).map(tuple),
+    gains=st.lists(gains, max_size=4).map(tuple),
+    possible=st.one_of(st.none(), gains.filter(lambda one: one.value == one.value)),
+    failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple), lacking=st.just(()),
+)  # fmt: skip
+
+
+@given(facts)
+def test_whatever_is_known_every_text_is_there_and_filled(known: Facts) -> None:
+    story = tell(known)
+    assert story.measured and story.wrong and len(story.advice) <= 3
+    for language in map(load_language, languages()):
+        for said in said_of(story):
+            text = say(language, said)
+            assert text and "{" not in text and "nan" not in text.lower().split()

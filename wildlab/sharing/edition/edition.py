@@ -1,0 +1,143 @@
+"""The page for partners: one A4 sheet in plain words about one flight, and what it means for the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from wildlab.pipeline.overviews.worth_fixing import LEVELS, UNJUDGED
+from wildlab.reporting.page import POLICY
+from wildlab.reporting.text import escape, inline
+from wildlab.sharing.edition.facts import Facts
+from wildlab.sharing.edition.language import Language, load_language, say
+from wildlab.sharing.edition.picture import ImagePicture, MapPicture, picture_html
+from wildlab.sharing.edition.said import Day, Said, Value, length
+from wildlab.sharing.edition.sentences import Story, tell
+from wildlab.sharing.edition.style import STYLE
+
+#: Signs of the verdicts, so that their colour is not all that tells them: a tick, a mark, a cross, a dash.
+SIGNS = {"good": "✓", "warn": "!", "bad": "✕", "neutral": "–"}
+
+_Say = Callable[[Value], str]
+
+
+class Place(NamedTuple):
+    """How exactly places are shown: ``withheld``, ``generalised`` or ``exact``.
+
+    Attributes
+    ----------
+    kind
+        One of these.
+    uncertainty_m
+        Of a generalised place, how far off it may be shown, m.
+    note
+        More on it, in any words; "" for nothing.
+    """
+
+    kind: str
+    uncertainty_m: float = 0.0
+    note: str = ""
+
+
+def edition_html(
+    facts: Facts,
+    *,
+    name: str,
+    place: Place,
+    day: Day | None = None,
+    picture: MapPicture | ImagePicture | None = None,
+    language: str | Path | Language = "en",
+) -> str:
+    """The page.
+
+    Parameters
+    ----------
+    facts
+        From `wildlab.sharing.edition.facts.facts_of`.
+    name
+        What the flight is called on the page.
+    place
+        How exactly places are shown.
+    day
+        When it was flown; None where that is not to be said.
+    picture
+        A map from points, or an image; None for a drawing of the numbers.
+    language
+        A code, the path of a file of texts, or texts that were loaded.
+
+    Returns
+    -------
+    str
+        HTML that asks nobody for anything and runs nothing.
+
+    Raises
+    ------
+    WildlabError
+        If the language or the picture cannot be used.
+    """
+    words = language if isinstance(language, Language) else load_language(language)
+    story = tell(facts)
+    level = LEVELS[facts.verdict or UNJUDGED]
+
+    def said(one: Value) -> str:
+        return inline(say(words, one))
+
+    kicker = [said(Said("page.kicker")), escape(name), *([said(day)] if day is not None else [])]
+    drawn = picture_html(picture, facts, words)
+    body = [
+        f'<header><p class="kicker">{" · ".join(kicker)}</p>',
+        f"<h1>{said(Said('page.question'))}</h1></header>",
+        "<main>",
+        f'<p class="twin">{said(Said("page.twin"))}</p>' if facts.twin else "",
+        f'<div class="verdict {level}"><span class="sign" aria-hidden="true">{SIGNS[level]}</span>',
+        f'<p class="word">{said(story.verdict)}</p><p>{said(story.why)}</p>',
+        f'<p class="next">{said(Said("page.next"))}: {said(story.next)}</p></div>',
+        f'<div class="top{"" if drawn else " alone"}">{drawn}{_tiles(story, said)}</div>',
+        '<div class="parts">',
+        _section(said, "heading.trusted" if story.trusted else "heading.measured", story.measured),
+        _section(said, "heading.wrong", story.wrong),
+        _section(said, "heading.advice", story.advice or (Said("next.nothing"),), ranked=True),
+        _section(said, "heading.unknown", story.unknown),
+        "</div>",
+        f'<p class="place">{_place(place, said)}</p>',
+        "</main>",
+        f"<footer><p>{said(Said('page.footer'))} {_untranslated(words, said)}</p></footer>",
+    ]
+    title = escape(say(words, Said("page.title", {"name": name})))
+    return (
+        f'<!doctype html>\n<html lang="{escape(words.code)}">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="referrer" content="no-referrer">\n'
+        f"<title>{title}</title>\n<style>\n{STYLE}\n</style>\n</head>\n<body>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _tiles(story: Story, said: _Say) -> str:
+    if not story.tiles:
+        return ""
+    items = "".join(
+        f"<li><b>{said(value)}</b><span>{said(label)}</span></li>" for value, label in story.tiles
+    )
+    return f'<ul class="tiles">{items}</ul>'
+
+
+def _section(said: _Say, heading: str, items: Sequence[Said], *, ranked: bool = False) -> str:
+    tag = "ol" if ranked and len(items) > 1 else "ul"
+    listed = "".join(f"<li>{said(one)}</li>" for one in items)
+    name = "do" if ranked else "tell"
+    return f'<section class="{name}"><h2>{said(Said(heading))}</h2><{tag}>{listed}</{tag}></section>'
+
+
+def _place(place: Place, said: _Say) -> str:
+    values = {"uncertainty": length(place.uncertainty_m)} if place.kind == "generalised" else {}
+    note = f" {escape(place.note)}" if place.note else ""
+    return said(Said(f"place.{place.kind}", values)) + note
+
+
+def _untranslated(words: Language, said: _Say) -> str:
+    return said(Said("page.untranslated", {}, len(words.missing))) if words.missing else ""

@@ -1,0 +1,222 @@
+"""What is known of a flight, as plain values, from the numbers that its reports recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from wildlab.pipeline.overviews.alarms import ALARMS
+from wildlab.pipeline.overviews.overview import TROUBLES
+from wildlab.pipeline.overviews.worth_fixing import CAUSES, WORTH, possible_gain
+from wildlab.reporting.own_flights import OwnFlight
+
+NAN = math.nan
+#: Reports that tell how good something was, beside the overview.
+PARTS = ("georeferencing", "tracking", "navigation")
+_TROUBLES = dict(
+    zip(
+        (trouble.replace(" ", "-") for trouble in TROUBLES),
+        ("poses", "jumps", "satellites", "few_satellites", "unsure", "shaken", "inertial"),
+        strict=True,
+    )
+)
+
+
+class Alarm(NamedTuple):
+    """Something very wrong: a key of `ALARMS`, the worst of it (m, degrees or m/s^2), and how often."""
+
+    what: str
+    size: float
+    often: int
+
+
+class Gain(NamedTuple):
+    """One thing to fix, as `wildlab.pipeline.overviews.worth_fixing.Gain`: ``value`` of ``of``."""
+
+    key: str
+    causes: tuple[str, ...]
+    value: float
+    of: float
+    share: float
+
+
+class Facts(NamedTuple):
+    """All that the page follows from. Numbers that are not known are NaN.
+
+    Attributes
+    ----------
+    twin
+        Whether nobody flew it.
+    verdict
+        A key of `wildlab.pipeline.overviews.worth_fixing.LEVELS`; None where the flight was not looked over.
+    problems
+        Things in its records that cannot be used or contradict each other.
+    length_s, height_m, area_m2
+        Of the flight; above the ground; of the ground that its images show.
+    seen, things
+        Detections; different things that they name, NaN where not all name one.
+    placed
+        Detections with a place on the ground.
+    error_median, error_p90, compared
+        Distance from where things were said to be to where they were, m, and of how many points.
+    scatter, sightings
+        How far apart sightings of the same thing lie, m, each axis, where no true place is known.
+    tracks, track_error, track_sure
+        How many tracks were held against the truth; the median of their root mean square errors, m; that of
+        the mean squared error over the highest that chance allows for what the tracks say of themselves.
+    alarms, troubles, gains
+        Worst first; trouble and its seconds, longest first; by share.
+    possible
+        A gain that is not certain.
+    failed, lacking
+        Those of `PARTS`, and ``overview``, that failed, and that the records do not allow.
+    """
+
+    twin: bool
+    verdict: str | None
+    problems: int
+    length_s: float
+    height_m: float
+    area_m2: float
+    seen: float
+    things: float
+    placed: float
+    error_median: float
+    error_p90: float
+    compared: int
+    scatter: float
+    sightings: int
+    tracks: int
+    track_error: float
+    track_sure: float
+    alarms: tuple[Alarm, ...]
+    troubles: tuple[tuple[str, float], ...]
+    gains: tuple[Gain, ...]
+    possible: Gain | None
+    failed: tuple[str, ...]
+    lacking: tuple[str, ...]
+
+
+def facts_of(flight: OwnFlight) -> Facts:
+    """What the reports on a flight recorded.
+
+    Parameters
+    ----------
+    flight
+        With the reports that there are, done or not.
+
+    Returns
+    -------
+    Facts
+    """
+    numbers = {key: entry for one in reversed(flight.reports) for key, entry in one.numbers.items()}
+
+    def value(name: str, subject: str = "flight") -> float:
+        found = flight.value(name, subject)
+        return NAN if found is None else found
+
+    def count(name: str, subject: str) -> int:
+        entry = flight.number(name, subject)
+        return int(entry["n"]) if entry is not None and entry["n"] is not None else 0
+
+    alarms = tuple(Alarm(what, value("alarm", what), count("alarm", what)) for what in ALARMS)
+    troubles = {_TROUBLES[s]: v for (name, s) in numbers if name == "trouble" and s in _TROUBLES
+                for v in [value(name, s)]}  # fmt: skip
+    tracks = _leading_tracks(flight)
+    possible = possible_gain({key: entry for key, entry in numbers.items() if entry["value"] is not None})
+    failed = tuple(one.about for one in flight.reports if one.state != "done")
+    return Facts(
+        twin=flight.kind == "twin",
+        verdict=flight.verdict,
+        problems=int(flight.value("problems", "flight") or 0),
+        length_s=flight.length_s,
+        height_m=value("height_above_ground"),
+        area_m2=value("area_seen"),
+        seen=value("detections"),
+        things=value("things_named"),
+        placed=value("detections_placed"),
+        error_median=value("horizontal_error_median", "logged-pose"),
+        error_p90=value("horizontal_error_p90", "logged-pose"),
+        compared=count("horizontal_error_median", "logged-pose"),
+        scatter=value("sighting_spread", "logged-pose"),
+        sightings=count("sighting_spread", "logged-pose"),
+        tracks=len(tracks),
+        track_error=_median([error for error, _ in tracks]),
+        track_sure=_median([sure for _, sure in tracks]),
+        alarms=tuple(one for one in alarms if math.isfinite(one.size)),
+        troubles=tuple(sorted(troubles.items(), key=lambda one: -one[1])),
+        gains=_gains(flight),
+        possible=None if possible is None else _possible(flight, possible.value, possible.of),
+        failed=tuple(about for about in ("overview", *PARTS) if about in failed),
+        lacking=tuple(sorted(_lacking(flight), key=PARTS.index)),
+    )
+
+
+def _possible(flight: OwnFlight, value: float, of: float) -> Gain:
+    return Gain("possible", _causes(flight), value, of, value / of if of > 0 else 0.0)
+
+
+def _lacking(flight: OwnFlight) -> set[str]:
+    """Parts that the records do not allow: an overview names them, and what is neither done nor failed."""
+    there = {one.about for one in flight.reports}
+    return {part for part in PARTS if part not in there}
+
+
+def _causes(flight: OwnFlight) -> tuple[str, ...]:
+    fitted = {name for one in flight.reports for name, subject in one.numbers if subject == "calibration"}
+    return tuple(cause for cause, names in CAUSES.items() if fitted & set(names))
+
+
+def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
+    """What the overview ranked, with the metres or counts behind each."""
+    overview = flight.report("overview")
+    found = []
+    for (name, key), entry in overview.numbers.items() if overview is not None else ():
+        if name != "gain_share" or entry["value"] is None:
+            continue
+        if key in ("cause", "far_out"):
+            gained = flight.value("gain", "winner" if key == "cause" else "without-far-out")
+            after = "calibrated-pose" if key == "cause" else "without-far-out"
+            left = flight.value("horizontal_error_mean", after)
+            value, of = (NAN, NAN) if gained is None or left is None else (gained, gained + left)
+        else:
+            lost = overview.numbers.get(("lost", key))
+            value, of = (NAN, NAN) if lost is None else (float(lost["value"]), float(lost["n"]))
+        causes = _causes(flight) if key == "cause" else ()
+        found.append(Gain(key, causes, value, of, float(entry["value"])))
+    return tuple(sorted(found, key=lambda one: -one.share))
+
+
+def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
+    """Error and sureness of each track of the filter that the report speaks of."""
+    report = flight.report("tracking")
+    if report is None:
+        return []
+    from wildlab.reporting.tracking import leading
+
+    rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]
+    filters = list(dict.fromkeys(subject.rsplit("/", 1)[-1] for subject, _ in rows))
+    if not rows:
+        return []
+    best = leading(filters)
+    found = []
+    for subject, entry in rows:
+        if subject.rsplit("/", 1)[-1] != best or entry["value"] is None:
+            continue
+        nees = report.numbers.get(("nees", subject))
+        high = None if nees is None else nees["high"]
+        sure = float(nees["value"]) / float(high) if nees is not None and nees["value"] and high else NAN
+        found.append((float(entry["value"]), sure))
+    return found
+
+
+def _median(values: Sequence[float]) -> float:
+    known = sorted(value for value in values if math.isfinite(value))
+    middle = len(known) // 2
+    if not known:
+        return NAN
+    return known[middle] if len(known) % 2 else (known[middle - 1] + known[middle]) / 2
+
+
+__all__ = ["PARTS", "WORTH", "Alarm", "Facts", "Gain", "facts_of"]

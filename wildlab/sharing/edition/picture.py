@@ -1,0 +1,274 @@
+"""The one picture of the page, drawn here as SVG in the page's own colours: a map, or what the numbers say.
+
+A picture that somebody else made (PNG, JPEG, WebP, SVG) goes in as it is, as an image: nothing in it runs.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.georeferencing import FEW
+from wildlab.reporting.text import escape
+from wildlab.sharing.edition.facts import Facts
+from wildlab.sharing.edition.language import Language, say
+from wildlab.sharing.edition.said import Said, length, number
+from wildlab.sharing.edition.sentences import MEDIAN_DISTANCE, STEP_M
+
+Array = NDArray[np.float64]
+
+WIDTH, HEIGHT, MARGIN = 480.0, 360.0, 26.0
+#: Room below for the bar that tells the scale.
+FOOT = 46.0
+#: More points of a line, and more dots, than can be told apart at this size.
+MOST_POINTS, MOST_DOTS = 600, 400
+#: First bytes of the kinds of images that a page may hold.
+KINDS = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp", b"<svg": "svg+xml", b"<?xm": "svg+xml"}
+
+
+class MapPicture(NamedTuple):
+    """What is drawn as a map; (N, 2) metres north and east from anywhere, NaN where not known.
+
+    Attributes
+    ----------
+    path
+        The way of the aircraft, in the order of time.
+    seen
+        Where something was said to be.
+    truth
+        Where it really was.
+    """
+
+    path: Array
+    seen: Array
+    truth: Array
+
+
+class ImagePicture(NamedTuple):
+    """An image file, and what is on it in words, in the language of the page."""
+
+    data: bytes
+    alt: str
+
+
+def nice_length(most: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above ``most``.
+
+    Parameters
+    ----------
+    most
+        Above 0.
+
+    Returns
+    -------
+    float
+    """
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= most * (1 + 1e-12))
+
+
+def picture_html(picture: MapPicture | ImagePicture | None, facts: Facts, language: Language) -> str:
+    """The picture with its caption, or nothing where there is nothing to draw.
+
+    Parameters
+    ----------
+    picture
+        What to show; None for a drawing of the numbers.
+    facts
+        Of the flight.
+    language
+        From `wildlab.sharing.edition.language.load_language`.
+
+    Returns
+    -------
+    str
+        A ``<figure>``.
+
+    Raises
+    ------
+    WildlabError
+        If an image is none of the kinds that a page may hold.
+    """
+    if isinstance(picture, ImagePicture):
+        return _figure(_image(picture), "")
+    if picture is not None and len(_known(picture.path)) + len(_known(picture.seen)) >= 2:
+        return _map(picture, language)
+    return _drawn(facts, language)
+
+
+def _figure(drawing: str, caption: str) -> str:
+    below = f"<figcaption>{caption}</figcaption>" if caption else ""
+    return f"<figure>{drawing}{below}</figure>"
+
+
+def _image(picture: ImagePicture) -> str:
+    kind = next((kind for begin, kind in KINDS.items() if picture.data.lstrip().startswith(begin)), None)
+    if kind is None:
+        raise WildlabError(
+            "the picture is neither PNG, JPEG, WebP nor SVG", "give one of these", field="picture"
+        )
+    if not picture.alt.strip():
+        raise WildlabError("the picture has no words", "say in a sentence what is on it", field="picture")
+    data = base64.b64encode(picture.data).decode("ascii")
+    return f'<img src="data:image/{kind};base64,{data}" alt="{escape(picture.alt)}">'
+
+
+def _svg(content: str, alt: str) -> str:
+    return (
+        f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(alt)}">'
+        f"<title>{escape(alt)}</title>{content}</svg>"
+    )
+
+
+def _known(points: Array) -> Array:
+    points = np.asarray(points, float).reshape(-1, 2)
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def _map(picture: MapPicture, language: Language) -> str:
+    seen, truth = _known(picture.seen), _known(picture.truth)
+    path = np.asarray(picture.path, float).reshape(-1, 2)
+    # No point that is kilometres off, of whatever it is, shrinks the rest.
+    near = np.concatenate([_usual(one) for one in (_known(path), seen, truth) if len(one)])
+    low, high = near.min(axis=0), near.max(axis=0)
+    size = np.maximum(high - low, 5.0)
+    room = np.array([HEIGHT - FOOT - 2 * MARGIN, WIDTH - 2 * MARGIN])
+    scale = float((room / size).min())
+    middle = (low + high) / 2
+
+    def place(points: Array) -> Array:
+        offset = (points - middle) * scale
+        return np.stack([WIDTH / 2 + offset[:, 1], (HEIGHT - FOOT) / 2 - offset[:, 0]], axis=1)
+
+    drawn = [f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT - FOOT:g}" rx="10"/>']
+    # An inner picture cuts off what is outside of it.
+    way = f'<path class="way" d="{_line(place(path))}"/>'
+    drawn.append(f'<svg width="{WIDTH:g}" height="{HEIGHT - FOOT:g}">{way}</svg>')
+    drawn += [_dots(place(seen), "seen", 4.2), _dots(place(truth), "true", 3.0)]
+    begin = _known(path)
+    if len(begin):
+        x, y = place(begin[:1])[0]
+        drawn.append(f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="5.5"/>')
+    drawn.append(_north())
+    drawn.append(_bar(scale, language))
+    wide = length(float(size[1]))
+    alt = say(language, Said("picture.map_alt", {"way": wide, "seen": number(len(seen))}))
+    keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
+    keys += [("true", "truth")] * bool(len(truth))
+    legend = "".join(
+        f'<li><i class="{name}"></i>{escape(say(language, Said(f"picture.{key}")))}</li>'
+        for name, key in keys
+    )
+    caption = f'<ul class="legend">{legend}</ul>{escape(say(language, Said("picture.map")))}'
+    return _figure(_svg("".join(drawn), alt), caption)
+
+
+def _usual(points: Array) -> Array:
+    """Points without the few that lie far beyond all others."""
+    low, high = np.quantile(points, [0.02, 0.98], axis=0)
+    room = np.maximum(high - low, 1.0)
+    return points[((points >= low - room) & (points <= high + room)).all(axis=1)]
+
+
+def _line(points: Array) -> str:
+    keep = points[np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(int))]
+    parts, pen = [], "M"
+    for x, y in keep:
+        if not (math.isfinite(x) and math.isfinite(y)):
+            pen = "M"
+            continue
+        parts.append(f"{pen}{x:.1f} {y:.1f}")
+        pen = "L"
+    return "".join(parts)
+
+
+def _dots(points: Array, name: str, radius: float) -> str:
+    inside = points[((points > 4) & (points < [WIDTH - 4, HEIGHT - FOOT - 4])).all(axis=1)]
+    keep = (
+        inside[np.unique(np.linspace(0, len(inside) - 1, min(len(inside), MOST_DOTS)).astype(int))]
+        if len(inside)
+        else inside
+    )
+    return "".join(f'<circle class="{name}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:g}"/>' for x, y in keep)
+
+
+def _north() -> str:
+    x = WIDTH - 24
+    return f'<path class="north" d="M{x:g} 14l8 24l-8 -6l-8 6z"/><text class="mid" x="{x:g}" y="55">N</text>'
+
+
+def _bar(scale: float, language: Language, steps: bool = False) -> str:
+    """A bar of a round length; ``scale`` is drawn units for a metre."""
+    metres = nice_length(0.42 * WIDTH / scale)
+    x, y, wide = MARGIN, HEIGHT - 24.0, metres * scale
+    said = say(language, length(metres))
+    count = round(metres / STEP_M)
+    if steps and 1 <= count <= 200:
+        said += f" ({say(language, Said('steps.some', {}, count))})"
+    return (
+        f'<path class="scale" d="M{x:g} {y - 6:g}v12M{x:g} {y:g}h{wide:.1f}M{x + wide:.1f} {y - 6:g}v12"/>'
+        f'<text x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(said)}</text>'
+    )
+
+
+def _drawn(facts: Facts, language: Language) -> str:
+    """Circles of how far off things are, by the best that is known; else the sightings with a place."""
+    if facts.compared >= FEW and facts.error_p90 > 0:
+        words = {"median": length(facts.error_median), "p90": length(facts.error_p90)}
+        alt, caption = Said("picture.errors_alt", words), Said("picture.errors")
+        return _circles([(facts.error_median, "median"), (facts.error_p90, "p90")], alt, caption, language)
+    if facts.tracks and facts.track_error > 0:
+        alt = Said("picture.track_alt", {"error": length(facts.track_error)})
+        return _circles([(facts.track_error, "about")], alt, Said("picture.track"), language)
+    if facts.scatter > 0:
+        radius = MEDIAN_DISTANCE * facts.scatter
+        alt = Said("picture.scatter_alt", {"apart": length(radius)})
+        return _circles([(radius, "about")], alt, Said("picture.scatter"), language)
+    if facts.seen > 0 and math.isfinite(facts.placed):
+        return _share(facts, language)
+    return ""
+
+
+def _circles(rings: list[tuple[float, str]], alt: Said, caption: Said, language: Language) -> str:
+    biggest = max(radius for radius, _ in rings)
+    scale = ((HEIGHT - FOOT) / 2 - 14) / biggest
+    x, y = 0.36 * WIDTH, (HEIGHT - FOOT) / 2
+    drawn = [f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT - FOOT:g}" rx="10"/>']
+    last, legend = math.inf, ""
+    for radius, key in sorted(rings, reverse=True):
+        r = radius * scale
+        drawn.append(f'<circle class="ring {key}" cx="{x:g}" cy="{y:g}" r="{r:.1f}"/>')
+        # A label beside the upper right of its circle; two of them never on one line.
+        at = min(y - 0.82 * r, last if last == math.inf else 1e9)
+        at = max(at, 26.0) if last == math.inf else max(at, last + 26.0)
+        last = at
+        edge = x + math.sqrt(max(0.0, r * r - min(r, abs(y - at)) ** 2))
+        said = escape(say(language, length(radius)))
+        legend += f'<li><i class="{key}"></i>{escape(say(language, Said(f"picture.{key}")))}</li>'
+        drawn.append(f'<path class="lead" d="M{edge:.1f} {at:.1f}H{0.69 * WIDTH:.1f}"/>')
+        drawn.append(f'<text x="{0.7 * WIDTH:.1f}" y="{at + 5:.1f}">{said}</text>')
+    drawn.append(f'<path class="cross" d="M{x - 9:g} {y:g}h18M{x:g} {y - 9:g}v18"/>')
+    drawn.append(_bar(scale, language, steps=True))
+    below = f'<ul class="legend">{legend}</ul>{escape(say(language, caption))}'
+    return _figure(_svg("".join(drawn), say(language, alt)), below)
+
+
+def _share(facts: Facts, language: Language) -> str:
+    wide = WIDTH - 2 * MARGIN
+    part = wide * min(1.0, facts.placed / facts.seen)
+    y = HEIGHT / 2 - 30
+    drawn = (
+        f'<rect class="ground" width="{WIDTH:g}" height="{HEIGHT:g}" rx="10"/>'
+        f'<rect class="whole" x="{MARGIN:g}" y="{y:g}" width="{wide:g}" height="60" rx="6"/>'
+        f'<rect class="part" x="{MARGIN:g}" y="{y:g}" width="{part:.1f}" height="60" rx="6"/>'
+    )
+    words = {"placed": number(facts.placed), "seen": number(facts.seen)}
+    return _figure(
+        _svg(drawn, say(language, Said("picture.share_alt", words))),
+        escape(say(language, Said("picture.share"))),
+    )

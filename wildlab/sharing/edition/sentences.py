@@ -1,0 +1,279 @@
+"""What the page says, in no language yet: which texts, with which values. Each follows from the facts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, MOST, SOUND, UNJUDGED, WORTH
+from wildlab.reporting.georeferencing import FEW
+from wildlab.reporting.tracking import NEAR_THE_BAND
+from wildlab.sharing.edition.facts import Alarm, Facts, Gain
+from wildlab.sharing.edition.said import Quantity, Said, Value, duration, length, number, share
+
+#: A step of somebody who walks, m, and beyond how many nobody counts them.
+STEP_M, MOST_STEPS = 0.75, 200
+#: Of two normal errors of equal spread, the median distance from the middle over that spread.
+MEDIAN_DISTANCE = math.sqrt(2 * math.log(2))
+#: The verdicts by their texts.
+VERDICTS = {
+    ALARM: "went_wrong",
+    MEND: "mend",
+    FIX: "fix",
+    LOOK: "look",
+    SOUND: "sound",
+    UNJUDGED: "unjudged",
+    None: "unjudged",
+}
+
+
+class Story(NamedTuple):
+    """All that is said of a flight.
+
+    Attributes
+    ----------
+    verdict, why, next
+        In a word or two; what it follows from; what it means for the next flight.
+    trusted
+        Whether what was measured may be relied on as it is.
+    tiles
+        The numbers at the top, each with what it is.
+    measured, wrong, advice, unknown
+        The four lists; advice is ranked, most first.
+    """
+
+    verdict: Said
+    why: Said
+    next: Said
+    trusted: bool
+    tiles: tuple[tuple[Value, Said], ...]
+    measured: tuple[Said, ...]
+    wrong: tuple[Said, ...]
+    advice: tuple[Said, ...]
+    unknown: tuple[Said, ...]
+
+
+def tell(facts: Facts) -> Story:
+    """What a flight's numbers come to.
+
+    Parameters
+    ----------
+    facts
+        From `wildlab.sharing.edition.facts.facts_of`.
+
+    Returns
+    -------
+    Story
+    """
+    key = VERDICTS[facts.verdict]
+    advice = _advice(facts)
+    return Story(
+        Said(f"verdict.{key}"),
+        _why(facts),
+        _next(facts, advice),
+        facts.verdict not in (ALARM, MEND),
+        _tiles(facts)[:4],
+        _measured(facts)[:MOST],
+        _wrong(facts)[:MOST],
+        advice[:MOST],
+        _unknown(facts)[:MOST],
+    )
+
+
+def steps_of(metres: float) -> Said | None:
+    """A length in steps, roughly; None where nobody would count them.
+
+    Parameters
+    ----------
+    metres
+        The length.
+
+    Returns
+    -------
+    Said or None
+        From 20 steps on to the nearest five, from 100 on to the nearest ten.
+    """
+    steps = metres / STEP_M
+    if not steps <= MOST_STEPS:
+        return None
+    if steps < 0.75:
+        return Said("steps.none")
+    to = 1 if steps < 20 else 5 if steps < 100 else 10
+    return Said("steps.some", {}, to * max(1, round(steps / to)))
+
+
+def _why(facts: Facts) -> Said:
+    if facts.verdict == ALARM or (facts.verdict == LOOK and facts.alarms):
+        return _alarm(facts.alarms[0]) if facts.alarms else Said("why.alarm")
+    if facts.verdict == MEND:
+        return Said("wrong.problems", {}, facts.problems)
+    if facts.verdict == FIX:
+        worth = [gain for gain in facts.gains if gain.share >= WORTH]
+        return Said("why.fix", {"first": _gained(worth[0])}, len(worth)) if worth else Said("why.alarm")
+    if facts.verdict == LOOK:
+        for what, seconds in facts.troubles:
+            lasting = facts.length_s > 0 and seconds >= WORTH * facts.length_s
+            if lasting or what == "poses":
+                return _trouble(facts, what, seconds)
+        if facts.possible is not None:
+            return Said(
+                "why.possible", {"gain": length(facts.possible.value), "of": length(facts.possible.of)}
+            )
+        return Said("why.alarm")
+    if facts.verdict == SOUND:
+        measured = facts.compared > 0 or facts.tracks > 0
+        return Said("why.sound" if measured else "why.sound_unmeasured", {"share": share(WORTH)})
+    return Said("why.failed" if "overview" in facts.failed else "why.unjudged")
+
+
+def _next(facts: Facts, advice: tuple[Said, ...]) -> Said:
+    if facts.verdict in (ALARM, MEND, LOOK):
+        return Said(f"next.{VERDICTS[facts.verdict]}")
+    if facts.verdict == FIX and facts.gains:
+        first = facts.gains[0]
+        what = "next.fix_error" if first.key in ("cause", "far_out") else "next.fix_data"
+        return Said(what, {"share": share(first.share)})
+    if facts.verdict == SOUND:
+        return Said("next.sound")
+    return Said("next.unjudged" if advice else "next.nothing")
+
+
+def _tiles(facts: Facts) -> tuple[tuple[Value, Said], ...]:
+    found: list[tuple[Value, Said]] = []
+    if facts.compared >= FEW and math.isfinite(facts.error_median):
+        found.append((length(facts.error_median), Said("tile.error")))
+    elif facts.tracks and math.isfinite(facts.track_error):
+        found.append((length(facts.track_error), Said("tile.track")))
+    if facts.seen > 0:
+        found.append((number(facts.seen), Said("tile.seen")))
+    if math.isfinite(facts.length_s):
+        found.append((duration(facts.length_s), Said("tile.length")))
+    if math.isfinite(facts.area_m2):
+        found.append((Quantity("area", facts.area_m2), Said("tile.area")))
+    return tuple(found)
+
+
+def _measured(facts: Facts) -> tuple[Said, ...]:
+    found: list[Said] = []
+    if facts.compared >= FEW and math.isfinite(facts.error_median) and math.isfinite(facts.error_p90):
+        values: dict[str, Value] = {
+            "median": length(facts.error_median),
+            "p90": length(facts.error_p90),
+            "compared": number(facts.compared),
+        }
+        steps = steps_of(facts.error_median)
+        found.append(Said("measured.error_steps", {**values, "steps": steps}) if steps else
+                     Said("measured.error", values))  # fmt: skip
+    elif math.isfinite(facts.scatter):
+        apart = length(MEDIAN_DISTANCE * facts.scatter)
+        found.append(Said("measured.scatter", {"apart": apart, "sightings": number(facts.sightings)}))
+    if facts.tracks and math.isfinite(facts.track_error):
+        found.append(Said("measured.track", {"error": length(facts.track_error)}, facts.tracks))
+    if facts.seen > 0 and math.isfinite(facts.placed):
+        if math.isfinite(facts.things):
+            seen: dict[str, Value] = {"seen": number(facts.seen), "placed": number(facts.placed)}
+            found.append(Said("measured.things", seen, int(facts.things)))
+        else:
+            found.append(Said("measured.seen", {"placed": number(facts.placed)}, int(facts.seen)))
+    if math.isfinite(facts.area_m2) and math.isfinite(facts.height_m):
+        found.append(Said("measured.area", {"area": Quantity("area", facts.area_m2),
+                                            "height": length(round(facts.height_m))}))  # fmt: skip
+    return tuple(found) or (Said("measured.nothing"),)
+
+
+def _alarm(alarm: Alarm) -> Said:
+    if alarm.what == "jumps":
+        return Said("alarm.jumps", {"size": length(alarm.size)}, alarm.often)
+    if alarm.what == "leans":
+        return Said("alarm.leans", {"size": Quantity("angle", math.radians(alarm.size))})
+    if alarm.what == "shakes":
+        return Said("alarm.shakes", {"times": number(alarm.size / 9.81)})
+    return Said("alarm.apart", {"size": length(alarm.size)})
+
+
+def _trouble(facts: Facts, what: str, seconds: float) -> Said:
+    values: dict[str, Value] = {"time": duration(seconds)}
+    if facts.length_s > 0:
+        values["share"] = share(min(1.0, seconds / facts.length_s))
+        return Said(f"trouble.{what}", values)
+    return Said(f"trouble_time.{what}", values)
+
+
+def _wrong(facts: Facts) -> tuple[Said, ...]:
+    found = [_alarm(one) for one in facts.alarms]
+    if facts.problems:
+        found.append(Said("wrong.problems", {}, facts.problems))
+    if facts.tracks and facts.track_sure > NEAR_THE_BAND:
+        found.append(Said("wrong.too_sure"))
+    told = {one.what for one in facts.alarms}
+    for what, seconds in facts.troubles:
+        # Jumps are instants; an alarm has said them, and that it shakes.
+        if seconds >= 1 and not (what == "shaken" and "shakes" in told):
+            found.append(_trouble(facts, what, seconds))
+    # What the verdict says already is not said again, nor what the troubles say of time.
+    for gain in facts.gains[1 if facts.verdict == FIX else 0 :]:
+        counted = gain.key.startswith(("images", "detections"))
+        if counted or (gain.key in ("cause", "far_out") and gain.share >= WORTH):
+            found.append(_gained(gain))
+    if found:
+        return tuple(found)
+    return (Said("wrong.none"),) if facts.verdict is not None else (Said("wrong.unlooked"),)
+
+
+def _gained(gain: Gain) -> Said:
+    """What it is, in a sentence."""
+    if gain.key == "cause":
+        causes = tuple(Said(f"cause.{cause.replace(chr(39), '').replace(' ', '_')}") for cause in gain.causes)
+        if not math.isfinite(gain.value):
+            return Said("lost.cause_share", {"share": share(gain.share)})
+        values: dict[str, Value] = {"gain": length(gain.value), "of": length(gain.of)}
+        return Said("lost.cause", {**values, "causes": causes or Said("cause.any")})
+    if not math.isfinite(gain.value):
+        return Said(f"lost_share.{gain.key}", {"share": share(gain.share)})
+    if gain.key == "far_out":
+        return Said("lost.far_out", {"gain": length(gain.value), "of": length(gain.of)})
+    if gain.key.startswith("time"):
+        return Said(f"lost.{gain.key}", {"time": duration(gain.value), "of": duration(gain.of)})
+    return Said(f"lost.{gain.key}", {"of": number(gain.of)}, int(gain.value))
+
+
+def _advice(facts: Facts) -> tuple[Said, ...]:
+    """What to do, what comes before all gains first."""
+    found = [Said(f"do.{one.what}") for one in facts.alarms]
+    if facts.problems:
+        found.append(Said("do.problems", {}, facts.problems))
+    for gain in facts.gains:
+        if gain.key != "cause":
+            found.append(Said(f"do.{gain.key}", {"share": share(gain.share)}))
+            continue
+        for cause in gain.causes[:1]:
+            key = cause.replace("'", "").replace(" ", "_")
+            found.append(Said(f"do.cause_{key}" if len(gain.causes) == 1 else "do.causes",
+                              {"share": share(gain.share)}))  # fmt: skip
+        if not gain.causes:
+            found.append(Said("do.causes", {"share": share(gain.share)}))
+    if facts.possible is not None:
+        found.append(Said("do.possible", {"gain": length(facts.possible.value)}))
+    if not facts.compared and "georeferencing" not in facts.failed:
+        found.append(Said("do.known_places"))
+    elif facts.compared < FEW and facts.compared:
+        found.append(Said("do.more_places", {"few": number(FEW)}))
+    if facts.failed:
+        found.append(Said("do.failed", {}, len(facts.failed)))
+    return tuple(found)
+
+
+def _unknown(facts: Facts) -> tuple[Said, ...]:
+    found = [Said(f"unknown.failed_{part}") for part in facts.failed]
+    if not facts.compared and "georeferencing" not in facts.failed:
+        found.append(Said("unknown.error"))
+    elif 0 < facts.compared < FEW:
+        values: dict[str, Value] = {"median": length(facts.error_median)}
+        found.append(Said("unknown.few", values, facts.compared))
+    if not facts.seen > 0:
+        found.append(Said("unknown.seen"))
+    elif not math.isfinite(facts.things):
+        found.append(Said("unknown.things"))
+    found += [Said("unknown.hidden")] if facts.seen > 0 else []
+    found += [Said("unknown.another_day")] if facts.compared >= FEW else []
+    return tuple(found)
