@@ -109,8 +109,8 @@ def test_steps_are_near_the_length(metres: float) -> None:
     elif said.key == "steps.none":
         assert metres < STEP_M
     else:
-        assert said.count is not None
-        assert abs(said.count * STEP_M - metres) <= max(0.5 * STEP_M, 0.13 * metres) + 1e-9
+        assert said.n is not None
+        assert abs(said.n * STEP_M - metres) <= max(0.5 * STEP_M, 0.13 * metres) + 1e-9
 
 
 def said_of(story: Story) -> list[Any]:

@@ -171,8 +171,10 @@ def _causes(flight: OwnFlight) -> tuple[str, ...]:
 def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
     """What the overview ranked, with the metres or counts behind each."""
     overview = flight.report("overview")
-    found = []
-    for (name, key), entry in overview.numbers.items() if overview is not None else ():
+    found: list[Gain] = []
+    if overview is None:
+        return ()
+    for (name, key), entry in overview.numbers.items():
         if name != "gain_share" or entry["value"] is None:
             continue
         if key in ("cause", "far_out"):

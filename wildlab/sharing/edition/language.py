@@ -209,10 +209,10 @@ def say(language: Language, said: Value) -> str:
     if isinstance(said, Said):
         text = language.texts[said.key]
         if isinstance(text, Mapping):
-            text = text["one" if said.count == 1 else "many"]
+            text = text["one" if said.n == 1 else "many"]
         values = {name: say(language, value) for name, value in said.values.items()}
-        if said.count is not None:
-            values.setdefault("n", _number(language, said.count))
+        if said.n is not None:
+            values.setdefault("n", _number(language, said.n))
         return _fill(str(text), values)
     parts = [say(language, one) for one in said]
     if len(parts) < 2:

@@ -172,7 +172,8 @@ def _usual(points: Array) -> Array:
     """Points without the few that lie far beyond all others."""
     low, high = np.quantile(points, [0.02, 0.98], axis=0)
     room = np.maximum(high - low, 1.0)
-    return points[((points >= low - room) & (points <= high + room)).all(axis=1)]
+    inside = ((points >= low - room) & (points <= high + room)).all(axis=1)
+    return np.asarray(points[inside])
 
 
 def _line(points: Array) -> str:

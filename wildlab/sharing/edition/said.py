@@ -38,13 +38,13 @@ class Said(NamedTuple):
         Of the texts, with dots between its parts: ``verdict.sound``.
     values
         By placeholder.
-    count
+    n
         What decides between the text for one and for several; None where there is one text for all.
     """
 
     key: str
     values: Mapping[str, Value] = {}
-    count: int | None = None
+    n: int | None = None
 
 
 #: What may stand for a placeholder: a quantity, a date, another text, a list of texts, or text as it is.
