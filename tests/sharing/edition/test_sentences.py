@@ -139,11 +139,14 @@ facts = st.builds(
 )  # fmt: skip
 
 
+LANGUAGES = [load_language(code) for code in languages()]
+
+
 @given(facts)
 def test_whatever_is_known_every_text_is_there_and_filled(known: Facts) -> None:
     story = tell(known)
     assert story.measured and story.wrong and len(story.advice) <= 3
-    for language in map(load_language, languages()):
+    for language in LANGUAGES:
         for said in said_of(story):
             text = say(language, said)
             assert text and "{" not in text and "nan" not in text.lower().split()

@@ -65,6 +65,8 @@ def tell(facts: Facts) -> Story:
     -------
     Story
     """
+    if not (math.isfinite(facts.error_median) and math.isfinite(facts.error_p90)):
+        facts = facts._replace(compared=0)
     key = VERDICTS[facts.verdict]
     advice = _advice(facts)
     return Story(
