@@ -27,6 +27,7 @@ from wildlab.commands.detect import detect
 from wildlab.commands.georeference import georeference
 from wildlab.commands.import_ import import_
 from wildlab.commands.plan import plan
+from wildlab.commands.replay import replay
 from wildlab.commands.shared import FOLDER
 from wildlab.commands.terrain import terrain
 from wildlab.commands.track import track
@@ -80,6 +81,7 @@ for _command in (
     click_,
     georeference,
     track,
+    replay,
     camera,
     detect,
     calibrate,

@@ -1,0 +1,168 @@
+"""What a replay shows of a flight: arrays in local metres over seconds since its first pose.
+
+Everything here is in n (north, east, down from an origin that is not told). Nothing in it says where on Earth
+or on what day that was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.terrain import Terrain
+
+Array = NDArray[np.float64]
+Names = NDArray[np.object_]
+
+
+class Path(NamedTuple):
+    """Where the aircraft was: (N,) s, (N, 3) m; and what the poses are called."""
+
+    times: Array
+    places: Array
+    source: str
+
+
+class Views(NamedTuple):
+    """The frames of the camera, in the order of time. NaN where a pose or a footprint is not known.
+
+    Attributes
+    ----------
+    ids
+        (N,) what the flight calls them; never shown.
+    times
+        (N,) s.
+    p_nc, R_nc
+        (N, 3) m, (N, 3, 3): the camera's pose; takes a vector from c to n.
+    outlines
+        (N, B, 3) m, the border of each image on the ground, in order, not closed.
+    """
+
+    ids: Names
+    times: Array
+    p_nc: Array
+    R_nc: Array
+    outlines: Array
+
+
+class Sightings(NamedTuple):
+    """Detections in images.
+
+    Attributes
+    ----------
+    frame
+        (M,) row of `Views`.
+    uv
+        (M, 2) px, the middle of the first pixel being (0, 0).
+    names
+        (M,) the target that each names, "" none.
+    """
+
+    frame: NDArray[np.intp]
+    uv: Array
+    names: Names
+
+
+class Points(NamedTuple):
+    """Detections on the ground.
+
+    Attributes
+    ----------
+    times, places, covariance
+        (K,) s, (K, 3) m, (K, 2, 2) m^2 north before east; a covariance may be NaN.
+    names
+        (K,) the target, "" none.
+    error, nees
+        (K,) m and 1, point beside truth; NaN where that is not known.
+    """
+
+    times: Array
+    places: Array
+    covariance: Array
+    names: Names
+    error: Array
+    nees: Array
+
+
+class Estimates(NamedTuple):
+    """One target as one filter follows it: as `Points`, one row for each look, in the order of time."""
+
+    target: str
+    filter: str
+    sensor: str
+    times: Array
+    places: Array
+    covariance: Array
+    error: Array
+    nees: Array
+
+
+class Target(NamedTuple):
+    """Where a target really was: (T,) s and (T, 3) m; one row and the time NaN where it never moves."""
+
+    name: str
+    times: Array
+    places: Array
+
+    @property
+    def still(self) -> bool:
+        """Whether it never moves."""
+        return len(self.times) == 1 and bool(np.isnan(self.times[0]))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a replay shows.
+
+    Attributes
+    ----------
+    name, kind
+        Of the flight: what it is called, and ``twin`` or ``logged``.
+    timed
+        Whether times are times; else they number the images.
+    path, camera, views, sightings, points, tracks, truth, terrain
+        What there is; None or empty where there is nothing of it.
+    ground
+        Down coordinate of level ground, m, where there is no terrain; NaN where it is not known.
+    lacks
+        Clauses: what is not shown, and why.
+    """
+
+    name: str
+    kind: str
+    timed: bool
+    path: Path | None = None
+    camera: Camera | None = None
+    views: Views | None = None
+    sightings: Sightings | None = None
+    points: Points | None = None
+    tracks: tuple[Estimates, ...] = ()
+    truth: tuple[Target, ...] = ()
+    terrain: Terrain | None = None
+    ground: float = float("nan")
+    lacks: tuple[str, ...] = field(default=())
+
+    @property
+    def length(self) -> float:
+        """The last time at which anything happens, s; zero where nothing does."""
+        times = [one.times for one in (self.path, self.views, self.points, *self.tracks) if one is not None]
+        known = [float(np.nanmax(t)) for t in times if np.isfinite(t).any()]
+        return max([0.0, *known])
+
+    @property
+    def extent(self) -> tuple[Array, Array]:
+        """The least and the greatest north, east and down of what is shown, (3,) m each; the sea not."""
+        parts = [np.empty((0, 3))]
+        parts += [self.path.places] if self.path is not None else []
+        parts += [self.views.outlines.reshape(-1, 3)] if self.views is not None else []
+        parts += [self.points.places] if self.points is not None else []
+        parts += [one.places for one in (*self.tracks, *self.truth)]
+        known = np.concatenate(parts)
+        known = known[np.isfinite(known).all(axis=1)]
+        if not len(known):
+            return np.full(3, -50.0), np.full(3, 50.0)
+        return known.min(axis=0), known.max(axis=0)

@@ -1,0 +1,208 @@
+"""A replay of a flight folder, or of the flight that a report was made from: files in, files out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from wildlab.errors import WildlabError
+from wildlab.files import write_atomic
+from wildlab.flight.manifest import FILE_NAME
+from wildlab.flight.store import Flight, load_flight
+from wildlab.paths import REPORTS
+from wildlab.replay.gather import scene_of
+from wildlab.replay.page import page
+from wildlab.replay.recording import save_recording
+from wildlab.replay.scene import Scene
+from wildlab.replay.shots import Shot, read_shots
+from wildlab.replay.viewer import read_viewer
+from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+
+RECORDING, PAGE, ESTIMATES = "replay.rrd", "replay.html", "estimates.parquet"
+#: Columns of a table of tracks that a replay reads.
+COLUMNS = (
+    "target", "filter", "sensor", "time_s", "north_m", "east_m", "p_00", "p_01", "p_11",
+    "error_north_m", "error_east_m", "nees",
+)  # fmt: skip
+
+
+def replay(
+    folder: Path,
+    *,
+    into: Path | None = None,
+    images: Path | None = None,
+    source: str | None = None,
+    html: bool = False,
+    reports: Path = REPORTS,
+    console: Console | None = None,
+) -> tuple[list[Path], Scene]:
+    """Write the replay of a flight.
+
+    Parameters
+    ----------
+    folder
+        A flight folder, or a report's whose flight can be found.
+    into
+        Where to; left out, the report's own folder, or ``<reports>/<name of the flight>-replay``.
+    images
+        A folder of the flight's images, or a video; left out, ``images`` in the flight folder where that is.
+    source
+        Name of the ``nav`` table; left out, the best known one.
+    html
+        Whether to write the page that has the viewer inside, too.
+    reports
+        Where reports are: tracks of the flight are looked for there.
+    console
+        Where progress is shown.
+
+    Returns
+    -------
+    files, scene
+        What was written, and what it shows.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such flight, nothing to show, or no viewer.
+    """
+    report = None if (folder / FILE_NAME).exists() else folder
+    place = folder if report is None else flight_of(folder, reports)
+    viewer = read_viewer() if html else None  # before the long part: it may be missing
+    flight = load_flight(place)
+    with _progress(console) as tell:
+        tell("reading the flight", None, None)
+        scene = scene_of(flight, source, estimates_of(flight, report, reports))
+        scene, shots = _with_images(scene, place, images, tell)
+        target = into or report or reports / f"{flight.name}-replay"
+        if target.resolve() == place.resolve():
+            raise WildlabError(
+                "a replay is no part of a flight",
+                "name another folder with --into",
+                file=target,
+                field="--into",
+            )
+        target.mkdir(parents=True, exist_ok=True)
+        written = [target / RECORDING]
+        save_recording(scene, written[0], shots, lambda what: tell(f"writing {what}", None, None))
+        if viewer is not None:
+            tell("packing the viewer", None, None)
+            written.append(target / PAGE)
+            write_atomic(written[1], page(written[0].read_bytes(), viewer, scene.name))
+    return written, scene
+
+
+def _with_images(scene: Scene, flight: Path, images: Path | None, tell: Any) -> tuple[Scene, dict[int, Shot]]:
+    own = flight / "images"
+    place = images or (own if own.is_dir() else None)
+    if scene.views is None:
+        return scene, {}
+    if place is None:
+        lacks = "pictures: they are not in the flight folder; --images names where they are"
+        return replace(scene, lacks=(*scene.lacks, lacks)), {}
+    size = None if scene.camera is None else (scene.camera.width, scene.camera.height)
+    found = read_shots(place, scene.views.ids, size, lambda done, of: tell("reducing images", done, of))
+    return replace(scene, lacks=(*scene.lacks, *found.lacks)), found.by_row
+
+
+def estimates_of(flight: Flight, report: Path | None, reports: Path) -> pd.DataFrame | None:
+    """Tracks of a flight: those of the report that was named, else of its report on tracks, if there is one.
+
+    Returns
+    -------
+    DataFrame or None
+        None where there are none, or those there are of another flight of the same name.
+
+    Raises
+    ------
+    WildlabError
+        Where the table cannot be read or lacks a column.
+    """
+    if flight.folder is None:
+        return None
+    names = [flight.name, f"{flight.name}-tracking"]
+    beside = reports if report is None else report.resolve().parent
+    files = provenance_of_flight(flight.folder)["files"]
+    for one in ([report] if report is not None else []) + [beside / name for name in names[1:]]:
+        theirs = read_provenance(one).get("flight")
+        if (one / ESTIMATES).is_file() and isinstance(theirs, dict) and theirs.get("files") == files:
+            return _read_estimates(one / ESTIMATES)
+    return None
+
+
+def _read_estimates(path: Path) -> pd.DataFrame:
+    try:
+        table = pd.read_parquet(path)
+    except Exception as error:  # whatever a damaged file gives
+        first = (str(error).strip() or type(error).__name__).splitlines()[0]
+        fix = "make it again: wildlab track"
+        raise WildlabError(f"is not a readable Parquet file ({first})", fix, file=path) from None
+    for name in COLUMNS:
+        if name not in table:
+            raise WildlabError(
+                "this column is missing", "make the table again: wildlab track", file=path, field=name
+            )
+    return table
+
+
+def flight_of(report: Path, reports: Path) -> Path:
+    """The folder of the flight that a report was made from, known by the content of its files.
+
+    It is looked for where flights usually are: among those that reports keep, beside the folder of reports,
+    in ``flights`` there and here, and in the folder that one stands in.
+
+    Raises
+    ------
+    WildlabError
+        Where the folder is no report, says of no flight, or that flight is in none of these places.
+    """
+    if not report.is_dir():
+        raise WildlabError("there is no such folder", "name a flight folder, or a report's", file=report)
+    theirs = read_provenance(report).get("flight")
+    if not isinstance(theirs, dict) or not isinstance(theirs.get("files"), dict) or not theirs["files"]:
+        raise WildlabError(
+            "this is neither a flight folder (it has no flight.toml) nor the report of a flight",
+            "name the folder of a flight: wildlab replay flights/mine",
+            file=report,
+        )
+    for place in _places(report, reports):
+        for manifest in sorted(place.glob(f"*/{FILE_NAME}")):
+            if provenance_of_flight(manifest.parent)["files"] == theirs["files"]:
+                return manifest.parent
+    raise WildlabError(
+        f"the flight {json.dumps(str(theirs.get('name', '')))} that this report was made from is not among "
+        "the flights here, or was changed since",
+        "name its folder: wildlab replay flights/mine --into REPORT",
+        file=report,
+    )
+
+
+def _places(report: Path, reports: Path) -> Iterator[Path]:
+    seen = set()
+    for base in (report.resolve().parent, reports.resolve(), Path.cwd()):
+        for place in (base / ".flights", base.parent / "flights", base / "flights", base, base.parent):
+            if place not in seen and place.is_dir():
+                seen.add(place)
+                yield place
+
+
+@contextmanager
+def _progress(console: Console | None) -> Iterator[Any]:
+    if console is None:
+        yield lambda what, done, of: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}"))
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("", total=None)
+
+        def tell(what: str, done: int | None, of: int | None) -> None:
+            progress.update(task, description=what, completed=done or 0, total=of)
+
+        yield tell
