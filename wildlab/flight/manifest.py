@@ -80,8 +80,13 @@ class CameraPart(Strict):
 
 
 class MountPart(Strict):
-    """How the camera is fixed to the airframe: see `wildlab.geometry.mount.Mount`."""
+    """How the camera is fixed to the airframe: see `wildlab.geometry.mount.Mount`.
 
+    ``poses`` names the nav source whose axes it counts from, where the flight has several: that of the
+    vehicle and that of a camera with a log of its own take different mounts. Left out, it holds for all.
+    """
+
+    poses: str = ""
     looks: Literal["down", "forward"] = "down"
     pan_deg: Angle = 0.0
     tilt_deg: Angle = 0.0
@@ -311,9 +316,22 @@ class Manifest(Strict):
         distortion = (c.k1, c.k2, c.p1, c.p2, c.k3)
         return Camera(c.width_px, c.height_px, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.skew_px, distortion)
 
-    def geometry_mount(self) -> Mount:
-        """The mount, in radians and metres."""
+    def geometry_mount(self, source: str | None = None) -> Mount:
+        """The mount, in radians and metres, to be used on the poses of ``source``; None: by itself.
+
+        Raises
+        ------
+        WildlabError
+            Where it belongs to other poses.
+        """
         m = self.mount
+        if source is not None and m.poses not in ("", source):
+            raise WildlabError(
+                f"[mount] is of a camera on the poses {m.poses!r}, and those of {source!r} are used",
+                f"use --source {m.poses}; or state the mount on {source!r} in [mount], with poses = "
+                f'"{source}"',
+                field="mount.poses",
+            )
         turn = math.radians
         return Mount(
             looks=m.looks,

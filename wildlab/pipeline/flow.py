@@ -141,9 +141,10 @@ _COLUMNS = (
 
 def camera_poses_at(flight: Flight, times: Array, reading: Reading) -> CameraPoses:
     """The camera's poses at times (N,) s, by the log: NaN where it has none."""
-    p_nb, R_nb, covariance = poses_at(flight.pose_source(reading.source)[1], times)
+    name, nav = flight.pose_source(reading.source)
+    p_nb, R_nb, covariance = poses_at(nav, times)
     manifest = flight.manifest
-    mount = reading.mount or manifest.geometry_mount()
+    mount = reading.mount or manifest.geometry_mount(name)
     pan, tilt = None, None
     if flight.gimbal is not None:
         angles = np.unwrap(flight.gimbal[["pan_rad", "tilt_rad"]].to_numpy(float), axis=0)

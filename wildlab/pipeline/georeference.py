@@ -148,11 +148,12 @@ def observe(
         }
     )
     manifest = flight.manifest
+    mount = manifest.geometry_mount(flight.pose_source(source)[0])
     level = _ground_heights(flight, table, pixels)
     seen = Observations(
         table,
         pixels[["u_px", "v_px"]].to_numpy(float),
-        CameraPoses(manifest.geometry_camera(), manifest.geometry_mount(), p_nb, R_nb, pan, tilt, covariance),
+        CameraPoses(manifest.geometry_camera(), mount, p_nb, R_nb, pan, tilt, covariance),
         level,
         flight.terrain,
         None if flight.terrain is None else level,

@@ -218,7 +218,7 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
         pan, tilt = (angle[chosen] for angle in gimbal_angles(flight))
         manifest = flight.manifest
         poses = CameraPoses(
-            manifest.geometry_camera(), manifest.geometry_mount(), p, R_nb, pan, tilt, covariance
+            manifest.geometry_camera(), manifest.geometry_mount(name), p, R_nb, pan, tilt, covariance
         )
         plane = _camera_plane(flight, name, seen, row, plane)
     drop = plane - p[:, 2]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.following.beliefs import ROUGH, Said
 from wildlab.pipeline.following.follow import TOGETHER, Followed
 from wildlab.pipeline.following.judged import (
     CAUTIOUS,
@@ -191,6 +191,7 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
             f"With {filter_words('ekf')} the errors are {size_words(float(white['nees'].median()))}: "
             f"{_counts(white)}; {_error_change(ratio)}."
         )
+    said += _smoothed(mine, by_name.get(f"{best}-smoothed"))
     pairs_in_all = len(rows.drop_duplicates(["sensor", "target"]))
     if len(mine) < pairs_in_all:
         said.append(
@@ -204,6 +205,18 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     if good or (mine["verdict"] == UNKNOWN).all():
         return said, "neutral" if few.any() or not good else "good"
     return said, "bad" if bad and not few.any() else "warn"
+
+
+def _smoothed(mine: pd.DataFrame, smoothed: pd.DataFrame | None) -> list[str]:
+    """What going back over the tracks made of their errors; nothing where nobody did."""
+    if smoothed is None or not len(smoothed):
+        return []
+    both = mine.merge(smoothed, on=["sensor", "target"], suffixes=("", "_smoothed"))
+    ratio = float((both["rmse_smoothed"] / both["rmse"]).median())
+    return [
+        f"Smoothed, with later detections too, the errors are {ratio:.2f} of these, and "
+        f"{size_words(float(smoothed['nees'].median()))}: {_counts(smoothed)}."
+    ]
 
 
 def _together(together: pd.DataFrame, alone: pd.DataFrame) -> tuple[str, bool]:
@@ -347,8 +360,8 @@ def columns_of(table: pd.DataFrame) -> dict[str, str]:
 
 
 def said_table(said: Sequence[Said]) -> pd.DataFrame:
-    """What filters were told, assumed values first."""
-    ordered = sorted(said, key=lambda one: not one.source.startswith("assumed"))
+    """What filters were told, first what is assumed or estimated on this flight."""
+    ordered = sorted(said, key=lambda one: not (one.source.startswith("assumed") or one.source == ROUGH))
     return pd.DataFrame(
         [{"of": one.subject, "what": one.what, "value": one.value, "source": one.source} for one in ordered]
     )
@@ -357,12 +370,24 @@ def said_table(said: Sequence[Said]) -> pd.DataFrame:
 def assumed_sentence(said: Sequence[Said]) -> str:
     """How much of what filters were told is assumed; nothing where none is."""
     assumed = sum(one.source.startswith("assumed") for one in said)
-    if not assumed:
+    here = sum(one.source == ROUGH for one in said)
+    if not assumed and not here:
         return "All that the filters were told is stated or was tuned on another flight."
-    return (
-        f"{assumed} of {len(said)} values that the filters were told are assumed. State them in "
-        "`flight.toml` or with `--settings`, or tune them on another flight with `--tune`."
-    )
+    parts = [
+        f"{assumed} of {len(said)} values that the filters were told {_are(assumed)} assumed."
+        if assumed
+        else "",
+        f"{here} of {len(said)} {_are(here)} estimated from the detections that are judged here, so that NIS "
+        "is no proof of it."
+        if here
+        else "",
+        "State them in `flight.toml` or with `--settings`, or tune them on another flight with `--tune`.",
+    ]  # fmt: skip
+    return " ".join(filter(None, parts))
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
 
 
 def record(report: Report, rows: pd.DataFrame) -> None:

@@ -36,7 +36,7 @@ def straight_flight(
     turning: float = 0.0,
     seed: int = 0,
 ) -> Flight:
-    """Two minutes at 17 m/s, straight on or swinging; ``who`` leaps along its way, the receiver's clock is off."""
+    """Two minutes at 17 m/s, straight on or swinging; ``who`` leaps along its way, a clock is off."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 120.0, 0.1)
     p, v = way(t, turning)
@@ -101,7 +101,8 @@ def test_a_leap_comes_off_as_it_went_on(north: float, east: float, at: float, ba
     table = clean.drop(columns=["v_north_m_s", "v_east_m_s", "v_down_m_s"]) if bare else clean
     behind = table["time_s"].to_numpy() >= at
     leapt = table.assign(
-        north_m=table["north_m"] + np.where(behind, north, 0), east_m=table["east_m"] + np.where(behind, east, 0)
+        north_m=table["north_m"] + np.where(behind, north, 0),
+        east_m=table["east_m"] + np.where(behind, east, 0),
     )
     assert find_leaps(table) == []
     found = find_leaps(leapt)

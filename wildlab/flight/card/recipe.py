@@ -188,8 +188,16 @@ def _mount(proposal: Proposal, camera: bool) -> None:
     if "frames" not in proposal.data:
         return
     if camera:
-        proposal.data["mount"] = {"looks": "forward"}
-        proposal.said.append("The poses are those of the camera itself: its lens points along them.")
+        poses = list(proposal.data.get("poses", {}))
+        own = {"poses": "camera"} if "camera" in poses and len(poses) > 1 else {}
+        proposal.data["mount"] = own | {"looks": "forward"}
+        others = [name for name in poses if name != "camera"]
+        proposal.said.append(
+            f"[mount] is that of the camera's own poses (--source camera): its lens points along them. How "
+            f"it sits on {', '.join(others)} nobody states, so images are not used with these."
+            if own
+            else "The poses are those of the camera itself: its lens points along them."
+        )
     elif "gimbal" not in proposal.data:
         proposal.data["mount"] = {"looks": "down"}
         proposal.said.append(

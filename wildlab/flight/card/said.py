@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wildlab.flight.card.found import OTHER
 from wildlab.flight.card.roles import Choice
@@ -17,6 +17,8 @@ from wildlab.flight.readers.logs.log import Clock, Stream
 
 #: Headings of `rows_of`.
 HEADINGS = ("file", "format", "begins (UTC)", "lasts", "holds", "time from", "heights from", "role")
+#: A rate is of so many steps together, and a pause is a step of so many usual ones.
+STRETCH, PAUSE = 10, 5.0
 _COUNTED = {"photos": "images", "marks": "points", "clicks": "pixels"}
 _REFERENCES = {"height_ellipsoid_m": "ellipsoid", "height_sea_m": "sea level", "height_home_m": "take-off"}
 
@@ -54,10 +56,48 @@ def _row(choice: Choice) -> list[str]:
 def _amount(name: str, stream: Stream) -> str:
     if name in _COUNTED:
         return f"{len(stream)} {_COUNTED[name]}"
-    times = _times(stream)
-    steps = np.diff(times)
-    rate = f" at {1 / float(np.median(steps)):.3g} Hz" if len(steps) and np.median(steps) > 0 else ""
-    return f"{name} {len(stream)}{rate}"
+    return f"{name} {len(stream)}{paced(_times(stream))}"
+
+
+def paced(stamps: ArrayLike) -> str:
+    """The rate of a stream while it runs, and its pauses, as they stand behind its name.
+
+    A rate is of stretches of samples and not of single steps: what comes in bursts has the rate of the whole,
+    and a step of several usual ones is a pause and no part of the rate.
+
+    Parameters
+    ----------
+    stamps
+        (N,) s, in any order.
+
+    Returns
+    -------
+    str
+        Empty where there is no rate.
+
+    Examples
+    --------
+    >>> paced(np.concatenate([np.arange(0, 60, 0.1), np.arange(90, 150, 0.1)]))
+    ' at 10 Hz (1 pause, 30 s)'
+    >>> paced(np.repeat(np.arange(0, 60, 0.5), 5) + np.tile(np.arange(5) * 1e-3, 120))  # five at once
+    ' at 10 Hz'
+    """
+    t = np.sort(np.asarray(stamps, float))
+    width = min(STRETCH, len(t) - 1)
+    if width < 1:
+        return ""
+    stretches = (t[width:] - t[:-width]) / width
+    usual = float(np.median(stretches))
+    if not usual > 0:
+        return ""
+    steps = np.diff(t)
+    pauses = steps[steps > PAUSE * usual]
+    # Of stretches without a pause, where there are such.
+    before = np.concatenate([[0], np.cumsum(steps > PAUSE * usual)])
+    running = stretches[before[width:] == before[:-width]]
+    rate = 1 / float(np.median(running)) if len(running) and np.median(running) > 0 else 1 / usual
+    count = f"{len(pauses)} pause{'' if len(pauses) == 1 else 's'}"
+    return f" at {rate:.3g} Hz" + (f" ({count}, {pauses.sum():.3g} s)" if len(pauses) else "")
 
 
 def _times(stream: Stream) -> NDArray[np.float64]:

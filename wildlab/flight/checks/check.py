@@ -252,6 +252,14 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "the clock of the camera is taken to agree with that of the poses",
             "let `wildlab clock` estimate the offset: at 20 m/s a tenth of a second is 2 m",
         )
+    if manifest.mount.poses and manifest.mount.poses not in flight.nav:
+        yield Finding(
+            "problem",
+            "flight.toml",
+            "mount.poses",
+            f"the mount is said to be on the poses {manifest.mount.poses!r}, and there are none of that name",
+            f"name one of those there are: {', '.join(sorted(flight.nav)) or 'none'}",
+        )
     if manifest.vertical.reference != "ellipsoid" and manifest.vertical.correction_m == 0:
         # Where nothing is placed on the ground, a constant height changes no result.
         placed = manifest.camera is not None or flight.truth is not None

@@ -267,6 +267,16 @@ class Recipe(Strict):
         return self
 
     @model_validator(mode="after")
+    def _mount_of_poses(self) -> Self:
+        if self.mount.poses and self.mount.poses not in self.poses:
+            known = ", ".join(sorted(self.poses)) or "none"
+            raise ValueError(
+                f"[mount] is said to sit on the poses {self.mount.poses!r}, and there are none of that name; "
+                f"name one of these: {known}"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _poses_belong(self) -> Self:
         for name, poses in self.poses.items():
             if poses.time is not None and poses.frame is not None:

@@ -46,6 +46,8 @@ _REACH, _REACH_OF_RAYS = "a detection of its own is within", "a ray to it is wit
 #: What is not asked of targets that detections name.
 OF_UNNAMED = (_GATE, _PATIENCE, _REACH, _REACH_OF_RAYS)
 STATED, ASSUMED = "stated", "assumed"
+#: Of a noise that nobody states: it is estimated where it is judged, and the page says so.
+ROUGH = "estimated here: how rough its detections are"
 
 
 class Considered(NamedTuple):
@@ -223,10 +225,11 @@ def of_sensor(
         lasts = "constant" if np.isinf(error.correlation_time_s) else f"for {error.correlation_time_s:.3g} s"
         tell(f"considered error: {error.name.replace('_', ' ')}", f"{_in_unit(error)}, {lasts}", source)
     offset = part.clock_offset_s if part is not None else 0.0
-    if found is not None and (part is None or "clock_offset_s" not in part.model_fields_set):
-        offset = found.offset_s
+    stated_clock = part is not None and "clock_offset_s" in part.model_fields_set
+    if tuned is not None and tuned.clock_tuned and not stated_clock:
+        offset = tuned.offset_s
         tell("to be added to its stamps", f"{offset:.2f} s", by_tuning)
-    elif part is not None and "clock_offset_s" in part.model_fields_set:
+    elif stated_clock:
         tell("to be added to its stamps", f"{offset:.2f} s", STATED)
     base = found or Beliefs(
         scans.sensor, scans.kind, 0.0, noise, noise, (), None, 1.0,
@@ -285,7 +288,7 @@ def _noise(
             sources[i] = "the detections' own"
         else:
             rough = roughness(scans) if rough is None else rough
-            values[i], sources[i] = rough[i], f"{ASSUMED}: how rough its detections are"
+            values[i], sources[i] = rough[i], ROUGH
     bad = ~(values > 0)
     if bad.any():
         name = scans.elements[int(np.flatnonzero(bad)[0])]

@@ -127,6 +127,7 @@ def follow_targets(
         any_truth |= any(np.isfinite(one.position).any() for one in truths)
         names, without = chosen_filters(looks, belief, filters)
         notes += without
+        notes += _not_smoothed(names, sensor) if smooth else []
         names = _with_smoothed(names) if smooth else names
         for truth in truths:
             if targets and truth.target not in targets:
@@ -223,6 +224,14 @@ def _with_smoothed(names: Sequence[str]) -> list[str]:
     """Each with its smoothed one behind it, where there is such."""
     both = [one for name in names for one in (name, f"{name}{SMOOTHED}")]
     return [one for one in both if one in (*NAMES, *SMOOTHABLE)]
+
+
+def _not_smoothed(names: Sequence[str], sensor: str) -> list[str]:
+    """Filters that have no way back, in a sentence each."""
+    without = [name for name in names if f"{name}{SMOOTHED}" not in SMOOTHABLE]
+    return [
+        f"The filter {name!r} of {sensor} was not smoothed: there is no smoother for it." for name in without
+    ]
 
 
 def _never(tracks: Sequence[SensorTrack], scans: Scans) -> list[str]:

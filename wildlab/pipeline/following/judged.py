@@ -21,6 +21,7 @@ from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size, white_bound
 from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.filters import SMOOTHED
 from wildlab.pipeline.following.follow import TOGETHER, Followed
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 
@@ -183,9 +184,10 @@ def apart(followed: Followed) -> list[Apart]:
     for track in followed.tracks:
         groups.setdefault((track.target, track.filter), []).append(track)
     for (target, name), tracks in groups.items():
-        apart_from = [one for one in tracks if one.sensor in followed.scans]
+        # Smoothed ones lean on the motion that both assume, twice: their distance proves little.
+        apart_from = [one for one in tracks if one.sensor in followed.scans and not name.endswith(SMOOTHED)]
         for a, b in combinations(apart_from, 2):
-            x, P = _between(b, a.times)
+            x, P = _between(b, a.times, followed.targets.density)
             gap = a.estimate[:, :2] - x
             both = np.isfinite(gap).all(axis=1)
             if not both.any():
@@ -197,8 +199,9 @@ def apart(followed: Followed) -> list[Apart]:
     return found
 
 
-def _between(one: SensorTrack, times: Array) -> tuple[Array, Array]:
-    """Position (N, 2) and its covariance at other times: carried on from the look before."""
+def _between(one: SensorTrack, times: Array, density: float) -> tuple[Array, Array]:
+    """Position (N, 2) and its covariance at other times: carried on from the look before, and the
+    less certain the longer, as the filters believe."""
     row = np.searchsorted(one.times, times, side="right") - 1
     there = row >= 0
     row = np.maximum(row, 0)
@@ -207,6 +210,7 @@ def _between(one: SensorTrack, times: Array) -> tuple[Array, Array]:
     F = np.tile(np.eye(2, 4), (len(times), 1, 1))
     F[:, 0, 2] = F[:, 1, 3] = dt[:, 0]
     P = F @ one.covariance[row] @ np.swapaxes(F, 1, 2)
+    P[:, :2, :2] += (density**2 * np.maximum(dt[:, 0], 0.0) ** 3 / 3)[:, None, None] * np.eye(2)
     ended = ~there | (times > one.times[-1])
     x[ended] = np.nan
     return x, P

@@ -92,8 +92,9 @@ def tune_by_innovations(
         n = sum(int(np.isfinite(one.own[:, 0]).sum()) for one in mine)
         kind, interval = mine[0].scans.kind, mine[0].scans.interval_s
         tunings[name] = SensorTuning(
-            name, kind, mine[0].beliefs.offset_s, 0.0, 0.0, float(sds[0]), 0.0, max(interval, 1e-3), 0.0, 0.0,
-            0.0, mine[0].beliefs.range_m, mine[0].beliefs.range_sd_m, interval, n, tuple(sds.tolist()),
+            name, kind, mine[0].beliefs.offset_s, np.nan, np.nan, float(sds[0]), 0.0, max(interval, 1e-3),
+            0.0, 0.0, 0.0, mine[0].beliefs.range_m, mine[0].beliefs.range_sd_m, interval, n,
+            tuple(sds.tolist()),
         )  # fmt: skip
     return tunings, float(targets.density * factors[0])
 
@@ -103,6 +104,8 @@ def _cases(
 ) -> list[_Case]:
     looks = identified(scans_of(flight, sensor, 0.0, source), targets)
     beliefs, _ = of_sensor(flight, looks, told)
+    if beliefs.offset_s:
+        looks = identified(scans_of(flight, sensor, beliefs.offset_s, source), targets)
     found = []
     truths = targets_of(flight, looks)
     for truth in truths:

@@ -137,6 +137,7 @@ def follow(
     patience = np.inf if scans.labelled else targets.patience_s
     last = last_row(scans.times, first.used, begin.time, patience, targets.patience_s)
     begun = scans.times > begin.time
+    first, own = ended(first, own, last)
     found = []
     for name in filters:
         track = follow_with("ekf" if name == "kf" else name, scans, own, first, beliefs, targets, begin)
@@ -172,6 +173,14 @@ def last_row(
     pauses = np.flatnonzero(np.diff(hits) > patience)
     end = hits[pauses[0]] if len(pauses) else hits[-1]
     return int(np.searchsorted(times, end + (patience if after is None else after), side="right"))
+
+
+def ended(first: Track, own: Array, last: int) -> tuple[Track, Array]:
+    """The track and its detections (N, m) up to its end: what the filter took in behind it is of no track,
+    and a smoother must not know it."""
+    x, P, kept = first.x.copy(), first.P.copy(), own.copy()
+    x[last:], P[last:], kept[last:] = np.nan, np.nan, np.nan
+    return first._replace(x=x, P=P), kept
 
 
 def scored(

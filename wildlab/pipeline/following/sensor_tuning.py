@@ -39,7 +39,8 @@ class SensorTuning(NamedTuple):
     Attributes
     ----------
     offset_s, offset_low_s, offset_high_s
-        What to add to the stamps, with a 95 % interval for as many errors as the correlated ones are worth.
+        What to add to the stamps, with a 95 % interval for as many errors as the correlated ones are worth;
+        low and high are NaN where the clock was not tuned and is as it was stated.
         A hull seen ahead of or behind its antenna is in it too: on a straight course nothing tells the two
         apart.
     sd
@@ -78,6 +79,11 @@ class SensorTuning(NamedTuple):
     own_sds: tuple[float, ...] = ()
     range_bias_sd_m: float = 0.0
     roll_pitch_sd_rad: float = 0.0
+
+    @property
+    def clock_tuned(self) -> bool:
+        """Whether the offset is an estimate."""
+        return bool(np.isfinite(self.offset_low_s))
 
     @property
     def sds(self) -> Array:
@@ -144,11 +150,28 @@ def tune(
     Raises
     ------
     WildlabError
-        Where fewer than `FEWEST` detections lie near a target.
+        Where fewer than `FEWEST` detections lie near a target, or the clock is further off than is looked.
     """
     reach = reach_of(scans_of(flight, sensor, 0.0, source).kind)
     # Poses that belong to frames stay with them, whatever the clock says.
-    offsets = np.zeros(1) if "frame_id" in flight.pose_source(source)[1] else OFFSETS_S
+    fixed = "frame_id" in flight.pose_source(source)[1]
+    found = _tuned(flight, sensor, reach, source, np.zeros(1) if fixed else OFFSETS_S)
+    if found.offset_s not in OFFSETS_S[[0, -1]]:
+        return found
+    if found.offset_low_s <= 0 <= found.offset_high_s:
+        # Nothing here tells the time, as where nothing moves.
+        return _tuned(flight, sensor, reach, source, np.zeros(1))
+    raise WildlabError(
+        f"the stamps of {sensor!r} fit the truth best with {found.offset_s:+.1f} s added, and further is not "
+        "looked: its clock is further off, or the truth is of something else",
+        f"correct the clock of {sensor!r} or of the truth first (`wildlab check` compares them), then tune",
+        file=flight.folder,
+        field="time_s",
+    )
+
+
+def _tuned(flight: Flight, sensor: str, reach: float, source: str | None, offsets: Array) -> SensorTuning:
+    """The tuning with the best of some offsets; of one alone its interval is NaN."""
 
     def errors_at(offset: float) -> list[_Errors]:
         return _errors_of(flight, scans_of(flight, sensor, offset, source), reach)
@@ -174,7 +197,10 @@ def tune(
     sds = np.array(own) if own else np.full(known.shape[1], float(np.sqrt(np.mean(known**2))))
     # Correlated errors are worth fewer: the sum of squares says less than it seems to.
     worth = sum(_worth(one.error) for one in errors)
+    low, high = float("nan"), float("nan")
     near = offsets[(costs - costs[best]) / (2 * sd**2) * worth / n <= DROP]
+    if len(offsets) > 1:
+        low, high = float(near.min()), float(near.max())
     share, correlation_time = _autocorrelation(errors, sds if own else np.ones(1), scans.interval_s)
     lasting = _considered(errors, sds, share * np.exp(-scans.interval_s / correlation_time))
     position, clock, yaw, range_bias, roll_pitch = lasting
@@ -185,8 +211,8 @@ def tune(
         sensor,
         scans.kind,
         offset,
-        float(near.min()),
-        float(near.max()),
+        low,
+        high,
         float(sds[0]) if not own else sd,
         share,
         correlation_time,

@@ -24,7 +24,14 @@ from wildlab.pipeline.following.filters import (
     white_noise,
     without_innovations,
 )
-from wildlab.pipeline.following.sensor_tracks import SensorTrack, begin_of_target, last_row, no_track, scored
+from wildlab.pipeline.following.sensor_tracks import (
+    SensorTrack,
+    begin_of_target,
+    ended,
+    last_row,
+    no_track,
+    scored,
+)
 from wildlab.pipeline.scans import Scans, Truth, truths_at
 from wildlab.tracking.combined import Merged, Seen, merge
 from wildlab.tracking.considered import Considered, consider_all
@@ -77,6 +84,7 @@ def follow_together(
     ids = np.where(first.used, looks.ids[rows, chosen], "")
     patience = np.inf if labelled else targets.patience_s
     last = last_row(merged.times, first.used, begin.time, patience, targets.patience_s)
+    first, own = ended(first, own, last)
     begun = rows > begin.row if begin.row >= 0 else merged.times > begin.time
     found = []
     for name in filters:

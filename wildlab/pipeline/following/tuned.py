@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
+
+import numpy as np
 
 from wildlab.errors import WildlabError
 from wildlab.flight.checksums import checksums_of
@@ -85,8 +88,15 @@ def tune_flight(
     return Tuned(flight.name, "truth", found)
 
 
+#: Fewest detections alike, stamp and values, by which two flights are one, and their share of the smaller.
+ALIKE, SHARE = 5, 0.05
+_VALUES = ("u_px", "v_px", "range_m", "azimuth_rad", "elevation_rad", "north_m", "east_m", "down_m",
+           "v_north_m_s", "v_east_m_s")  # fmt: skip
+
+
 def refuse_same(flight: Flight, other: Flight) -> None:
-    """Refuse to tune on the flight that is judged: one whose detections are the same, whatever its name.
+    """Refuse to tune on the flight that is judged: one that shares detections with it, whatever its name, its
+    folder, or how much of it was imported.
 
     Raises
     ------
@@ -97,13 +107,32 @@ def refuse_same(flight: Flight, other: Flight) -> None:
     if flight.folder is not None and other.folder is not None:
         mine, its = checksums_of(flight.folder), checksums_of(other.folder)
         same = "detections.parquet" in mine and mine["detections.parquet"] == its.get("detections.parquet")
-    if flight.detections is not None and other.detections is not None:
-        same = same or flight.detections.equals(other.detections)
-    if same:
+    both = _as_measured(flight), _as_measured(other)
+    alike = sum((both[0] & both[1]).values())
+    if same or alike >= max(ALIKE, SHARE * min(map(Counter.total, both))):
         raise WildlabError(
-            "this is the flight that is judged: its detections are the same, and nothing is tuned where it "
-            "is judged",
+            f"this is the flight that is judged, or part of it: {alike} of its detections have the same "
+            "stamps and values, and nothing is tuned where it is judged",
             "tune on another flight",
             file=other.folder,
             field="--tune",
         )
+
+
+def _as_measured(flight: Flight) -> Counter[tuple[object, ...]]:
+    """Detections by sensor, UTC to the millisecond, and values as they were measured."""
+    seen, frames = flight.detections, flight.frames
+    if seen is None or not len(seen):
+        return Counter()
+    times = np.full(len(seen), np.nan)
+    if frames is not None and "time_s" in frames and "frame_id" in seen:
+        by_frame = frames.drop_duplicates("frame_id").set_index("frame_id")["time_s"]
+        times = seen["frame_id"].map(by_frame).to_numpy(float)
+    epoch = flight.manifest.time.epoch
+    began = epoch.timestamp() if epoch is not None else 0.0
+    # Places match only where they are counted from the same origin; ranges, bearings and pixels in any case.
+    values = np.round(seen.reindex(columns=list(_VALUES)).to_numpy(float), 6) + 0.0
+    known = np.isfinite(values).any(axis=1)
+    stamps = np.where(np.isfinite(times), np.round(began + times, 3), -1.0)
+    rows = zip(seen["source"], stamps, map(bytes, values), strict=True)
+    return Counter(row for row, good in zip(rows, known, strict=True) if good)

@@ -118,12 +118,11 @@ def cover_images(flight: Flight, source: str | None) -> tuple[Coverage | None, s
     try:
         p, R, _ = frame_poses(flight, source)
         pan, tilt = gimbal_angles(flight)
+        mount = manifest.geometry_mount(source)
     except WildlabError as error:
         return None, error.problem
     posed = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2)) & np.isfinite(pan + tilt)
-    poses = CameraPoses(
-        manifest.geometry_camera(), manifest.geometry_mount(), p[posed], R[posed], pan[posed], tilt[posed]
-    )
+    poses = CameraPoses(manifest.geometry_camera(), mount, p[posed], R[posed], pan[posed], tilt[posed])
     uv = _border(poses.camera.width, poses.camera.height)
     outlines = np.full((len(frames), len(uv), 2), np.nan)
     flat = np.zeros(len(frames), bool)

@@ -77,6 +77,8 @@ def _rays(flight: Flight, pixels: pd.DataFrame) -> Iterator[Finding]:
     terrain = flight.terrain
     frame = pd.Index(flight.table("frames")["frame_id"]).get_indexer(pd.Index(pixels["frame_id"]))
     for name, nav in flight.nav.items():
+        if flight.manifest.mount.poses not in ("", name):
+            continue  # the mount says nothing of a camera on these poses
         try:
             times = frame_times(flight)
             p, R, _ = poses_at(nav, times[frame], pixels["frame_id"])

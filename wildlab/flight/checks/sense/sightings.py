@@ -147,6 +147,8 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
     if len(chosen) < ENOUGH:
         return None
     frame, detections = frame[chosen], detections.iloc[chosen]
+    if flight.manifest.mount.poses not in ("", source):
+        return None  # the mount says nothing of a camera on these poses
     nav = flight.nav[source]
     brief = nav[[name for name in nav if name in POSE]]  # at other times without covariances: those take long
     ids = detections["frame_id"]

@@ -1,0 +1,170 @@
+"""Nothing is tuned where it is judged, what was not tuned is not said to be, and a smoother knows no more
+than its track: each held against numbers computed here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from filterpy.kalman import KalmanFilter
+
+from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from wildlab.errors import WildlabError
+from wildlab.flight.following import parse_settings
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.follow import follow_targets
+from wildlab.pipeline.following.judged import apart
+from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+
+
+def later(flight: Flight, seconds: float) -> Flight:
+    frames = flight.tables["frames"]
+    tables = flight.tables | {"frames": frames.assign(time_s=frames["time_s"] + seconds)}
+    return replace(flight, tables=tables)
+
+
+def test_tracks_smoothers_and_their_numbers_are_those_of_another_program():
+    """Tuned on one flight, judged on another: filterpy's filter and smoother, and sums written out."""
+    tuned = tune_flight(robot_flight(1, kind="position", position_sd=1.0), ["radar"], None, "innovations")
+    flight = robot_flight(2, kind="position", position_sd=1.0, name="judged")
+    followed = follow_targets(flight, tuned=tuned, smooth=True, filters=["ekf"])
+    track, back = followed.tracks
+    scans = followed.scans["radar"]
+    z, t = scans.detections[:, 0], scans.times
+    sd, q = np.array(tuned.sensors["radar"].own_sds), tuned.density**2
+    kf = KalmanFilter(4, 2)
+    kf.x, kf.P, kf.R = track.estimate[0], track.covariance[0], np.diag(sd**2)
+    kf.H = np.eye(2, 4)
+    xs, Ps, Fs, Qs, nis = [kf.x], [kf.P], [np.eye(4)], [np.zeros((4, 4))], []
+    for k in range(1, len(t)):
+        dt = t[k] - t[k - 1]
+        kf.F = np.eye(4) + dt * np.eye(4, k=2)
+        kf.Q = q * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
+        kf.predict()
+        kf.update(z[k])
+        nis.append(float(kf.y @ np.linalg.inv(kf.S) @ kf.y))
+        xs, Ps, Fs, Qs = [*xs, kf.x], [*Ps, kf.P], [*Fs, kf.F], [*Qs, kf.Q]
+    np.testing.assert_allclose(track.estimate, xs, atol=1e-7)
+    # Their smoother takes the matrices of the step from a row from that row, or from the next: the steps are
+    # equal here, and both are the same.
+    steps = slice(1, None)
+    Fs[0], Qs[0] = Fs[steps][0], Qs[steps][0]
+    smoothed, covariance, *_ = kf.rts_smoother(np.array(xs), np.array(Ps), Fs=Fs, Qs=Qs)
+    np.testing.assert_allclose(back.estimate, smoothed, atol=1e-6)
+    np.testing.assert_allclose(back.covariance, covariance, atol=1e-6)
+    rows = rows_of(followed)
+    truth = np.column_stack([80 + 0.8 * t, 40 + 25 * np.sin(t / 25)])
+    for name, x, P in (("ekf", np.array(xs), np.array(Ps)), ("ekf-smoothed", smoothed, covariance)):
+        e = truth - x[:, :2]
+        shown = rows.loc[name]
+        assert shown["rmse"] == pytest.approx(np.sqrt((e**2).sum(axis=1).mean()), rel=1e-3)
+        with_truth = P[:, :2, :2] + 0.05**2 * np.eye(2)
+        nees = np.einsum("ni,nij,nj->n", e, np.linalg.inv(with_truth), e)
+        assert shown["nees"] == pytest.approx(nees.mean(), rel=0.02)
+    assert rows.loc["ekf", "nis"] == pytest.approx(np.mean(nis), rel=1e-6)
+    # A smoother is never fed to NIS or to whiteness.
+    assert np.isnan(rows.loc["ekf-smoothed", "nis"]) and rows.loc["ekf-smoothed", "detections"] == 0
+    assert np.isnan(back.nis).all() and np.isnan(back.innovation).all() and np.isnan(back.S).all()
+
+
+def test_innovations_are_likeliest_at_what_was_tuned():
+    flight = robot_flight(1, kind="position", position_sd=1.0)
+    tuned = tune_flight(flight, ["radar"], None, "innovations")
+    scans = follow_targets(flight, tuned=tuned).scans["radar"]
+    z, t = scans.detections[:, 0], scans.times
+
+    def minus_log_likelihood(density: float, sd: np.ndarray) -> float:
+        x, P = np.array([*z[0], 0.0, 0.0]), np.diag([*sd**2, 25.0, 25.0])
+        total, H = 0.0, np.eye(2, 4)
+        for k in range(1, len(t)):
+            dt = t[k] - t[k - 1]
+            F = np.eye(4) + dt * np.eye(4, k=2)
+            Q = density**2 * np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.eye(2))
+            x, P = F @ x, F @ P @ F.T + Q
+            S = H @ P @ H.T + np.diag(sd**2)
+            y, K = z[k] - x[:2], P @ H.T @ np.linalg.inv(S)
+            x, P = x + K @ y, P - K @ H @ P
+            total += (y @ np.linalg.solve(S, y) + np.log(np.linalg.det(S))) / 2
+        return total
+
+    sd, density = np.array(tuned.sensors["radar"].own_sds), tuned.density
+    best = minus_log_likelihood(density, sd)
+    for by in (0.7, 1.4):
+        assert minus_log_likelihood(by * density, sd) > best - 0.1
+        assert minus_log_likelihood(density, by * sd) > best - 0.1
+
+
+def test_part_of_the_flight_that_is_judged_teaches_nothing():
+    flight = robot_flight(1)
+    seen = flight.tables["detections"]
+    part = replace(flight, tables=flight.tables | {"detections": seen.iloc[20:90].assign(target_id="x")})
+    with pytest.raises(WildlabError, match="70 of its detections have the same stamps") as caught:
+        refuse_same(flight, part)
+    assert caught.value.field == "--tune" and "another flight" in caught.value.fix
+    refuse_same(flight, robot_flight(2))
+
+
+def test_a_clock_that_nothing_tells_of_is_not_said_to_be_tuned():
+    other = robot_flight(2, name="other")
+    by_truth = tune_flight(robot_flight(1), ["radar"])
+    by_innovations = tune_flight(robot_flight(1), ["radar"], None, "innovations")
+    assert by_truth.sensors["radar"].clock_tuned
+    for tuned, said in ((by_truth, True), (by_innovations, False)):
+        told = follow_targets(other, tuned=read_tuned(tuned_text(tuned))).said
+        assert any(one.what == "to be added to its stamps" for one in told) is said
+
+
+def test_a_clock_further_off_than_is_looked_is_refused_and_not_tuned_at_the_edge():
+    for off in (3.0, -6.0):
+        with pytest.raises(WildlabError, match="further is not looked") as caught:
+            tune_flight(later(robot_flight(1, kind="position"), -off), ["radar"])
+        assert "wildlab check" in caught.value.fix
+    assert tune_flight(later(robot_flight(1, kind="position"), 1.0), ["radar"]).sensors[
+        "radar"
+    ].offset_s == pytest.approx(-1.0, abs=0.3)
+
+
+def test_a_stated_clock_holds_while_innovations_are_tuned():
+    stated = parse_settings("[sensors.radar]\nclock_offset_s = 2.0\n")
+    right = tune_flight(robot_flight(1), ["radar"], None, "innovations")
+    moved = tune_flight(later(robot_flight(1), -2.0), ["radar"], stated, "innovations")
+    assert moved.sensors["radar"].sds == pytest.approx(right.sensors["radar"].sds, rel=0.02)
+
+
+def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_track():
+    whole = robot_flight(3, kind="position", labelled=False, truth=False)
+    stamps = whole.tables["frames"].set_index("frame_id")["time_s"]
+    seen = whole.tables["detections"]
+    at = seen["frame_id"].map(stamps)
+    torn = replace(whole, tables=whole.tables | {"detections": seen[(at < 50) | (at > 90)]})
+    short = replace(whole, tables=whole.tables | {"detections": seen[at < 50]})
+    settings = parse_settings("[targets]\npatience_s = 10.0\ngate_probability = 1.0\n")
+    followed = [follow_targets(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
+    one, two = (each.tracks[1] for each in followed)
+    assert one.filter == "ekf-smoothed" and np.isfinite(one.estimate[:, 0]).sum() > 60
+    known = np.isfinite(two.estimate[:, 0])
+    np.testing.assert_allclose(one.estimate[: len(known)][known], two.estimate[known])
+
+
+def test_filters_without_a_smoother_are_named():
+    followed = follow_targets(robot_flight(1, kind="position"), smooth=True, filters=["imm", "ukf"])
+    assert [one for one in followed.notes if "not smoothed" in one] == [
+        "The filter 'imm' of radar was not smoothed: it has no smoother."
+    ]
+
+
+def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
+    """Both sensors are right, and one looks every five seconds: the mean square is near two."""
+    fast = robot_flight(1, kind="position", position_sd=0.5, rate_hz=2.0, seconds=400, sensor="fast")
+    slow = robot_flight(2, kind="position", position_sd=0.5, rate_hz=0.2, seconds=400, sensor="slow")
+    tables = {name: pd.concat([fast.tables[name], slow.tables[name]]) for name in ("frames", "detections")}
+    both = replace(fast, tables=fast.tables | tables)
+    settings = parse_settings(
+        KNOWN.split("[targets]")[0].replace("radar", "none")
+        + "[sensors.fast.noise]\nposition_m = 0.5\n[sensors.slow.noise]\nposition_m = 0.5\n"
+        + "[targets]\nacceleration_m_s_sqrt_s = 0.15\nstart_speed_m_s = 1.0\n"
+    )
+    (pair,) = apart(follow_targets(both, settings=settings, smooth=True, filters=["ekf"]))
+    assert pair.filter == "ekf" and pair.squares.mean < 2.6
