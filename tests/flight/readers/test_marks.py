@@ -82,6 +82,14 @@ def test_geojson_gives_its_points_above_the_ellipsoid() -> None:
         ("station,LATITUDE,LONGITUDE,orthometric_height", ",", "height_sea_m"),
         ("Punkt;Breite;Laenge;height_sea_m", ";", "height_sea_m"),
         ("marker,lat,lon,elevation_egm96", ",", "height_sea_m"),
+        ("Name;Breite;Länge;Höhe NHN (m)", ";", "height_sea_m"),
+        ("Punktname;geogr. Breite;geogr. Länge;Ellipsoidhöhe", ";", "height_ellipsoid_m"),
+        ("Nom;Latitude;Longitude;Hauteur ellipsoïdale (m)", ";", "height_ellipsoid_m"),
+        ("Repère;Latitude;Longitude;Altitude NGF", ";", "height_sea_m"),
+        ("Nombre;Latitud;Longitud;Altura elipsoidal", ";", "height_ellipsoid_m"),
+        ("Punto;Latitud;Longitud;Elevación sobre el mar", ";", "height_sea_m"),
+        ("Navn;Breddegrad;Lengdegrad;Høyde NN2000", ";", "height_sea_m"),
+        ("Namn;Latitud;Längdgrad;Höjd RH2000", ";", "height_sea_m"),
     ],
 )
 def test_tables_under_many_names(header: str, sign: str, height: str) -> None:
@@ -111,14 +119,30 @@ def test_order_comments_and_spreads_of_a_table() -> None:
         ("name,lat,lon,altitude", "'altitude' does not say", "height_ellipsoid or height_sea"),
         ("name,lat,lon,note", "no column of heights", "height_ellipsoid or height_sea"),
         ("name,northing,easting,h", "eastings and northings", "latitude and longitude, in degrees"),
+        ("Name;Breite;Länge;Höhe", "'Höhe' does not say what its heights", "height_ellipsoid or height_sea"),
+        ("Punkt;Rechtswert;Hochwert;Höhe NHN", "eastings and northings", "which projection they are of"),
+        ("Name;X;Y;Höhe NHN", "no latitude and longitude: Name, X, Y, Höhe NHN", "latitude and longitude"),
         ("name,a,b,c", "no latitude and longitude", "latitude and longitude, in degrees"),
     ],
 )
 def test_a_table_that_does_not_say_enough(header: str, problem: str, fix: str) -> None:
     with pytest.raises(WildlabError) as error:
-        marks_csv.read(HERE, table(POINTS, header))
+        marks_csv.read(HERE, table(POINTS, header, ";" if ";" in header else ","))
     assert problem in error.value.problem
     assert fix in error.value.fix
+
+
+def test_a_table_of_metres_is_known_to_be_refused_and_others_are_not_taken() -> None:
+    for header in ("Punkt;Rechtswert;Hochwert;H", "name;Easting (m);Northing (m);h"):
+        assert marks_csv.recognise(table(POINTS, header, ";"), "x")
+    for header in ("Name;X;Y;Z", "a;b;c;d", "time;easting;northing;name"):
+        assert not marks_csv.recognise(table(POINTS, header, ";"), "x")
+
+
+def test_a_table_of_latin_1_has_its_umlauts() -> None:
+    data = table(POINTS, "Name;Breite;Länge;Höhe NHN", ";").decode().encode("latin-1")
+    assert marks_csv.recognise(data, "x")
+    check_points(marks_csv.read(HERE, data), "height_sea_m")
 
 
 def test_a_table_over_time_is_no_marks() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -17,53 +18,18 @@ from wildlab.flight.readers.marks.text_table import (
     said_of_short,
     to_number,
 )
+from wildlab.paths import DATA
 
-#: Names of columns, as `plain` has them, with and without their unit at the end.
-NAMES = (
-    *("name", "id", "point", "point_id", "point_name", "mark", "marker", "target", "target_id", "label"),
-    *("station", "code", "number", "no", "nr", "gcp", "gcp_name", "punkt", "nom", "nombre", "navn"),
-)
-LATITUDES = (
-    "latitude",
-    "lat",
-    "breite",
-    "breitengrad",
-    "breddegrad",
-    "latitud",
-    "wgs84_lat",
-    "gps_lat",
-)
-LONGITUDES = (
-    *("longitude", "lon", "long", "lng", "laenge", "laengengrad", "lengdegrad", "longitud", "wgs84_lon"),
-    *("gps_lon", "gps_long"),
-)
+#: Headings by what they mean, as `plain` has them: data/headings.toml.
+HEADINGS: dict[str, list[str]] = tomllib.loads((DATA / "headings.toml").read_text("utf-8"))
+NAMES, LATITUDES, LONGITUDES = (tuple(HEADINGS[one]) for one in ("name", "latitude", "longitude"))
 #: Words in a height's name, and what it then counts from.
-ELLIPSOID = frozenset({"ellipsoid", "ellipsoidal", "ell", "ellips", "hae", "hell", "wgs84"})
-SEA = frozenset(
-    {"sea", "msl", "amsl", "asl", "orthometric", "geoid", "egm96", "egm2008", "nn2000", "nhn", "navd88"}
-)
-HIGH = frozenset(
-    {
-        "height",
-        "h",
-        "alt",
-        "altitude",
-        "elev",
-        "elevation",
-        "z",
-        "hoehe",
-        "hoyde",
-        "altura",
-        "hae",
-        "hell",
-        "msl",
-    }
-)
+ELLIPSOID, SEA, HIGH = (frozenset(HEADINGS[one]) for one in ("ellipsoid", "sea", "height"))
+METRES = frozenset(HEADINGS["metres"])
 #: What a table of marks has none of: it is over time.
 TIMES = frozenset(
     {"time", "date", "datetime", "timestamp", "stamp", "utc", "gpst", "tow", "epoch", "millisecond"}
 )
-METRES = frozenset({"easting", "northing", "east", "north", "utm_e", "utm_n", "rechtswert", "hochwert"})
 _DEG = ("", "_deg", "_degrees", "_dd", "_wgs84", "_decimal", "_decimal_degrees", "_decimaldegree")
 
 
@@ -77,10 +43,20 @@ def _over_time(names: list[str]) -> bool:
 
 
 def recognise(head: bytes, name: str) -> bool:
-    """Whether a file is a table with latitudes and longitudes and without times."""
+    """Whether a file is a table without times that has latitudes and longitudes, or names points and has
+    metres of a projection, which `read` refuses with what to do."""
     names = header_of(head)
     places = _find(names, LATITUDES) is not None and _find(names, LONGITUDES) is not None
-    return places and not _over_time(names)
+    return (places or _projected(names)) and not _over_time(names)
+
+
+def _projected(names: list[str]) -> bool:
+    """Whether points have names and two coordinates in metres; nothing says which projection they are of."""
+    return len(METRES & {_bare(one) for one in names}) == 2 and bool(set(NAMES) & set(names))
+
+
+def _bare(name: str) -> str:
+    return name.removesuffix("_m")
 
 
 def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
@@ -96,16 +72,15 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     there = printable(", ".join(table.header[:12]))[:200]
     north, east = _find(names, LATITUDES), _find(names, LONGITUDES)
     if north is None or east is None:
-        metres = METRES & set(names)
-        problem = (
-            f"has eastings and northings and no degrees: {there}"
-            if metres
-            else f"has no latitude and longitude: {there}"
-        )
-        raise WildlabError(
-            problem, "name two columns latitude and longitude, in degrees of WGS 84", file=path
-        )
-    high, kind = _height(names, {north, east}, path, there)
+        fix = "name two columns latitude and longitude, in degrees of WGS 84"
+        if METRES & {_bare(one) for one in names}:
+            raise WildlabError(
+                f"has eastings and northings and no degrees: {there}",
+                f"convert them (nothing here says which projection they are of), and {fix}",
+                file=path,
+            )
+        raise WildlabError(f"has no latitude and longitude: {there}", fix, file=path)
+    high, kind = _height(names, table.header, {north, east}, path, there)
 
     def values(column: int) -> list[float]:
         return [to_number(row[column], table.comma) for row in table.rows]
@@ -128,7 +103,7 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
     return marks_log("marks-csv", part, said_of_short(table), notes)
 
 
-def _height(names: list[str], others: set[int], path: Path, there: str) -> tuple[int, str]:
+def _height(names: list[str], header: list[str], others: set[int], path: Path, there: str) -> tuple[int, str]:
     """Column of the heights, and the one of the part that they belong to."""
     words = {at: set(name.split("_")) for at, name in enumerate(names) if at not in others}
     for at, own in words.items():
@@ -137,7 +112,7 @@ def _height(names: list[str], others: set[int], path: Path, there: str) -> tuple
     for at, own in words.items():
         if own & SEA and own & (HIGH | SEA):
             return at, "height_sea_m"
-    plain_one = next((names[at] for at, own in words.items() if own & HIGH), None)
+    plain_one = next((printable(header[at]) for at, own in words.items() if own & HIGH), None)
     raise WildlabError(
         f"the column {plain_one!r} does not say what its heights count from, as height_ellipsoid does"
         if plain_one

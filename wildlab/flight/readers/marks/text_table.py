@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+import unicodedata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from wildlab.errors import WildlabError
 MOST_ROWS, MOST_COLUMNS, MOST_LETTERS = 1_000_000, 200, 200
 #: A number with digits before or after the point.
 _NUMBER = re.compile(r"[+-]?(?:\d{1,20}(?:\.\d{0,20})?|\.\d{1,20})(?:[eE][+-]?\d{1,3})?")
+_FOLDED = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "å": "aa", "ß": "ss", "ø": "o", "æ": "ae"})
 
 
 class TextTable(NamedTuple):
@@ -42,8 +44,17 @@ class TextTable(NamedTuple):
 
 
 def plain(name: str) -> str:
-    """A column's name as people vary it: ``Latitude [deg]`` is ``latitude_deg``, ``hEll`` is ``hell``."""
-    return re.sub(r"[^a-z0-9]+", "_", name.strip().lower()).strip("_")
+    """A column's name as people vary it: ``Latitude [deg]`` is ``latitude_deg``, ``hEll`` is ``hell``; letters
+    of other languages are written with those of English.
+
+    Examples
+    --------
+    >>> plain("Länge (°)"), plain("HØYDE"), plain("Repère"), plain("Höjd")
+    ('laenge', 'hoyde', 'repere', 'hoejd')
+    """
+    folded = unicodedata.normalize("NFC", name.strip()).lower().translate(_FOLDED)
+    bare = "".join(one for one in unicodedata.normalize("NFD", folded) if not unicodedata.combining(one))
+    return re.sub(r"[^a-z0-9]+", "_", bare).strip("_")
 
 
 def header_of(head: bytes) -> list[str]:
