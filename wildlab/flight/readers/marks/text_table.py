@@ -44,8 +44,8 @@ class TextTable(NamedTuple):
 
 
 def plain(name: str) -> str:
-    """A column's name as people vary it: ``Latitude [deg]`` is ``latitude_deg``, ``hEll`` is ``hell``; letters
-    of other languages are written with those of English.
+    """A column's name as people vary it: ``Latitude [deg]`` is ``latitude_deg``, ``hEll`` is ``hell``;
+    letters of other languages are written with those of English.
 
     Examples
     --------
