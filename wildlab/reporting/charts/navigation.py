@@ -17,6 +17,7 @@ from wildlab.reporting.figures import (
     BLUE,
     GREEN,
     GREY,
+    INK,
     PURPLE,
     VERMILLION,
     colour,
@@ -67,16 +68,21 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
     labels = list(next(iter(sources.values()))[1])
     fig, axes = new_figure(5.9, 1.5 * len(labels) + 0.1, rows=len(labels), sharex=True)
     for ax, label in zip(axes, labels, strict=True):
-        for name, (times, quantities) in sources.items():
+        for width, (name, (times, quantities)) in zip(_widths(len(sources)), sources.items(), strict=True):
             y = np.array(quantities[label], float)
             y[1:][np.abs(np.diff(y)) > 180] = np.nan
-            ax.plot(times, y, lw=1.0, color=colour(name), label=NAMES.get(name, name))
+            ax.plot(times, y, lw=width, color=colour(name), label=NAMES.get(name, name))
         ax.set_ylabel(label)
     if len(sources) > 1:
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
     axes[0].set_title(title)
     axes[-1].set_xlabel("time (s)")
     return fig
+
+
+def _widths(count: int) -> Array:
+    """Widths of lines that lie on one another: the first is the widest, so that each later one shows it."""
+    return np.linspace(1.0 + 0.9 * (count - 1), 1.0, count)
 
 
 def error_bands(
@@ -107,15 +113,24 @@ def error_bands(
     keep = thinned(len(t))
     for i, (ax, label) in enumerate(zip(axes, labels, strict=True)):
         reach = 0.0
+        shown = {name: np.asarray(error, float)[keep, i] for name, error in errors.items()}
+        # What scatters most is drawn first, and the bands over all: nothing hides what is narrower.
+        order = sorted(
+            shown, key=lambda name: -np.nanstd(shown[name]) if np.isfinite(shown[name]).any() else 0
+        )
+        for level, name in enumerate(order):
+            e = shown[name]
+            ax.plot(
+                t[keep], e, lw=0.9, color=colour(name), label=NAMES.get(name, name), zorder=2 + 0.1 * level
+            )
+            reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
         for name, stated in bounds.items():
             two = 2 * np.asarray(stated, float)[keep, i]
             two_of = f"two SD of the {NAMES.get(name, name)}"
-            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.25, lw=0, label=two_of)
+            ax.fill_between(t[keep], -two, two, color=colour(name), alpha=0.2, lw=0, label=two_of, zorder=3)
+            for edge in (-two, two):
+                ax.plot(t[keep], edge, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=3.1)
             reach = max(reach, float(np.nanmax(two, initial=0.0)))
-        for name, error in errors.items():
-            e = np.asarray(error, float)[keep, i]
-            ax.plot(t[keep], e, lw=0.9, color=colour(name), label=NAMES.get(name, name))
-            reach = max(reach, float(np.nanmax(np.abs(e), initial=0.0)))
         ax.axhline(0, color=GREY, lw=0.6)
         if reach > 0:
             ax.set_ylim(*(np.array([-1.05, 1.05]) * min(reach, largest or reach)))
@@ -170,7 +185,7 @@ def bias_chart(times: ArrayLike, biases: ArrayLike, sd: ArrayLike, title: str) -
         for i, (name, color) in enumerate(zip(("forward", "right", "down"), LINES, strict=True)):
             b, s = (scale * np.asarray(a, float)[keep, first + i] for a in (biases, sd))
             ax.plot(t[keep], b, color=color, lw=1.1, label=name)
-            ax.fill_between(t[keep], b - 2 * s, b + 2 * s, color=color, alpha=0.15, lw=0)
+            ax.fill_between(t[keep], b - 2 * s, b + 2 * s, color=color, alpha=0.15, lw=0, zorder=3)
             late = slice(len(b) // 10, None)
             reach = max(reach, float(np.nanmax(np.abs(b[late]) + 2 * s[late], initial=0.0)))
         ax.set_ylim(-1.1 * reach, 1.1 * reach)

@@ -280,6 +280,8 @@ def _mark_start(ax: Axes, way: Array) -> None:
     """A dot where a way (N, 2 or more) begins, and its name on the side that the way turns away from."""
     north, east = way[0, 0], way[0, 1]
     northward = way[-1, 0] > north
+    # Room for the name between the dot and the title.
+    ax.margins(0.1)
     ax.plot(east, north, "o", color=colour("truth"), ms=5)
     ax.annotate(
         "start",

@@ -9,6 +9,7 @@ import pandas as pd
 
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array
 from wildlab.pipeline.navigate import likelihoods_of_latency
 from wildlab.pipeline.navigation_errors import (
     AXES,
@@ -23,6 +24,7 @@ from wildlab.pipeline.navigation_errors import (
 )
 from wildlab.pipeline.navigation_inputs import heading_from
 from wildlab.reporting.charts.navigation import (
+    Strips,
     bias_chart,
     correlation_strips,
     deviation_chart,
@@ -34,6 +36,7 @@ from wildlab.reporting.charts.navigation import (
     velocities_of,
 )
 from wildlab.reporting.report import Report
+from wildlab.reporting.text import percent
 
 WORDS = {
     "mekf": "MEKF, noise as stated",
@@ -113,14 +116,14 @@ def show_flight(report: Report, studied: Studied, window: tuple[float, float], f
     )
     _, velocity = poses_between(moving, *window)
     report.figure(
-        strips(attitude, "Attitude"),
+        strips(attitude, f"Rolls by up to {_most(attitude['mekf'], 'roll (°)'):.0f}°"),
         name=f"fig-7-{figures}",
         alt=f"Roll, pitch and yaw over time by {', '.join(nav)}.",
         caption=f"Roll, pitch and yaw, {window[0]:.0f} to {window[1]:.0f} s. Counterpart of H figures 5.3a "
         f"and 7.{figures}.",
     )
     report.figure(
-        strips(velocity, "Velocity over ground"),
+        strips(velocity, f"Climbs or sinks by up to {_most(velocity['mekf'], 'down (m/s)'):.1f} m/s"),
         name=f"fig-7-{figures + 1}",
         alt=f"Velocity north, east and down over time by {', '.join(moving)}.",
         caption=f"Velocity over the same time. Counterpart of H figures 5.3b and 7.{figures + 1}.",
@@ -135,25 +138,38 @@ def show_flight(report: Report, studied: Studied, window: tuple[float, float], f
     )
 
 
+def _most(shown: Strips, label: str) -> float:
+    """The largest size of a quantity of `poses_between`."""
+    return float(np.nanmax(np.abs(np.asarray(shown[1][label], float))))
+
+
+def _inside(errors: Array, stated: Array) -> str:
+    """The share of errors that are within two stated standard deviations; (K, 3) both."""
+    known = np.isfinite(errors) & np.isfinite(stated)
+    return percent(float((np.abs(errors) <= 2 * stated)[known].mean()), 0)
+
+
 def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
     """Attitude and velocity against the reference, with the bounds that the filter states of itself."""
     late = (studied.times >= window[0]) & (studied.times < window[1])
     of = {"mekf": studied.scored[studied.filter], "observer": studied.scored["observer"]}
     whom = "the truth" if has_truth(studied) else "the one found on board"
     turns = {who: np.degrees(e.error[late, 6:]) for who, e in of.items()}
+    stated = np.degrees(of["mekf"].sd[late, 6:])
     report.figure(
         error_bands(
             studied.times[late],
             turns,
-            {"mekf": np.degrees(of["mekf"].sd[late, 6:])},
+            {"mekf": stated},
             _TURNS,
-            f"Attitude against {whom}",
+            f"{_inside(turns['mekf'], stated)} of the angles are within two SD of {whom}",
             largest=3 * float(np.nanquantile(np.abs(turns["observer"]), 0.95)),
         ),
         name="attitude-errors",
         alt="Differences of roll, pitch and yaw over time by filter and observer, with two deviations.",
         caption="Rotation from the estimate to the reference about the axes of the body; shaded: two "
         f"deviations. Counterpart of H figure 7.{figures + 2}, with {whom} in place of the autopilot.",
+        main=True,
     )
     if np.isfinite(of["mekf"].error[late, 3:6]).any():
         report.figure(
@@ -162,7 +178,8 @@ def show_errors(report: Report, studied: Studied, window: tuple[float, float], f
                 {who: e.error[late, 3:6] for who, e in of.items()},
                 {"mekf": of["mekf"].sd[late, 3:6]},
                 _SPEEDS,
-                f"Velocity against {whom}",
+                f"{_inside(of['mekf'].error[late, 3:6], of['mekf'].sd[late, 3:6])} of the velocities are "
+                f"within two SD of {whom}",
             ),
             name="velocity-errors",
             alt="Differences of velocity over time by filter and observer, and two standard deviations.",
