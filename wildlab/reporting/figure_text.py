@@ -15,6 +15,10 @@ from matplotlib.text import Annotation, Text
 FULL_SIZE, LEAST_SIZE = 128, 80
 #: CSS pixels that the smallest letters of a figure have on a phone; where they do not fit, it scrolls.
 LEAST_TEXT = 11.0
+#: A share of the figure that a title has at least, and where it begins to have it, pixels from the edge.
+_NARROWEST, _EDGE = 0.7, 8.0
+#: Letters that a line of a title has at least.
+_FEWEST = 10
 #: What stands beside a title, points.
 _BESIDE = 60.0
 #: What marks a line's name at its end.
@@ -119,7 +123,7 @@ def _place(place: str, outside: str | None) -> str:
 
 
 def fit_titles(figure: Figure) -> None:
-    """Break titles that are wider than their place onto more lines; they come out of data, too.
+    """Break titles and names of axes that are wider than their place onto more lines; they hold data, too.
 
     Parameters
     ----------
@@ -127,23 +131,40 @@ def fit_titles(figure: Figure) -> None:
         With everything on it. A title may go on to the figure's edge, or, where another panel stands to the
         right, to the end of its own.
     """
-    long = [
-        (axes, title)
-        for axes in figure.get_axes()
-        for where in ("left", "center", "right")
-        if (title := axes.title if where == "center" else getattr(axes, f"_{where}_title")).get_text()
-        and len(title.get_text()) * _NARROW * title.get_fontsize()
-        > 72 * figure.get_size_inches()[0] / _columns(axes) - _BESIDE
-    ]
-    for axes, title in long:
-        figure.draw_without_rendering()
-        box = title.get_window_extent()
-        beside = _columns(axes) > 1
-        end = axes.get_window_extent().x1 if beside else figure.bbox.x1 - 4
-        room = end - (box.x0 if title.get_horizontalalignment() == "left" else figure.bbox.x0)
-        if box.width > room:
-            letters = max(12, int(len(title.get_text()) * room / box.width))
-            title.set_text("\n".join(textwrap.wrap(title.get_text(), letters)))
+    wide = 72 * figure.get_size_inches()[0]
+    long: list[tuple[Axes, Text]] = []
+    for axes in figure.get_axes():
+        for text in (axes.title, axes._left_title, axes._right_title, axes.xaxis.label):  # type: ignore[attr-defined]
+            longest = max(map(len, text.get_text().split("\n")))
+            if longest * _NARROW * text.get_fontsize() > wide / _columns(axes) - _BESIDE:
+                long.append((axes, text))
+    if not long:
+        return
+    for _, text in long:
+        text.set_in_layout(False)  # else the axes shrink to make room for them
+    figure.draw_without_rendering()
+    for axes, text in long:
+        panel, edge = axes.get_window_extent(), figure.bbox.x1 - 4
+        if text.get_horizontalalignment() == "left":
+            room = (panel.x1 if _columns(axes) > 1 else edge) - panel.x0
+            if _columns(axes) == 1 and room < _NARROWEST * figure.bbox.width:
+                # Beside long names on the axis: the title goes over them.
+                text.set_x((_EDGE - panel.x0) / panel.width)
+                room = edge - _EDGE
+        else:
+            middle = (panel.x0 + panel.x1) / 2
+            room = panel.width if _columns(axes) > 1 else 2 * min(middle, edge - middle)
+        _break(text, room)
+        text.set_in_layout(True)
+
+
+def _break(text: Text, room: float) -> None:
+    """Set a text on as many lines as it needs to be no wider than ``room``, pixels."""
+    words = text.get_text()
+    letters = max(map(len, words.split("\n")))
+    while text.get_window_extent().width > room and letters > _FEWEST:
+        letters -= 1
+        text.set_text("\n".join(textwrap.wrap(words, letters, break_long_words=False)))
 
 
 def _columns(axes: Axes) -> int:

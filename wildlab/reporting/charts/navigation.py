@@ -161,7 +161,9 @@ def deviation_chart(
             if printed is not None:
                 ax.axhline(printed[first + i], color=color, lw=1.0, ls=(0, (4, 3)), alpha=0.8)
         ax.set_yscale("log")
-        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        low, high = ax.get_ylim()
+        # Over more than a decade and a half, labels in between would lie on one another.
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
         ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         ax.yaxis.set_minor_formatter(NullFormatter())
         ax.set_ylabel(f"SD ({unit})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 
 import numpy as np
 import pandas as pd
@@ -55,7 +56,7 @@ def rates_shown(outcomes: Mapping[str, Outcome], published: Mapping[str, float])
         at[: len(FORMS)], [published[form] for form in FORMS], yerr=2 * spread / np.sqrt(PRINTED_RUNS),
         fmt="D", mfc="white", mec=INK, ecolor=INK, ms=8, capsize=3, label="published",
     )  # fmt: skip
-    ax.set_xticks(at, [NAMES[gate].replace(" and ", "\nand ") for gate in GATES])
+    ax.set_xticks(at, [fill(NAMES[gate], 11) for gate in GATES])
     ax.set(xlim=(-0.5, len(GATES) - 0.5), ylabel="right associations (%)")
     rates = outcomes[DEFAULT].rate
     ax.set_title(words.rates_title(rates))
