@@ -141,9 +141,10 @@ def fit_titles(figure: Figure) -> None:
     if not long:
         return
     for _, text in long:
-        text.set_in_layout(False)  # else the axes shrink to make room for them
+        text.set_visible(False)  # else the axes shrink to make room for their middle
     figure.draw_without_rendering()
     for axes, text in long:
+        text.set_visible(True)
         panel, edge = axes.get_window_extent(), figure.bbox.x1 - 4
         if text.get_horizontalalignment() == "left":
             room = (panel.x1 if _columns(axes) > 1 else edge) - panel.x0
@@ -155,7 +156,6 @@ def fit_titles(figure: Figure) -> None:
             middle = (panel.x0 + panel.x1) / 2
             room = panel.width if _columns(axes) > 1 else 2 * min(middle, edge - middle)
         _break(text, room)
-        text.set_in_layout(True)
 
 
 def _break(text: Text, room: float) -> None:
