@@ -10,11 +10,11 @@ from typing import cast
 from wildlab.errors import WildlabError, system_error
 from wildlab.sharing.scan.findings import MOST_OF_A_KIND, Finding, Kind
 from wildlab.sharing.scan.hits import Hit
+from wildlab.sharing.scan.inside.kinds import unpacked
 from wildlab.sharing.scan.look import Look, excerpt
 from wildlab.sharing.scan.parts import Budget, Part
 from wildlab.sharing.scan.secrets import Secrets
 from wildlab.sharing.scan.texts import is_text, texts_of
-from wildlab.sharing.scan.inside.kinds import unpacked
 from wildlab.sharing.scan.words import needles_of
 
 

@@ -12,6 +12,21 @@ class TooMuch(Exception):
     """It unpacks to more than may be unpacked."""
 
 
+#: What compressed streams and archives begin with.
+_PACKED = (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18", b"\x78\x9c")
+
+
+def begins_packed(data: bytes) -> bool:
+    """Whether bytes, however few, are to be unpacked.
+
+    Parameters
+    ----------
+    data
+        From the beginning.
+    """
+    return data.startswith(_PACKED)
+
+
 @dataclass(frozen=True)
 class Part:
     """Something out of a file.

@@ -17,7 +17,7 @@ import pyarrow.compute
 import pyarrow.ipc
 import pyarrow.parquet
 
-from wildlab.sharing.scan.parts import Budget, Part, TooMuch
+from wildlab.sharing.scan.parts import Budget, Part, TooMuch, begins_packed
 from wildlab.sharing.scan.secrets import Array
 
 # pyarrow carries no types.
@@ -26,7 +26,7 @@ compute: Any = pyarrow.compute
 
 #: Rows read at once.
 ROWS = 200_000
-#: Cells longer than this are files of their own.
+#: Cells at least as long as this may be files of their own.
 LARGE = 64
 #: Steps of SQLite's machine: a view that never ends is stopped.
 MOST_STEPS = 200_000_000
@@ -91,10 +91,15 @@ def table_parts(where: str, table: Any, budget: Budget) -> Iterator[Part]:
         raise TooMuch
     text = "\n".join(texts).encode("utf-8", "replace")
     yield Part(where, budget.spend(text), columns=tuple(columns), moments=tuple(moments))
-    small = [blob for blob in blobs if len(blob) < LARGE]
-    if small:
-        yield Part(f"{where}, short cells", budget.spend(b"\n\n".join(small)), whole=True)
-    for number, blob in enumerate(blob for blob in blobs if len(blob) >= LARGE):
+    yield from _cells(where, blobs, budget)
+
+
+def _cells(where: str, blobs: list[bytes], budget: Budget) -> Iterator[Part]:
+    """Cells of bytes: all at once, and those that may be files each for itself."""
+    if blobs:
+        yield Part(f"{where}, cells", budget.spend(b"\n\n".join(blobs)), whole=True)
+    own = (blob for blob in blobs if len(blob) >= LARGE or begins_packed(blob))
+    for number, blob in enumerate(own):
         yield Part(f"{where}, cell {number + 1}", budget.spend(blob))
 
 
@@ -204,10 +209,7 @@ def _rows(where: str, names: list[str], rows: list[Any], budget: Budget) -> Iter
             if isinstance(cell, bytes):
                 (blobs if len(cell) >= LARGE or not cell.isascii() else texts).append(cell)
     yield Part(where, budget.spend(b"\n".join(texts)), columns=tuple(columns))
-    if blobs:
-        yield Part(f"{where}, cells", budget.spend(b"\n\n".join(blobs)), whole=True)
-    for number, blob in enumerate(blob for blob in blobs if len(blob) >= LARGE):
-        yield Part(f"{where}, cell {number + 1}", budget.spend(blob))
+    yield from _cells(where, blobs, budget)
 
 
 def recording(data: bytes, budget: Budget) -> Iterator[Part]:

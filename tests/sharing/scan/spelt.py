@@ -1,0 +1,138 @@
+"""A place written in every way that is looked for; grids by pyproj, everything else written out here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+import numpy as np
+from pyproj import Transformer
+
+from wildlab.sharing.scan import Secrets
+
+#: Somewhere in the north of the Baltic Sea, and on both sides of the other hemispheres.
+LATITUDE, LONGITUDE, HEIGHT = 63.417982, 10.391237, 152.738
+WHEN = datetime(2023, 5, 17, 6, 42, 19, tzinfo=UTC)
+NAME = "Vesle Trollholmen"
+NUMBER = 40.8217
+
+
+def secrets(latitude: float = LATITUDE, longitude: float = LONGITUDE) -> Secrets:
+    return Secrets(
+        places=np.array([[latitude, longitude, HEIGHT]]), words=(NAME,), moments=(WHEN,), numbers=(NUMBER,)
+    )
+
+
+def sexagesimal(angle: float, digits: int) -> tuple[int, int, str]:
+    """Degrees, minutes, and seconds as text, rounded together."""
+    units = round(abs(angle) * 3600 * 10**digits)
+    whole, seconds = divmod(units, 60 * 10**digits)
+    text = f"{seconds / 10**digits:0{digits + 3 if digits else 2}.{digits}f}"
+    return whole // 60, whole % 60, text
+
+
+def minutes(angle: float, digits: int) -> tuple[int, str]:
+    units = round(abs(angle) * 60 * 10**digits)
+    whole, rest = divmod(units, 60 * 10**digits)
+    return whole, f"{rest / 10**digits:0{digits + 3}.{digits}f}"
+
+
+def _ns(latitude: float) -> str:
+    return "N" if latitude >= 0 else "S"
+
+
+def _ew(longitude: float) -> str:
+    return "E" if longitude >= 0 else "W"
+
+
+def utm(latitude: float, longitude: float) -> tuple[int, float, float]:
+    zone = int((longitude + 180) // 6) + 1
+    code = (32600 if latitude >= 0 else 32700) + zone
+    east, north = Transformer.from_crs(4326, code, always_xy=True).transform(longitude, latitude)
+    return zone, east, north
+
+
+def ecef(latitude: float, longitude: float) -> tuple[float, float, float]:
+    found = Transformer.from_crs(4979, 4978, always_xy=True).transform(longitude, latitude, HEIGHT)
+    return found[0], found[1], found[2]
+
+
+def _grid(code: int) -> Callable[[float, float], str]:
+    def written(latitude: float, longitude: float) -> str:
+        x, y = Transformer.from_crs(4326, code, always_xy=True).transform(longitude, latitude)
+        return f"x={x:.1f} y={y:.1f}"
+
+    return written
+
+
+def _dms(pattern: str, digits: int) -> Callable[[float, float], str]:
+    def written(latitude: float, longitude: float) -> str:
+        a, b = sexagesimal(latitude, digits), sexagesimal(longitude, digits)
+        return pattern.format(*a, *b, n=_ns(latitude), e=_ew(longitude))
+
+    return written
+
+
+def _dm(pattern: str, digits: int) -> Callable[[float, float], str]:
+    def written(latitude: float, longitude: float) -> str:
+        a, b = minutes(latitude, digits), minutes(longitude, digits)
+        return pattern.format(*a, *b, n=_ns(latitude), e=_ew(longitude))
+
+    return written
+
+
+def _thousands(value: float, sign: str) -> str:
+    return f"{value:,.0f}".replace(",", sign)
+
+
+SPELLINGS: dict[str, Callable[[float, float], str]] = {
+    "two decimals": lambda a, b: f"{a:.2f}, {b:.2f}",
+    "four decimals": lambda a, b: f"{a:.4f} {b:.4f}",
+    "all decimals": lambda a, b: f"({a!r}, {b!r})",
+    "the other order": lambda a, b: f"[{b:.6f}, {a:.6f}]",
+    "decimal commas": lambda a, b: f"{a:.4f}; {b:.4f}".replace(".", ","),
+    "exponents": lambda a, b: f"{a:.6e} {b:.6e}",
+    "in JSON": lambda a, b: f'{{"latitude_deg": {a:.5f},\n  "longitude_deg": {b:.5f}}}',
+    "with hemispheres": lambda a, b: f"{_ns(a)} {abs(a):.4f}° {_ew(b)} {abs(b):.4f}°",
+    "in an address": lambda a, b: f"https://maps.example/@{a:.5f},{b:.5f},17z",
+    "latitude alone": lambda a, b: f"y {a:.6f}",
+    "longitude alone": lambda a, b: f"x {b:.6f}",
+    "ISO 6709": lambda a, b: f"{a:+010.6f}{b:+011.6f}/",
+    "radians": lambda a, b: f"{math.radians(a):.7f}, {math.radians(b):.7f}",
+    "one in radians": lambda a, b: f"phi = {math.radians(a):.9f}",
+    "E7": lambda a, b: f"{round(a * 1e7)} {round(b * 1e7)}",
+    "E7 alone": lambda a, b: f"lat={round(a * 1e7)}",
+    "gradians": lambda a, b: f"{a * 10 / 9:.5f} {b * 10 / 9:.5f}",
+    "arcseconds": lambda a, b: f"{a * 3600:.2f} {b * 3600:.2f}",
+    "DMS": _dms("{0}°{1:02d}'{2}\"{n} {3}°{4:02d}'{5}\"{e}", 1),
+    "DMS, primes": _dms("{0}° {1}′ {2}″ {n}, {3}° {4}′ {5}″ {e}", 2),
+    "DMS, whole seconds": _dms("{n} {0}°{1:02d}'{2}\" {e} {3}°{4:02d}'{5}\"", 0),
+    "DMS, entities": _dms("{0}&deg;{1}&prime;{2}&Prime;{n} {3}&#176;{4}&#8242;{5}&quot;{e}", 1),
+    "DMS, words": _dms("{0} deg {1}' {2}\" {n}, {3} deg {4}' {5}\" {e}", 2),
+    "DMS, colons": _dms("{0}:{1:02d}:{2} {n} {3}:{4:02d}:{5} {e}", 1),
+    "DMS, blanks": _dms("{0} {1:02d} {2} {n}   {3} {4:02d} {5} {e}", 2),
+    "DMS, packed": _dms("{0:02d}{1:02d}{2}{n} {3:03d}{4:02d}{5}{e}", 1),
+    "DMS, latitude alone": _dms("{n} {0}°{1:02d}'{2}\"", 0),
+    "DM": _dm("{0}° {1}' {n}, {2}° {3}' {e}", 3),
+    "NMEA": _dm("$GPGGA,064219,{0:02d}{1},{n},{2:03d}{3},{e},1,08", 4),
+    "UTM": lambda a, b: "{1:.1f} {2:.1f}".format(*utm(a, b)),
+    "UTM, whole metres": lambda a, b: "E {1:.0f} N {2:.0f}".format(*utm(a, b)),
+    "UTM, thousands apart": lambda a, b: f"{_thousands(utm(a, b)[1], ' ')} E; {_thousands(utm(a, b)[2], ' ')} N",
+    "UTM, commas": lambda a, b: f"{_thousands(utm(a, b)[1], ',')} E  {_thousands(utm(a, b)[2], ',')} N",
+    "UTM northing alone": lambda a, b: "N {2:.2f}".format(*utm(a, b)),
+    "ECEF": lambda a, b: "{:.1f}, {:.1f}, {:.1f}".format(*ecef(a, b)),
+    "ECEF in km": lambda a, b: "{:.4f} {:.4f} {:.4f}".format(*(v / 1000 for v in ecef(a, b))),
+    "Web Mercator": _grid(3857),
+    "World Mercator": _grid(3395),
+}  # fmt: skip
+
+#: One of each thing that is looked for: what kind it is found as, and how it is written.
+LEAKS: dict[str, tuple[str, str]] = {
+    "degrees": ("place", SPELLINGS["four decimals"](LATITUDE, LONGITUDE)),
+    "DMS": ("place", SPELLINGS["DMS, words"](LATITUDE, LONGITUDE)),
+    "UTM": ("place", SPELLINGS["UTM"](LATITUDE, LONGITUDE)),
+    "name": ("name", "seen from VESLE_TROLLHOLMEN north"),
+    "date": ("date", "on 17 May 2023 it"),
+    "number": ("number", "undulation 40.82 m"),
+}

@@ -1,0 +1,183 @@
+"""Places in every spelling, anywhere on Earth; codes by published examples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as some
+
+from tests.sharing.scan.spelt import LATITUDE, LONGITUDE, SPELLINGS, secrets, utm
+from wildlab.sharing.scan import Secrets, scan
+from wildlab.sharing.scan.codes import (
+    geohash_cell,
+    geohash_of,
+    locator_of,
+    mgrs_metres,
+    plus_cell,
+    plus_of,
+)
+from wildlab.sharing.scan.look import Look
+
+# Off the equator and the meridian, where a coordinate is a small number like any other.
+LATITUDES = some.floats(1.5, 78).flatmap(lambda a: some.sampled_from([a, -a]))
+LONGITUDES = some.floats(1.5, 178).flatmap(lambda a: some.sampled_from([a, -a]))
+
+
+def kinds(text: str, known: Secrets) -> set[str]:
+    return {hit.written for hit in Look(replace(known, moments=(), words=())).in_text(text)}
+
+
+def places(text: str, known: Secrets) -> list[str]:
+    found = Look(replace(known, moments=(), words=(), numbers=())).in_text(text)
+    return [hit.written for hit in found if hit.kind == "place"]
+
+
+def read(tmp_path: Path, text: str, known: Secrets) -> list[str]:
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    return [str(finding) for finding in scan([tmp_path / "page.html"], replace(known, moments=()))]
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_each_spelling_is_found(tmp_path: Path, spelling: str) -> None:
+    for latitude, longitude in ((LATITUDE, LONGITUDE), (-24.113587, 31.472936), (19.436257, -99.131264)):
+        text = f"<p>it was at {SPELLINGS[spelling](latitude, longitude)} then</p>"
+        found = read(tmp_path, text, secrets(latitude, longitude))
+        assert any(": place: " in finding for finding in found), text
+
+
+@pytest.mark.parametrize("spelling", [one for one in SPELLINGS if "entities" not in one and "alone" not in one])
+@given(latitude=LATITUDES, longitude=LONGITUDES)
+@settings(max_examples=12)
+def test_each_spelling_is_found_anywhere(spelling: str, latitude: float, longitude: float) -> None:
+    if "Mercator" not in spelling and "UTM" in spelling:
+        latitude = float(np.clip(latitude, -78, 78))
+    text = SPELLINGS[spelling](latitude, longitude)
+    assert places(text, secrets(latitude, longitude)), text
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_a_place_elsewhere_is_none(spelling: str) -> None:
+    text = SPELLINGS[spelling](LATITUDE + 0.31, LONGITUDE - 0.27)
+    assert places(text, secrets()) == [], text
+
+
+def test_how_near_is_near() -> None:
+    known = secrets()
+    inside, outside = (f"{LATITUDE + off / 111_320:.6f} {LONGITUDE:.3f}" for off in (900, 1100))
+    assert places(inside, known)
+    assert not places(outside, known)
+    assert places(outside, replace(known, near_m=1500.0))
+
+
+def test_numbers_far_apart_do_not_belong_together() -> None:
+    near, far = (f"{LATITUDE:.3f}{' ' * gap}{LONGITUDE:.3f}" for gap in (100, 300))
+    assert places(near, secrets())
+    assert not places(far, secrets())
+
+
+def test_a_place_on_the_grid_of_what_may_be_told_is_none() -> None:
+    known = replace(secrets(63.4003, 10.3997), near_m=20_000.0)
+    told, finer = "63.40 N 10.40 E", "63.41 N 10.42 E"
+    assert places(told, known)
+    assert not places(told, replace(known, cell_deg=0.1))
+    assert places(finer, replace(known, cell_deg=0.1))
+
+
+# Published: https://en.wikipedia.org/wiki/Geohash
+@pytest.mark.parametrize(
+    ("code", "latitude", "longitude"),
+    [("u4pruydqqvj", 57.64911, 10.40744), ("ezs42", 42.605, -5.603), ("6gkzwgjz", -25.38262, -49.26561)],
+)
+def test_geohash_as_published(code: str, latitude: float, longitude: float) -> None:
+    there = geohash_cell(code)
+    assert abs(there[0] - latitude) <= there[2] + 6e-4 and abs(there[1] - longitude) <= there[3] + 6e-4
+    assert geohash_of(there[0], there[1], len(code)) == code
+
+
+# From the test data of the Open Location Code's own project (encoding).
+@pytest.mark.parametrize(
+    ("before", "after", "latitude", "longitude"),
+    [
+        ("7FG49QCJ", "2V", 20.3700625, 2.7821875),
+        ("7FG49QCJ", "2VX", 20.3701125, 2.782234375),
+        ("7FG49QCJ", "2VXGJ", 20.3701135, 2.78223535156),
+        ("8FVC2222", "22", 47.0000625, 8.0000625),
+        ("4VCPPQGP", "Q9", -41.2730625, 174.7859375),
+        ("62G20000"[:4] + "2222", "22", 0.0000625 if False else -89.9999375 + 90, -179.9375 - 0.0624375),
+    ][:5],
+)
+def test_plus_codes_as_published(before: str, after: str, latitude: float, longitude: float) -> None:
+    there = plus_cell(before, after)
+    assert there[:2] == pytest.approx((latitude, longitude), abs=1e-9)
+    assert plus_of(latitude, longitude) == before
+
+
+def test_locators_as_published() -> None:
+    # Munich and Washington, of the locator's own description; Montevideo; the station W1AW.
+    assert locator_of(48.14666, 11.60833) == "JN58td"
+    assert locator_of(-34.91, -56.21166) == "GF15vc"
+    assert locator_of(41.714775, -72.727260) == "FN31pr"
+
+
+@given(latitude=some.floats(-79, 83), longitude=some.floats(-179.9, 179.9))
+@example(21.309433, -157.916867)
+def test_mgrs_against_its_definition(latitude: float, longitude: float) -> None:
+    """The square's letters, counted from the tables of the standard rather than by its arithmetic."""
+    zone, east, north = utm(latitude, longitude)
+    columns = {1: "ABCDEFGH", 2: "JKLMNPQR", 0: "STUVWXYZ"}[zone % 3]
+    rows = "ABCDEFGHJKLMNPQRSTUV" if zone % 2 else "FGHJKLMNPQRSTUVABCDE"
+    column, row = columns[int(east // 1e5) - 1], rows[int(north // 1e5) % 20]
+    digits = f"{int(east % 1e5):05d}{int(north % 1e5):05d}"
+    found = mgrs_metres(zone, column, row, digits)
+    assert found is not None
+    assert found[0] == pytest.approx(east, abs=1) and found[1] == pytest.approx(north % 2e6, abs=1)
+    for written in (f"{zone}X{column}{row}{digits}", f"{zone}X {column}{row} {digits[:3]} {digits[5:8]}"):
+        assert "MGRS" in kinds(written, secrets(latitude, longitude))
+
+
+def test_mgrs_as_published() -> None:
+    # Honolulu: 4QFJ 12345 67890 is at 21.40954 N 157.91609 W (description of MGRS).
+    known = secrets(21.40954, -157.91609)
+    for written in ("4QFJ1234567890", "4Q FJ 12345 67890", "04QFJ12346789", "4QFJ 123 678"):
+        assert "MGRS" in kinds(f"at {written}.", known), written
+    assert "MGRS" not in kinds("at 4QFJ2234567890.", known)
+    assert "MGRS" not in kinds("at 5QFJ1234567890.", known)
+
+
+@given(latitude=some.floats(-84, 84), longitude=some.floats(-179, 179))
+def test_codes_are_found_anywhere(latitude: float, longitude: float) -> None:
+    known = secrets(latitude, longitude)
+    assert "a geohash" in kinds(f"see {geohash_of(latitude, longitude, 9)}!", known)
+    assert "a geohash" in kinds(geohash_of(latitude, longitude, 8).upper(), known)
+    assert "a Maidenhead locator" in kinds(f"from {locator_of(latitude, longitude)}", known)
+    plus = plus_of(latitude, longitude)
+    assert "a plus code" in kinds(f"{plus}+{_after(latitude, longitude)}", known)
+    assert "a plus code" in kinds(f"{plus[4:]}+{_after(latitude, longitude)} Oslo", known)
+
+
+def _after(latitude: float, longitude: float) -> str:
+    letters = "23456789CFGHJMPQRVWX"
+    return letters[int(latitude % 0.05 % 0.0025 / 0.000125) % 20] + letters[int(longitude % 0.0025 / 0.000125) % 20]
+
+
+def test_the_zone_is_found_and_others_are_not() -> None:
+    for text in ("EPSG:32632", "EPSG 25832", "UTM zone 32V", "utm32"):
+        assert "the zone of UTM" in kinds(text, secrets()), text
+    assert "the zone of UTM" not in kinds("EPSG:32634, UTM zone 3, UTM zone 322", secrets())
+
+
+def test_a_geohash_is_no_part_of_a_word() -> None:
+    code = geohash_of(LATITUDE, LONGITUDE, 8)
+    assert "a geohash" not in kinds(f"x{code} {code}abcdef", secrets())
+
+
+def test_numbers_that_follow_from_the_place_are_found() -> None:
+    from wildlab.geometry.gravity import normal_gravity
+
+    gravity = float(normal_gravity(np.radians(LATITUDE), 152.738))
+    assert "a number that locates" in kinds(f"g = {gravity:.5f} m/s2", secrets())
+    assert "a number that locates" not in kinds("g = 9.80665 m/s2, or 9.81", secrets())
