@@ -104,7 +104,11 @@ def pdf_of_glyphs(text: str) -> bytes:
     shown = "".join(f"{letters.index(letter) + 3:04X}" for letter in text)
     pieces = []
     for number, body in enumerate(
-        (f"1 beginbfchar\n{table}\nendbfchar".encode(), f"BT /F1 9 Tf 1 0 0 1 9 9 Tm <{shown}> Tj ET\n".encode()), 1
+        (
+            f"1 beginbfchar\n{table}\nendbfchar".encode(),
+            f"BT /F1 9 Tf 1 0 0 1 9 9 Tm <{shown}> Tj ET\n".encode(),
+        ),
+        1,
     ):
         packed = zlib.compress(body)
         head = f"{number} 0 obj\n<</Length {len(packed)} /Filter /FlateDecode>>\nstream\n".encode()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import cache
 
 import numpy as np
 from pyproj import Transformer
@@ -38,6 +39,11 @@ def minutes(angle: float, digits: int) -> tuple[int, str]:
     return whole, f"{rest / 10**digits:0{digits + 3}.{digits}f}"
 
 
+@cache
+def to_grid(code: int, of: int = 4326) -> Transformer:
+    return Transformer.from_crs(of, code, always_xy=True)
+
+
 def _ns(latitude: float) -> str:
     return "N" if latitude >= 0 else "S"
 
@@ -49,18 +55,18 @@ def _ew(longitude: float) -> str:
 def utm(latitude: float, longitude: float) -> tuple[int, float, float]:
     zone = int((longitude + 180) // 6) + 1
     code = (32600 if latitude >= 0 else 32700) + zone
-    east, north = Transformer.from_crs(4326, code, always_xy=True).transform(longitude, latitude)
+    east, north = to_grid(code).transform(longitude, latitude)
     return zone, east, north
 
 
 def ecef(latitude: float, longitude: float) -> tuple[float, float, float]:
-    found = Transformer.from_crs(4979, 4978, always_xy=True).transform(longitude, latitude, HEIGHT)
+    found = to_grid(4978, 4979).transform(longitude, latitude, HEIGHT)
     return found[0], found[1], found[2]
 
 
 def _grid(code: int) -> Callable[[float, float], str]:
     def written(latitude: float, longitude: float) -> str:
-        x, y = Transformer.from_crs(4326, code, always_xy=True).transform(longitude, latitude)
+        x, y = to_grid(code).transform(longitude, latitude)
         return f"x={x:.1f} y={y:.1f}"
 
     return written

@@ -50,7 +50,7 @@ def _last(numbers: Numbers, runs: Runs) -> Ints:
 
 
 def _marked(data: Bytes, at: Ints) -> NDArray[np.bool_]:
-    """Whether what follows a number says degrees: the sign, d, or what stands for it where signs were lost."""
+    """Whether what follows a number says degrees: the sign, d, or what it becomes where signs are lost."""
     last = len(data) - 1
     one, two = data[np.minimum(at, last)], data[np.minimum(at + 1, last)]
     return is_one_of(one, MARKS) | ((one == 32) & is_one_of(two, MARKS))

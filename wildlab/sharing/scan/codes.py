@@ -1,4 +1,4 @@
-"""Places written as codes: MGRS, geohash, plus codes (Open Location Code), Maidenhead locators, zones of UTM."""
+"""Places as codes: MGRS, geohash, plus codes (Open Location Code), Maidenhead locators, zones of UTM."""
 
 from __future__ import annotations
 
@@ -199,14 +199,16 @@ class Codes:
         near = sorted({(zone - 1 + step) % 60 + 1 for zone in zones for step in (-1, 0, 1)})
         zone = "|".join(f"0?{one}" for one in near)
         own = "|".join(f"0?{one}" for one in sorted(zones))
+        two = "|".join(f"{one:02d}" for one in sorted(zones))
         locators = "|".join(sorted({locator_of(lat, lon) for lat, lon in around}))
         self.patterns = {
             name: re.compile(pattern, re.IGNORECASE)
             for name, pattern in {
                 "geohash": rf"(?<![A-Z0-9])(?:{'|'.join(hashes)})[{GEOHASH}]{{1,7}}(?![A-Z0-9])",
-                "MGRS": rf"(?<![A-Z0-9.])({zone})\s?[C-HJ-NP-X]\s?([A-HJ-NP-Z])([A-HJ-NP-V])\s?(\d{{2,5}}\s\d{{2,5}}|\d{{4,10}})(?!\d)",
+                "MGRS": rf"(?<![A-Z0-9.])({zone})\s?[C-HJ-NP-X]\s?([A-HJ-NP-Z])([A-HJ-NP-V])"
+                r"\s?(\d{2,5}\s\d{2,5}|\d{4,10})(?!\d)",
                 "locator": rf"(?<![A-Z0-9])(?:{locators})(?:[0-9]{{2}}(?:[A-X]{{2}})?)?(?![A-Z0-9])",
-                "zone": rf"EPSG\W{{0,12}}(?:326|327|258|230|227)(?:{own.replace('0?', '0')})(?!\d)"
+                "zone": rf"EPSG\W{{0,12}}(?:326|327|258|230|227)(?:{two})(?!\d)"
                 rf"|(?<![A-Z])UTM\W{{0,3}}(?:zone)?\W{{0,3}}(?:{own})(?!\d)",
             }.items()
         }

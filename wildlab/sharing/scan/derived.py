@@ -15,7 +15,7 @@ MOST = 3
 
 
 def derived_numbers(places: Array) -> list[float]:
-    """Gravity, the geoid's undulation, radii of the Earth, and what a degree measures, at the first few places.
+    """Gravity, the geoid's undulation, radii of the Earth, what a degree measures: at the first few places.
 
     Parameters
     ----------

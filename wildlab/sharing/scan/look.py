@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from datetime import datetime
+from functools import cached_property
 
 import numpy as np
 
@@ -40,9 +41,13 @@ class Look:
         self.reach = reach(self.encodings, secrets.near_m)
         self.reach_of_angles = reach(self.degrees, secrets.near_m)
         self.numbers = (*secrets.numbers, *derived_numbers(places))
-        moments = secrets.moments if secrets.may_stay != "all" else ()
-        self.days = days_of(moments) if secrets.may_stay != "day" else set()
-        self.binary = Binary(self.encodings, secrets.near_m, self.numbers, moments)
+        self.moments = secrets.moments if secrets.may_stay != "all" else ()
+        self.days = days_of(self.moments) if secrets.may_stay != "day" else set()
+
+    @cached_property
+    def binary(self) -> Binary:
+        """What is looked for among bytes: made where there are any."""
+        return Binary(self.encodings, self.secrets.near_m, self.numbers, self.moments)
 
     def in_text(self, text: str, *, drawn: bool = False) -> list[Hit]:
         """What is in a text.

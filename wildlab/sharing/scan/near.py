@@ -189,7 +189,8 @@ def alone(numbers: Sorted, encoding: Encoding, cell: float = 0.0) -> list[Hit]:
     for axis in encoding.axes:
         if axis.decimals is None:
             continue
-        coarse = ALONE_M * axis.per_metre + 0.5 * 10.0**-axis.decimals
+        fine = numbers.numbers.half[numbers.numbers.decimals >= axis.decimals]
+        coarse = ALONE_M * axis.per_metre + fine.max(initial=0.0)
         found = numbers.within(axis.values, coarse)
         found = found[numbers.numbers.decimals[found] >= axis.decimals]
         if cell > 0:

@@ -12,8 +12,11 @@ class TooMuch(Exception):
     """It unpacks to more than may be unpacked."""
 
 
-#: What compressed streams and archives begin with.
-_PACKED = (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18", b"\x78\x9c")
+#: What archives, compressed streams, pictures and documents begin with.
+_PACKED = (
+    b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18", b"\x78\x9c",
+    b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"RIFF", b"%PDF", b"II*\x00", b"MM\x00*", b"PAR1", b"ARROW1", b"SQLite ",
+)  # fmt: skip
 
 
 def begins_packed(data: bytes) -> bool:
