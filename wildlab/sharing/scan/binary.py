@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.sharing.scan.encodings import Encoding
+from wildlab.sharing.scan.findings import Kind
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.near import MOST, merged, within
 from wildlab.sharing.scan.numbers import Ints
@@ -28,6 +29,8 @@ CLOSE_M = 200.0
 TOGETHER = 64
 #: A single number of eight bytes must agree to this, m (of a kind that alone says enough); a time to this, s.
 ALONE_M, ALONE_S = 0.55, 5.0
+#: Kinds of which one float of 64 bits is enough: of all together, one would come by chance.
+SURE = ("decimal degrees", "radians")
 #: 32-bit floats are no finer than this share of themselves.
 FLOAT32 = 6e-8
 #: Pieces, so that memory stays bounded.
@@ -45,8 +48,8 @@ class Needle(NamedTuple):
         (N,) without signs, in order, apart.
     group, part
         Which encoding, and which of its axes; single numbers have a group of their own.
-    alone
-        Whether one of them is enough.
+    kind
+        What one of them is found as, where one is enough.
     """
 
     name: str
@@ -54,7 +57,7 @@ class Needle(NamedTuple):
     high: Array
     group: int
     part: int
-    alone: bool
+    kind: Kind | None
 
 
 class Binary:
@@ -123,10 +126,9 @@ def _judged(at: Ints, values: Array, needles: list[Needle], size: int, name: str
         if not inside.any():
             continue
         places = at[inside]
-        if needle.alone:
-            kind = "date" if "time" in needle.name else "number" if "number" in needle.name else "place"
+        if needle.kind:
             for place in places[:MOST].tolist():
-                yield Hit(place, place + size, kind, f"{needle.name}, as {name}")  # type: ignore[arg-type]
+                yield Hit(place, place + size, needle.kind, f"{needle.name}, as {name}")
         else:
             found[needle.group, needle.part] = places
     names = {(needle.group, needle.part): needle.name for needle in needles}
@@ -157,7 +159,7 @@ def _places(kind: str, encodings: Sequence[Encoding], close_m: float) -> Iterato
             tolerance = close_m * axis.per_metre
             if kind[1:] == "f4":
                 tolerance = tolerance + axis.values * FLOAT32
-            yield _needle(f"{axis.name}, {encoding.name}", axis.values, tolerance, group, part, False)
+            yield _needle(f"{axis.name}, {encoding.name}", axis.values, tolerance, group, part, None)
 
 
 def _single(
@@ -167,28 +169,28 @@ def _single(
     if kind[1:] == "f8":
         for encoding in encodings:
             for axis in encoding.axes:
-                if axis.decimals is not None:
+                if axis.decimals is not None and encoding.name in SURE:
                     yield _needle(
-                        f"{axis.name}, {encoding.name}", axis.values, ALONE_M * axis.per_metre, -1, 0, True
+                        f"{axis.name}, {encoding.name}", axis.values, ALONE_M * axis.per_metre, -1, 0, "place"
                     )
         true = np.abs([one for one in numbers if np.isfinite(one) and one])
         # Whole numbers and halves stand everywhere.
         true = true[np.abs(true * 2 - np.round(true * 2)) > 1e-9]
-        yield _needle("a number that locates", true, true * 1e-9, -1, 0, True)
+        yield _needle("a number that locates", true, true * 1e-9, -1, 0, "number")
     if kind[2] == "8":
         stamps = np.array([moment.timestamp() for moment in moments])
         for unit, scale in (("seconds", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
             if kind[1] == "f" or scale > 1:
                 tolerance = np.full(len(stamps), ALONE_S * scale)
-                yield _needle(f"time as {unit} since 1970", stamps * scale, tolerance, -1, 0, True)
+                yield _needle(f"time as {unit} since 1970", stamps * scale, tolerance, -1, 0, "date")
 
 
-def _needle(name: str, values: Array, tolerance: Array, group: int, part: int, alone: bool) -> Needle:
+def _needle(name: str, values: Array, tolerance: Array, group: int, part: int, kind: Kind | None) -> Needle:
     good = np.isfinite(values)
     # Next to zero everything agrees.
     good &= values > 20 * tolerance
     low, high = merged(values[good] - tolerance[good], values[good] + tolerance[good])
-    return Needle(name, low, high, group, part, alone)
+    return Needle(name, low, high, group, part, kind)
 
 
 def _table(kind: str, needles: list[Needle]) -> NDArray[np.bool_]:

@@ -74,8 +74,8 @@ def encodings_of(places: Array) -> list[Encoding]:
     for name, unit, pair, alone in (
         ("decimal degrees", 1.0, 2, 5),
         ("radians", np.pi / 180, 4, 7),
-        ("degrees times 1e7", 1e7, 0, 0),
-        ("degrees times 1e6", 1e6, 0, 0),
+        ("E7 degrees", 1e7, 0, 0),
+        ("E6 degrees", 1e6, 0, 0),
         ("milliarcseconds", 3.6e6, 0, 0),
         ("arcseconds", 3600.0, 0, 3),
         ("arcminutes", 60.0, 2, 4),

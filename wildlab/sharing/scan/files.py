@@ -119,6 +119,10 @@ def _in_part(look: Look, name: str, part: Part) -> Iterator[Finding]:
     for moment, written in part.moments:
         if look.is_secret(moment):
             yield Finding(name, where, "date", written, moment.isoformat())
+    for box in part.boxes:
+        grid = look.in_box(box)
+        if grid:
+            yield Finding(name, where, "place", f"a map that reaches over it, {grid}")
     for said in look.in_columns(part.columns):
         kind, _, written = said.partition(": ")
         yield Finding(name, where, cast(Kind, kind), written)

@@ -8,6 +8,7 @@ from datetime import datetime
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wildlab.sharing.scan.angles import angles_of
 from wildlab.sharing.scan.binary import Binary
@@ -57,7 +58,7 @@ class Look:
         text
             One reading of it.
         drawn
-            It is mostly the coordinates of lines on paper: of those only what two numbers say together counts.
+            It is mostly the coordinates of lines on paper: of those only two numbers together count.
         """
         hits: list[Hit] = []
         for begin in range(0, max(len(text), 1), PIECE):
@@ -69,10 +70,10 @@ class Look:
     def _in_piece(self, text: str, *, drawn: bool) -> Iterator[Hit]:
         yield from self.words.found_in(text)
         text, data = as_bytes(text)
+        yield from self.codes.found_in(text)
         runs = runs_of(data)
         if not len(runs.start):
             return
-        yield from self.codes.found_in(text)
         numbers = numbers_of(data, runs)
         yield from dates_in(data, text, runs, numbers, self.secrets)
         if not drawn:
@@ -109,6 +110,25 @@ class Look:
         """
         return in_columns(list(columns), self.encodings, self.secrets, self.numbers)
 
+    def in_box(self, box: tuple[float, float, float, float, bool]) -> str:
+        """How a map that reaches over a place counts its metres or degrees; nothing where it does not.
+
+        Parameters
+        ----------
+        box
+            As a `Part` has it.
+        """
+        for encoding in self.encodings:
+            first, second = encoding.axes[:2]
+            degrees = encoding.name == "decimal degrees"
+            if degrees != box[4] or (not degrees and first.name != "easting"):
+                continue
+            x, y = (second, first) if degrees else (first, second)
+            inside = _between(x.values, *box[:2]) & _between(y.values, *box[2:4])
+            if inside.any():
+                return encoding.name
+        return ""
+
     def in_bytes(self, data: bytes) -> list[Hit]:
         """What is in plain bytes, as binary numbers, and names with letters beyond ASCII.
 
@@ -128,6 +148,12 @@ class Look:
             With a zone.
         """
         return moment.date() in self.days
+
+
+def _between(values: Array, least: float, greatest: float) -> NDArray[np.bool_]:
+    """Whether numbers without their sign may lie between two that have one."""
+    low = 0.0 if least <= 0 <= greatest else min(abs(least), abs(greatest))
+    return np.asarray((values >= low) & (values <= max(abs(least), abs(greatest))))
 
 
 def excerpt(text: str, hit: Hit, around: int = 12) -> str:

@@ -38,7 +38,7 @@ class Numbers(NamedTuple):
     value
         Without its sign: whether a minus or an S stands before a latitude makes no difference here.
     decimals
-        How many digits stand after the point, less the exponent; below zero where the last digits are left off.
+        How many digits stand after the point, less the exponent; below zero where last digits are left off.
     digits
         How many digits count (leading zeros do not).
     half

@@ -15,7 +15,8 @@ class TooMuch(Exception):
 #: What archives, compressed streams, pictures and documents begin with.
 _PACKED = (
     b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18", b"\x78\x9c",
-    b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"RIFF", b"%PDF", b"II*\x00", b"MM\x00*", b"PAR1", b"ARROW1", b"SQLite ",
+    b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"RIFF", b"%PDF", b"II*\x00", b"MM\x00*", b"PAR1", b"ARROW1",
+    b"SQLite ",
 )  # fmt: skip
 
 
@@ -48,6 +49,8 @@ class Part:
         Numbers by the name of their column, (N,) each; those of equal length belong together row by row.
     moments
         Times that stand there in a form of their own, and what they are.
+    boxes
+        What maps reach over: least and greatest x, least and greatest y, and whether they are degrees.
     trouble
         Why it could not be looked into; empty where it could.
     """
@@ -58,6 +61,7 @@ class Part:
     drawn: bool = False
     columns: tuple[tuple[str, Array], ...] = ()
     moments: tuple[tuple[datetime, str], ...] = ()
+    boxes: tuple[tuple[float, float, float, float, bool], ...] = ()
     trouble: str = ""
 
 

@@ -66,11 +66,11 @@ def without_coded(data: bytes, budget: Budget) -> Iterator[Part]:
         if b"base64" not in match[2] and len(match[3]) > 1:
             number += 1
             yield Part(f"data address {number}", budget.spend(unquote_to_bytes(match[3])))
-    texts = [inner for inner in small if is_text(inner)]
+    texts = [inner for inner in small if inner.isascii() and is_text(inner)]
     if texts:
         yield Part("short pieces of base64 or hexadecimal", b"\n".join(texts))
     if len(texts) < len(small):
-        others = (inner for inner in small if not is_text(inner))
+        others = (inner for inner in small if not (inner.isascii() and is_text(inner)))
         yield Part("short pieces of base64 or hexadecimal", b"\n\n".join(others), whole=True)
     yield Part("", text, whole=True)
 

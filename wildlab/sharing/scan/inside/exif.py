@@ -56,7 +56,7 @@ def tiff(data: bytes, budget: Budget) -> Iterator[Part]:
     (version,) = struct.unpack_from(order + "H", data, 2)
     big = version == 43
     head = struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)[0]
-    todo, seen, said, columns, pieces = [head], set(), [], [], []
+    todo, seen, said, columns, pieces, boxes = [head], set(), [], [], [], []
     while todo and len(seen) < MOST_DIRECTORIES:
         at = todo.pop()
         if at in seen or not at:
@@ -76,16 +76,37 @@ def tiff(data: bytes, budget: Budget) -> Iterator[Part]:
             elif tag not in _PIECES and tag not in _PIECES.values():
                 columns.append((f"tag {tag:#06x}", values.astype(float)))
                 said.append(_written(values, kind, raw, order))
+        boxes += _boxes(held)
         for starts, lengths in _PIECES.items():
             if starts in held and lengths in held:
                 pieces += list(zip(held[starts].tolist(), held[lengths].tolist(), strict=False))
-    yield Part("tags", b"\n".join(said), columns=tuple(columns), whole=True)
+    yield Part("tags", b"\n".join(said), columns=tuple(columns), boxes=tuple(boxes), whole=True)
     around, pictures = _around(data, pieces)
     yield Part("around the picture", around, whole=True)
     for number, picture in enumerate(pictures):
         # A small picture inside is a JPEG of its own, with tags of its own.
         if picture.startswith(b"\xff\xd8\xff"):
             yield Part(f"picture {number + 1}", picture)
+
+
+def _boxes(held: dict[int, np.ndarray]) -> list[tuple[float, float, float, float, bool]]:
+    """What the map reaches over, as GeoTIFF says it: a corner and the size of a pixel, or a matrix."""
+    if not {0x0100, 0x0101} <= held.keys():
+        return []
+    width, height = float(held[0x0100][0]), float(held[0x0101][0])
+    keys = held.get(0x87AF, np.zeros(0)).astype(int)[4:]
+    model = {int(keys[k]): int(keys[k + 3]) for k in range(0, len(keys) - 3, 4)}.get(1024, 0)
+    scale, tie, matrix = held.get(0x830E), held.get(0x8482), held.get(0x85D8)
+    if matrix is not None and len(matrix) >= 8:
+        a, b, _, c, d, e, _, f = (float(value) for value in matrix[:8])
+    elif scale is not None and tie is not None and len(scale) >= 2 and len(tie) >= 6:
+        a, b, d, e = float(scale[0]), 0.0, 0.0, -float(scale[1])
+        c, f = float(tie[3] - tie[0] * a), float(tie[4] - tie[1] * e)
+    else:
+        return []
+    corners = np.array([(0, 0), (width, 0), (0, height), (width, height)])
+    x, y = a * corners[:, 0] + b * corners[:, 1] + c, d * corners[:, 0] + e * corners[:, 1] + f
+    return [(float(x.min()), float(x.max()), float(y.min()), float(y.max()), model == 2)]
 
 
 def _directory(data: bytes, at: int, order: str, big: bool) -> tuple[list[tuple[int, int, bytes]], int]:

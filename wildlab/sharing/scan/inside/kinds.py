@@ -103,7 +103,7 @@ def unpacked(data: bytes, budget: Budget, where: str = "", depth: int = 0) -> It
             if part.whole or not part.data:
                 yield replace(part, where=there)
                 continue
-            if part.columns or part.moments or part.trouble:
+            if part.columns or part.moments or part.boxes or part.trouble:
                 yield replace(part, where=there, data=b"", whole=True)
             yield from unpacked(part.data, budget, there, depth + 1)
     except TooMuch:

@@ -99,7 +99,7 @@ def jpeg(data: bytes, budget: Budget) -> Iterator[Part]:
         elif body.startswith((b"Exif\x00\x00", b"Exif\x00\xff")):
             yield Part("EXIF", body[6:])
         elif kind >= 0xE0:  # comments and what programs add
-            head, _, rest = body.partition(b"\x00")
+            rest = body.partition(b"\x00")[2]
             yield Part(f"segment {kind:#x}", body)
             if rest[:2] in (b"II", b"MM"):
                 yield Part(f"segment {kind:#x}", rest)

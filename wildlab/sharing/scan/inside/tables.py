@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import sqlite3
 import tempfile
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -218,9 +218,8 @@ def recording(data: bytes, budget: Budget) -> Iterator[Part]:
 
     yield Part("", data, whole=True)
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "recording.rrd")
-        with open(path, "wb") as file:
-            file.write(data)
+        path = Path(folder) / "recording.rrd"
+        path.write_bytes(data)
         reader = RrdReader(path)
         for store in (*reader.recordings(), *reader.blueprints()):
             yield Part("store", str(store).encode("utf-8", "replace"), whole=True)
