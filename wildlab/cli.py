@@ -28,6 +28,7 @@ from wildlab.commands.georeference import georeference
 from wildlab.commands.import_ import import_
 from wildlab.commands.plan import plan
 from wildlab.commands.replay import replay
+from wildlab.commands.share import share
 from wildlab.commands.shared import FOLDER
 from wildlab.commands.terrain import terrain
 from wildlab.commands.track import track
@@ -88,6 +89,7 @@ for _command in (
     clock,
     terrain,
     plan,
+    share,
 ):
     wildlab.add_command(_command)
 

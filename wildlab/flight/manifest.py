@@ -31,9 +31,16 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class LocationsPart(Strict):
-    """How sensitive the places are: whoever shares a report decides by this. Denied unless stated."""
+    """How sensitive the places are: whoever shares a report decides by this. Denied unless stated.
+
+    ``sensitivity`` says what reports print. ``category`` is that of GBIF's guide to sensitive species, from 1
+    (place withheld) to 4 (0.001 degrees), and says what copies for others give; ``agreed_category`` is what
+    was agreed for partners. Left out, ``data/sharing/tiers.toml`` says what is assumed.
+    """
 
     sensitivity: Literal["open", "generalised", "withheld"] = "withheld"
+    category: Annotated[int, Field(ge=1, le=4)] | None = None
+    agreed_category: Annotated[int, Field(ge=1, le=4)] | None = None
 
 
 class OriginPart(Strict):

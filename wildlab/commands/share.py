@@ -1,0 +1,77 @@
+"""A copy of reports that is safe to send."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from wildlab.commands.shared import FILE, FOLDER, terminal_console
+from wildlab.terminal import shown
+
+#: Where a password may stand that nobody types: never on the command line, which others can see.
+VARIABLE = "WILDLAB_SHARE_PASSWORD"
+
+
+@click.command(short_help="A copy of reports that is safe to send.")
+@click.argument("report", type=click.Path(path_type=Path))
+@click.option(
+    "--for",
+    "tier",
+    type=click.Choice(["public", "partner", "team"]),
+    default="public",
+    show_default=True,
+    help="Who gets it.",
+)
+@click.option("--flight", type=FOLDER, help="The flight's folder.  [default: found in flights/]")
+@click.option("--out", type=FILE, help="The file to make.  [default: flight-public.html, here]")
+@click.option("--zip", "zipped", is_flag=True, help="A zip with a page for each flight and study.")
+@click.option("--encrypt", is_flag=True, help=f"A zip with a password: asked for, or in {VARIABLE}.")
+@click.option("--overwrite", is_flag=True, help="Replace the copy that is there.")
+def share(
+    report: Path,
+    tier: str,
+    flight: Path | None,
+    out: Path | None,
+    zipped: bool,
+    encrypt: bool,
+    overwrite: bool,
+) -> None:
+    """Make one file of REPORT that can be mailed: a report, or a folder of reports.
+
+    For the public the place is withheld or is a cell of the flight's category (locations.category in
+    flight.toml), dates are months, names are neutral, pictures are left out. For partners it may be what
+    was agreed with them (locations.agreed_category). Reports are computed and drawn again from generalised
+    data; then every byte is looked through, and where something is found there is no copy. The team gets
+    the reports as they are, without the names of this machine.
+
+    What was removed is printed, and kept beside the copy in a file for you alone.
+
+    \b
+    Examples:
+      wildlab share reports/tuesday
+      wildlab share reports/tuesday --for partner --encrypt
+      wildlab share reports --for team --zip
+    """
+    from wildlab.sharing.share import share as make
+
+    password = None
+    if encrypt:
+        password = os.environ.get(VARIABLE) or click.prompt(
+            "Password", hide_input=True, confirmation_prompt=True
+        )
+    made = make(
+        report,
+        tier,  # type: ignore[arg-type]  # click has checked it
+        flight=flight,
+        out=out,
+        zipped=zipped,
+        password=password,
+        overwrite=overwrite,
+        console=terminal_console(),
+    )
+    for line in made.lines:
+        click.echo(line, err=True)
+    click.echo(shown(made.told), err=True)
+    click.echo(shown(made.file))

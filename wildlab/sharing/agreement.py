@@ -1,0 +1,113 @@
+"""Whether numbers computed from generalised data are those of the sender's own report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wildlab.runner.record.beside import finished_metrics
+from wildlab.sharing.names import Names
+
+#: Numbers that differ by no more than this share are the same.
+SAME = 1e-3
+#: Nor do these, whatever they are a share of: beyond what any report prints.
+NOTHING = 1e-6
+
+
+class Agreement(NamedTuple):
+    """How many numbers both have, how many are the same, and the one that differs most.
+
+    Attributes
+    ----------
+    compared, same
+        Numbers.
+    worst
+        Greatest difference as a share of the greater number; 0 without any.
+    which
+        The number that has it, for the sender; "" without any.
+    """
+
+    compared: int
+    same: int
+    worst: float
+    which: str
+
+
+def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
+    """Numbers of the sender's reports against those of the copy's.
+
+    Parameters
+    ----------
+    pairs
+        Folders: of the copy's report by the sender's.
+    names
+        Neutral names by the true ones, which subjects may hold.
+
+    Returns
+    -------
+    Agreement
+    """
+    compared = same = 0
+    worst, which = 0.0, ""
+    for mine, theirs in pairs.items():
+        here, there = _numbers(mine), _numbers(theirs)
+        for (name, subject), value in here.items():
+            other = there.get((name, _neutral(subject, names)))
+            if other is None:
+                continue
+            compared += 1
+            difference = share_apart(value, other)
+            same += difference <= SAME
+            if difference > worst:
+                worst, which = (
+                    difference,
+                    f"{mine.name}: {name} of {subject} is {value:.6g}, in the copy {other:.6g}",
+                )
+    return Agreement(compared, same, worst, which)
+
+
+def share_apart(one: float, other: float) -> float:
+    """How far two numbers are apart as a share of the greater one.
+
+    Examples
+    --------
+    >>> share_apart(2.0, 1.0), share_apart(0.0, 1e-9)
+    (0.5, 0.0)
+    """
+    if math.isnan(one) and math.isnan(other):
+        return 0.0
+    apart = abs(one - other)
+    if math.isnan(apart):
+        return 1.0
+    return 0.0 if apart <= NOTHING else apart / max(abs(one), abs(other))
+
+
+def agreement_words(found: Agreement) -> str:
+    """For the page: what it says of its own numbers; nothing where nothing was compared."""
+    if not found.compared:
+        return ""
+    if found.same == found.compared:
+        return (
+            f"All {found.compared} numbers are those of the report that was made from the exact data, to "
+            f"{SAME:.1%} or better."
+        )
+    return (
+        f"Of {found.compared} numbers, {found.same} are those of the report that was made from the exact "
+        f"data, to {SAME:.1%} or better; the others differ, by {found.worst:.1%} at most."
+    )
+
+
+def _neutral(subject: str, names: Names) -> str:
+    """A subject as the copy calls it: whole, or part by part."""
+    known = {true: neutral for kind in names.by_kind.values() for true, neutral in kind.items()}
+    return known.get(subject) or "/".join(known.get(part, part) for part in subject.split("/"))
+
+
+def _numbers(report: Path) -> dict[tuple[str, str], float]:
+    metrics: dict[str, Any] = finished_metrics(report) or {}
+    return {
+        (str(one["name"]), str(one["subject"])): math.nan if one["value"] is None else float(one["value"])
+        for one in metrics.get("metrics", [])
+    }

@@ -1,0 +1,196 @@
+"""Several reports as one page: no file beside it, no link out of it, nothing about who made it when."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bs4 import BeautifulSoup, Comment, Tag
+
+from wildlab.errors import WildlabError
+from wildlab.flight.files import read_regular
+from wildlab.reporting.page import STYLE, page
+from wildlab.reporting.text import escape
+
+#: A report is a tenth of this.
+_MOST_BYTES = 100_000_000
+#: Data that may go along inside of a page: tables of text. Maps are places.
+_DATA = re.compile(r"data:(text/csv|application/json)[;,]", re.IGNORECASE)
+#: Attributes that name another part of the page.
+_NAMING = (
+    "for",
+    "headers",
+    "aria-labelledby",
+    "aria-describedby",
+    "aria-controls",
+    "aria-owns",
+    "aria-details",
+)
+_REFERENCES = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
+_HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
+#: Scripts and whatever else loads or runs something; pictures inside of the page stay.
+_NEVER = ("script", "iframe", "object", "embed", "link", "meta", "base", "form", "noscript", "template")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One report, ready to stand beside others on a page: its number there, title, HTML and style."""
+
+    number: int
+    title: str
+    body: str
+    style: str
+
+
+def read_part(report: Path, number: int, *, hashes: bool) -> Part:
+    """One report out of its file.
+
+    Parameters
+    ----------
+    report
+        ``report.html``.
+    number
+        Which one it is on its page; what it names by id then is its own.
+    hashes
+        Whether the foot of the page may say by which hashes its data and code are known, and when it was
+        made.
+
+    Returns
+    -------
+    Part
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such file, or it is no page of ours.
+    """
+    try:
+        text = read_regular(report, _MOST_BYTES).decode("utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise WildlabError("this report cannot be read", "make it again", file=report) from None
+    soup = BeautifulSoup(text, "html.parser")
+    body, main = soup.body, soup.main
+    if body is None or main is None or soup.h1 is None:
+        raise WildlabError("this is not a report of wildlab", "make it again", file=report)
+    style = "\n".join(one.get_text() for one in soup.find_all("style")).replace(STYLE, "").strip()
+    title = soup.h1.get_text(" ", strip=True)
+    for unwanted in body.find_all([*_NEVER, "style"]):
+        unwanted.decompose()
+    for comment in body.find_all(string=lambda text: isinstance(text, Comment)):
+        comment.extract()
+    footer = body.find("footer")
+    kept = [] if not isinstance(footer, Tag) else [one for one in footer.find_all("p") if _stays(one, hashes)]
+    for one in kept:
+        one["class"] = "note"
+        main.append(one)
+    for link in main.find_all("a"):
+        _tie(link)
+    prefix = f"r{number}-"
+    ids = {str(one["id"]) for one in main.find_all(id=True)}
+    for tag in main.find_all(True):
+        _rename(tag, ids, prefix)
+    style = re.sub(r"#([\w-]+)", lambda m: f"#{prefix}{m[1]}" if m[1] in ids else m[0], style)
+    return Part(number, title, main.decode_contents().strip(), style)
+
+
+def _stays(paragraph: Tag, hashes: bool) -> bool:
+    """Whether a line at the foot stays: not where it points to files beside the page."""
+    beside = any(not str(a.get("href", "")).startswith(("#", "data:")) for a in paragraph.find_all("a"))
+    return not beside and (hashes or (paragraph.code is None and not _HASH.search(paragraph.get_text())))
+
+
+def _tie(link: Tag) -> None:
+    """A link out of the page becomes its words: mailed alone, it would be dead."""
+    target = str(link.get("href", ""))
+    if target.startswith("#") or _DATA.match(target):
+        return
+    if target.startswith("data:"):
+        link.decompose()
+    else:
+        link.unwrap()
+
+
+def _rename(tag: Tag, ids: set[str], prefix: str) -> None:
+    for name, value in list(tag.attrs.items()):
+        words = value if isinstance(value, list) else str(value).split()
+        text = " ".join(words) if isinstance(value, list) else str(value)
+        if name.lower().startswith("on") or name in ("srcset", "ping", "action", "formaction"):
+            del tag[name]
+        elif name == "id":
+            tag[name] = prefix + text
+        elif name in _NAMING:
+            tag[name] = " ".join(prefix + word if word in ids else word for word in words)
+        elif name in ("href", "xlink:href") and text.startswith("#"):
+            tag[name] = f"#{prefix}{text[1:]}" if text[1:] in ids else f"#{prefix}top"
+        elif name in ("src", "poster", "data") and not text.startswith("data:"):
+            del tag[name]
+        elif "url(" in text:
+            tag[name] = _REFERENCES.sub(lambda m: f"url(#{prefix}{m[1]})", text)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What belongs together on a page: a flight or a study.
+
+    Attributes
+    ----------
+    heading
+        Its own.
+    about
+        Sentences on the copy.
+    before
+        HTML that stands before the reports.
+    parts
+        Its reports.
+    """
+
+    heading: str
+    about: tuple[str, ...]
+    before: str
+    parts: tuple[Part, ...]
+
+
+def joined(chapters: Sequence[Chapter], heading: str) -> str:
+    """One page with all chapters, and a list of their reports first where there is more than one.
+
+    Parameters
+    ----------
+    chapters
+        In their order.
+    heading
+        Of the page, where there are several.
+
+    Returns
+    -------
+    str
+    """
+    several = len(chapters) > 1
+    body = [f"<header><h1>{escape(heading)}</h1></header>"] if several else []
+    parts = [part for chapter in chapters for part in chapter.parts]
+    contents = ""
+    if len(parts) > 1:
+        listed = "".join(f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in parts)
+        contents = f'<nav aria-label="Reports"><h2>In this file</h2><ol>{listed}</ol></nav>'
+    body.append(contents if several else "")
+    for chapter in chapters:
+        level = "h2" if several else "h1"
+        told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
+        body.append(
+            f'<section aria-label="About this copy"><header><{level}>{escape(chapter.heading)}</{level}>'
+            f"</header><ul>{told}</ul></section>"
+        )
+        body += [chapter.before, "" if several else contents]
+        body += [
+            f'<article class="shared" id="r{part.number}-top" aria-label="{escape(part.title)}">\n'
+            f"{part.body}\n</article>"
+            for part in chapter.parts
+        ]
+    styles = dict.fromkeys([*(part.style for part in parts if part.style), _STYLE])
+    title = heading if several else chapters[0].heading
+    return page(title=title, body="\n".join(filter(None, body)), style="\n".join(styles))
+
+
+_STYLE = """.shared { border-top: 3px solid var(--line); margin-top: 3rem; padding-top: 1.5rem }
+@media print { .shared { break-before: page; border: 0; margin: 0; padding: 0 } }"""

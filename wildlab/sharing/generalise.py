@@ -1,0 +1,257 @@
+"""A flight, generalised: the same motion, seen from a point that is not named, on a day that is not told.
+
+Nothing is masked afterwards. Coordinates count from the middle of the flight, heights from its ground, time
+from its first sample; names are neutral; the sensors measure what they would have at the cell's middle. What
+is computed from such a flight is what would be computed from the true one, to rounding errors.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wildlab.flight.following import SensorPart
+from wildlab.flight.learnt import Learnt
+from wildlab.flight.manifest import Manifest, make_manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array, ned_to_geodetic
+from wildlab.geometry.gravity import local_earth
+from wildlab.pipeline.overviews.image_coverage import ground_height
+from wildlab.sharing.cells import Cell, cell_of
+from wildlab.sharing.inertial import USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG, moved_field, moved_imu
+from wildlab.sharing.names import Names, learn_names, renamed
+from wildlab.sharing.removed import Removed, removed_from
+from wildlab.sharing.tiers import Treatment
+
+#: Where a flight is put whose place is withheld: a latitude that is nobody's.
+NOWHERE = (45.0, 0.0)
+#: Offsets of clocks are cut by whole quarters of an hour, which zones of time are made of, s.
+QUARTER = 900.0
+_PLACES = (
+    ("north_m", "east_m", "down_m"),
+    ("second_north_m", "second_east_m", "second_down_m"),
+    (None, None, "plane_down_m"),
+)
+#: What stands for a hash, which would tell a file that is public.
+_NOBODY = "0" * 64
+
+
+@dataclass(frozen=True)
+class Generalised:
+    """A generalised flight, what it can say of where and when it was, and what was taken out of it.
+
+    Attributes
+    ----------
+    flight
+        In memory.
+    cell
+        None where the place is withheld.
+    when
+        ``"May 2024"``, ``"3 May 2024"``, or nothing where the log knows no date.
+    names
+        Neutral names by the true ones.
+    removed
+        For the sender only.
+    """
+
+    flight: Flight
+    cell: Cell | None
+    when: str
+    names: Names
+    removed: tuple[Removed, ...]
+
+
+def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Generalised:
+    """The flight as a copy may show it.
+
+    Parameters
+    ----------
+    flight
+        Is not changed.
+    treatment
+        From `wildlab.sharing.tiers.treatment_of`.
+    name
+        What the copy is called.
+
+    Returns
+    -------
+    Generalised
+    """
+    manifest = flight.manifest
+    shift = new_origin(flight)
+    place = ned_to_geodetic(shift[None], manifest.origin_tuple())[0]
+    lat, lon = math.degrees(place[0]), math.degrees(place[1])
+    cell = None if treatment.cell_deg is None else cell_of(lat, lon, treatment.cell_deg, reach(flight, shift))
+    there = NOWHERE if cell is None else (cell.latitude_deg, cell.longitude_deg)
+    names = learn_names(flight.nav, flight.tables, manifest.sensors)
+    clocks = {key: math.remainder(value, QUARTER) for key, value in manifest.clocks.model_dump().items()}
+    folded = {key: value - clocks[key] for key, value in manifest.clocks.model_dump().items()}
+    start = first_stamp(flight)
+    nav = {
+        names.of("poses", source): _moved(renamed(table, names, "nav"), shift, start)
+        for source, table in flight.nav.items()
+    }
+    best = _poses(flight)
+    tables: dict[str, pd.DataFrame] = {}
+    for key, table in flight.tables.items():
+        table = renamed(table, names, key)
+        if key == "imu":
+            here = local_earth(*manifest.origin_tuple()[::2])
+            table = moved_imu(table, best, shift, here, local_earth(math.radians(there[0]), 0.0))
+        elif key == "magnetometer":
+            stated = manifest.magnetometer
+            moved = moved_field(table, best, stated.declination_deg, stated.inclination_deg)
+            if moved is None:
+                continue
+            table, stretch = moved
+        offset = {"frames": "camera", "truth": "truth", "gnss": "gnss"}.get(key)
+        table = _moved(table, shift, start - (folded[f"{offset}_offset_s"] if offset else 0.0))
+        # Another clock's stamps tell the zone, and no report looks at them.
+        tables[key] = table.drop(columns="time_onboard_s", errors="ignore")
+    field = manifest.magnetometer.hard_iron_ut
+    iron = None if field is None or "magnetometer" not in tables else tuple(stretch * one for one in field)
+    epoch, when = _date(manifest, start, treatment)
+    data = _manifest(manifest, names, clocks, name)
+    data["origin"] = {"latitude_deg": there[0], "longitude_deg": there[1], "height_m": 0.0}
+    data["time"] = {"kind": manifest.time.kind} | ({"epoch": epoch} if epoch else {})
+    data["magnetometer"] = _field_part(manifest, iron, "magnetometer" in tables)
+    terrain = flight.terrain
+    if terrain is not None:
+        # Moved as the rest is; what a report draws of it is only what the flight itself shows.
+        terrain = replace(
+            terrain,
+            height=terrain.height + np.float32(shift[2]),
+            north=terrain.north - shift[0],
+            east=terrain.east - shift[1],
+        )
+    made = Flight(make_manifest(data), nav, tables, None, terrain)
+    at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
+    removed = tuple(removed_from(flight, made, names, start, when, at))
+    return Generalised(made, cell, when, names, removed)
+
+
+def new_origin(flight: Flight) -> Array:
+    """(3,) in n: the middle of the box that the flight was flown in, at the height of its ground.
+
+    It follows from the flight, not from where its origin was put, which may be a place that is known.
+    """
+    p = _flown(flight)
+    if not len(p):
+        return np.zeros(3)
+    ground = ground_height(flight)
+    down = float(p[:, 2].max()) if ground is None else ground[0]
+    return np.array([*((p[:, :2].min(axis=0) + p[:, :2].max(axis=0)) / 2), down])
+
+
+def reach(flight: Flight, middle: Array) -> float:
+    """How far from a point (3,) in n anything of the flight was, level, metres."""
+    tables = [*flight.nav.values(), *flight.tables.values()]
+    p = [table[["north_m", "east_m"]].to_numpy(float) for table in tables if "north_m" in table]
+    away = [float(np.nanmax(np.hypot(*(one - middle[:2]).T), initial=0.0)) for one in p if len(one)]
+    return max(away, default=0.0)
+
+
+def first_stamp(flight: Flight) -> float:
+    """The first stamp of all tables, in flight time, s."""
+    offsets = flight.manifest.clocks
+    mine = {"frames": offsets.camera_offset_s, "truth": offsets.truth_offset_s, "gnss": offsets.gnss_offset_s}
+    tables = {**{f"nav/{name}": nav for name, nav in flight.nav.items()}, **flight.tables}
+    stamps = [
+        table["time_s"].dropna().min() + mine.get(name, 0.0)
+        for name, table in tables.items()
+        if "time_s" in table and table["time_s"].notna().any()
+    ]
+    return float(min(stamps, default=0.0))
+
+
+def neutral_learnt(learnt: Learnt) -> Learnt:
+    """A calibration from another flight, without that flight's name and what it is told by."""
+    data = learnt.model_dump(exclude_none=True)
+    data["learnt_on"] |= {"flight": "another", "source": "poses", "fingerprint": _NOBODY}
+    data["camera"] |= {"name": "camera"}
+    return Learnt.model_validate(data)
+
+
+def _flown(flight: Flight) -> Array:
+    """Known positions (N, 3) in n: of the aircraft, else of whatever has any."""
+    tables = [*flight.nav.values(), *(flight.tables[name] for name in ("gnss",) if name in flight.tables)]
+    if not tables and flight.truth is not None:
+        tables = [flight.truth]
+    p = [table[["north_m", "east_m", "down_m"]].to_numpy(float) for table in tables]
+    whole = np.concatenate(p) if p else np.empty((0, 3))
+    return np.asarray(whole[np.isfinite(whole).all(axis=1)])
+
+
+def _poses(flight: Flight) -> pd.DataFrame | None:
+    """The poses that move the inertial samples: those with the most rows."""
+    over_time = [nav for nav in flight.nav.values() if "frame_id" not in nav]
+    return max(over_time, key=len, default=None)
+
+
+def _moved(table: pd.DataFrame, shift: Array, start: float) -> pd.DataFrame:
+    """Coordinates from the new origin, stamps from the first one."""
+    changed = {
+        column: table[column] - float(by)
+        for columns in _PLACES
+        for column, by in zip(columns, shift, strict=True)
+        if column is not None and column in table
+    }
+    if "time_s" in table:
+        changed["time_s"] = table["time_s"] - start
+    return table.assign(**changed)
+
+
+def _date(manifest: Manifest, start: float, treatment: Treatment) -> tuple[datetime | None, str]:
+    """The epoch of the copy, and the date in words."""
+    if manifest.time.epoch is None:
+        return None, ""
+    true = datetime.fromtimestamp(manifest.time.epoch.timestamp() + start, UTC)
+    day = true.day if treatment.date == "day" else 1
+    words = f"{true:%B %Y}"
+    return datetime(
+        true.year, true.month, day, tzinfo=UTC
+    ), f"{day} {words}" if treatment.date == "day" else words
+
+
+def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: str) -> dict[str, Any]:
+    """The parts of the manifest that say how, not where, when or who. What is not named here is left out."""
+    parts: dict[str, Any] = {
+        key: getattr(manifest, key).model_dump(exclude_none=True)
+        for key in ("mount", "imu", "gnss", "uncertainty", "scoring", "targets")
+    }
+    for part in ("imu", "gnss"):
+        parts[part] |= {"name": "", "note": ""}
+    parts["uncertainty"]["note"] = ""
+    if manifest.camera is not None:
+        parts["camera"] = manifest.camera.model_dump() | {"name": "camera"}
+    if manifest.terrain is not None:
+        # The sides of a map's cells in metres tell its latitude, its reference tells the zone.
+        parts["terrain"] = manifest.terrain.model_dump(exclude_none=True) | {
+            "source": "map", "sha256": _NOBODY, "crs": "n", "added_m": 0.0,
+            "cell_m": (manifest.terrain.step_m, manifest.terrain.step_m),
+        }  # fmt: skip
+    parts["sensors"] = {names.of("sensor", key): _sensor(part) for key, part in manifest.sensors.items()}
+    return parts | {
+        "name": name,
+        "kind": manifest.kind,
+        "locations": {"sensitivity": "withheld"},
+        "platform": {"name": "aircraft"},
+        "clocks": clocks,
+    }
+
+
+def _sensor(part: SensorPart) -> dict[str, Any]:
+    return part.model_dump(exclude_none=True, exclude_unset=True)
+
+
+def _field_part(manifest: Manifest, iron: tuple[float, ...] | None, there: bool) -> dict[str, Any]:
+    stated = manifest.magnetometer
+    part: dict[str, Any] = {"heading_sd_deg": stated.heading_sd_deg} if stated.heading_sd_deg else {}
+    if there:
+        part |= {"declination_deg": USUAL_DECLINATION_DEG, "inclination_deg": USUAL_INCLINATION_DEG}
+    return part | ({"hard_iron_ut": iron} if iron is not None else {})

@@ -1,0 +1,138 @@
+"""The reports of one flight, computed and drawn again from the generalised flight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from wildlab.errors import RunFailed
+from wildlab.flight.checksums import CALIBRATION
+from wildlab.flight.learnt import Learnt, parse_learnt, read_learnt, write_learnt
+from wildlab.flight.store import Flight, save_flight
+from wildlab.paths import NOTEBOOKS
+from wildlab.runner.evaluate import evaluate_flight
+from wildlab.runner.record.own_flights import ABOUT
+from wildlab.sharing.agreement import Agreement, compare
+from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
+from wildlab.sharing.reports import Source
+from wildlab.sharing.tiers import Treatment
+
+#: What `wildlab evaluate` does not set of these, `wildlab track` was told.
+_TOLD = ("filters", "targets", "sensors", "settings", "tuned", "smooth")
+
+
+class Redrawn(NamedTuple):
+    """A generalised flight and its reports.
+
+    Attributes
+    ----------
+    made
+        The flight, and what was taken out of it.
+    folders
+        Of the reports, by the end of their name (`ABOUT`), in order.
+    agreement
+        With the sender's own reports.
+    notes
+        Sentences for the sender.
+    """
+
+    made: Generalised
+    folders: dict[str, Path]
+    agreement: Agreement
+    notes: tuple[str, ...]
+
+
+def redraw(
+    flight: Flight,
+    source: Source,
+    treatment: Treatment,
+    work: Path,
+    *,
+    name: str = "flight",
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Redrawn:
+    """Make the reports of a flight again from its generalised copy.
+
+    Parameters
+    ----------
+    flight
+        The true one, from its folder.
+    source
+        Its reports here, whose parameters are used again.
+    treatment
+        What becomes of the flight.
+    work
+        A folder to work in, which is gone afterwards.
+    name
+        What the copy is called.
+    notebooks, console
+        As for `evaluate_flight`.
+
+    Returns
+    -------
+    Redrawn
+
+    Raises
+    ------
+    RunFailed
+        Where a report could not be made again.
+    """
+    made = generalise(flight, treatment, name)
+    copy, reports = work / name, work / "reports"
+    kept = None if flight.calibration is None else neutral_learnt(read_learnt(flight.calibration))
+    save_flight(made.flight, copy, calibration=kept)
+    told = _told(source, made)
+    learnt: Learnt | None = told["calibration"]
+    applied = None
+    if learnt is not None and not (kept is not None and learnt == kept):
+        applied = work / CALIBRATION
+        write_learnt(learnt, applied)
+    outcomes = evaluate_flight(
+        copy,
+        source=told["source"],
+        calibration=applied,
+        reports=reports,
+        notebooks=notebooks,
+        console=console,
+    )
+    for outcome in outcomes:
+        if outcome.state == "failed":
+            why = outcome.reason.rstrip(".")
+            raise RunFailed(
+                f"the report {outcome.name} could not be made from generalised data ({why})",
+                "check the flight: wildlab check; then evaluate it and share it again",
+                file=flight.folder,
+            )
+    ends = ("-overview", "", "-navigation", "-tracking")
+    folders = {
+        end: reports / f"{name}{end}" for end in ends if (reports / f"{name}{end}" / "report.html").is_file()
+    }
+    mine = {one.name: one for one in source.folders}
+    pairs = {
+        mine[f"{source.name}{end}"]: there for end, there in folders.items() if f"{source.name}{end}" in mine
+    }
+    return Redrawn(made, folders, compare(pairs, made.names), tuple(told["notes"]))
+
+
+def _told(source: Source, made: Generalised) -> dict[str, Any]:
+    """What the sender's reports were told, in the copy's names."""
+    given: Mapping[str, Any] = {}
+    notes = []
+    for end in ABOUT:
+        parameters = source.parameters.get(f"{source.name}{end}", {})
+        given = {**{key: value for key, value in parameters.items() if value}, **given}
+        if end == "-tracking" and any(parameters.get(key) for key in _TOLD):
+            notes.append(
+                "The report on tracking was made by `wildlab track` with settings of its own; that in the "
+                "copy is the one that `wildlab evaluate` makes."
+            )
+    poses, calibration = given.get("source"), given.get("calibration")
+    return {
+        "source": made.names.of("poses", str(poses)) if poses else None,
+        "calibration": neutral_learnt(parse_learnt(str(calibration))) if calibration else None,
+        "notes": notes,
+    }

@@ -1,0 +1,204 @@
+"""Which reports are meant, what each was made from, and where the flight lies that it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import FILE_NAME
+from wildlab.paths import ROOT
+from wildlab.runner.catalogue import StudyEntry
+from wildlab.runner.record.beside import state_of
+from wildlab.runner.record.own_flights import ABOUT
+from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+
+
+@dataclass(frozen=True)
+class Source:
+    """One flight with its reports, or one study.
+
+    Attributes
+    ----------
+    name
+        Of the flight or the study.
+    folders
+        Of its reports that are done, in order.
+    logged
+        Whether it is a flight whose place and date are somebody's: its reports are drawn again.
+    flight
+        What provenance says of the flight.
+    parameters
+        By the name of the report's folder.
+    """
+
+    name: str
+    folders: tuple[Path, ...]
+    logged: bool
+    flight: dict[str, Any] = field(default_factory=dict)
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source], list[str]]:
+    """What a report's folder, or a folder of reports, is made from.
+
+    Parameters
+    ----------
+    path
+        ``reports/NAME``, its ``report.html``, or ``reports``.
+    studies
+        By name.
+
+    Returns
+    -------
+    sources : list of Source
+        Of a single report on a flight, with all of the flight's reports.
+    left_out : list of str
+        Sentences, on reports in a folder of reports that cannot be shared.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no report, or the one that is meant cannot be shared, with the reason.
+    """
+    folder = path.parent if path.name == "report.html" else path
+    if not folder.is_dir():
+        fix = "name the folder of a report, reports/NAME, or the folder of all of them"
+        raise WildlabError("there is no such report", fix, file=path)
+    if (folder / "report.html").is_file():
+        source = _source(folder, studies)
+        return [_with_siblings(source, folder.parent, studies) if source.logged else source], []
+    found: dict[str, Source] = {}
+    left_out = []
+    for one in sorted(folder.iterdir()):
+        if one.name.startswith(".") or not (one / "report.html").is_file():
+            continue
+        try:
+            source = _source(one, studies)
+        except WildlabError as error:
+            left_out.append(str(error))
+            continue
+        if source.logged:
+            source = _with_siblings(source, folder, studies)
+        found.setdefault(source.name, source)
+    if not found:
+        why = f" ({left_out[0]})" if left_out else ""
+        raise WildlabError(
+            f"no report here can be shared{why}", "name a folder with reports that are done", file=path
+        )
+    return list(found.values()), left_out
+
+
+def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
+    if state_of(folder).get("state") != "done":
+        raise WildlabError("this report is not done", "make it again, then share it", file=folder)
+    provenance = read_provenance(folder)
+    if not provenance:
+        fix = "only reports of studies and of `wildlab evaluate` are shared: evaluate the flight, share that"
+        raise WildlabError("nothing says what this report was made from", fix, file=folder)
+    flight = provenance.get("flight")
+    given = provenance.get("parameters")
+    parameters = {folder.name: given if isinstance(given, dict) else {}}
+    entry = studies.get(folder.name)
+    if not isinstance(flight, dict) or flight.get("kind") == "twin":
+        return Source(folder.name, (folder,), False, {}, parameters)
+    if entry is not None and (entry.dataset is not None or entry.twin is not None):
+        # Of the catalogue: everybody has the data.
+        return Source(folder.name, (folder,), False, {}, parameters)
+    name = str(flight.get("name", ""))
+    if folder.name not in {f"{name}{end}" for end in ABOUT}:
+        raise WildlabError(
+            "this report on a flight is not one that `wildlab evaluate` makes, so it cannot be drawn again "
+            "from generalised data",
+            f"share the reports that it makes: wildlab evaluate, then wildlab share reports/{name}",
+            file=folder,
+        )
+    return Source(name, (folder,), True, flight, parameters)
+
+
+def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> Source:
+    """All reports on the flight, in their usual order."""
+    folders: list[Path] = []
+    parameters: dict[str, dict[str, Any]] = {}
+    for end in ABOUT:
+        folder = reports / f"{source.name}{end}"
+        if not (folder / "report.html").is_file():
+            continue
+        try:
+            one = _source(folder, studies)
+        except WildlabError:
+            continue
+        if one.logged and one.name == source.name and same_flight(one.flight, source.flight):
+            folders.append(folder)
+            parameters |= one.parameters
+    return Source(source.name, tuple(folders), True, source.flight, parameters)
+
+
+def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether two records of provenance are of one flight: all tables that both have are the same."""
+    tables = [{k: v for k, v in _files(flight).items() if k != FILE_NAME} for flight in (one, other)]
+    return bool(tables[0]) and tables[0] == tables[1]
+
+
+def _files(flight: dict[str, Any]) -> dict[str, Any]:
+    files = flight.get("files")
+    return files if isinstance(files, dict) else {}
+
+
+def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = ()) -> Path:
+    """The flight that reports were made from: the one that is given, or one that lies where flights lie.
+
+    Parameters
+    ----------
+    source
+        With what provenance says.
+    given
+        What the user names, if anything.
+    around
+        Folders in which flights may lie.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    WildlabError
+        Where none is found, or the one given is another, with what to type.
+    """
+    again = f"wildlab share {source.folders[0]} --flight FOLDER"
+    if given is not None:
+        if not (given / FILE_NAME).is_file():
+            raise WildlabError(
+                "there is no flight in this folder", "name the folder with its flight.toml", file=given
+            )
+        if not same_flight(provenance_of_flight(given), source.flight):
+            raise WildlabError(
+                f"this is not the flight that the reports on {source.name} were made from, or it was changed "
+                "since",
+                f"evaluate it again, or name the right one: {again}",
+                file=given,
+                field="--flight",
+            )
+        return given
+    for folder in candidates(source.name, around):
+        if same_flight(provenance_of_flight(folder), source.flight):
+            return folder
+    raise WildlabError(
+        f"the flight {source.name!r} that this report was made from is not found, and figures are drawn "
+        "again from generalised data, never masked",
+        f"say where it is: {again}",
+        file=source.folders[0],
+    )
+
+
+def candidates(name: str, around: Iterable[Path]) -> Sequence[Path]:
+    """Flight folders in ``flights`` here and beside the reports, those of the same name first."""
+    places = [Path("flights"), *around, *([ROOT / "flights"] if ROOT is not None else [])]
+    found = []
+    for place in dict.fromkeys(place.resolve() for place in places):
+        if place.is_dir():
+            found += [one for one in sorted(place.iterdir()) if (one / FILE_NAME).is_file()]
+    return sorted(dict.fromkeys(found), key=lambda folder: folder.name != name)

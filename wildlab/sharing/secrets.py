@@ -1,0 +1,160 @@
+"""What must not be in a copy: of the machine always, of the flight where it is generalised."""
+
+from __future__ import annotations
+
+import getpass
+import socket
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from wildlab.flight.manifest import Manifest
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import Array, ned_to_geodetic
+from wildlab.geometry.gravity import normal_gravity
+from wildlab.paths import ROOT
+from wildlab.sharing.generalise import Generalised, first_stamp, new_origin
+from wildlab.sharing.reports import Source
+from wildlab.sharing.scan import Secrets
+from wildlab.sharing.tiers import Treatment
+
+#: So many places of each table are looked for; the scan finds what is near to one of them.
+_PLACES = 20
+#: A place that is written and lies no farther from the flight than this is a leak, m: beyond, it is chance.
+_NEAR = 2000.0
+#: So many digits of a hash tell it: what the foot of a report prints.
+_SHORT = 8
+
+
+def machine_secrets() -> Secrets:
+    """Who makes the copy, and where on which machine."""
+    words = [str(folder) for folder in (Path.home(), ROOT, Path.cwd(), sys.prefix) if folder is not None]
+    for ask in (getpass.getuser, socket.gethostname):
+        try:
+            words.append(ask())
+        except (OSError, KeyError):
+            continue
+    return Secrets(words=tuple(dict.fromkeys(words)), may_stay="all")
+
+
+def flight_secrets(
+    flight: Flight, made: Generalised, treatment: Treatment, source: Source, folder: Path
+) -> Secrets:
+    """What tells where, when and of whom a flight is.
+
+    Parameters
+    ----------
+    flight, made
+        The true one, and its generalised copy.
+    treatment
+        What may be told.
+    source
+        Its reports, with the hashes of its files.
+    folder
+        Where it lies.
+
+    Returns
+    -------
+    Secrets
+    """
+    m = flight.manifest
+    moments = []
+    if m.time.epoch is not None:
+        first = m.time.epoch.timestamp() + first_stamp(flight)
+        moments = [datetime.fromtimestamp(t, UTC) for t in (first, first + _length(flight))]
+    own = replace(
+        machine_secrets(),
+        places=_places(flight),
+        near_m=_NEAR,
+        cell_deg=treatment.cell_deg or 0.0,
+        moments=tuple(moments),
+        # A day may be told to those who are told it; the scan knows no finer step than the month.
+        may_stay="month" if treatment.date == "month" else "all",
+        numbers=tuple(_numbers(m)),
+    )
+    paths = (str(folder.resolve()), *(str(one.resolve()) for one in source.folders))
+    return own.with_words(*dict.fromkeys((*_words(m, made), *paths, *_hashes(source))))
+
+
+def all_of(several: Sequence[Secrets]) -> Secrets:
+    """The secrets of all, as strictly as the strictest of them: nobody's may be in the copy of another."""
+    order = ("nothing", "year", "month", "all")
+    with_places = [one for one in several if len(one.places)]
+    return Secrets(
+        places=np.concatenate([one.places for one in several]),
+        near_m=max((one.near_m for one in with_places), default=_NEAR),
+        cell_deg=max((one.cell_deg for one in with_places), default=0.0),
+        words=tuple(dict.fromkeys(word for one in several for word in one.words)),
+        moments=tuple(moment for one in several for moment in one.moments),
+        may_stay=min((one.may_stay for one in several), key=order.index),
+        numbers=tuple(number for one in several for number in one.numbers),
+    )
+
+
+def _places(flight: Flight) -> Array:
+    """(N, 3) latitude and longitude, deg, and height, m: the origin, the middle, and some of every table."""
+    p = [np.zeros((1, 3)), new_origin(flight)[None]]
+    for table in (*flight.nav.values(), *flight.tables.values()):
+        if {"north_m", "east_m", "down_m"} <= set(table):
+            rows = table[["north_m", "east_m", "down_m"]].to_numpy(float)
+            rows = rows[np.isfinite(rows).all(axis=1)]
+            p.append(
+                rows[np.unique(np.linspace(0, len(rows) - 1, _PLACES).astype(int))] if len(rows) else rows
+            )
+    llh = ned_to_geodetic(np.concatenate(p), flight.manifest.origin_tuple())
+    return np.column_stack([np.degrees(llh[:, 0]), np.degrees(llh[:, 1]), llh[:, 2]])
+
+
+def _length(flight: Flight) -> float:
+    tables = [*flight.nav.values(), *flight.tables.values()]
+    spans = [table["time_s"].max() - table["time_s"].min() for table in tables if "time_s" in table]
+    return float(max((span for span in spans if pd.notna(span)), default=0.0))
+
+
+def _numbers(m: Manifest) -> Iterator[float]:
+    """Other numbers that locate."""
+    yield m.origin.height_m
+    yield float(normal_gravity(np.radians(m.origin.latitude_deg), m.origin.height_m))
+    if m.vertical.correction_m:
+        yield m.vertical.correction_m
+    for angle in (m.magnetometer.declination_deg, m.magnetometer.inclination_deg):
+        if angle:
+            yield angle
+    if m.terrain is not None:
+        yield from (one for one in (m.terrain.added_m, *m.terrain.cell_m) if one and one != m.terrain.step_m)
+
+
+def _words(m: Manifest, made: Generalised) -> Iterator[str]:
+    yield from (m.name, m.platform.name, m.imu.name, m.gnss.name, m.magnetometer.name)
+    yield from (
+        m.description,
+        m.imu.note,
+        m.gnss.note,
+        m.magnetometer.note,
+        m.vertical.note,
+        m.uncertainty.note,
+    )
+    yield m.camera.name if m.camera is not None else ""
+    yield from (m.terrain.source, m.terrain.crs) if m.terrain is not None else ()
+    yield from (one.file for one in m.sources)
+    for known in made.names.by_kind.values():
+        yield from _some(known)
+
+
+def _some(names: Iterable[str]) -> list[str]:
+    """All names of a kind; of thousands of frames the first and last, whose parts are those of all."""
+    known = list(names)
+    return known if len(known) <= 1000 else [*known[:500], *known[-500:]]
+
+
+def _hashes(source: Source) -> Iterator[str]:
+    """What files are known by."""
+    files = source.flight.get("files")
+    sources = source.flight.get("sources")
+    for digest in (*(files.values() if isinstance(files, dict) else ()), *(sources or ())):
+        yield from (str(digest), str(digest)[:_SHORT])

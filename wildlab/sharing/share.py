@@ -1,0 +1,270 @@
+"""A copy of reports that is safe to send."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.console import Console
+
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.files import write_atomic
+from wildlab.flight.store import load_flight
+from wildlab.paths import NOTEBOOKS
+from wildlab.runner.catalogue import load_studies
+from wildlab.sharing.agreement import agreement_words
+from wildlab.sharing.cells import generalisation_words, place_words
+from wildlab.sharing.document import Chapter, joined, read_part
+from wildlab.sharing.package import aside, check_password, put, refuse_existing, write_zip
+from wildlab.sharing.redrawn import Redrawn, redraw
+from wildlab.sharing.reports import Source, flight_folder, sources_of
+from wildlab.sharing.scan import Secrets, not_searched, scan
+from wildlab.sharing.secrets import all_of, flight_secrets, machine_secrets
+from wildlab.sharing.tiers import Tier, Treatment, load_tiers, treatment_of
+from wildlab.sharing.told import removed_lines, sender_list
+
+#: Of what the scan found, so many are named.
+_MOST = 5
+#: What is said of a copy whose flight is as it was.
+_EXACT = "For the team: places, dates and names are the true ones. Do not pass it on."
+_WORDS = {"public": "for the public", "partner": "for partners", "team": "for the team"}
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What was made.
+
+    Attributes
+    ----------
+    file
+        To be sent.
+    told
+        What was removed, for the sender alone.
+    lines
+        The same, as lines.
+    """
+
+    file: Path
+    told: Path
+    lines: tuple[str, ...]
+
+
+class _Document(NamedTuple):
+    """What is said of one flight or study: to those who get the copy, to the scan, and to the sender."""
+
+    name: str
+    chapter: Chapter
+    secrets: Secrets
+    told: tuple[str, tuple[str, ...]]
+
+
+def share(
+    report: Path,
+    tier: Tier = "public",
+    *,
+    flight: Path | None = None,
+    out: Path | None = None,
+    zipped: bool = False,
+    password: str | None = None,
+    overwrite: bool = False,
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Shared:
+    """Make a copy of a flight's reports, of a study's, or of all in a folder, that is safe to send.
+
+    Parameters
+    ----------
+    report
+        ``reports/NAME``, its ``report.html``, or a folder of reports.
+    tier
+        For whom.
+    flight
+        The folder of the flight, where it does not lie where flights lie.
+    out
+        The file to make; left out, ``<name>-<tier>.html`` (or ``.zip``) here, whose name says nothing.
+    zipped
+        A zip with a page for each flight and study in place of one page.
+    password
+        Encrypts; the copy is then a zip.
+    overwrite
+        Whether a file that is there may be replaced.
+    notebooks, console
+        Where the notebooks are, and where progress is shown.
+
+    Returns
+    -------
+    Shared
+
+    Raises
+    ------
+    WildlabError
+        Where the report, or its flight, cannot be used.
+    RunFailed
+        Where a report could not be made again, or something was found in the copy that must not be sent:
+        then there is no copy.
+    """
+    zipped = zipped or password is not None
+    if password is not None:
+        check_password(password)
+    studies = load_studies(notebooks / "studies.toml")
+    sources, left_out = sources_of(report, studies)
+    if flight is not None and sum(source.logged for source in sources) != 1:
+        raise WildlabError(
+            "a flight is named, and this is not one flight's report", "leave --flight out", field="--flight"
+        )
+    exact = load_tiers().tier[tier].exact
+    flights = [source for source in sources if source.logged]
+    calls = _calls(sources, exact)
+    target = _target(calls[0] if len(sources) == 1 else "reports", tier, out, zipped)
+    told = target.with_name(f"{target.stem}.for-the-sender.txt")
+    refuse_existing(target, overwrite)
+    refuse_existing(told, overwrite)
+    around = [source.folders[0].resolve().parent.parent / "flights" for source in flights]
+    # All are found before the first is computed.
+    folders = [
+        None if exact or not source.logged else flight_folder(source, flight, around) for source in sources
+    ]
+    documents: list[_Document] = []
+    for source, name, folder in zip(sources, calls, folders, strict=True):
+        first = 1 + sum(len(document.chapter.parts) for document in documents)
+        if folder is not None:
+            documents.append(_generalised(folder, source, tier, name, first, notebooks, console))
+        else:
+            documents.append(_copied(source, tier, name, first))
+    secrets = all_of([document.secrets for document in documents])
+    with aside(target) as work:
+        pages = work / "pages"
+        pages.mkdir()
+        files = {name: page.encode("utf-8") for name, page in _pages(documents, target, zipped).items()}
+        for name, content in files.items():
+            (pages / name).write_bytes(content)
+        _refuse_leaks(pages, target.name, secrets)
+        made = work / "made"
+        if zipped:
+            write_zip(made, files, password)
+        else:
+            (pages / target.name).replace(made)
+        notes = [*left_out, *not_searched(secrets)]
+        lines = sender_list(
+            target.name, [document.told for document in documents], notes, generalised=any(folders)
+        )
+        put(made, target, overwrite)
+    write_atomic(told, "\n".join(lines) + "\n")
+    told.chmod(0o600)
+    return Shared(target, told, tuple(lines))
+
+
+def _calls(sources: Sequence[Source], exact: bool) -> list[str]:
+    """What each is called in the copy: flights by number, where their names are not for everybody."""
+    flights = [source for source in sources if source.logged]
+    names = []
+    for source in sources:
+        if exact or not source.logged:
+            names.append(source.name)
+        else:
+            names.append("flight" if len(flights) == 1 else f"flight-{flights.index(source) + 1}")
+    return names
+
+
+def _target(name: str, tier: Tier, out: Path | None, zipped: bool) -> Path:
+    ending = ".zip" if zipped else ".html"
+    if out is None:
+        return Path(f"{name}-{tier}{ending}")
+    if out.suffix.lower() != ending:
+        what = "a zip" if zipped else "a page"
+        raise WildlabError(
+            f"the copy is {what}", f"give it a name that ends in {ending}", file=out, field="--out"
+        )
+    return out
+
+
+def _pages(documents: Sequence[_Document], target: Path, zipped: bool) -> dict[str, str]:
+    """The pages by name: one of all, or one of each."""
+    if zipped:
+        return {f"{one.name}.html": joined([one.chapter], one.chapter.heading) for one in documents}
+    flights = sum(one.secrets.places.size > 0 for one in documents)
+    counts = [(flights, "flight"), (len(documents) - flights, "study")]
+    said = " and ".join(f"{n} {what if n == 1 else _PLURAL[what]}" for n, what in counts if n)
+    return {target.name: joined([one.chapter for one in documents], f"Reports on {said}")}
+
+
+_PLURAL = {"flight": "flights", "study": "studies"}
+
+
+def _generalised(
+    folder: Path, source: Source, tier: Tier, name: str, first: int, notebooks: Path, console: Console | None
+) -> _Document:
+    """A flight's reports, drawn again."""
+    flight = load_flight(folder)
+    treatment = treatment_of(flight.manifest.locations, tier)
+    with tempfile.TemporaryDirectory(prefix="wildlab-share-") as work:
+        drawn = redraw(flight, source, treatment, Path(work), name=name, notebooks=notebooks, console=console)
+        parts = [
+            read_part(one / "report.html", number, hashes=False)
+            for number, one in enumerate(drawn.folders.values(), first)
+        ]
+    made = drawn.made
+    about = [
+        place_words(made.cell),
+        f"It was flown in {made.when}; times count from its first sample." if made.when else "",
+        "Names of the flight, of targets, files and sensors are replaced by neutral ones, and photographs "
+        "are left out.",
+        "Every figure and every number was computed again from generalised data. "
+        + agreement_words(drawn.agreement),
+        generalisation_words(made.cell, treatment.category),
+    ]
+    heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
+    chapter = Chapter(heading, tuple(one.strip() for one in about if one), "", tuple(parts))
+    secrets = flight_secrets(flight, made, treatment, source, folder)
+    return _Document(name, chapter, secrets, (f"Flight {source.name}", tuple(_told(drawn, treatment))))
+
+
+def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
+    how = "as flight.toml states" if treatment.stated else "assumed: flight.toml states no category"
+    yield f"category {treatment.category} of GBIF's guide ({how}), dates to the {treatment.date}"
+    yield from removed_lines(drawn.made.removed)
+    a = drawn.agreement
+    if a.compared:
+        yield f"{a.same} of {a.compared} numbers are those of your report, to 0.1 % or better"
+    if a.which:
+        yield f"the one that differs most ({a.worst:.2g} of it): {a.which}"
+    yield from drawn.notes
+
+
+def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
+    """A study's reports, or a flight's for those who have it, as they are."""
+    parts = [
+        read_part(one / "report.html", number, hashes=True)
+        for number, one in enumerate(source.folders, first)
+    ]
+    about = (
+        _EXACT if source.logged else "Simulated, or computed from public data: it has no place to be hidden."
+    )
+    chapter = Chapter(f"{name}, {_WORDS[tier]}", (about,), "", tuple(parts))
+    heading = f"{'Flight' if source.logged else 'Study'} {source.name}"
+    removed = "removed: links to files beside the report, and what this machine and its users are called"
+    return _Document(name, chapter, machine_secrets(), (heading, (removed,)))
+
+
+def _refuse_leaks(pages: Path, name: str, secrets: Secrets) -> None:
+    """Look through all that is to be sent, and refuse it where something must not be in it.
+
+    Raises
+    ------
+    RunFailed
+        Naming what was found, how it is written, and where.
+    """
+    found = scan(sorted(pages.iterdir()), secrets)
+    if not found:
+        return
+    several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])
+    more = f"; and {len(found) - _MOST} more" if len(found) > _MOST else ""
+    raise RunFailed(
+        f"there is no copy, since this was found in it: {several}{more}",
+        "rename what the flight calls so (flight.toml, its tables), evaluate it again, and share it again; "
+        "if it is a place or a date, keep the report to yourself and tell the makers of wildlab",
+        file=name,
+    )
