@@ -104,8 +104,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
             here = local_earth(*manifest.origin_tuple()[::2])
             table = moved_imu(table, best, shift, here, local_earth(math.radians(there[0]), 0.0))
         elif key == "magnetometer":
-            stated = manifest.magnetometer
-            moved = moved_field(table, best, stated.declination_deg, stated.inclination_deg)
+            moved = moved_field(table, best, manifest.magnetometer)
             if moved is None:
                 continue
             table, stretch = moved

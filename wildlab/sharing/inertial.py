@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
+from wildlab.flight.manifest import MagnetometerPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth
@@ -92,8 +93,7 @@ def _motion(nav: pd.DataFrame, times: Array) -> tuple[Array, Array, Array]:
 def moved_field(
     table: pd.DataFrame,
     nav: pd.DataFrame | None,
-    declination_deg: float | None,
-    inclination_deg: float | None,
+    stated: MagnetometerPart,
 ) -> tuple[pd.DataFrame, float] | None:
     """Magnetic measurements as they would have been in the usual field, and what they were stretched by.
 
@@ -105,24 +105,26 @@ def moved_field(
         Of the magnetometer.
     nav
         Poses over time.
-    declination_deg, inclination_deg
-        Of the true field, as the manifest states it.
+    stated
+        What the manifest says of the true field, and of what is magnetic on board.
 
     Returns
     -------
     (DataFrame, float) or None
         None where it cannot be told what the field there did to them: they had better be left out.
     """
-    if nav is None or len(nav) < 2 or declination_deg is None or inclination_deg is None:
+    declination, inclination = stated.declination_deg, stated.inclination_deg
+    if nav is None or len(nav) < 2 or declination is None or inclination is None:
         return None
     _, R, _ = _motion(nav, table["time_s"].to_numpy(float))
     field = table[FIELD].to_numpy(float)
-    strength = float(np.nanmedian(np.linalg.norm(field, axis=1)))
+    iron = np.zeros(3) if stated.hard_iron_ut is None else np.array(stated.hard_iron_ut)
+    strength = float(np.nanmedian(np.linalg.norm(field - iron, axis=1)))
     known = np.asarray(np.isfinite(R).all(axis=(1, 2)))
     if not strength > 0 or not known.any():
         return None
     there = earth_field(*np.radians([USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG]))
-    here = earth_field(*np.radians([declination_deg, inclination_deg]))
+    here = earth_field(*np.radians([declination, inclination]))
     field = field + strength * np.einsum("nji,j->ni", R, there - here)
     stretch = USUAL_FIELD / strength
     moved = table.assign(**dict(zip(FIELD, (field * stretch).T, strict=True)))

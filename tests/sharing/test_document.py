@@ -1,0 +1,106 @@
+"""Several reports as one page: nothing dead, nothing that runs, nothing of who made it when."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from bs4 import BeautifulSoup
+
+from wildlab.errors import WildlabError
+from wildlab.reporting.page import page
+from wildlab.sharing.document import Chapter, joined, read_part
+
+BODY = """<header><h1>How far off &amp; why?</h1></header>
+<h2 id="numbers">Numbers</h2>
+<p>See <a href="#numbers">above</a>, <a href="#gone">nowhere</a>, <a href="../index.html">the ledger</a>,
+<a href="https://example.org/x?y=1">the net</a>,
+<a download="a.csv" href="data:text/csv;base64,YQ==">as CSV</a>
+and <a href="data:application/geo+json;base64,e30=">as a map</a>.</p>
+<!-- by jonas on kestrel -->
+<svg viewBox="0 0 9 9" aria-labelledby="t"><title id="t">An arrow</title>
+<clipPath id="c"><path d="M0 0"/></clipPath><g clip-path="url(#c)"><use href="#c"/></g></svg>
+<script>alert(1)</script><img src="figures/a.png" alt="a" onerror="alert(1)">
+<img src="data:image/png;base64,YQ==" alt="b">
+<iframe src="x"></iframe><form action="http://x"><input></form>"""
+FOOTER = """<p>wildlab 0.1.0 at commit <code>c247ba823b</code> · made 2026-11-23 03:24:15 UTC.</p>
+<p>All hashes are in <a href="provenance.json">provenance.json</a> beside this page.</p>
+<p>H: H. H. Helgesen, doctoral thesis, 2019.</p>"""
+
+
+def report(folder: Path, body: str = BODY, style: str = "#numbers { color: red }") -> Path:
+    path = folder / "report.html"
+    kicker = '<a href="../index.html">wildlab ledger</a> › kifaru-ridge'
+    path.write_text(page(title="x", body=body, kicker=kicker, footer=FOOTER, style=style), encoding="utf-8")
+    return path
+
+
+def whole(tmp_path: Path, *, hashes: bool = False, times: int = 2) -> str:
+    path = report(tmp_path)
+    parts = tuple(read_part(path, i, hashes=hashes) for i in range(1, times + 1))
+    return joined([Chapter("A flight, for the public", ("It was <b>somewhere</b>.",), "", parts)], "")
+
+
+def test_ids_are_each_once_and_links_lead_somewhere(tmp_path: Path) -> None:
+    soup = BeautifulSoup(whole(tmp_path), "html.parser")
+    ids = [tag["id"] for tag in soup.find_all(id=True)]
+    assert len(ids) == len(set(ids)) and "r1-numbers" in ids and "r2-numbers" in ids
+    for link in soup.find_all("a"):
+        target = str(link["href"])
+        assert target.startswith("data:text/csv") or target.removeprefix("#") in ids, target
+    assert soup.find("g")["clip-path"] == "url(#r1-c)"  # type: ignore[index]
+    assert soup.find("svg")["aria-labelledby"] == "r1-t"  # type: ignore[index]
+    assert soup.find("use")["href"] == "#r1-c"  # type: ignore[index]
+    assert "#r1-numbers { color: red }" in str(soup.style)
+
+
+def test_nothing_runs_asks_or_lies_beside(tmp_path: Path) -> None:
+    text = whole(tmp_path)
+    soup = BeautifulSoup(text, "html.parser")
+    assert not soup.find_all(["script", "iframe", "form", "object", "embed", "link", "base"])
+    assert not [tag for tag in soup.find_all(True) if any(name.startswith("on") for name in tag.attrs)]
+    assert [tag["src"] for tag in soup.find_all(src=True)] == ["data:image/png;base64,YQ=="] * 2
+    for secret in (
+        "jonas",
+        "kestrel",
+        "example.org",
+        "geo+json",
+        "ledger</a>",
+        "kifaru-ridge",
+        "provenance.json",
+    ):
+        assert secret not in text
+    assert "the ledger" in text  # its words stay
+
+
+def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> None:
+    text = whole(tmp_path)
+    assert "Helgesen" in text
+    assert "c247ba823b" not in text and "2026-11-23" not in text
+    assert "c247ba823b" in whole(tmp_path, hashes=True)
+
+
+def test_sentences_are_escaped_and_reports_listed(tmp_path: Path) -> None:
+    soup = BeautifulSoup(whole(tmp_path), "html.parser")
+    assert "It was <b>somewhere</b>." in soup.section.get_text()  # type: ignore[union-attr]
+    assert [one.get_text() for one in soup.nav.find_all("a")] == ["How far off & why?"] * 2  # type: ignore[union-attr]
+    assert len(soup.find_all("main")) == 1
+    assert not BeautifulSoup(whole(tmp_path, times=1), "html.parser").nav
+
+
+def test_its_policy_forbids_the_net(tmp_path: Path) -> None:
+    assert re.search(r"default-src 'none'", whole(tmp_path))
+
+
+@pytest.mark.parametrize("text", ["", "<p>hello</p>", "<html><body><main>no heading</main></body></html>"])
+def test_what_is_no_report_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text(text, encoding="utf-8")
+    with pytest.raises(WildlabError, match="not a report of wildlab"):
+        read_part(tmp_path / "report.html", 1, hashes=False)
+
+
+def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(WildlabError, match="cannot be read"):
+        read_part(tmp_path / "report.html", 1, hashes=False)

@@ -1,0 +1,273 @@
+"""A generalised flight: the same motion, and nothing of where, when and who."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
+from wildlab.flight.clocks import frame_times
+from wildlab.flight.manifest import LocationsPart
+from wildlab.flight.store import Flight, save_flight
+from wildlab.geometry.gravity import local_earth
+from wildlab.navigation.strapdown import integrate_strapdown
+from wildlab.navigation.timeline import ImuSamples
+from wildlab.pipeline.georeference import observe
+from wildlab.sharing.generalise import NOWHERE, QUARTER, Generalised, first_stamp, generalise, new_origin
+from wildlab.sharing.tiers import treatment_of
+
+POSITION = ["north_m", "east_m", "down_m"]
+FELT = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
+
+
+def made(flight: Flight, tier: str = "public") -> Generalised:
+    return generalise(flight, treatment_of(flight.manifest.locations, tier))  # type: ignore[arg-type]
+
+
+def numbers_of(flight: Flight) -> dict[str, np.ndarray]:
+    tables = {**flight.nav, **flight.tables}
+    return {
+        f"{name}.{column}": table[column].to_numpy(float)
+        for name, table in tables.items()
+        for column in table.columns
+        if pd.api.types.is_numeric_dtype(table[column])
+    }
+
+
+def test_two_places_give_the_same_copy_where_the_place_is_withheld() -> None:
+    """Nothing can be recovered of what the result does not depend on."""
+    south = made(canary()).flight
+    north = made(canary((69.6, -18.9, 1204.0), corner=(-300.0, 90.0, 40.0), field=(53.0, 9.2, 77.1))).flight
+    # What is magnetic on board is as much larger in the copy as the field was weaker there.
+    one, other = south.manifest.magnetometer, north.manifest.magnetometer
+    assert np.multiply(one.hard_iron_ut, 31.2) == pytest.approx(np.multiply(other.hard_iron_ut, 53.0))
+    assert south.manifest == north.manifest.model_copy(update={"magnetometer": one})
+    here, there = numbers_of(south), numbers_of(north)
+    assert here.keys() == there.keys()
+    for name, values in here.items():
+        if name.startswith("magnetometer.field"):
+            continue
+        # Attitudes between poses, and rounding, are all that is left.
+        loose = 5e-5 if name.split(".")[1] in FELT else 1e-8
+        np.testing.assert_allclose(values, there[name], atol=loose, err_msg=name)
+    assert south.terrain is not None and north.terrain is not None
+    np.testing.assert_allclose(south.terrain.height, north.terrain.height, atol=1e-4)
+    assert (south.terrain.north, south.terrain.east) == pytest.approx(
+        (north.terrain.north, north.terrain.east)
+    )
+
+
+def test_two_days_of_a_month_give_the_same_copy() -> None:
+    one, other = made(canary()), made(canary(epoch=datetime(2023, 9, 2, 3, 0, 0, tzinfo=UTC)))
+    assert one.flight.manifest == other.flight.manifest
+    assert one.when == other.when == "September 2023"
+    for name, values in numbers_of(one.flight).items():
+        np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
+
+
+def test_the_day_is_told_only_where_the_table_says_so() -> None:
+    flight = canary(locations={"category": 3})
+    assert made(flight, "public").when == "September 2023"
+    assert made(flight, "partner").when == "17 September 2023"
+    assert made(flight, "partner").flight.manifest.time.epoch == datetime(2023, 9, 17, tzinfo=UTC)
+    assert made(flight).flight.manifest.time.epoch == datetime(2023, 9, 1, tzinfo=UTC)
+
+
+def test_a_flight_over_midnight_has_the_date_of_its_first_sample() -> None:
+    # The epoch is a month before the first sample.
+    assert made(canary(epoch=datetime(2023, 8, 31, 23, 0, tzinfo=UTC))).when == "September 2023"
+
+
+@pytest.mark.parametrize("category", [1, 2, 3, 4])
+def test_the_moved_sensors_feel_the_same_flight(category: int) -> None:
+    """Dead reckoning over the copy, on the Earth of its origin, leads where the true one does."""
+    flight = canary(locations={"category": category})
+    copy = made(flight).flight
+    ends = []
+    for one in (flight, copy):
+        imu = one.table("imu")
+        samples = ImuSamples(*(imu[names].to_numpy(float) for names in ("time_s", FELT[:3], FELT[3:])))
+        nav = next(iter(one.nav.values()))
+        latitude, _, height = one.manifest.origin_tuple()
+        start = [nav[names].iloc[0].to_numpy(float) for names in (POSITION, list(VELOCITY), list(QUATERNION))]
+        found = integrate_strapdown(samples, *start, local_earth(latitude, height))
+        ends.append(found.position - nav[POSITION].iloc[0].to_numpy(float))
+        truth = place(samples.times - samples.times[0], np.zeros(3))
+        np.testing.assert_allclose(ends[-1], truth - truth[0], atol=0.2)
+    np.testing.assert_allclose(ends[0], ends[1], atol=0.02)
+
+
+VELOCITY = ("v_north_m_s", "v_east_m_s", "v_down_m_s")
+QUATERNION = ("q_w", "q_x", "q_y", "q_z")
+
+
+def test_without_the_move_the_sensors_would_contradict_the_place() -> None:
+    """The test above can fail: the true samples on the copy's Earth lead metres away."""
+    flight = canary()
+    imu, nav = flight.table("imu"), flight.nav["Kestrel-log"]
+    samples = ImuSamples(*(imu[names].to_numpy(float) for names in ("time_s", FELT[:3], FELT[3:])))
+    start = [nav[names].iloc[0].to_numpy(float) for names in (POSITION, list(VELOCITY), list(QUATERNION))]
+    found = integrate_strapdown(samples, *start, local_earth(math.radians(NOWHERE[0])))
+    truth = place(samples.times - samples.times[0], np.array((812.0, -455.0, -13.0)))
+    assert np.linalg.norm(found.position[-1] - truth[-1]) > 10
+
+
+def test_without_attitudes_gravity_is_still_that_of_no_place() -> None:
+    flight = canary()
+    flight.nav = {"Kestrel-log": flight.nav["Kestrel-log"].iloc[:1]}
+    still = flight.table("imu").assign(f_x_m_s2=0.0, f_y_m_s2=0.0)
+    flight.tables["imu"] = still.assign(f_z_m_s2=-local_earth(math.radians(HERE[0]), HERE[2]).gravity)
+    found = made(flight).flight.table("imu")["f_z_m_s2"].to_numpy(float)
+    np.testing.assert_allclose(found, -local_earth(math.radians(NOWHERE[0])).gravity, rtol=1e-9)
+
+
+def test_the_magnetic_field_is_that_of_no_place() -> None:
+    flight = canary()
+    copy = made(flight).flight
+    stated, iron = copy.manifest.magnetometer, copy.manifest.magnetometer.hard_iron_ut
+    assert (stated.declination_deg, stated.inclination_deg) == (0.0, 60.0)
+    assert iron is not None
+    field = copy.table("magnetometer")[["field_x_ut", "field_y_ut", "field_z_ut"]].to_numpy(float) - iron
+    # What is left points where the copy says, and as strongly everywhere as the usual field.
+    np.testing.assert_allclose(np.linalg.norm(field, axis=1), 50.0, rtol=1e-6)
+    R = quaternions_to_matrices(next(iter(copy.nav.values())))
+    seen = np.einsum("nij,nj->ni", R, field)
+    np.testing.assert_allclose(seen, np.tile([25.0, 0.0, 50 * math.sqrt(0.75)], (len(seen), 1)), atol=1e-4)
+
+
+def quaternions_to_matrices(nav: pd.DataFrame) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(nav[["q_x", "q_y", "q_z", "q_w"]].to_numpy(float)).as_matrix()
+
+
+def test_a_field_of_which_nothing_is_stated_is_left_out() -> None:
+    flight = canary(magnetometer={"declination_deg": -17.4})
+    found = made(flight)
+    assert "magnetometer" not in found.flight.tables
+    assert found.flight.manifest.magnetometer.declination_deg is None
+    assert any(one.what == "table" and one.was == "magnetometer" for one in found.removed)
+
+
+def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path: Path) -> None:
+    flight = canary(locations={"category": 2})
+    saved = save_flight(made(flight).flight, tmp_path / "flight")
+    assert saved.folder is not None
+    text = "".join(
+        path.read_bytes().decode("latin-1") for path in sorted(saved.folder.rglob("*")) if path.is_file()
+    )
+    for secret in (
+        *(
+            "kifaru",
+            "Olifants",
+            "Letaba",
+            "Skukuza",
+            "Jonas",
+            "Kestrel",
+            "Sarah",
+            "Thandi",
+            "KIFARU",
+            "rhino",
+        ),
+        *("873165", "486297", "317.43", "13.57", "32736", "30.87", "28.02", "58.3", "17.4", HASH, HASH[:8]),
+        *("2023-09-17", "lat_raw", "-7198"),
+    ):
+        assert secret not in text, secret
+    assert "-24.9" in text and "31.5" in text  # the cell of category 2
+    terrain = saved.manifest.terrain
+    assert terrain is not None and terrain.cell_m == (40.0, 40.0)
+
+
+def test_columns_that_the_schema_does_not_know_are_dropped() -> None:
+    found = made(canary())
+    assert all("lat_raw" not in nav for nav in found.flight.nav.values())
+    assert any(one.what == "column" and "lat_raw" in one.was for one in found.removed)
+
+
+def test_stamps_begin_at_zero_and_keep_their_distances() -> None:
+    flight = canary()
+    copy = made(flight).flight
+    assert first_stamp(copy) == pytest.approx(0.0, abs=1e-9)
+    assert frame_times(copy) == pytest.approx(frame_times(flight) - START, abs=1e-9)
+    # The zone of the camera's clock is gone, and what it is late by is still said.
+    assert copy.manifest.clocks.camera_offset_s == pytest.approx(1.5)
+    assert copy.table("frames")["time_s"].min() == pytest.approx(5.0 - 1.5)
+
+
+@given(st.integers(-60, 60), st.floats(-449, 449))
+@settings(max_examples=40, deadline=None)
+def test_no_zone_of_time_is_left_in_an_offset(quarters: int, rest: float) -> None:
+    flight = canary(imu=False, clocks={"truth_offset_s": quarters * QUARTER + rest})
+    assert made(flight).flight.manifest.clocks.truth_offset_s == pytest.approx(rest, abs=1e-6)
+
+
+def test_what_is_computed_from_the_copy_is_what_is_computed_from_the_flight() -> None:
+    flight = canary()
+    copy = made(flight).flight
+    true, same = observe(flight), observe(copy)
+    np.testing.assert_allclose(same.poses.R_nb, true.poses.R_nb, atol=1e-9)
+    np.testing.assert_allclose(
+        same.poses.p_nb - same.poses.p_nb[0], true.poses.p_nb - true.poses.p_nb[0], atol=1e-8
+    )
+    np.testing.assert_allclose(
+        same.plane_down - same.poses.p_nb[:, 2], true.plane_down - true.poses.p_nb[:, 2], atol=1e-4
+    )
+    np.testing.assert_allclose(
+        velocity(np.zeros(1))[0], next(iter(copy.nav.values()))[list(VELOCITY)].iloc[0]
+    )
+
+
+def test_the_new_origin_follows_from_the_flight_alone() -> None:
+    one = canary()
+    moved = canary(corner=(5_812.0, 9_545.0, -113.0))
+    np.testing.assert_allclose(new_origin(moved) - new_origin(one), [5_000.0, 10_000.0, -100.0])
+    for flight in (one, moved):
+        p = made(flight).flight.nav["poses-1"][POSITION].to_numpy(float)
+        np.testing.assert_allclose(p.min(axis=0)[:2], -p.max(axis=0)[:2], atol=1e-8)
+
+
+def test_the_sender_is_told_each_thing() -> None:
+    told = {(one.what, one.was) for one in made(canary()).removed}
+    assert ("flight", "kifaru-ridge") in told
+    assert ("target", "Sarah") in told
+    assert ("platform", "Kestrel of Olifants camp") in told
+    assert any(what == "origin" and "-24.873165" in was for what, was in told)
+    assert any(what == "date and time" and "2023-09-17 14:23:51" in was for what, was in told)
+    assert any(what == "raw file" and "kifaru_ridge_2023-09-17.bin" in was for what, was in told)
+    assert any(what == "camera offset" for what, was in told)
+
+
+def test_made_twice_it_is_the_same() -> None:
+    """Two copies of one flight, laid over each other, say no more than one."""
+    one, other = made(canary()), made(canary())
+    assert one.flight.manifest == other.flight.manifest
+    for name, values in numbers_of(one.flight).items():
+        np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
+
+
+def test_the_copy_of_a_copy_is_the_copy() -> None:
+    once = made(canary()).flight
+    twice = generalise(once, treatment_of(LocationsPart(), "public")).flight
+    for name, values in numbers_of(once).items():
+        np.testing.assert_allclose(numbers_of(twice)[name], values, atol=1e-6, err_msg=name)
+
+
+def test_a_flight_without_positions_or_stamps_is_no_trouble() -> None:
+    flight = canary(imu=False, time={"kind": "sequence"})
+    flight.nav, flight.terrain = {}, None
+    flight.tables = {"frames": flight.table("frames")}
+    flight = dataclasses.replace(flight, manifest=flight.manifest.model_copy(update={"terrain": None}))
+    found = made(flight)
+    assert found.when == "" and found.flight.manifest.time.epoch is None
+    assert found.flight.table("frames")["frame_id"].iloc[0] == "frame-01"
+    assert re.fullmatch(r"frame-\d\d", found.flight.table("frames")["frame_id"].iloc[-1])
+    assert EPOCH.year == 2023

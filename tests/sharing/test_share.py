@@ -1,0 +1,270 @@
+"""Copies, from the report to the file: what is in them, what is refused, and what is left when it ends badly.
+
+Reports are made by a stand-in that shows all that a flight has; one slow test runs the true notebooks.
+"""
+
+from __future__ import annotations
+
+import json
+import stat
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pyzipper
+
+from tests.sharing.canary import HASH, canary
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.files import write_json
+from wildlab.flight.manifest import manifest_toml
+from wildlab.flight.store import load_flight, save_flight
+from wildlab.reporting.page import page
+from wildlab.reporting.text import escape
+from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.sharing import redrawn
+from wildlab.sharing.share import share
+
+SECRETS = (
+    *("kifaru", "Olifants", "Letaba", "Skukuza", "Jonas", "Kestrel", "Thandi", "873165", "486297", "13.57"),
+    *("2023-09-17", HASH[:8], "lat_raw"),
+)
+
+
+def write_report(folder: Path, flight: Path, body: str, parameters: dict[str, Any] | None = None) -> None:
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text(page(title="x", body=f"<h1>Report</h1>{body}"), encoding="utf-8")
+    given = parameters or {"source": "Kestrel-log"}
+    write_json(folder / "provenance.json", {"flight": provenance_of_flight(flight), "parameters": given})
+    write_json(folder / "status.json", {"state": "done"})
+    metrics = [{"name": "error", "subject": "logged-pose", "value": 3.25}]
+    write_json(folder / "metrics.json", {"metrics": metrics, "claims": []})
+
+
+def everything(flight: Path) -> str:
+    """All that a flight says, as a careless report might print it."""
+    loaded = load_flight(flight)
+    tables = {**loaded.nav, **loaded.tables}
+    shown = "".join(f"<h2>{escape(name)}</h2>{table.head(60).to_html()}" for name, table in tables.items())
+    return f"<pre>{escape(manifest_toml(loaded.manifest))}</pre>{shown}"
+
+
+@pytest.fixture
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a flight and a report on it; reports on copies are made by a stand-in."""
+    monkeypatch.chdir(tmp_path)
+    flight = tmp_path / "flights" / "mine"
+    save_flight(canary(locations={"category": 2}), flight)
+    write_report(tmp_path / "reports" / "kifaru-ridge", flight, everything(flight))
+
+    def evaluate(folder: Path, *, source: str | None, reports: Path, **_: Any) -> list[Outcome]:
+        name = load_flight(folder).name
+        assert source in load_flight(folder).nav
+        write_report(reports / name, folder, everything(folder))
+        return [Outcome(name, "done", 1.0, "", reports / name)]
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
+    return tmp_path
+
+
+def test_a_canary_is_in_no_copy_but_that_of_the_team(made: Path) -> None:
+    report = made / "reports" / "kifaru-ridge"
+    for tier in ("public", "partner"):
+        copy = share(report, tier)  # type: ignore[arg-type]
+        assert copy.file.name == f"flight-{tier}.html"
+        text = copy.file.read_text(encoding="utf-8")
+        for secret in SECRETS:
+            assert secret not in text, (tier, secret)
+        assert "24.9° S" in text and "dataGeneralizations" in text and "September 2023" in text
+        assert "All 1 numbers are those of the report" in text
+    team = share(report, "team")
+    text = team.file.read_text(encoding="utf-8")
+    assert team.file.name == "kifaru-ridge-team.html"
+    assert "Olifants" in text and "873165" in text
+
+
+def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> None:
+    copy = share(made / "reports" / "kifaru-ridge")
+    told = copy.told.read_text(encoding="utf-8")
+    for secret in (
+        "kifaru-ridge",
+        "-24.873165",
+        "Thandi",
+        "Kestrel of Olifants camp",
+        "What a copy cannot hide",
+    ):
+        assert secret in told
+    assert stat.S_IMODE(copy.told.stat().st_mode) == 0o600
+    assert "\n".join(copy.lines) in told
+    assert sorted(path.name for path in made.iterdir()) == [
+        "flight-public.for-the-sender.txt", "flight-public.html", "flights", "reports",
+    ]  # fmt: skip
+
+
+def test_made_twice_it_is_the_same_to_the_byte(made: Path) -> None:
+    one = share(made / "reports" / "kifaru-ridge", out=made / "a.html").file.read_bytes()
+    assert share(made / "reports" / "kifaru-ridge", out=made / "b.html").file.read_bytes() == one
+    zips = [
+        share(made / "reports", zipped=True, out=made / name).file.read_bytes() for name in ("a.zip", "b.zip")
+    ]
+    assert zips[0] == zips[1]
+
+
+def test_a_zip_is_encrypted_and_lists_neutral_names(made: Path) -> None:
+    words = "four words that differ"
+    copy = share(made / "reports" / "kifaru-ridge", password=words)
+    assert copy.file.name == "flight-public.zip"
+    with zipfile.ZipFile(copy.file) as zipped:
+        assert [(one.filename, one.date_time[0]) for one in zipped.infolist()] == [("flight.html", 1980)]
+    with pyzipper.AESZipFile(copy.file) as zipped:
+        with pytest.raises(RuntimeError):
+            zipped.read("flight.html")
+        assert b"September 2023" in zipped.read("flight.html", pwd=words.encode())
+    assert words not in copy.told.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "secret", ["-24.873165, 31.486297", "Thandi", "2023-09-17", HASH, "24°52'23.4\"S 31°29'10.7\"E"]
+)
+def test_what_slips_through_is_found_and_no_copy_is_left(
+    secret: str, made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clean = redrawn.evaluate_flight
+
+    def leaky(folder: Path, **given: Any) -> list[Outcome]:
+        outcomes = clean(folder, **given)
+        page_made = given["reports"] / "flight" / "report.html"
+        text = page_made.read_text(encoding="utf-8")
+        page_made.write_text(text.replace("</main>", f"<p>{escape(secret)}</p></main>"), encoding="utf-8")
+        return outcomes
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", leaky)
+    with pytest.raises(RunFailed, match="there is no copy, since this was found in it"):
+        share(made / "reports" / "kifaru-ridge")
+    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+
+
+def test_a_name_of_the_file_that_gives_the_place_away_is_refused(made: Path) -> None:
+    with pytest.raises(RunFailed, match="the name of the file"):
+        share(made / "reports" / "kifaru-ridge", out=made / "kifaru-ridge.html")
+    with pytest.raises(RunFailed, match="the name of the file"):
+        share(made / "reports" / "kifaru-ridge", out=made / "olifants.zip", zipped=True)
+    assert not list(made.glob("*.html")) and not list(made.glob("*.zip"))
+
+
+def test_nothing_is_left_of_what_was_broken_off(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: Any, **__: Any) -> list[Outcome]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", broken)
+    with pytest.raises(KeyboardInterrupt):
+        share(made / "reports" / "kifaru-ridge")
+    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+
+
+def test_a_report_that_fails_on_the_copy_stops_it(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failed(*_: Any, **__: Any) -> list[Outcome]:
+        return [Outcome("flight", "failed", 1.0, "no rays.")]
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", failed)
+    with pytest.raises(RunFailed, match=r"flight could not be made from generalised data \(no rays\)"):
+        share(made / "reports" / "kifaru-ridge")
+
+
+def test_without_its_flight_a_report_is_refused_with_what_to_type(made: Path) -> None:
+    (made / "flights").rename(made / "elsewhere")
+    with pytest.raises(WildlabError, match=r"wildlab share .*kifaru-ridge --flight FOLDER"):
+        share(made / "reports" / "kifaru-ridge")
+    assert share(made / "reports" / "kifaru-ridge", flight=made / "elsewhere" / "mine").file.is_file()
+
+
+def test_another_flight_is_refused(made: Path) -> None:
+    other = made / "other"
+    save_flight(canary((10.0, 20.0, 30.0), corner=(0.0, 0.0, 0.0)), other)
+    with pytest.raises(WildlabError, match="not the flight that the reports on kifaru-ridge were made from"):
+        share(made / "reports" / "kifaru-ridge", flight=other)
+    with pytest.raises(WildlabError, match="there is no flight in this folder"):
+        share(made / "reports" / "kifaru-ridge", flight=made)
+
+
+def test_a_category_that_was_stated_later_counts(made: Path) -> None:
+    """`flight.toml` may change without another evaluation; tables may not."""
+    path = made / "flights" / "mine" / "flight.toml"
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("category = 2", "category = 1"), encoding="utf-8"
+    )
+    text = share(made / "reports" / "kifaru-ridge").file.read_text(encoding="utf-8")
+    assert "informationWithheld" in text and "° S" not in text
+
+
+def test_numbers_that_differ_are_said(made: Path) -> None:
+    path = made / "reports" / "kifaru-ridge" / "metrics.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["metrics"][0]["value"] = 3.25 * 1.02
+    write_json(path, content)
+    copy = share(made / "reports" / "kifaru-ridge")
+    assert "Of 1 numbers, 0 are those of the report" in copy.file.read_text(encoding="utf-8")
+    assert any("error of logged-pose is 3.315, in the copy 3.25" in line for line in copy.lines)
+
+
+def test_nothing_is_overwritten_without_being_asked(made: Path) -> None:
+    first = share(made / "reports" / "kifaru-ridge").file
+    with pytest.raises(WildlabError, match="there already"):
+        share(made / "reports" / "kifaru-ridge")
+    assert share(made / "reports" / "kifaru-ridge", overwrite=True).file == first
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda folder: (folder / "report.html").unlink(), "no report here can be shared"),
+        (lambda folder: write_json(folder / "status.json", {"state": "failed"}), "this report is not done"),
+        (lambda folder: (folder / "provenance.json").unlink(), "nothing says what this report was made from"),
+        (lambda folder: folder.rename(folder.with_name("detected")), "there is no such report"),
+    ],
+)
+def test_a_report_that_cannot_be_shared_is_refused(change: Any, said: str, made: Path) -> None:
+    change(made / "reports" / "kifaru-ridge")
+    with pytest.raises(WildlabError, match=said):
+        share(made / "reports" / "kifaru-ridge")
+
+
+def test_a_report_that_is_not_of_evaluate_is_refused(made: Path) -> None:
+    (made / "reports" / "kifaru-ridge").rename(made / "reports" / "found")
+    with pytest.raises(WildlabError, match="not one that `wildlab evaluate` makes"):
+        share(made / "reports" / "found")
+
+
+def test_an_ending_that_is_not_that_of_the_copy_is_refused(made: Path) -> None:
+    for name, zipped in (("a.zip", False), ("a.html", True), ("a", False)):
+        with pytest.raises(WildlabError, match="Give it a name"):
+            share(made / "reports" / "kifaru-ridge", out=made / name, zipped=zipped)
+
+
+def test_a_study_is_copied_as_it_is(made: Path) -> None:
+    """Simulated: it has no place to be hidden. Links, and what the machine is called, go."""
+    folder = made / "reports" / "static-point"
+    twin = {"name": "static-antenna-1", "kind": "twin", "files": {}, "sources": []}
+    folder.mkdir()
+    body = '<h1>Study</h1><p>63.6 N <a href="../index.html">back</a></p>'
+    (folder / "report.html").write_text(page(title="x", body=body), encoding="utf-8")
+    write_json(folder / "provenance.json", {"flight": twin, "parameters": {}})
+    write_json(folder / "status.json", {"state": "done"})
+    copy = share(folder)
+    assert copy.file.name == "static-point-public.html"
+    text = copy.file.read_text(encoding="utf-8")
+    assert "63.6 N" in text and "index.html" not in text
+    both = share(made / "reports", zipped=True)
+    with zipfile.ZipFile(both.file) as zipped:
+        assert sorted(zipped.namelist()) == ["flight.html", "static-point.html"]
+    whole = share(made / "reports").file.read_text(encoding="utf-8")
+    assert "Reports on 1 flight and 1 study" in whole
+
+
+def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(made: Path) -> None:
+    path = made / "reports" / "kifaru-ridge" / "report.html"
+    text = path.read_text(encoding="utf-8").replace("</main>", f"<p>{Path.cwd()}</p></main>")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RunFailed, match="there is no copy"):
+        share(made / "reports" / "kifaru-ridge", "team")

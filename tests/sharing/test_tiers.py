@@ -1,0 +1,135 @@
+"""Who is told what: categories against the guide's own numbers, and cells against another library."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyproj import Geod
+
+from wildlab.errors import WildlabError
+from wildlab.flight.manifest import LocationsPart
+from wildlab.sharing import tiers
+from wildlab.sharing.cells import Cell, cell_of, generalisation_words, half_diagonal, place_words, round_up
+from wildlab.sharing.tiers import TIERS, load_tiers, treatment_of
+
+GEOD = Geod(ellps="WGS84")
+
+
+@pytest.mark.parametrize(
+    ("category", "cell"), [(1, None), (2, 0.1), (3, 0.01), (4, 0.001)], ids=["1", "2", "3", "4"]
+)
+def test_the_public_is_told_the_cell_of_the_guide(category: int, cell: float | None) -> None:
+    """GBIF's guide, table 7."""
+    for agreed in (None, 4):
+        found = treatment_of(LocationsPart(category=category, agreed_category=agreed), "public")
+        assert (found.cell_deg, found.date, found.exact, found.stated) == (cell, "month", False, True)
+
+
+def test_a_cell_is_as_far_off_as_the_guide_says_where_it_is_largest() -> None:
+    """Chapman and Wieczorek, table 3: what one digit less adds at the equator, corner to corner, metres."""
+    for size, added in ((0.1, 15_691), (0.01, 1_570), (0.001, 157)):
+        assert 2 * half_diagonal(0.0, size) == pytest.approx(added, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("locations", "category"),
+    [
+        ({}, 1),
+        ({"sensitivity": "withheld"}, 1),
+        ({"sensitivity": "generalised"}, 2),
+        ({"sensitivity": "open"}, 4),
+    ],
+)
+def test_without_a_category_the_most_careful_that_fits_is_assumed(
+    locations: dict[str, str], category: int
+) -> None:
+    found = treatment_of(LocationsPart(**locations), "public")  # type: ignore[arg-type]
+    assert (found.category, found.stated) == (category, False)
+
+
+def test_a_partner_to_whom_nothing_was_promised_is_the_public() -> None:
+    for category in (1, 2, 3, 4):
+        locations = LocationsPart(category=category)
+        one, other = (treatment_of(locations, tier) for tier in ("public", "partner"))
+        assert one.cell_deg == other.cell_deg
+        assert other.date == ("month" if category < 3 else "day")
+
+
+def test_a_partner_is_told_what_was_agreed() -> None:
+    found = treatment_of(LocationsPart(category=2, agreed_category=3), "partner")
+    assert (found.category, found.cell_deg, found.date) == (3, 0.01, "day")
+
+
+def test_what_is_agreed_cannot_be_more_careful_than_what_all_are_told() -> None:
+    with pytest.raises(
+        WildlabError, match="category 2 is agreed with partners, and the public is told by category 3"
+    ):
+        treatment_of(LocationsPart(category=3, agreed_category=2), "partner")
+
+
+def test_no_tier_is_told_less_than_a_more_careful_one() -> None:
+    order = ["month", "day", "exact"]
+    for category in (1, 2, 3, 4):
+        found = [treatment_of(LocationsPart(category=category), tier) for tier in TIERS]
+        dates = [order.index(one.date) for one in found]
+        assert dates == sorted(dates)
+        assert [one.exact for one in found] == [False, False, True]
+
+
+@given(
+    st.floats(-89.9, 89.9), st.floats(-179.9, 179.9), st.sampled_from([0.1, 0.01, 0.001]), st.floats(0, 5e3)
+)
+def test_no_place_is_farther_from_the_named_point_than_is_said(
+    latitude: float, longitude: float, size: float, reach: float
+) -> None:
+    cell = cell_of(latitude, longitude, size, reach)
+    _, _, away = GEOD.inv(longitude, latitude, cell.longitude_deg, cell.latitude_deg)
+    assert away + reach <= cell.uncertainty_m * 1.0001
+    # No digit more than the cell has, and the same for all in the cell.
+    assert round(cell.latitude_deg, 3) == cell.latitude_deg
+    assert abs(cell.latitude_deg - latitude) <= size / 2 + 1e-9
+    assert cell_of(cell.latitude_deg, cell.longitude_deg, size, reach) == cell
+
+
+@given(st.floats(1e-3, 1e6))
+def test_an_uncertainty_is_never_rounded_down(metres: float) -> None:
+    assert metres <= round_up(metres) * (1 + 1e-12) <= metres * 1.1001
+    assert len(f"{round_up(metres):e}".split("e")[0].rstrip("0").replace(".", "")) <= 2
+
+
+def test_at_the_edges_of_the_map_cells_have_places_on_earth() -> None:
+    assert cell_of(89.99, 0.0, 0.1).latitude_deg == 90.0
+    assert cell_of(0.0, 179.99, 0.1).longitude_deg == -180.0
+    assert math.isfinite(cell_of(-90.0, -180.0, 1.0).uncertainty_m)
+
+
+def test_the_words_say_cell_uncertainty_and_term() -> None:
+    cell = Cell(-24.9, 31.5, 0.1, 7600.0)
+    assert "near 24.9° S, 31.5° E" in place_words(cell) and "up to 7.6 km" in place_words(cell)
+    assert "coordinateUncertaintyInMeters 7600" in generalisation_words(cell, 2)
+    assert generalisation_words(cell, 2).startswith("dataGeneralizations: coordinates rounded to 0.1 degrees")
+    assert generalisation_words(None, 1).startswith("informationWithheld")
+    assert "withheld" in place_words(None)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("number = 4", "number = 3"), "categories are not 1, 2, 3, 4"),
+        (("cell_deg = 0.1\n", "cell_deg = 10\n"), "cell_deg"),
+        (("[tier.team]", "[tier.friends]"), "friends"),
+        (('["month", "month", "day", "day"]', '["month", "hour", "day", "day"]'), "dates"),
+        (("open = 4\n", ""), "a sensitivity or a tier has no row"),
+    ],
+)
+def test_a_table_that_is_wrong_is_refused(change: tuple[str, str], said: str, tmp_path: Path) -> None:
+    text = tiers.FILE.read_text(encoding="utf-8")
+    assert change[0] in text
+    path = tmp_path / "tiers.toml"
+    path.write_text(text.replace(*change), encoding="utf-8")
+    with pytest.raises(WildlabError, match=said):
+        load_tiers(path)
