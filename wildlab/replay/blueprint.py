@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wildlab.replay.scene import Scene
+from wildlab.replay.scene import Scene, heights
 
 #: Seconds for which ellipses of single detections stay, and playback takes for a long flight, at least.
 STAY_S, PLAYED_S = 10.0, 120.0
@@ -76,31 +76,37 @@ def blueprint_of(scene: Scene) -> Any:
 
 def _plots(rrb: Any, scene: Scene) -> list[Any]:
     edge = rrb.TimeRangeBoundary
-    margin = 0.02 * scene.length
-    whole = rrb.TimeRange(
-        start=edge.absolute(seconds=-margin) if scene.timed else edge.absolute(seq=0),
-        end=edge.absolute(seconds=scene.length + margin)
-        if scene.timed
-        else edge.absolute(seq=int(scene.length)),
-    )
-    axis_x = rrb.TimeAxis(view_range=whole)
+    if scene.timed:
+        margin = 0.02 * scene.length
+        ends = edge.absolute(seconds=-margin), edge.absolute(seconds=scene.length + margin)
+    else:
+        ends = edge.absolute(seq=0), edge.absolute(seq=int(scene.length))
+    whole = rrb.TimeAxis(view_range=rrb.TimeRange(start=ends[0], end=ends[1]))
+
+    def plot(part: str, name: str, top: float) -> Any:
+        return rrb.TimeSeriesView(
+            origin=f"/plots/{part}",
+            name=name,
+            axis_x=whole,
+            axis_y=rrb.ScalarAxis(range=(0.0, top)),
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        )
+
     judged = scene.tracks or ((scene.points,) if scene.points is not None else ())
+    errors = _known([one.error for one in judged])
+    nees = _known([one.nees for one in judged])
     found = []
-    if any(np.isfinite(one.error).any() for one in judged):
-        found.append(rrb.TimeSeriesView(origin="/plots/error", name="Error (m)", axis_x=axis_x))
-    nees = [one.nees[np.isfinite(one.nees)] for one in judged]
-    values = np.concatenate(nees) if nees else np.empty(0)
-    if len(values):
-        # A few large ones would press all others flat; they are there when the plot is moved.
-        top = max(12.0, 1.2 * float(np.quantile(values, 0.95)))
-        axis = rrb.ScalarAxis(range=(0.0, top))
-        found.append(
-            rrb.TimeSeriesView(
-                origin="/plots/nees", name="NEES, and its 95 % band", axis_y=axis, axis_x=axis_x
-            )
-        )
+    # A few large values would press all others flat; they are there when the plot is moved.
+    if len(errors):
+        found.append(plot("error", "Error (m)", 1.3 * max(float(np.quantile(errors, 0.98)), 1e-3)))
+    if len(nees):
+        found.append(plot("nees", "NEES, and its 95 % band", max(12.0, 1.2 * float(np.quantile(nees, 0.95)))))
     if scene.path is not None:
-        found.append(
-            rrb.TimeSeriesView(origin="/plots/height", name="Height above ground (m)", axis_x=axis_x)
-        )
+        highest = float(heights(scene).max())
+        found.append(plot("height", "Height above ground (m)", 1.2 * max(highest, 1.0)))
     return found
+
+
+def _known(parts: list[Any]) -> Any:
+    values = np.concatenate(parts) if parts else np.empty(0)
+    return values[np.isfinite(values)]

@@ -14,7 +14,7 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.georeference import georeference_pixels, pixel_rays
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.pipeline.evaluate import score_points
-from wildlab.pipeline.georeference import covariances_of, georeference, observe
+from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe
 from wildlab.pipeline.overviews.image_coverage import FLATTEST, ground_height
 from wildlab.pipeline.overviews.lost import POSITION, ordered
 from wildlab.pipeline.overviews.overview import best_source
@@ -26,7 +26,13 @@ MOST_POSES, MOST_FRAMES, MOST_POINTS = 6000, 3000, 6000
 SIDE = 5
 
 
-def scene_of(flight: Flight, source: str | None = None, estimates: pd.DataFrame | None = None) -> Scene:
+def scene_of(
+    flight: Flight,
+    source: str | None = None,
+    estimates: pd.DataFrame | None = None,
+    *,
+    ellipses: bool = True,
+) -> Scene:
     """What a replay shows of a flight.
 
     Parameters
@@ -37,6 +43,9 @@ def scene_of(flight: Flight, source: str | None = None, estimates: pd.DataFrame 
         Name of the ``nav`` table; left out, the best known one.
     estimates
         A table of tracks, as `wildlab.pipeline.following.estimates.estimates_table` makes it.
+
+    ellipses
+        Whether points on the ground get their covariance, which takes most of the time.
 
     Returns
     -------
@@ -55,7 +64,7 @@ def scene_of(flight: Flight, source: str | None = None, estimates: pd.DataFrame 
     path = _path(flight, source, lacks)
     views = _views(flight, source, lacks)
     sightings = _sightings(flight, views, lacks)
-    points = _points(flight, source, lacks)
+    points = _points(flight, source, lacks, ellipses)
     tracks = _tracks(flight, estimates, lacks)
     truth = _truth(flight, lacks)
     if path is None and views is None and not truth and not tracks:
@@ -243,14 +252,14 @@ def _sightings(flight: Flight, views: Views | None, lacks: list[str]) -> Sightin
     return Sightings(at[good].astype(np.intp), uv[good], names.to_numpy(object)[good])
 
 
-def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | None:
+def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool) -> Points | None:
     if source is None or flight.frames is None or flight.manifest.camera is None:
         return None
     if flight.detections is None or not (flight.detections["kind"] == "pixel").any():
         return None
     try:
         seen = observe(flight, source)
-        table = georeference(flight, seen, np.random.default_rng(0))
+        table = georeference(flight, seen, np.random.default_rng(0)) if ellipses else _placed(seen)
     except WildlabError as error:
         lacks.append(f"detections on the ground: {error.problem}")
         return None
@@ -280,6 +289,17 @@ def _points(flight: Flight, source: str | None, lacks: list[str]) -> Points | No
         np.hypot(*error.T),
         position_nees(error, P),
     )
+
+
+def _placed(seen: Observations) -> pd.DataFrame:
+    """The table of `georeference` without covariances."""
+    if seen.terrain is not None:
+        ground = pixels_to_terrain(seen.poses, seen.uv, seen.terrain).points
+    else:
+        ground = georeference_pixels(seen.poses, seen.uv, seen.plane_down)
+    columns = dict(zip(("north_m", "east_m", "down_m"), ground.T, strict=True))
+    unknown = dict.fromkeys(("cov_nn", "cov_ne", "cov_ee"), np.nan)
+    return seen.table.assign(**columns, **unknown)
 
 
 def _tracks(flight: Flight, table: pd.DataFrame | None, lacks: list[str]) -> tuple[Estimates, ...]:

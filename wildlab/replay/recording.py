@@ -17,7 +17,7 @@ import numpy as np
 
 from wildlab.geometry.frames import ned_to_enu
 from wildlab.replay.colours import FLOWN, GROUND, SIGHTING, TRUTH, VIEW, of_filter, rgba
-from wildlab.replay.scene import Array, Estimates, Points, Scene
+from wildlab.replay.scene import Array, Estimates, Points, Scene, heights
 from wildlab.replay.shapes import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
 from wildlab.replay.words import about, path_part, plain
@@ -154,16 +154,11 @@ class _Writer:
             ),
         )
         self.columns("world/flown/aircraft", path.times, *rr.Points3D.columns(positions=enu))
-        height = -path.places[:, 2] - self._ground_below(path.places)
+        height = heights(self.scene)
         self.static(
             "plots/height/aircraft", rr.SeriesLines(colors=[rgba(FLOWN)], names=["height (m)"], widths=[1.5])
         )
         self._scalars("plots/height/aircraft", path.times, height)
-
-    def _ground_below(self, places: Array) -> Array:
-        if self.scene.terrain is not None:
-            return self.scene.terrain.heights_at(places[:, :2])
-        return np.full(len(places), -self.scene.ground if np.isfinite(self.scene.ground) else 0.0)
 
     def _scalars(self, entity: str, times: Array, values: Array) -> None:
         known = np.isfinite(values) & np.isfinite(times)

@@ -166,3 +166,24 @@ class Scene:
         if not len(known):
             return np.full(3, -50.0), np.full(3, 50.0)
         return known.min(axis=0), known.max(axis=0)
+
+
+def heights(scene: Scene) -> Array:
+    """Heights (N,) m of the path above the ground that is known, else above the origin of n; never NaN.
+
+    Parameters
+    ----------
+    scene
+        With a path.
+
+    Returns
+    -------
+    (N,) m
+    """
+    assert scene.path is not None  # noqa: S101 - for the type checker
+    up = -scene.path.places[:, 2]
+    if scene.terrain is not None:
+        ground = scene.terrain.heights_at(scene.path.places[:, :2])
+        # Beside the map the ground is taken to be as high as the map is in the mean.
+        return np.asarray(up - np.where(np.isfinite(ground), ground, np.nanmean(scene.terrain.height)))
+    return np.asarray(up + (scene.ground if np.isfinite(scene.ground) else 0.0))

@@ -26,6 +26,8 @@ from matplotlib.figure import Figure
 
 from wildlab.errors import WildlabError
 from wildlab.reporting import metrics as schema
+from wildlab.reporting.animation import ShownFlight, animated_flight, pausable
+from wildlab.reporting.animation.drawing import PAUSE_STYLE
 from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.figures import png_bytes, save_figure
 from wildlab.reporting.page import TAGS
@@ -216,6 +218,21 @@ class Report:
     def figures(self, row: Sequence[tuple[Figure, str, str, str]]) -> None:
         """Several ``(fig, name, alt, caption)`` side by side, or one below the other on a phone."""
         self._show(f'<div class="row">{"".join(self._figure(*item) for item in row)}</div>')
+
+    def animation(self, shown: ShownFlight, *, alt: str, most_bytes: int = 1_000_000) -> None:
+        """Show a flight that moves without a script, and stands still on paper and where motion is unwanted.
+
+        Parameters
+        ----------
+        shown
+            The arrays.
+        alt
+            What a reader who cannot see it should know; never empty.
+        most_bytes
+            Of the picture.
+        """
+        drawn = pausable(animated_flight(shown, alt=alt, most_bytes=most_bytes))
+        self._show(f"<style>{PAUSE_STYLE}</style><figure>{drawn}</figure>")
 
     def table(
         self,

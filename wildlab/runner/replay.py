@@ -18,6 +18,7 @@ from wildlab.files import write_atomic
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.store import Flight, load_flight
 from wildlab.paths import REPORTS
+from wildlab.pipeline.following.estimates import read_estimates
 from wildlab.replay.gather import scene_of
 from wildlab.replay.page import page
 from wildlab.replay.recording import save_recording
@@ -27,11 +28,6 @@ from wildlab.replay.viewer import read_viewer
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 
 RECORDING, PAGE, ESTIMATES = "replay.rrd", "replay.html", "estimates.parquet"
-#: Columns of a table of tracks that a replay reads.
-COLUMNS = (
-    "target", "filter", "sensor", "time_s", "north_m", "east_m", "p_00", "p_01", "p_11",
-    "error_north_m", "error_east_m", "nees",
-)  # fmt: skip
 
 
 def replay(
@@ -133,23 +129,8 @@ def estimates_of(flight: Flight, report: Path | None, reports: Path) -> pd.DataF
     for one in ([report] if report is not None else []) + [beside / name for name in names[1:]]:
         theirs = read_provenance(one).get("flight")
         if (one / ESTIMATES).is_file() and isinstance(theirs, dict) and theirs.get("files") == files:
-            return _read_estimates(one / ESTIMATES)
+            return read_estimates(one / ESTIMATES)
     return None
-
-
-def _read_estimates(path: Path) -> pd.DataFrame:
-    try:
-        table = pd.read_parquet(path)
-    except Exception as error:  # whatever a damaged file gives
-        first = (str(error).strip() or type(error).__name__).splitlines()[0]
-        fix = "make it again: wildlab track"
-        raise WildlabError(f"is not a readable Parquet file ({first})", fix, file=path) from None
-    for name in COLUMNS:
-        if name not in table:
-            raise WildlabError(
-                "this column is missing", "make the table again: wildlab track", file=path, field=name
-            )
-    return table
 
 
 def flight_of(report: Path, reports: Path) -> Path:

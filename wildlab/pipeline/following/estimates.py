@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from wildlab.errors import WildlabError
 from wildlab.files import write_csv
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
 from wildlab.pipeline.scans import Scans
@@ -18,6 +19,11 @@ UNITS = {
     "north": "m", "east": "m", "range": "m", "azimuth": "rad", "elevation": "rad", "u": "px", "v": "px",
     "v_north": "m_s", "v_east": "m_s",
 }  # fmt: skip
+#: Columns that a table of tracks must have for its tracks to be shown.
+COLUMNS = (
+    "target", "filter", "sensor", "time_s", "north_m", "east_m", "p_00", "p_01", "p_11",
+    "error_north_m", "error_east_m", "nees",
+)  # fmt: skip
 
 
 def estimates_table(tracks: Sequence[SensorTrack], scans: dict[str, Scans]) -> pd.DataFrame:
@@ -73,3 +79,28 @@ def write_estimates(table: pd.DataFrame, folder: Path) -> None:
     """Write ``estimates.parquet`` and ``estimates.csv`` into a folder; metres, no place on Earth."""
     table.to_parquet(folder / "estimates.parquet", index=False)
     write_csv(folder / "estimates.csv", table, "%.9g")
+
+
+def read_estimates(path: Path) -> pd.DataFrame:
+    """A table that `write_estimates` wrote.
+
+    Raises
+    ------
+    WildlabError
+        Where it cannot be read, or lacks one of `COLUMNS`, or has words where numbers belong.
+    """
+    again = "make the table again: wildlab track"
+    try:
+        table = pd.read_parquet(path)
+        numbers = list(COLUMNS[3:])
+        table[numbers] = table[numbers].astype(float)
+    except KeyError:
+        lacking = next(name for name in COLUMNS if name not in table)
+        raise WildlabError("this column is missing", again, file=path, field=lacking) from None
+    except Exception as error:  # whatever a damaged file gives
+        first = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise WildlabError(f"is not a readable table of tracks ({first})", again, file=path) from None
+    for name in COLUMNS[:3]:
+        if name not in table:
+            raise WildlabError("this column is missing", again, file=path, field=name)
+    return table

@@ -1,0 +1,84 @@
+"""The small moving picture of a flight in its report: its arrays are the flight's, its words true."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.estimates import COLUMNS
+from wildlab.replay.gather import scene_of
+from wildlab.replay.moving import MOST_BYTES, alt, moving_flight, said, show_moving
+from wildlab.reporting.report import open_report
+from wildlab.simulation.twins import simulate_twin
+
+
+@pytest.fixture(scope="module")
+def ship() -> Flight:
+    return simulate_twin("large-ship", 1)
+
+
+def report_of(flight: Flight, out: str = "") -> str:
+    report = open_report(study="overview", kind="twin", flight=flight.name, out=out)
+    show_moving(report, flight)
+    return "".join(report.parts)
+
+
+def test_the_arrays_are_those_of_the_flight(ship: Flight) -> None:
+    scene = scene_of(ship, ellipses=False)
+    shown = moving_flight(scene)
+    nav = ship.nav["autopilot"]
+    t = np.asarray(shown.path.times) + nav["time_s"].iloc[0]
+    assert np.allclose(np.asarray(shown.path.points)[:, 0], np.interp(t, nav["time_s"], nav["north_m"]))
+    assert shown.points is not None and scene.points is not None and shown.footprints is not None
+    assert np.asarray(shown.footprints.corners).shape[1:] == (4, 2)
+    # Without covariances the places are the same.
+    whole = scene_of(ship).points
+    assert whole is not None
+    assert np.allclose(shown.points.points, whole.places[:, :2]) and np.isfinite(whole.covariance).any()
+    assert np.isnan(scene.points.covariance).all()
+
+
+def test_it_is_in_the_report_without_a_script_and_not_too_large(ship: Flight) -> None:
+    page = report_of(ship)
+    assert "<svg" in page and "<script" not in page and len(page.encode()) < MOST_BYTES + 10_000
+    assert "prefers-reduced-motion" in page
+    nav = ship.nav["autopilot"]
+    way = np.linalg.norm(np.diff(nav[["north_m", "east_m"]].to_numpy(), axis=0), axis=1).sum()
+    assert f"goes {way:.0f} m in 4 min 0 s" in page
+
+
+def test_a_table_of_tracks_gives_ellipses_of_one_filter(ship: Flight, tmp_path: Path) -> None:
+    rows = {name: [0.5, 1.5, 2.5] * 2 for name in COLUMNS}
+    rows |= {"target": ["ship"] * 6, "sensor": ["camera"] * 6, "filter": ["ekf"] * 3 + ["schmidt"] * 3}
+    rows |= {"p_00": [4.0] * 6, "p_01": [0.0] * 6, "p_11": [4.0] * 6}
+    pd.DataFrame(rows).to_parquet(tmp_path / "estimates.parquet")
+    assert "the filter schmidt" in report_of(ship, str(tmp_path)) and "the filter" not in report_of(ship)
+    scene = scene_of(ship, estimates=pd.DataFrame(rows), ellipses=False)
+    assert len(moving_flight(scene).ellipses) == 1
+    pd.DataFrame(rows).drop(columns="nees").to_parquet(tmp_path / "estimates.parquet")
+    with pytest.raises(WildlabError, match="this column is missing"):
+        report_of(ship, str(tmp_path))
+    (tmp_path / "estimates.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(WildlabError, match="is not a readable table of tracks"):
+        report_of(ship, str(tmp_path))
+
+
+def test_words_name_only_what_is_there(ship: Flight) -> None:
+    bare = replace(ship, tables={})
+    scene = scene_of(bare, ellipses=False)
+    assert "detection" not in said(scene) + alt(scene) and "cross" not in said(scene)
+    assert "detections land" in alt(scene_of(ship, ellipses=False))
+
+
+def test_a_flight_without_a_path_or_times_gets_no_picture(ship: Flight) -> None:
+    assert report_of(replace(ship, nav={})) == ""
+    assert report_of(replace(ship, nav={}, tables={})) == ""
+    scene = replace(scene_of(ship, ellipses=False), timed=False)
+    with pytest.raises(WildlabError, match="no path over time"):
+        moving_flight(scene)

@@ -1,0 +1,79 @@
+"""`wildlab replay`, as it is typed: of a flight, of a report, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.replay.recordings import read_recording
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.store import save_flight
+from wildlab.pipeline.following.estimates import COLUMNS
+from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.simulation.twins import simulate_twin
+
+POSES = ("--source", "autopilot")
+
+
+def typed(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(wildlab, ["replay", *map(str, arguments)])
+
+
+def refused(*arguments: str | Path) -> str:
+    result = typed(*arguments)
+    assert isinstance(result.exception, WildlabError), result.output
+    return str(result.exception)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("here") / "flights" / "ship"
+    save_flight(simulate_twin("large-ship", 1), folder)
+    return folder
+
+
+def report_of(flight: Path, place: Path) -> Path:
+    place.mkdir(parents=True)
+    (place / "provenance.json").write_text(json.dumps({"flight": provenance_of_flight(flight)}))
+    rows = {name: [0.5, 1.5, 2.5] for name in COLUMNS}
+    rows |= {"target": ["ship"] * 3, "sensor": ["camera"] * 3, "filter": ["schmidt"] * 3}
+    pd.DataFrame(rows | {"p_01": [0.0] * 3}).to_parquet(place / "estimates.parquet")
+    return place
+
+
+def test_a_flight_is_written_and_what_lacks_is_said(flight: Path, tmp_path: Path) -> None:
+    result = typed(flight, "--into", tmp_path / "out", *POSES)
+    assert result.exit_code == 0, result.output
+    assert "Not shown: tracks: none of this flight are at hand" in result.stderr
+    assert result.stdout.strip() == str(tmp_path / "out" / "replay.rrd")
+    assert [one.name for one in (tmp_path / "out").iterdir()] == ["replay.rrd"]
+    assert not (flight / "replay.rrd").exists()
+
+
+def test_a_report_finds_its_flight_and_shows_its_tracks(flight: Path, tmp_path: Path) -> None:
+    report = report_of(flight, flight.parents[1] / "reports" / "ship-tracking")
+    result = typed(report)
+    assert result.exit_code == 0, result.output
+    found = read_recording(report / "replay.rrd")
+    assert ("/world/tracks/schmidt/ship/camera/place", "Points3D:positions") in found
+    assert "tracks" not in result.stderr
+    # The flight is another one now: its report is not taken for it.
+    other = report_of(flight, flight.parents[1] / "reports" / "other")
+    content = json.loads((other / "provenance.json").read_text())
+    content["flight"]["files"] = {"flight.toml": "0" * 64}
+    (other / "provenance.json").write_text(json.dumps(content))
+    assert "is not among the flights here, or was changed since" in refused(other)
+
+
+def test_what_is_refused(flight: Path, tmp_path: Path) -> None:
+    assert "there is no such folder" in refused(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    assert "neither a flight folder" in refused(tmp_path / "empty")
+    assert "a replay is no part of a flight" in refused(flight, "--into", flight, *POSES)
+    assert "there is no nav source 'x'" in refused(flight, "--source", "x", "--into", tmp_path / "a")
+    assert not (tmp_path / "a").exists()

@@ -1,0 +1,98 @@
+"""The operator's view at a moment: the map with footprint and tracks, and the image beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+
+from wildlab.replay.scene import Scene
+from wildlab.reporting.figures import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    VERMILLION,
+    colour,
+    ellipse,
+    map_axes,
+    new_figure,
+)
+
+#: Half of the side of the map, m.
+AROUND = 170.0
+#: What is a moment: detections this near in time belong to it, s.
+NOW_S = 0.01
+
+
+def operator_view(scene: Scene, t: float, title: str) -> Figure:
+    """The map about the aircraft, and beside it the image.
+
+    Parameters
+    ----------
+    scene
+        With a path, views, a camera and tracks.
+    t
+        When, s.
+    title
+        The message.
+    """
+    assert scene.path is not None and scene.views is not None and scene.camera is not None  # noqa: S101
+    fig, (ax, image) = new_figure(7.6, 4.4, columns=2, width_ratios=[3, 2])
+    path, views = scene.path, scene.views
+    row = int(np.abs(views.times - t).argmin())
+    here = np.array([np.interp(t, path.times, path.places[:, k]) for k in range(2)])
+    if scene.terrain is not None:
+        _contours(ax, scene, here)
+    flown = path.times <= t
+    ax.plot(path.places[flown, 1], path.places[flown, 0], lw=1.0, color=BLUE, label="flown so far")
+    outline = views.outlines[row]
+    if np.isfinite(outline).all():
+        ax.add_patch(Polygon(outline[:, 1::-1], fc=GREEN, ec=GREEN, alpha=0.35, lw=1.5, label="camera sees"))
+    ax.plot(*here[::-1], "o", ms=7, color=BLUE, label="aircraft")
+    shown = False
+    for one in scene.tracks:
+        k = int(np.searchsorted(one.times, t, side="right")) - 1
+        if k < 0:
+            continue
+        ellipse(ax, one.places[k, 1::-1], one.covariance[k][::-1, ::-1], color=VERMILLION, lw=1.0, alpha=0.9)
+        ax.plot(*one.places[k, 1::-1], "x", ms=4, color=VERMILLION, label=None if shown else "tracks, 90 %")
+        shown = True
+    for i, one in enumerate(scene.truth):
+        place = _at(one.times, one.places, t, still=one.still)
+        ax.plot(*place[1::-1], "+", ms=6, color=colour("truth"), label=None if i else "truth")
+    ax.set_xlim(here[1] - AROUND, here[1] + AROUND)
+    ax.set_ylim(here[0] - AROUND, here[0] + AROUND)
+    map_axes(ax)
+    ax.set_title(title)
+    w, h = scene.camera.width, scene.camera.height
+    image.add_patch(Rectangle((-0.5, -0.5), w, h, fc="#eef2f4", ec=GREY))
+    count = 0
+    if scene.sightings is not None:
+        uv = scene.sightings.uv[scene.sightings.frame == row]
+        count = len(uv)
+        image.plot(*uv.T, "o", ms=8, mfc="none", mec=ORANGE, mew=2.0)
+    image.set(xlim=(-0.5, w - 0.5), ylim=(h - 0.5, -0.5), aspect="equal", xticks=[], yticks=[])
+    image.grid(visible=False)
+    image.set_title(f"image: {count} detected")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3)
+    return fig
+
+
+def _at(times: np.ndarray, places: np.ndarray, t: float, *, still: bool) -> np.ndarray:
+    if still:
+        return np.asarray(places[0])
+    return np.array([np.interp(t, times, places[:, k]) for k in range(3)])
+
+
+def _contours(ax: object, scene: Scene, here: np.ndarray) -> None:
+    terrain = scene.terrain
+    assert terrain is not None  # noqa: S101
+    rows, columns = terrain.height.shape
+    north = terrain.north + terrain.step * np.arange(rows)
+    east = terrain.east + terrain.step * np.arange(columns)
+    n, e = (np.abs(north - here[0]) <= AROUND + 20, np.abs(east - here[1]) <= AROUND + 20)
+    if n.sum() > 2 and e.sum() > 2:
+        ax.contour(  # type: ignore[attr-defined]
+            east[e], north[n], terrain.height[np.ix_(n, e)], levels=8, colors=GREY, linewidths=0.4, alpha=0.5
+        )
