@@ -69,9 +69,11 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
     fig, axes = new_figure(5.9, 1.5 * len(labels) + 0.1, rows=len(labels), sharex=True)
     for ax, label in zip(axes, labels, strict=True):
         for width, (name, (times, quantities)) in zip(_widths(len(sources)), sources.items(), strict=True):
-            y = np.array(quantities[label], float)
+            keep = thinned(len(np.asarray(times)))
+            y = np.array(quantities[label], float)[keep]
             y[1:][np.abs(np.diff(y)) > 180] = np.nan
-            ax.plot(times, y, lw=width, color=colour(name), label=NAMES.get(name, name))
+            t = np.asarray(times, float)[keep]
+            ax.plot(t, y, lw=width, color=colour(name), label=NAMES.get(name, name))
         ax.set_ylabel(label)
     if len(sources) > 1:
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
@@ -83,6 +85,30 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
 def _widths(count: int) -> Array:
     """Widths of lines that lie on one another: the first is the widest, so that each later one shows it."""
     return np.linspace(1.0 + 0.9 * (count - 1), 1.0, count)
+
+
+def span_words(sources: Mapping[str, Strips]) -> str:
+    """From where to where each quantity goes, by source: for alternative texts."""
+    said = []
+    for name, (_, quantities) in sources.items():
+        parts = []
+        for label, values in quantities.items():
+            what, _, unit = label.rstrip(")").partition(" (")
+            known = np.asarray(values, float)
+            if np.isfinite(known).any():
+                low, high = np.nanmin(known), np.nanmax(known)
+                parts.append(f"{what} {low:.0f} to {high:.0f} {unit}".replace(" °", "°"))
+        said.append(f"{NAMES.get(name, name)}: {', '.join(parts)}")
+    return "; ".join(said)
+
+
+def mark_period(fig: Figure, period: tuple[float, float] | None) -> None:
+    """Draw a black line over time at either end of a period, s, in every strip; nothing without one."""
+    for ax in fig.axes if period is not None else ():
+        limits = ax.get_xlim()
+        for at in period or ():
+            ax.axvline(at, color="black", lw=1.2)
+        ax.set_xlim(limits)
 
 
 def error_bands(

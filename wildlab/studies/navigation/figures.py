@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from wildlab.evaluation.whiteness import innovation_whiteness
 from wildlab.flight.store import Flight
@@ -24,19 +25,17 @@ from wildlab.pipeline.navigation_errors import (
 )
 from wildlab.pipeline.navigation_inputs import heading_from
 from wildlab.reporting.charts.navigation import (
-    Strips,
+    NAMES,
     bias_chart,
     correlation_strips,
     deviation_chart,
     error_bands,
-    poses_between,
-    speed_chart,
+    mark_period,
     squares_chart,
-    strips,
-    velocities_of,
 )
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import percent
+from wildlab.studies.navigation.flown import counterpart_words, period_words, tracking_period
 
 WORDS = {
     "mekf": "MEKF, noise as stated",
@@ -103,111 +102,99 @@ def differences_table(studied: Studied, parts: Sequence[tuple[str, float, float]
     )
 
 
-def show_flight(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
-    """Attitude, velocity and speed by each source between two times, s; counterpart of H 7.<figures>."""
-    nav = {"mekf": studied.found[studied.filter].nav, "observer": studied.found["observer"].nav}
-    reference = studied.flight.nav[studied.reference]
-    nav["truth" if has_truth(studied) else "onboard"] = reference.iloc[:: max(1, len(reference) // 3000)]
-    if has_truth(studied):
-        nav["autopilot"] = studied.flight.nav["autopilot"]
-    moving = {name: table for name, table in nav.items() if "v_north_m_s" in table}
-    attitude, _ = poses_between(
-        {name: t.reindex(columns=nav["mekf"].columns) for name, t in nav.items()}, *window
-    )
-    _, velocity = poses_between(moving, *window)
-    report.figure(
-        strips(attitude, f"Rolls by up to {_most(attitude['mekf'], 'roll (°)'):.0f}°"),
-        name=f"fig-7-{figures}",
-        alt=f"Roll, pitch and yaw over time by {', '.join(nav)}.",
-        caption=f"Roll, pitch and yaw, {window[0]:.0f} to {window[1]:.0f} s. Counterpart of H figures 5.3a "
-        f"and 7.{figures}.",
-    )
-    report.figure(
-        strips(velocity, f"Climbs or sinks by up to {_most(velocity['mekf'], 'down (m/s)'):.1f} m/s"),
-        name=f"fig-7-{figures + 1}",
-        alt=f"Velocity north, east and down over time by {', '.join(moving)}.",
-        caption=f"Velocity over the same time. Counterpart of H figures 5.3b and 7.{figures + 1}.",
-    )
-    speeds = {name: velocities_of(table[table["time_s"].between(*window)]) for name, table in moving.items()}
-    size = np.linalg.norm(speeds["mekf"][1], axis=1)
-    report.figure(
-        speed_chart(speeds, f"Speed over ground, {size.min():.0f} to {size.max():.0f} m/s"),
-        name=f"fig-7-{figures + 4}",
-        alt=f"Speed over ground over time by {', '.join(moving)}.",
-        caption=f"Total speed. Counterpart of H figure 7.{figures + 4}.",
-    )
-
-
-def _most(shown: Strips, label: str) -> float:
-    """The largest size of a quantity of `poses_between`."""
-    return float(np.nanmax(np.abs(np.asarray(shown[1][label], float))))
-
-
 def _inside(errors: Array, stated: Array) -> str:
     """The share of errors that are within two stated standard deviations; (K, 3) both."""
     known = np.isfinite(errors) & np.isfinite(stated)
     return percent(float((np.abs(errors) <= 2 * stated)[known].mean()), 0)
 
 
-def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int) -> None:
-    """Attitude and velocity against the reference, with the bounds that the filter states of itself."""
+def show_errors(report: Report, studied: Studied, window: tuple[float, float], figures: int | None) -> None:
+    """Attitude and velocity against the reference, with the bounds that the filter states of itself.
+
+    ``figures`` is the first figure of H's chapter 7 that the flight answers to; None for a public flight.
+    """
     late = (studied.times >= window[0]) & (studied.times < window[1])
     of = {"mekf": studied.scored[studied.filter], "observer": studied.scored["observer"]}
     whom = "the truth" if has_truth(studied) else "the one found on board"
+    period = tracking_period(studied.flight)
+
+    def instead(offset: int) -> str:
+        if figures is None:
+            return ""
+        return f"{counterpart_words(figures + offset)[:-1]}, with {whom} in place of the autopilot."
+
     turns = {who: np.degrees(e.error[late, 6:]) for who, e in of.items()}
     stated = np.degrees(of["mekf"].sd[late, 6:])
+    figure = error_bands(
+        studied.times[late],
+        turns,
+        {"mekf": stated},
+        _TURNS,
+        f"{_inside(turns['mekf'], stated)} of the angles are within two SD of {whom}",
+        largest=3 * float(np.nanquantile(np.abs(turns["observer"]), 0.95)),
+    )
+    mark_period(figure, period)
     report.figure(
-        error_bands(
-            studied.times[late],
-            turns,
-            {"mekf": stated},
-            _TURNS,
-            f"{_inside(turns['mekf'], stated)} of the angles are within two SD of {whom}",
-            largest=3 * float(np.nanquantile(np.abs(turns["observer"]), 0.95)),
-        ),
+        figure,
         name="attitude-errors",
-        alt="Differences of roll, pitch and yaw over time by filter and observer, with two deviations.",
+        alt="Differences of roll, pitch and yaw over time by filter and observer, with two deviations. "
+        f"{rms_words(turns, AXES, '°')}.{period_words(period)}",
         caption="Rotation from the estimate to the reference about the axes of the body; shaded: two "
-        f"deviations. Counterpart of H figure 7.{figures + 2}, with {whom} in place of the autopilot.",
+        f"deviations.{period_words(period)}{instead(2)}",
         main=True,
     )
     if np.isfinite(of["mekf"].error[late, 3:6]).any():
+        errors = {who: e.error[late, 3:6] for who, e in of.items()}
+        bound = of["mekf"].sd[late, 3:6]
+        title = f"{_inside(errors['mekf'], bound)} of the velocities are within two SD of {whom}"
+        figure = error_bands(studied.times[late], errors, {"mekf": bound}, _SPEEDS, title)
+        mark_period(figure, period)
         report.figure(
-            error_bands(
-                studied.times[late],
-                {who: e.error[late, 3:6] for who, e in of.items()},
-                {"mekf": of["mekf"].sd[late, 3:6]},
-                _SPEEDS,
-                f"{_inside(of['mekf'].error[late, 3:6], of['mekf'].sd[late, 3:6])} of the velocities are "
-                f"within two SD of {whom}",
-            ),
+            figure,
             name="velocity-errors",
-            alt="Differences of velocity over time by filter and observer, and two standard deviations.",
-            caption=f"Counterpart of H figure 7.{figures + 3}, with {whom} in place of the autopilot.",
+            alt="Differences of velocity over time by filter and observer, and two standard deviations. "
+            f"{rms_words(errors, PLACES, ' m/s')}.{period_words(period)}",
+            caption=f"Shaded: two deviations.{period_words(period)}{instead(3)}",
         )
+
+
+def rms_words(errors: Mapping[str, ArrayLike], axes: Sequence[str], unit: str) -> str:
+    """Root mean squares of errors (K, 3) by source, for alternative texts.
+
+    Examples
+    --------
+    >>> rms_words({"observer": [[3.0, 0.0, 1.0], [3.0, 0.0, -1.0]]}, ("x", "y", "z"), " m")
+    'Root mean squares: observer x 3.00 m, y 0.00 m, z 1.00 m'
+    """
+    said = []
+    for name, values in errors.items():
+        sizes = np.sqrt(np.nanmean(np.square(np.asarray(values, float)), axis=0))
+        each = ", ".join(f"{axis} {size:.2f}{unit}" for axis, size in zip(axes, sizes, strict=True))
+        said.append(f"{NAMES.get(name, name)} {each}")
+    return f"Root mean squares: {'; '.join(said)}"
 
 
 def show_against_autopilot(report: Report, studied: Studied, tuned: str, begin: float, figures: int) -> None:
     """The filter with deviations like the printed ones, against the autopilot as in H."""
     difference = against_autopilot(studied, tuned)
-    late = studied.times >= begin
+    late, period = studied.times >= begin, tracking_period(studied.flight)
     share = {name: 100 * value for name, value in shares_within(difference, begin).items()}
     for part, scale, labels, offset, title in (
         (slice(6, 9), np.degrees(1.0), _TURNS, 2, f"Roll: {share['inside_roll']:.0f} % within two SD"),
         (slice(3, 6), 1.0, _SPEEDS, 3, f"Velocity: {share['inside_velocity']:.0f} % within two SD"),
     ):
+        off = scale * difference.error[late, part]
+        stated = scale * difference.sd[late, part]
+        figure = error_bands(studied.times[late], {"mekf": off}, {"mekf": stated}, labels, title)
+        mark_period(figure, period)
+        axes, unit = (AXES, "°") if offset == 2 else (PLACES, " m/s")
         report.figure(
-            error_bands(
-                studied.times[late],
-                {"mekf": scale * difference.error[late, part]},
-                {"mekf": scale * difference.sd[late, part]},
-                labels,
-                title,
-            ),
+            figure,
             name=f"fig-7-{figures + offset}",
-            alt="Differences between filter and autopilot over time, with two deviations of the filter.",
-            caption=f"{WORDS[tuned]}, with the autopilot as reference. Counterpart of H figure "
-            f"7.{figures + offset}.",
+            alt="Differences between filter and autopilot over time, with two deviations of the filter. "
+            f"{title}. {rms_words({'mekf': off}, axes, unit)}.{period_words(period)}",
+            caption=f"{WORDS[tuned]}, with the autopilot as reference.{period_words(period)}"
+            f"{counterpart_words(figures + offset)}",
         )
 
 

@@ -29,6 +29,25 @@ and the observer's poses; $\mathbf{R}$ is each point's own ground covariance. Au
 their value at lag zero; white noise of this length stays within the grey band at 95 % of the lags."""
 
 
+def path_words(nav: pd.DataFrame, seen: pd.Series) -> str:
+    """Alternative text of the map of the path, the antenna being the origin.
+
+    Parameters
+    ----------
+    nav
+        The path, with ``time_s``, ``north_m`` and ``east_m``.
+    seen
+        When the antenna was seen, s.
+    """
+    north, east = (nav[f"{axis}_m"].to_numpy(float) for axis in ("north", "east"))
+    off = np.interp(seen, nav["time_s"], np.hypot(north, east))
+    return (
+        f"Map of the path in local metres, {np.ptp(north):.0f} m from south to north and "
+        f"{np.ptp(east):.0f} m from west to east, with the {len(off)} places from which the antenna was "
+        f"seen, {off.min():.0f} to {off.max():.0f} m beside it."
+    )
+
+
 def summary(spread: pd.DataFrame, bound: float) -> list[str]:
     """Three sentences on what the trial of this case gives, one row for each flight.
 
