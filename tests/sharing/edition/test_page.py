@@ -52,14 +52,18 @@ def longest(language: Language, *begins: str) -> tuple[Said, ...]:
     return tuple(found)
 
 
+MORE = Said("page.more", {}, 88)
+
+
 def longest_story(language: Language) -> Story:
     why = longest(language, "lost.cause", "why.", "alarm.")[0]
     tiles = longest(language, "tile.")
     return Story(
         longest(language, "verdict.")[0], why, longest(language, "next.")[0], False,
         tuple((length(8888.8), one) for one in (*tiles, tiles[0])), longest(language, "measured."),
-        longest(language, "alarm.", "trouble.", "lost.", "wrong."), longest(language, "do."),
-        longest(language, "unknown."),
+        (*longest(language, "alarm.", "trouble.", "lost.", "wrong."), MORE),
+        (*longest(language, "do."), MORE),
+        (*longest(language, "unknown."), MORE),
     )  # fmt: skip
 
 

@@ -127,10 +127,13 @@ def _tiles(story: Story, said: _Say) -> str:
 
 
 def _section(said: _Say, heading: str, items: Sequence[Said], *, ranked: bool = False) -> str:
-    tag = "ol" if ranked and len(items) > 1 else "ul"
-    listed = "".join(f"<li>{said(one)}</li>" for one in items)
+    more = [one for one in items if one.key == "page.more"]
+    kept = [one for one in items if one.key != "page.more"]
+    tag = "ol" if ranked and len(kept) > 1 else "ul"
+    listed = "".join(f"<li>{said(one)}</li>" for one in kept)
+    below = "".join(f'<p class="more">{said(one)}</p>' for one in more)
     name = "do" if ranked else "tell"
-    return f'<section class="{name}"><h2>{said(Said(heading))}</h2><{tag}>{listed}</{tag}></section>'
+    return f'<section class="{name}"><h2>{said(Said(heading))}</h2><{tag}>{listed}</{tag}>{below}</section>'
 
 
 def _place(place: Place, said: _Say) -> str:

@@ -39,7 +39,8 @@ class Story(NamedTuple):
     tiles
         The numbers at the top, each with what it is.
     measured, wrong, advice, unknown
-        The four lists; advice is ranked, most first.
+        The four lists; advice is ranked, most first. Where there are more than fit, the last text of a list
+        says how many.
     """
 
     verdict: Said
@@ -76,10 +77,16 @@ def tell(facts: Facts) -> Story:
         facts.verdict not in (ALARM, MEND),
         _tiles(facts)[:4],
         _measured(facts)[:MOST],
-        _wrong(facts)[:MOST],
-        advice[:MOST],
-        _unknown(facts)[:MOST],
+        _cut(_wrong(facts)),
+        _cut(advice),
+        _cut(_unknown(facts)),
     )
+
+
+def _cut(items: tuple[Said, ...]) -> tuple[Said, ...]:
+    """The first of them, and how many more there are: nothing is left out in silence."""
+    rest = len(items) - MOST
+    return items if rest <= 0 else (*items[:MOST], Said("page.more", {}, rest))
 
 
 def steps_of(metres: float) -> Said | None:
@@ -136,7 +143,7 @@ def _next(facts: Facts, advice: tuple[Said, ...]) -> Said:
         what = "next.fix_error" if first.key in ("cause", "far_out") else "next.fix_data"
         return Said(what, {"share": share(first.share)})
     if facts.verdict == SOUND:
-        return Said("next.sound")
+        return Said("next.sound_more" if advice else "next.sound")
     return Said("next.unjudged" if advice else "next.nothing")
 
 

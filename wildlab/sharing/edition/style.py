@@ -63,6 +63,7 @@ section { border-top: 3px solid var(--line); padding-top: .6rem }
 section.do { border-color: var(--blue) }
 section ul, section ol { padding-left: 1.3rem }
 section li { margin: .3rem 0 }
+.more { color: var(--dim); font-size: .92rem; padding-left: 1.3rem }
 .place { border-top: 3px solid var(--line); margin-top: 1.1rem; padding-top: .6rem }
 footer { margin-top: 1rem; color: var(--dim); font-size: .84rem }
 @media screen and (prefers-color-scheme: dark) {
@@ -83,13 +84,13 @@ footer { margin-top: 1rem; color: var(--dim); font-size: .84rem }
 @page { size: A4; margin: 10mm 13mm }
 @media print {
   html { font-size: 9pt }
-  body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.32 }
+  body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.3 }
   h1 { font-size: 1.7rem; margin-bottom: 2.5mm }
   .verdict, .legend i, svg { print-color-adjust: exact; -webkit-print-color-adjust: exact }
   .verdict { padding: 2.6mm 4mm }
   .top { margin: 3mm 0; gap: 6mm }
-  .top:not(.alone) { grid-template-columns: 92mm 1fr }
-  figure svg, figure img { max-height: 69mm; width: auto; max-width: 100% }
+  .top:not(.alone) { grid-template-columns: 86mm 1fr }
+  figure svg, figure img { max-height: 64.5mm; width: auto; max-width: 100% }
   .parts { gap: 2.5mm 6mm }
   section { padding-top: 1.2mm }
   section li { margin: .6mm 0 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.navigation_errors import Studied
 from wildlab.reporting.charts.georeferencing import aircraft_map
 from wildlab.reporting.charts.navigation import (
+    NAMES,
     mark_period,
     poses_between,
     span_words,
@@ -142,7 +145,7 @@ def show_flight(report: Report, studied: Studied, window: Period, figures: int |
         (
             speed_chart(speeds, f"Speed over ground, {speed_words}"),
             (4, "speed"),
-            f"Speed over ground over time by {', '.join(moving)}: {speed_words} by the filter.",
+            f"Speed over ground over time by {_names(moving)}: {speed_words} by the filter.",
             "Total speed.",
         ),
     ]
@@ -155,6 +158,10 @@ def show_flight(report: Report, studied: Studied, window: Period, figures: int |
             alt=alt + period_words(period),
             caption=caption + period_words(period) + counterpart_words(number),
         )
+
+
+def _names(sources: Iterable[str]) -> str:
+    return ", ".join(NAMES.get(name, name) for name in sources)
 
 
 def _sources(studied: Studied, *, twin: bool) -> dict[str, pd.DataFrame]:
