@@ -112,7 +112,7 @@ def aircraft_map(
     """Paths of aircraft (N, 2) and target (M, 2), north and east, and from where it was seen (K, 2)."""
     path, seen, below = (np.asarray(a, float) for a in (aircraft, seeing, target))
     fig, ax = new_figure(5.2, 4.6)
-    ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.5, alpha=0.7)
+    ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.9)
     ax.plot(seen[:, 1], seen[:, 0], ".", color=ORANGE, ms=2)
     ax.plot(below[:, 1], below[:, 0], color=colour("truth"), lw=2.2)
     ax.annotate(
