@@ -73,7 +73,7 @@ def strips(sources: Mapping[str, Strips], title: str) -> Figure:
             y = np.array(quantities[label], float)[keep]
             y[1:][np.abs(np.diff(y)) > 180] = np.nan
             t = np.asarray(times, float)[keep]
-            ax.plot(t, y, lw=width, color=_ink(name), label=NAMES.get(name, name))
+            ax.plot(t, y, lw=width, color=colour(name), label=NAMES.get(name, name))
         ax.set_ylabel(label)
     if len(sources) > 1:
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower right", ncols=len(sources))
