@@ -17,6 +17,7 @@ from wildlab.flight.manifest import CameraPart
 from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.photos.folder import camera_of, of_camera
 from wildlab.flight.time.matching import match_triggers
+from wildlab.flight.time.whole_hours import hours_words, whole_hours
 
 #: Time zones are whole quarters of an hour, s.
 QUARTER_S = 900.0
@@ -213,18 +214,23 @@ def clock_of_images(
         clock = _by_triggers(photos, *triggers)
         if clock is not None:
             return clock
+    flown = _flown(own, others)
     if len(utc):
-        return ImageClock("utc", offset, "The images' own stamps are in UTC." + _added(offset))
+        said = "The images' own stamps are in UTC." + _added(offset)
+        taken = (float(utc.min()) + offset, float(utc.max()) + offset)
+        if (by := whole_hours(taken, flown)) is not None:
+            said += (
+                f" They are {hours_words(by)} {'ahead of' if by < 0 else 'behind'} the flight's log: none "
+                "was taken on it, and with that taken off they were, so one of the two clocks has another "
+                f"zone. Give --camera-offset {offset + by:g} if it is the camera's."
+            )
+        return ImageClock("utc", offset, said)
     if not len(wall):
         return ImageClock("sequence", 0.0, "The images have no time: they are numbered in order.")
     if stated_offset_s is not None:
         return ImageClock(
             "utc", offset, f"The wall clock of the camera is corrected by {offset:g} s, as you said."
         )
-    flown = None if own is None else span_of(own)
-    spans = [span for one in others if (span := span_of(one)) is not None]
-    if own is None and spans:
-        flown = min(span[0] for span in spans), max(span[1] for span in spans)
     if flown is None:
         return ImageClock(
             "utc",
@@ -246,6 +252,14 @@ def clock_of_images(
         f"The camera's wall clock is taken to be {_hours(quarters)} UTC: only so do the images fall into the "
         "flight. By seconds it is not known: wildlab clock estimates that.",
     )
+
+
+def _flown(own: Found | None, others: Sequence[Found]) -> tuple[float, float] | None:
+    """When the flight was: by the vehicle's log, or where it has none by the tracks of targets."""
+    spans = [span for one in others if (span := span_of(one)) is not None]
+    if own is not None or not spans:
+        return None if own is None else span_of(own)
+    return min(span[0] for span in spans), max(span[1] for span in spans)
 
 
 def _by_triggers(photos: Stream, name: str, triggers: Stream) -> ImageClock | None:

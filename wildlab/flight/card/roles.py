@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.files import did_you_mean
+from wildlab.flight.time.whole_hours import hours_words, whole_hours
 from wildlab.geometry.frames import geodetic_to_ned
 
 Array = NDArray[np.float64]
@@ -221,7 +222,7 @@ def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
     if shared < SHARED_S:
         apart = max(mine.times[0] - theirs.times[-1], theirs.times[0] - mine.times[-1])
         why = f"it is of another time, or a clock is wrong: {_lasting(apart)} lie between it and the flight"
-        return Choice(one, "nothing", why)
+        return Choice(one, "nothing", why + _by_hours(one, mine, theirs))
     distance, above = _distance(mine, theirs)
     height = "" if math.isnan(above) else f" and {abs(above):.0f} m {'below' if above > 0 else 'above'}"
     if distance < ON_BOARD_M and not abs(above) >= ON_BOARD_M:
@@ -231,6 +232,18 @@ def _other(one: Found, own: Found | None, images: Found | None) -> Choice:
         one,
         "target",
         f"it is {distance:.0f} m beside{height} the vehicle (medians), for {_lasting(shared)} of its flight",
+    )
+
+
+def _by_hours(one: Found, mine: Way, theirs: Way) -> str:
+    """That another log's clock is off by whole or half hours, and what to write; nothing where it is not."""
+    by = whole_hours((theirs.times[0], theirs.times[-1]), (mine.times[0], mine.times[-1]))
+    if by is None:
+        return ""
+    return (
+        f"; its stamps are {hours_words(by)} {'ahead' if by < 0 else 'behind'}, for with that taken off both "
+        f"were under way together: take it with --role {one.name}=target (or camera, or receiver), write "
+        f"offset_s = {by:g} in its part [logs] of the recipe, and import that"
     )
 
 
