@@ -10,13 +10,14 @@ import pandas as pd
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from tests.pipeline.robots import robot_flight, rows_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.follow import follow_targets
-from wildlab.pipeline.following.judged import apart
+from wildlab.pipeline.following.judged import _between, apart
 from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
+from wildlab.tracking.maritime import white_acceleration
 
 
 def later(flight: Flight, seconds: float) -> Flight:
@@ -140,7 +141,9 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
     at = seen["frame_id"].map(stamps)
     torn = replace(whole, tables=whole.tables | {"detections": seen[(at < 50) | (at > 90)]})
     short = replace(whole, tables=whole.tables | {"detections": seen[at < 50]})
-    settings = parse_settings("[targets]\npatience_s = 10.0\ngate_probability = 1.0\n")
+    settings = parse_settings(
+        "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 1.0\n"
+    )
     followed = [follow_targets(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
     one, two = (each.tracks[1] for each in followed)
     assert one.filter == "ekf-smoothed" and np.isfinite(one.estimate[:, 0]).sum() > 60
@@ -151,20 +154,24 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
 def test_filters_without_a_smoother_are_named():
     followed = follow_targets(robot_flight(1, kind="position"), smooth=True, filters=["imm", "ukf"])
     assert [one for one in followed.notes if "not smoothed" in one] == [
-        "The filter 'imm' of radar was not smoothed: it has no smoother."
+        "The filter 'imm' of radar was not smoothed: there is no smoother for it."
     ]
 
 
 def test_a_track_carried_to_the_looks_of_another_sensor_is_the_less_certain():
-    """Both sensors are right, and one looks every five seconds: the mean square is near two."""
-    fast = robot_flight(1, kind="position", position_sd=0.5, rate_hz=2.0, seconds=400, sensor="fast")
-    slow = robot_flight(2, kind="position", position_sd=0.5, rate_hz=0.2, seconds=400, sensor="slow")
-    tables = {name: pd.concat([fast.tables[name], slow.tables[name]]) for name in ("frames", "detections")}
-    both = replace(fast, tables=fast.tables | tables)
-    settings = parse_settings(
-        KNOWN.split("[targets]")[0].replace("radar", "none")
-        + "[sensors.fast.noise]\nposition_m = 0.5\n[sensors.slow.noise]\nposition_m = 0.5\n"
-        + "[targets]\nacceleration_m_s_sqrt_s = 0.15\nstart_speed_m_s = 1.0\n"
-    )
-    (pair,) = apart(follow_targets(both, settings=settings, smooth=True, filters=["ekf"]))
-    assert pair.filter == "ekf" and pair.squares.mean < 2.6
+    track = follow_targets(robot_flight(1, kind="position"), filters=["ekf"]).tracks[0]
+    for dt in (0.0, 0.3):
+        P = _between(track, track.times[20:21] + dt, 0.7)[1][0]
+        F, Q = white_acceleration(dt, 0.7)
+        np.testing.assert_allclose(P, (F @ track.covariance[20] @ F.T + Q)[:2, :2], rtol=1e-9)
+
+
+def test_smoothed_tracks_are_not_held_against_each_other():
+    names = {one.filter for one in apart(follow_targets(two_sensors(), smooth=True, filters=["ekf"]))}
+    assert names == {"ekf"}
+
+
+def two_sensors() -> Flight:
+    one, other = (robot_flight(k, kind="position", sensor=f"radar-{k}") for k in (1, 2))
+    tables = {name: pd.concat([one.tables[name], other.tables[name]]) for name in ("frames", "detections")}
+    return replace(one, tables=one.tables | tables)
