@@ -142,7 +142,7 @@ def test_a_smoother_knows_nothing_of_what_its_filter_took_behind_the_end_of_the_
     torn = replace(whole, tables=whole.tables | {"detections": seen[(at < 50) | (at > 90)]})
     short = replace(whole, tables=whole.tables | {"detections": seen[at < 50]})
     settings = parse_settings(
-        "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 1.0\n"
+        "[sensors.radar.noise]\nposition_m = 1.0\n[targets]\npatience_s = 10.0\ngate_probability = 0.9999\n"
     )
     followed = [follow_targets(f, settings=settings, smooth=True, filters=["ekf"]) for f in (torn, short)]
     one, two = (each.tracks[1] for each in followed)
