@@ -41,7 +41,7 @@ else:
             "published": ("load_claims", "load_published"),
             "report": ("Report", "open_report"),
         },
-        folders=("charts",),
+        folders=("animation", "charts", "front"),
     )
 
 __all__ = [

@@ -259,8 +259,8 @@ def _drawn(
     for truth in shown.truth:
         both(lambda when, truth=truth: _cross(truth, onto, when))  # type: ignore[misc]
     both(lambda when: _aircraft(shown.path, onto, when))
-    lines = [_line(shown.path, onto, begin, end, "gone")]
-    lines += [_line(truth, onto, begin, end, "true") for truth in shown.truth if len(truth.times) > 1]
+    lines = [_line(shown.path, onto, grid, "gone")]
+    lines += [_line(truth, onto, grid, "true") for truth in shown.truth if len(truth.times) > 1]
     return (
         f'<svg class="flown" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" aria-label="{escape(alt)}">'
         f"<style>{STYLE}</style>"
@@ -391,21 +391,16 @@ def _headings(places: Array) -> Array:
     return np.asarray(np.unwrap(heading[last]))
 
 
-def _line(course: Course, onto: _Map, begin: float, end: float, name: str) -> str:
-    there = (course.times >= begin) & (course.times <= end) & np.isfinite(course.points).all(axis=1)
-    places = _thinned(onto.at(course.points[there]))
-    if len(places) < 2:
-        return ""
-    return f'<path class="{name}" d="M{"L".join(f"{_n(x)} {_n(y)}" for x, y in places)}"/>'
-
-
-def _thinned(places: Array) -> Array:
-    """Places along a line that are at least two units apart, and the last."""
-    kept: list[int] = []
-    for k, place in enumerate(places):
-        if not kept or np.hypot(*(place - places[kept[-1]])) >= 2 or k == len(places) - 1:
-            kept.append(k)
-    return places[kept]
+def _line(course: Course, onto: _Map, grid: Array, name: str) -> str:
+    """All of a course, as the moving picture goes along it; broken where it is not known."""
+    places = onto.at(_over(grid, course.times, course.points))
+    known = np.isfinite(places).all(axis=1)
+    begins = np.flatnonzero(np.diff(known.astype(int)) != 0) + 1
+    drawn = ""
+    for part, there in zip(np.split(places, begins), np.split(known, begins), strict=True):
+        if len(part) > 1 and there[0]:
+            drawn += f"M{'L'.join(f'{_n(x)} {_n(y)}' for x, y in part)}"
+    return f'<path class="{name}" d="{drawn}"/>' if drawn else ""
 
 
 def _rules(onto: _Map) -> str:

@@ -39,7 +39,7 @@ max-height:8rem;border:0}.card>.thumb+h3{grid-column:2;margin-left:.6rem}
 .card p:first-of-type{margin-top:.3rem}}
 @media print{.wall{display:block}.card{display:inline-flex;width:31.6%;margin:0 .6% 3mm;vertical-align:top;
 break-inside:avoid}.card .thumb{padding:1mm}.card h3{font-size:9.5pt}.card p,.card .verd{font-size:8pt}
-.card .tag-line{font-size:7.5pt}.card .ticks .near{display:none}}"""
+.card .tag-line,.card p.rest{font-size:7.5pt}.card .ticks .near{display:none}}"""
 
 
 class Card(NamedTuple):

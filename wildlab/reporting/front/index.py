@@ -42,7 +42,8 @@ padding:.85rem 1rem;text-decoration:none;color:var(--ink);background:var(--soft)
 {PAUSE_STYLE}
 @media(max-width:46rem){{.top{{grid-template-columns:minmax(0,1fr);gap:1rem}}.top h1{{font-size:1.65rem}}
 .doors{{grid-template-columns:1fr 1fr}}}}
-@media print{{.top{{grid-template-columns:1fr 1fr}}.doors a{{break-inside:avoid}}.doors{{grid-template-columns:repeat(4,1fr)}}}}"""
+@media print{{.top{{grid-template-columns:1fr 1fr}}.doors a{{break-inside:avoid}}
+.doors{{grid-template-columns:repeat(4,1fr)}}}}"""
 
 
 class Learn(NamedTuple):

@@ -29,7 +29,7 @@ padding:.12rem 0}
 .row-of .name{font-size:.9rem;line-height:1.25}
 @media(max-width:46rem){.row-of{grid-template-columns:minmax(0,1fr) auto;padding:.4rem 0}
 .row-of .marks,.row-of .ticks{grid-column:1/-1;grid-row:2}}
-@media print{.row-of{break-inside:avoid}}"""
+@media print{.row-of{break-inside:avoid;grid-template-columns:9.5rem minmax(0,1fr) 7.5rem}}"""
 
 
 def numbers_section(studies: Sequence[StudyStatus]) -> str:
