@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 from wildlab.pipeline.overviews.worth_fixing import ALARM, FIX, LOOK, MEND, SOUND, UNJUDGED, verdict_of
 from wildlab.reporting.overview_words import duration_words
@@ -13,6 +14,12 @@ from wildlab.reporting.text import NOTHING, escape
 
 #: The page, beside the ledger.
 PAGE = "flights.html"
+#: How to begin, where there is none yet.
+BEGIN = (
+    "None was evaluated here yet. <code>wildlab import CARD --into flights/tuesday</code> makes a flight of "
+    "what the aircraft logged, <code>wildlab simulate slow-vessel --into flights/trial</code> makes one up; "
+    "<code>wildlab evaluate flights/tuesday</code> writes its reports, and they are shown here."
+)
 #: What the verdict follows from, of the overview.
 COUNTS = ("problems", "worth_fixing", "troubled", "reports_beside")
 _PILLS = {ALARM: "no", MEND: "no", FIX: "part", LOOK: "part", SOUND: "yes", UNJUDGED: ""}
@@ -93,6 +100,11 @@ class OwnFlight(NamedTuple):
         return float("nan") if found is None else found
 
 
+def address(folder: str) -> str:
+    """Of the report in a folder, for a link: a folder may be called ``javascript:x`` or ``a?b``."""
+    return f"{escape(quote(folder, safe=''))}/report.html"
+
+
 def verdict_pill(flight: OwnFlight) -> str:
     """The verdict as HTML."""
     word = flight.verdict
@@ -125,7 +137,7 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
     parts = [
         "<header><h1>Flights evaluated here</h1>",
         f'<p class="sub">{len(flights)} flights, {judged} of them judged. '
-        '<a href="index.html">The ledger of the theses</a> is another page.</p></header>',
+        '<a href="ledger.html">The ledger of the theses</a> is another page.</p></header>',
     ]
     if flights:
         parts.append(
@@ -133,7 +145,7 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
             f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
         )
     else:
-        parts.append("<p>None yet: <code>wildlab evaluate</code> makes the reports of a flight.</p>")
+        parts.append(f"<p>{BEGIN}</p>")
     if comparison:
         parts.append(f'<p><a href="{escape(comparison)}">Flights compared on one page</a></p>')
     meanings = {
@@ -150,14 +162,14 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
     return page(
         title="Flights evaluated here",
         body="\n".join(parts),
-        kicker='<a href="index.html">wildlab ledger</a> › flights',
+        kicker='<a href="index.html">wildlab</a> › flights',
         footer=f"<p>Put together {made}.</p>",
     )
 
 
 def _row(flight: OwnFlight) -> str:
     links = ", ".join(
-        f'<a href="{escape(one.folder)}/report.html">{escape(one.about)}</a>'
+        f'<a href="{address(one.folder)}">{escape(one.about)}</a>'
         + ("" if one.state == "done" else f" ({escape(one.state)})")
         for one in flight.reports
     )

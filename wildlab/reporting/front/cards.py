@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
-from urllib.parse import quote
 
 from wildlab.reporting.front.glimpse import Glimpse
 from wildlab.reporting.front.ratios import drawable, plot, ticks
-from wildlab.reporting.own_flights import OwnFlight, verdict_pill
+from wildlab.reporting.own_flights import OwnFlight, address, verdict_pill
 from wildlab.reporting.page import TAGS
 from wildlab.reporting.report import PILLS
 from wildlab.reporting.standing import Standing, standing
@@ -150,11 +149,6 @@ def _links(flight: OwnFlight) -> str:
         for one in flight.reports
     ]
     return f"Reports: {', '.join(items)}"
-
-
-def address(folder: str) -> str:
-    """Of a report, for a link: a folder may be called ``javascript:x`` or ``a?b``."""
-    return f"{escape(quote(folder, safe=''))}/report.html"
 
 
 def _state(state: str) -> str:

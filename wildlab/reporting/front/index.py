@@ -12,6 +12,7 @@ from wildlab.reporting.front import cards, numbers, ratios
 from wildlab.reporting.front.cards import Card, card_html
 from wildlab.reporting.front.flight import PROBABILITY, FrontFlight
 from wildlab.reporting.front.numbers import LEDGER, numbers_section
+from wildlab.reporting.own_flights import BEGIN
 from wildlab.reporting.own_flights import PAGE as FLIGHTS
 from wildlab.reporting.page import page
 from wildlab.reporting.status import FIRST_LOOK, StudyStatus
@@ -160,14 +161,7 @@ def _doors(studies: Sequence[StudyStatus], flights: int, cases: int, learn: Sequ
 
 def _flights(shown: Sequence[Card], flights: int) -> str:
     if not shown:
-        return (
-            '<section><h2 id="flights">My flights</h2><p class="empty">None was evaluated here yet. '
-            "<code>wildlab import CARD --into flights/tuesday</code> makes a flight of what the "
-            "aircraft logged, "
-            "<code>wildlab simulate slow-vessel --into flights/trial</code> makes one up; "
-            "<code>wildlab evaluate flights/tuesday</code> writes its reports, and they are shown "
-            "here.</p></section>"
-        )
+        return f'<section><h2 id="flights">My flights</h2><p class="empty">{BEGIN}</p></section>'
     rest = flights - min(len(shown), MOST_FLIGHTS)
     more = f"All {flights} of them in a table" if rest > 0 else "The same in a table"
     return (

@@ -1,0 +1,139 @@
+"""Numbers as marks on one axis, and the small pictures of cards."""
+
+from __future__ import annotations
+
+import base64
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.evaluation.printed import AGREES, DIFFERS, NOT_JUDGED, POSSIBLE, TOO_VAGUE
+from wildlab.reporting.front import ratios
+from wildlab.reporting.front.glimpse import MOST_PIXELS, WIDE, read_glimpse, smaller
+from wildlab.reporting.status import FIRST_LOOK, MISSING, Number
+
+VERDICTS = (AGREES, POSSIBLE, TOO_VAGUE, DIFFERS, NOT_JUDGED, FIRST_LOOK)
+
+
+def number(ratio: float | None, verdict: str = AGREES) -> Number:
+    return Number("error", "kf", "m", "H", 1.0, 1, ratio, None, None, None, verdict, ratio=ratio)
+
+
+def on_axis(ratio: float, width: float) -> float:
+    """A logarithmic axis from an eighth to eight, with room for half a mark at its ends."""
+    share = (math.log2(min(max(ratio, 1 / 8), 8)) + 3) / 6
+    return 4.6 + share * (width - 9.2)
+
+
+@settings(max_examples=60)
+@given(
+    st.lists(st.tuples(st.floats(1e-3, 1e3), st.sampled_from(VERDICTS)), max_size=60),
+    st.sampled_from((1, 3, 5)),
+)
+def test_every_number_is_drawn_where_its_ratio_lies(given_: list[tuple[float, str]], levels: int) -> None:
+    marks = ratios.arranged([number(*one) for one in given_], 320.0, levels)
+    assert sorted((round(one.x, 6), one.verdict, one.beyond) for one in marks) == sorted(
+        (round(on_axis(ratio, 320.0), 6), verdict, (ratio > 8) - (ratio < 1 / 8)) for ratio, verdict in given_
+    )
+    assert {one.y for one in marks} <= {8.2 * k for k in range(-(levels // 2), levels // 2 + 1)}
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(0.2, 5.0), max_size=14))
+def test_no_mark_hides_another_where_there_is_room(given_: list[float]) -> None:
+    numbers = [number(one) for one in given_]
+    levels = ratios.levels_for(numbers, 320.0, 29)
+    marks = ratios.arranged(numbers, 320.0, levels)
+    for row in {one.y for one in marks}:
+        xs = sorted(one.x for one in marks if one.y == row)
+        assert all(b - a >= 2 * 3.6 for a, b in pairwise(xs))
+
+
+def test_the_plot_shows_what_has_a_ratio_and_nothing_else() -> None:
+    numbers = [number(2.0), number(0.01, DIFFERS), number(None), number(1.0, MISSING), number(-1.0)]
+    drawn = ratios.plot(numbers, alt="<two>", width=320.0)
+    at = dict(re.findall(r'class="(same|off|maybe|vague|none|look)" transform="translate\(([\d.]+) ', drawn))
+    assert {name: float(x) for name, x in at.items()} == {
+        "same": pytest.approx(on_axis(2.0, 320.0), abs=0.06),
+        "off": pytest.approx(4.6, abs=0.06),
+    }
+    assert drawn.count('class="far"') == 1 and 'aria-label="&lt;two&gt;"' in drawn
+    # The shaded margin ends where a ratio of 1.25 lies.
+    left, right = map(float, re.search(r'class="close" d="M([\d.]+) 0H([\d.]+)V', drawn).groups())  # type: ignore[union-attr]
+    assert (left, right) == (
+        pytest.approx(on_axis(0.8, 320), abs=0.06),
+        pytest.approx(on_axis(1.25, 320), abs=0.06),
+    )
+
+
+def test_verdicts_differ_in_shape_as_well_as_in_colour() -> None:
+    names, paths = zip(*ratios.SHAPES.values(), strict=True)
+    assert set(ratios.SHAPES) == set(VERDICTS) and len(set(names)) == len(set(paths)) == 6
+    for name in names:
+        assert re.search(rf"\.{name}[,{{]", ratios.STYLE)
+    said = ratios.legend([AGREES, DIFFERS])
+    assert AGREES in said and DIFFERS in said and POSSIBLE not in said and ratios.legend([]) == ""
+
+
+def test_the_words_below_stand_at_their_ratios() -> None:
+    for left, words in re.findall(r'left:([\d.]+)%">([^<]+)<', ratios.ticks()):
+        ratio = {"⅛": 1 / 8, "¼": 1 / 4, "½": 1 / 2, "as printed": 1, "2×": 2, "4×": 4, "8×": 8}[words]
+        assert float(left) * 3.2 == pytest.approx(on_axis(ratio, 320), abs=0.02)
+
+
+def png(picture: np.ndarray) -> str:
+    return base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()
+
+
+def shrunk(picture: np.ndarray) -> np.ndarray:
+    address = smaller(png(picture))
+    assert address.startswith("data:image/webp;base64,")
+    return cv2.imdecode(
+        np.frombuffer(base64.b64decode(address.partition(",")[2]), np.uint8), cv2.IMREAD_COLOR
+    )
+
+
+def test_a_small_picture_looks_like_the_large_one() -> None:
+    large = np.zeros((600, 880, 4), np.uint8)
+    large[:, :440] = (0, 0, 255, 255)  # red on the left; the right lets the paper through
+    small = shrunk(large)
+    assert small.shape == (300, WIDE, 3)
+    assert np.abs(small[:, 20:200].astype(int) - (0, 0, 255)).mean() < 12
+    assert small[:, 240:].min() > 240
+    grey = shrunk(np.full((100, 880), 128, np.uint8))
+    assert grey.shape == (50, WIDE, 3) and np.abs(grey.astype(int) - 128).max() < 4
+
+
+def test_what_is_no_picture_gives_none() -> None:
+    whole = base64.b64decode(png(np.zeros((10, 10, 3), np.uint8)))
+    huge = whole[:16] + (60_000).to_bytes(4, "big") * 2 + whole[24:]
+    assert MOST_PIXELS < 60_000**2
+    for content in (b"", b"GIF89a" + whole, whole[:30], huge):
+        assert smaller(base64.b64encode(content).decode()) == ""
+    assert smaller("=") == ""
+
+
+def test_a_glimpse_is_plain_text(tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    assert read_glimpse(report) == ("", "", "", "")
+    picture = png(np.zeros((10, 20, 3), np.uint8))
+    report.write_text(
+        '<h1>Is <code>a</code> &lt; b?</h1><section aria-label="Summary" class="summary good"><p><b>It is '
+        f'&amp; stays so.</b> More.</p></section><img alt="A &quot;map&quot;" '
+        f'src="data:image/png;base64,{picture}">',
+        encoding="utf-8",
+    )
+    found = read_glimpse(report)
+    assert found[:2] == ("Is a < b?", "It is & stays so.") and found.alt == 'A "map"' and found.picture
+    # It is read again once the report has changed.
+    report.write_text("<h1>Other</h1>", encoding="utf-8")
+    assert read_glimpse(report) == ("Other", "", "", "")
+    report.write_bytes(b"\xff\xfe<h1>")
+    assert read_glimpse(report).title == ""

@@ -1,0 +1,337 @@
+"""The front page and those beside it, put together from what runs left behind."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from html import unescape
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import cv2
+import numpy as np
+import pytest
+from bs4 import BeautifulSoup
+
+from tests.runner.test_ledger import a_study, ran
+from wildlab.evaluation.printed import AGREES, DIFFERS
+from wildlab.reporting import html, metrics
+from wildlab.reporting.front.cards import card_html, study_card
+from wildlab.reporting.front.counts import counted
+from wildlab.reporting.front.flight import FILE, load_front_flight, simulated
+from wildlab.reporting.front.glimpse import Glimpse
+from wildlab.reporting.front.index import flight_words, front_page
+from wildlab.reporting.front.numbers import poster_page
+from wildlab.reporting.published import published_rows
+from wildlab.reporting.standing import standing
+from wildlab.reporting.status import StudyStatus
+from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.record.front_page import build_ledger
+from wildlab.runner.record.status import study_status
+
+PAGES = ("index.html", "ledger.html", "numbers.html", "flights.html", "partners.html")
+#: A word that would run, were it not only text.
+HOSTILE = "<script>alert(1)</script>"
+
+
+def printed(folder: Path, **values: list[float]) -> Path:
+    """Calculated numbers of studies, by study: what each is in print, to a digit behind the point."""
+    folder.mkdir(exist_ok=True)
+    for study, numbers in values.items():
+        entries = "".join(
+            f'[[number]]\nstudy = "{study}"\nname = "error"\nsubject = "a/{i}"\nvalue = '
+            f'{value:.1f}\nunit = "m"\n'
+            'source = "H table 1"\nkind = "calculated"\n'
+            for i, value in enumerate(numbers)
+        )
+        (folder / f"{study}.toml").write_text(entries)
+    return folder
+
+
+def gave(reports: Path, study: str, values: list[float], **more: Any) -> None:
+    ran(
+        reports,
+        *(metrics.metric("error", f"a/{i}", v, "m") for i, v in enumerate(values)),
+        study=study,
+        **more,
+    )
+
+
+def make_first_look(folder: Path) -> None:
+    status = json.loads((folder / "status.json").read_text()) | {"first_look": {"seeds": [5, 200]}}
+    (folder / "status.json").write_text(json.dumps(status))
+
+
+@pytest.fixture
+def some(tmp_path: Path) -> list[StudyStatus]:
+    """Two studies that are done, one each that failed, was not run, and had a first look."""
+    reports = tmp_path / "reports"
+    folder = printed(
+        tmp_path / "published",
+        done=[2.0, 4.0, 1.0, 0.0],
+        other=[3.0],
+        failed=[1.0, 1.0],
+        never=[1.0] * 5,
+        looked=[1.0] * 7,
+    )
+    gave(reports, "done", [2.02, 8.0, 1.04, 0.01])
+    gave(reports, "other", [30.0])
+    ran(reports, study="failed", state="failed")
+    gave(reports, "looked", [1.0] * 7)
+    make_first_look(reports / "looked")
+    return [study_status(a_study(name=name, section="H 1"), reports, folder)
+            for name in ("done", "other", "failed", "never", "looked")]  # fmt: skip
+
+
+def page_of(studies: list[StudyStatus]) -> str:
+    made = [study_card(one, Glimpse()) for one in studies if one.state != "not run"]
+    return front_page(studies, load_front_flight(), study_cards=made)
+
+
+def test_counts_are_those_of_the_files(some: list[StudyStatus], tmp_path: Path) -> None:
+    """Counted once more from the files alone: a calculated number agrees within half of its last digit."""
+    agree = differ = others = 0
+    for path in (tmp_path / "published").glob("*.toml"):
+        entries = tomllib.loads(path.read_text())["number"]
+        recorded = tmp_path / "reports" / path.stem / "metrics.json"
+        status = recorded.with_name("status.json")
+        known = json.loads(status.read_text()) if status.is_file() else {}
+        if known.get("state") != "done" or known.get("first_look"):
+            others += len(entries)
+            continue
+        ours = {one["subject"]: one["value"] for one in json.loads(recorded.read_text())["metrics"]}
+        near = [abs(ours[one["subject"]] - one["value"]) <= 0.05 for one in entries]
+        agree, differ = agree + sum(near), differ + len(near) - sum(near)
+    counts = counted(some)
+    assert (
+        (counts.judged[AGREES], counts.judged[DIFFERS], counts.of)
+        == (agree, differ, agree + differ)
+        == (3, 2, 5)
+    )
+    assert sum(counts.others.values()) == others == 14 and counts.all == 19 and counts.undrawn == 1
+    text = BeautifulSoup(page_of(some), "html.parser").get_text(" ", strip=True)
+    assert re.search(r"\b3 agree 2 differ of 5 that were judged", text)
+    for words in (
+        "14 of the 19 numbers in print are not among them",
+        "7 seen in a first look only",
+        "5 of studies not run yet",
+        "2 of studies that failed",
+        "1 of those judged are signed or zero",
+        "5 studies of two theses; 2 done, 1 at a first look",
+    ):
+        assert words in text
+
+
+def test_what_was_not_run_is_in_no_denominator(tmp_path: Path) -> None:
+    folder = printed(tmp_path / "published", never=[1.0] * 5)
+    never = study_status(a_study(name="never"), tmp_path, folder)
+    assert counted([never]).of == 0
+    whole = page_of([never])
+    assert "5 numbers are in print; no study of them was run yet." in whole and " of 5" not in whole
+    assert "no study of them was run yet" in poster_page([never])
+
+
+def test_cards_say_the_word_that_reports_say(some: list[StudyStatus]) -> None:
+    cards = {one.study.name: study_card(one, Glimpse(sentence="A first sentence.")) for one in some}
+    expected = standing([n.verdict for n in some[0].numbers], [])
+    assert expected.word in cards["done"].verdict and expected.reason in unescape(cards["done"].verdict)
+    assert cards["done"].sentence == "A first sentence." and len(cards["done"].numbers) == 3
+    assert "failed" in cards["failed"].verdict and cards["failed"].sentence == "It <b>broke</b>."
+    assert "&lt;b&gt;broke" in card_html(cards["failed"])
+    assert "not counted yet" in cards["looked"].verdict and "5 of 200 flights" in cards["looked"].verdict
+
+
+def test_strips_of_all_cards_share_one_axis(some: list[StudyStatus]) -> None:
+    drawn = card_html(study_card(some[0], Glimpse()))
+    at = [float(x) for x in re.findall(r'class="(?:same|off)" transform="translate\(([\d.]+) ', drawn)]
+    # 2.02/2, 8/4 and 1.04/1 on a logarithmic axis from 1/8 to 8, 320 wide; 0.01 beside 0 has no ratio.
+    assert sorted(at) == pytest.approx(
+        [4.6 + (np.log2(r) + 3) / 6 * (320 - 9.2) for r in (1.01, 1.04, 2.0)], abs=0.06
+    )
+    assert 'viewBox="0 0 320 ' in drawn
+
+
+def test_the_caption_follows_from_the_arrays() -> None:
+    """Numbers of the picture's caption, computed once more from the file, by hand."""
+    content = json.loads(FILE.read_text())
+    (t, p), (te, xe, P), (tt, xt) = ([np.array(one) for one in content[name].values()] for name in
+                                     ("points", "ellipses", "truth"))  # fmt: skip
+    at = [np.stack([np.interp(when, tt, xt[:, k]) for k in (0, 1)], 1) for when in (t, te)]
+    off = np.median(np.linalg.norm(p - at[0], axis=1))
+    missed = at[1] - xe
+    held = np.mean(np.einsum("ni,nij,nj->n", missed, np.linalg.inv(P), missed) <= -2 * np.log(0.1))
+    words = flight_words(load_front_flight())
+    assert f"{off:.0f} m off in the middle case of {len(t)}" in words
+    assert f"here it does {min(100 * held, 99):.0f} %." in words.replace("\u00a0", " ")
+
+
+@pytest.mark.slow
+def test_the_flight_is_that_of_the_twin() -> None:
+    """The file is what the twin gives: a hundredth is rounding, a little more another machine."""
+    made, kept = simulated(), json.loads(FILE.read_text())
+    assert {key: made[key] for key in ("about", "twin")} == {key: kept[key] for key in ("about", "twin")}
+    for name in ("path", "footprints", "points", "ellipses", "truth"):
+        for key, values in made[name].items():
+            np.testing.assert_allclose(values, kept[name][key], atol=0.03)
+
+
+def overview(reports: Path, folder: str, flight: str, **report: str) -> None:
+    """A report on a flight, as ``wildlab evaluate`` leaves it."""
+    ran(reports, study=folder)
+    (reports / folder / "provenance.json").write_text(
+        json.dumps({"flight": {"name": flight, "kind": "logged"}, "parameters": {}})
+    )
+    noise = np.random.default_rng(len(folder)).integers(0, 255, (500, 800, 3), np.uint8)
+    picture = base64.b64encode(cv2.imencode(".png", noise)[1].tobytes()).decode()
+    (reports / folder / "report.html").write_text(
+        f'<h1>x</h1><section class="summary bad"><p><b>{report.get("sentence", "9 m off.")}</b></p></section>'
+        f'<img alt="{report.get("alt", "A map.")}" src="data:image/png;base64,{picture}">',
+        encoding="utf-8",
+    )
+
+
+def test_own_flights_alone(tmp_path: Path) -> None:
+    overview(tmp_path, "tuesday-overview", "tuesday")
+    path = build_ledger(tmp_path, {})
+    soup = BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
+    (card,) = soup.select("article.card")
+    assert card.select_one("h3 a")["href"] == "tuesday-overview/report.html" and "9 m off." in card.get_text()
+    assert card.img["src"].startswith("data:image/webp;base64,") and card.img["alt"] == "A map."
+    assert (
+        soup.select_one('.doors a[href="flights.html"]').get_text(" ") == "My flights 1 flight evaluated here"
+    )
+    assert "tuesday-overview" in (tmp_path / "partners.html").read_text(encoding="utf-8")
+
+
+def test_doors_lead_somewhere_before_anything_has_run(tmp_path: Path) -> None:
+    build_ledger(tmp_path, load_studies())
+    soup = BeautifulSoup((tmp_path / "index.html").read_text(encoding="utf-8"), "html.parser")
+    assert [one.b.get_text() for one in soup.select(".doors a")] == [
+        *("The theses", "My flights", "For partners", "Learn")
+    ]
+    assert dead_links(tmp_path) == []
+    text = soup.get_text(" ", strip=True)
+    for words in ("None was evaluated here yet", "wildlab evaluate", "None was run yet", "make tutorials"):
+        assert words in text
+    assert "wildlab share" in (tmp_path / "partners.html").read_text(encoding="utf-8")
+
+
+def dead_links(reports: Path) -> list[str]:
+    """Links of the pages that lead to no file, or to no place in it."""
+    dead = []
+    for name in PAGES:
+        soup = BeautifulSoup((reports / name).read_text(encoding="utf-8"), "html.parser")
+        for link in soup.find_all("a"):
+            file, _, place = link["href"].partition("#")
+            target = reports / unquote(file) if file else reports / name
+            if not target.is_file() or (
+                place and f'id="{unquote(place)}"' not in target.read_text(encoding="utf-8")
+            ):
+                dead.append(f"{name}: {link['href']}")
+    return dead
+
+
+def test_names_out_of_logs_are_only_text(tmp_path: Path) -> None:
+    for k, folder in enumerate(("javascript:alert(1)", "a?b#c", "100%", 'q"uote', "it's `rm`")):
+        overview(
+            tmp_path, folder, f"{HOSTILE}{k}", sentence=f"Off &lt;script&gt; {k}.", alt="&quot; onerror=x"
+        )
+    studies = {"s": a_study(title=HOSTILE, section=HOSTILE, dataset="d", recipe="r.toml")}
+    build_ledger(tmp_path, studies)
+    assert dead_links(tmp_path) == []
+    for name in PAGES:
+        whole = (tmp_path / name).read_text(encoding="utf-8")
+        assert "<script" not in whole and "onerror=x" not in re.sub(r'alt="[^"]*"', "", whole)
+        html.examine(whole, name)
+
+
+def test_two_hundred_flights_and_forty_studies_stay_below_two_megabytes(tmp_path: Path) -> None:
+    """Each with the worst of pictures: noise, which nothing compresses."""
+    overview(tmp_path, "f0-overview", "f0")
+    worst = (tmp_path / "f0-overview" / "report.html").read_text(encoding="utf-8")
+    for k in range(1, 40):
+        ran(tmp_path, study=f"f{k}-overview")
+        (tmp_path / f"f{k}-overview" / "report.html").write_text(worst + " " * k, encoding="utf-8")
+        (tmp_path / f"f{k}-overview" / "provenance.json").write_text(
+            json.dumps({"flight": {"name": f"f{k}", "kind": "logged"}, "parameters": {}})
+        )
+    studies = {}
+    for k in range(40):
+        ran(tmp_path, study=f"s{k}")
+        (tmp_path / f"s{k}" / "report.html").write_text(worst + " " * k, encoding="utf-8")
+        studies[f"s{k}"] = a_study(name=f"s{k}")
+    page = build_ledger(tmp_path, studies)
+    assert page.stat().st_size <= 2_000_000
+    soup = BeautifulSoup(page.read_text(encoding="utf-8"), "html.parser")
+    assert len(soup.select("article.card")) == 12 + 40 and "All 40 of them in a table" in soup.get_text()
+    assert len(str(soup.select_one("svg.flown")).encode()) <= 300_000
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Path:
+    """Pages with everything: studies in every state, an own flight."""
+    reports = tmp_path / "reports"
+    studies: dict[str, StudyEntry] = {}
+    for name in ("sensitivity", "consistency-bounds", "static-point", "slow-vessel"):
+        studies[name] = load_studies()[name]
+    entries = [
+        metrics.metric(one["name"], one["subject"], one["value"] * (1.0 + 0.6 * (k % 2)), one["unit"])
+        for k, one in enumerate(published_rows("sensitivity"))
+    ]
+    ran(reports, *entries, study="sensitivity", kind="computed")
+    ran(reports, study="static-point", state="failed")
+    overview(reports, "tuesday-overview", "tuesday")
+    build_ledger(reports, studies)
+    return reports
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_open_anywhere(whole: Path, name: str, faults: Callable[[Path], list[str]]) -> None:
+    assert faults(whole / name) == []
+    html.examine((whole / name).read_text(encoding="utf-8"), name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1200, 390])
+def test_pages_shut_nobody_out(whole: Path, browser: Any, name: str, scheme: str, width: int) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    size = {"width": width, "height": 900}
+    context = browser.new_context(viewport=size, color_scheme=scheme, offline=True)
+    tab = context.new_page()
+    tab.goto((whole / name).as_uri())
+    found = axe.run(tab).response["violations"]
+    context.close()
+    assert [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in found] == []
+
+
+def test_the_first_picture_is_within_two_screens_of_a_phone(whole: Path, browser: Any) -> None:
+    tab = browser.new_context(viewport={"width": 390, "height": 844}, offline=True).new_page()
+    tab.goto((whole / "index.html").as_uri())
+    assert tab.locator("svg.flown").bounding_box()["y"] < 844
+    assert tab.locator("article.card").first.bounding_box()["y"] < 3 * 844
+
+
+def test_the_sheet_is_one_page_of_paper(whole: Path, browser: Any) -> None:
+    tab = browser.new_page()
+    tab.goto((whole / "numbers.html").as_uri())
+    pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf(prefer_css_page_size=True)))
+    # No text leaves the sheet.
+    wide = tab.evaluate("""() => [...document.querySelectorAll('.sheet text')].filter(one => {
+        const box = one.getBBox(); return box.x < 0 || box.x + box.width > 190 || box.y + box.height > 276
+        }).map(one => one.textContent)""")
+    tab.close()
+    assert pages == 1 and wide == []
+
+
+def test_damaged_front_flight_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "front-flight.json"
+    for text in ("{", "[]", '{"path": 1}', json.dumps({"path": {}})):
+        path.write_text(text)
+        with pytest.raises(Exception, match=r"cannot be read.*[Mm]ake it again"):
+            load_front_flight(path)
