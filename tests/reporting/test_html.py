@@ -149,3 +149,17 @@ def test_reading_a_notebook_does_not_build_a_grammar() -> None:
     # jsonschema would import it, which takes seconds in every process of a run.
     program = "import sys, wildlab.runner.run, papermill\nassert 'lark' not in sys.modules"
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize("to", ["ledger.html", "a-b/report.html#x", "100%25/report.html"])
+def test_pages_of_the_folder_may_lead_to_one_another(to: str) -> None:
+    whole = page(title="a", body=f'<h1>a</h1><a href="{to}">x</a>')
+    html.examine(whole, "index", alone=False)
+    with pytest.raises(WildlabError, match="mailed alone"):
+        html.examine(whole, "study")
+
+
+@pytest.mark.parametrize("to", ["//host/x", "/etc/x", "http://host/x", "file:x", "a b", "javascript:x", ""])
+def test_and_nowhere_else(to: str) -> None:
+    with pytest.raises(WildlabError):
+        html.examine(page(title="a", body=f'<h1>a</h1><a href="{to}">x</a>'), "index", alone=False)

@@ -246,7 +246,7 @@ def test_ledger_of_every_state_opens_offline(tmp_path: Path, faults: Callable[[P
     assert "<script" not in whole and "It &lt;b&gt;broke" in whole and failed.is_dir()
     assert "25 % of 20 flights" in whole
     assert "published 7.90, here 21.900, ratio 2.77, lowest to highest 5.000 to 23.000" in whole
-    html.examine(whole, "ledger")
+    html.examine(whole, "ledger", alone=False)
     path = tmp_path / "index.html"
     path.write_text(whole, encoding="utf-8")
     assert faults(path) == []
@@ -334,7 +334,7 @@ def test_a_first_look_is_shown_and_counts_as_nothing(tmp_path: Path) -> None:
         assert words in whole
     for words in (">agrees</span></td>", ">holds</span>", "not run yet"):
         assert words not in whole
-    html.examine(whole, "ledger")
+    html.examine(whole, "ledger", alone=False)
     assert as_plain(one)["first_look"] == "5 of 200 flights"
     first_look(tmp_path, first_look={})
     whole = ledger_page([study_status(a_study(), tmp_path, folder)])

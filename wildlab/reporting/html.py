@@ -60,6 +60,8 @@ _CITED = re.compile(r"\b([HF])\s(?:\(?\d|(?:section|chapter|example|equation|tab
 #: How the address begins of a file within a link: a table or points, which no browser runs.
 HANDED_OVER = ("data:text/csv;base64,", "data:application/geo+json;base64,")
 _FETCHING = ("src", "srcset", "poster", "background", "data", "xlink:href", "action", "formaction", "ping")
+#: A link to a file in the same folder or below it: no scheme, no host.
+_BESIDE = re.compile(r"[\w.%~-]+(/[\w.%~-]+)*(#[\w.%~-]*)?")
 _CSS_REQUEST = re.compile(r"@import|url\s*\(\s*['\"]?(?!data:)", re.I)
 
 
@@ -215,8 +217,15 @@ def cited_theses(text: str) -> str:
     return f"<p>{'. '.join(named)}.</p>" if named else ""
 
 
-def examine(whole: str, name: str) -> None:
+def examine(whole: str, name: str, *, alone: bool = True) -> None:
     """Refuse a page that breaks a promise.
+
+    Parameters
+    ----------
+    whole, name
+        The page, and what it is called.
+    alone
+        Whether it may be mailed alone. The pages of the folder of reports lead to one another.
 
     Raises
     ------
@@ -240,7 +249,7 @@ def examine(whole: str, name: str) -> None:
             f"the report has a <{tag.name}>", "show text, tables and pictures only, through Report", file=file
         )
     for tag in soup.find_all(True):
-        _examine_attributes(tag, file)
+        _examine_attributes(tag, file, alone)
     for style in soup.find_all("style"):
         if _CSS_REQUEST.search(style.get_text()):
             raise WildlabError("a style asks the network for something", "take the url() out", file=file)
@@ -254,7 +263,7 @@ def examine(whole: str, name: str) -> None:
     _examine_headings([int(tag.name[1]) for tag in soup.find_all(re.compile("^h[1-6]$"))], file)
 
 
-def _examine_attributes(tag: Tag, file: str) -> None:
+def _examine_attributes(tag: Tag, file: str, alone: bool) -> None:
     for name, value in tag.attrs.items():
         text = " ".join(value) if isinstance(value, list) else str(value)
         if name.lower().startswith("on"):
@@ -264,13 +273,14 @@ def _examine_attributes(tag: Tag, file: str) -> None:
                 f"a <{tag.name}> asks for {text[:60]!r}", "put the picture into the page itself", file=file
             )
         if name.lower() == "href":
-            _examine_link(tag, text, file)
+            _examine_link(tag, text, file, alone)
         if name.lower() == "style" and _CSS_REQUEST.search(text):
             raise WildlabError("a style asks the network for something", "take the url() out", file=file)
 
 
-def _examine_link(tag: Tag, to: str, file: str) -> None:
-    """A page is mailed alone: a link leads to a place in it, hands over a file within, or to the web."""
+def _examine_link(tag: Tag, to: str, file: str, alone: bool) -> None:
+    """A page is mailed alone: a link leads to a place in it, hands over a file within, or to the web. One
+    that is not may lead to what lies beside it or below."""
     if re.match(r"\s*(javascript|vbscript):", to, re.I):
         raise WildlabError(f"a link runs {to[:60]!r}", "link to a page", file=file)
     if re.match(r"\s*data:", to, re.I):
@@ -283,7 +293,7 @@ def _examine_link(tag: Tag, to: str, file: str) -> None:
         root = tag.find_parent("html") or tag
         if len(to) < 2 or root.find(id=to[1:]) is None:
             raise WildlabError(f"a link leads to {to!r}, which is not on the page", "mend it", file=file)
-    elif not to.startswith("https://"):
+    elif not to.startswith("https://") and (alone or not _BESIDE.fullmatch(to)):
         raise WildlabError(
             f"a link leads to {to[:60]!r}, which is missing where the page is mailed alone",
             "say it in words",

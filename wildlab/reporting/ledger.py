@@ -218,7 +218,7 @@ def _section(one: StudyStatus) -> str:
         f'<p class="sub">{tag}<code>{escape(study.name)}</code>{answers}</p>',
         _state(one),
         numbers_table(one),
-        claims_table(one.claims, flights_of(one)),
+        claims_table(one.claims, flights_of(one), study.name),
     ]
     if one.has_report:
         words = "Open the report" if one.ran else "See what went wrong"

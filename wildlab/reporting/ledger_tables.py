@@ -194,10 +194,11 @@ def strip(n: Number) -> str:
     )
 
 
-def claims_table(claims: list[Claim], flights: str = "flights") -> str:
-    """Claims, the verdict on each, and on how many flights it is true; nothing where there are none."""
+def claims_table(claims: list[Claim], flights: str = "flights", study: str = "") -> str:
+    """Claims of a study, the verdict on each, and on how many flights it is true; nothing where there are none."""
     if not claims:
         return ""
+    label = escape(f"Claims of {study}" if study else "Claims")
     rows = []
     for one in claims:
         source = f' <span class="dim source">{escape(one.source)}</span>' if one.source else ""
@@ -208,7 +209,7 @@ def claims_table(claims: list[Claim], flights: str = "flights") -> str:
             f'<td class="text">{_pill(one.verdict)}</td><td>{_tested_on(one, flights)}</td></tr>'
         )
     return (
-        '<div class="scroll" role="region" tabindex="0" aria-label="Claims"><table><thead><tr>'
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{label}"><table><thead><tr>'
         '<th scope="col" class="text">claim</th><th scope="col" class="text">verdict</th>'
         f'<th scope="col">true on</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
     )
