@@ -68,7 +68,7 @@ def test_other_detectors_stand_beside_ours_with_their_curves():
 
 def test_without_labels_nothing_is_called_right():
     _, words = shown(run())
-    assert "10 detections; without labels, none is judged." in words
+    assert "10 detections ; without labels, none is judged." in words  # the word is linked
     assert "--labels FILE" in words
     assert "Rates" not in words and "recall" not in words
 

@@ -98,13 +98,6 @@ def test_the_summary_turns_with_the_rates() -> None:
     assert other[1].endswith("in the print it is azimuth and elevation before pixels by 19.0.")
 
 
-def test_the_mark_turns_with_the_tolerance() -> None:
-    rates = LIKE_PRINT[DEFAULT].rate
-    assert words.level_of(rates, PUBLISHED, WITHIN) == "good"
-    assert words.level_of(rates, PUBLISHED | {"angles": 97.6}, WITHIN) == "warn"
-    assert words.level_of(OPPOSED[DEFAULT].rate, PUBLISHED, WITHIN) == "warn"
-
-
 def test_tiles_say_what_is_gained_and_how_far_the_print_is() -> None:
     like, opposed = (words.tiles(one[DEFAULT].rate, PUBLISHED) for one in (LIKE_PRINT, OPPOSED))
     assert [value for value, _ in like] == ["96.6 %", "96.8 %", "96.0 %", "97.5 %"]

@@ -16,16 +16,18 @@ def found(yaw_sd: float = 2.4, **more: float) -> dict[str, float]:
 
 
 def test_the_axes_are_taken_together_and_the_point_moves_by_roll_and_pitch() -> None:
-    (first, second, _), level = text.summary(found(), "in the air", True)
+    (first, second, _), level, verdict = text.summary(found(), "in the air", True)
     assert "1.30 degrees from the truth" in first and "it would be 2.60" in first and "median" not in first
     assert f"by {300 * np.radians(0.5):.1f} metres" in second and level == "neutral"
+    assert verdict == ("within what it states", "From the truth it differs by 0.5 times what it states.")
 
 
 @pytest.mark.parametrize("times", [0.2, 5.0])
 def test_surer_than_the_difference_allows_only_where_it_is(times: float) -> None:
     sure = {name: value * (1 / times if name.startswith("rms") else 1) for name, value in found().items()}
-    (first, _, last), level = text.summary(sure, "in the air", False)
+    (first, _, last), level, verdict = text.summary(sure, "in the air", False)
     assert ("surer of itself" in last) == (times < 1) == (level == "warn")
+    assert verdict is not None and (verdict[0] == "too sure of itself") == (times < 1)
     assert "found on board" in first and "truth" in last
 
 
@@ -35,7 +37,8 @@ def test_the_middle_flight_speaks_for_all_of_them() -> None:
     spread["observer", "rms_yaw"] = 50.0
     middle = text.middle_flight(spread)
     assert middle["rms_yaw"] == 1.2 and len(middle) == 6
-    (first, *_), _ = text.summary(middle, "in the air", True, 3)
+    (first, *_), level, verdict = text.summary(middle, "in the air", True, 3)
+    assert level == "neutral" and verdict is None
     assert "1.30 degrees" in first and ", median of 3 flights;" in first
     assert text.tiles(middle, True, 3)[2] == (
         "1.20°",

@@ -13,6 +13,7 @@ from wildlab.detection.detections import PART
 from wildlab.pipeline.detecting.judged import ellipse_sentence, rate_words
 from wildlab.reporting.detectors_compared import compared_section
 from wildlab.reporting.figures import BLUE, new_figure, png_bytes
+from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
 from wildlab.reporting.page import page
 from wildlab.reporting.text import NOTHING, escape, inline
@@ -127,7 +128,7 @@ def detections_page(
         f'<div class="scroll"><table><thead><tr><th scope="col" class="text">threshold</th>'
         f'<th scope="col" class="text">value</th></tr></thead><tbody>{rows}</tbody></table></div></details>'
     )
-    whole = page(title=title, body="\n".join(parts), kicker="wildlab › detections")
+    whole = page(title=title, body=with_glossary("\n".join(parts)), kicker="wildlab › detections")
     examine(whole, name)
     return whole
 
@@ -213,10 +214,15 @@ def _summary(result: Mapping[str, Any]) -> str:
             )
     if lost:
         then.append(f"{_plural(lost, 'image')} of {of['all']} could not be used, for the reasons below.")
-    level = "warn" if lost else "neutral"
+    level, pill = ("warn", "part") if lost else ("neutral", "")
+    word = "images lost" if lost else "judged" if judged else "not judged"
+    reason = "By the labels of the images." if judged else "There are no labels to judge the detections by."
+    if lost:
+        reason = f"{lost} of {of['all']} images could not be used."
     return (
         f'<section class="summary {level}" aria-label="Summary"><p><b>{escape(first[0].upper() + first[1:])}'
-        f"</b> {escape(' '.join(then))}</p></section>"
+        f'</b> {escape(" ".join(then))}</p><p class="verdict"><span class="pill {pill}">{word}</span> '
+        f"{reason}</p></section>"
     )
 
 

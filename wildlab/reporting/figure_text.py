@@ -138,6 +138,12 @@ def fit_titles(figure: Figure) -> None:
             longest = max(map(len, text.get_text().split("\n")))
             if longest * _NARROW * text.get_fontsize() > wide / _columns(axes) - _BESIDE:
                 long.append((axes, text))
+        label, high = axes.yaxis.label, 72 * figure.get_size_inches()[1]
+        if max(map(len, label.get_text().split("\n"))) * _NARROW * label.get_fontsize() > high - _BESIDE:
+            long.append((axes, label))
+    over_all = [figure._suptitle, figure._supxlabel]  # type: ignore[attr-defined]
+    for text in filter(None, over_all):
+        _break(text, figure.bbox.width - 2 * _EDGE)
     if not long:
         return
     for _, text in long:
@@ -146,6 +152,10 @@ def fit_titles(figure: Figure) -> None:
     for axes, text in long:
         text.set_visible(True)
         panel, edge = axes.get_window_extent(), figure.bbox.x1 - 4
+        if text is axes.yaxis.label:
+            middle = (panel.y0 + panel.y1) / 2
+            _break(text, 2 * min(middle, figure.bbox.y1 - 4 - middle), upwards=True)
+            continue
         if text.get_horizontalalignment() == "left":
             room = (panel.x1 if _columns(axes) > 1 else edge) - panel.x0
             if _columns(axes) == 1 and room < _NARROWEST * figure.bbox.width:
@@ -158,11 +168,12 @@ def fit_titles(figure: Figure) -> None:
         _break(text, room)
 
 
-def _break(text: Text, room: float) -> None:
-    """Set a text on as many lines as it needs to be no wider than ``room``, pixels."""
+def _break(text: Text, room: float, *, upwards: bool = False) -> None:
+    """Set a text on as many lines as it needs to be no longer than ``room``, pixels, along its lines."""
     words = text.get_text()
     letters = max(map(len, words.split("\n")))
-    while text.get_window_extent().width > room and letters > _FEWEST:
+    side = "height" if upwards else "width"
+    while getattr(text.get_window_extent(), side) > room and letters > _FEWEST:
         letters -= 1
         text.set_text("\n".join(textwrap.wrap(words, letters, break_long_words=False)))
 

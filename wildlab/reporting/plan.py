@@ -22,6 +22,7 @@ from wildlab.pipeline.plans.plan import Plan
 from wildlab.pipeline.plans.said import count, head_count, hectares, minutes, percent
 from wildlab.reporting.figures import BLUE, GREEN, INK, ORANGE, PURPLE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.figures import png_bytes as png
+from wildlab.reporting.glossary import with_glossary
 from wildlab.reporting.html import examine
 from wildlab.reporting.page import page
 from wildlab.reporting.text import NOTHING, escape
@@ -82,18 +83,20 @@ def plan_page(
     if plan.terrain is not None:
         parts += ["<h2>Heights</h2>", _figure(*_heights(plan, plan.terrain))]
     parts += ["<h2>What this rests on</h2>", _points(result["assumed"])]
-    whole = page(title=title, body="\n".join(parts), kicker="wildlab › plan")
+    whole = page(title=title, body=with_glossary("\n".join(parts)), kicker="wildlab › plan")
     examine(whole, "plan")
     return whole
 
 
 def _summary(result: Mapping[str, Any]) -> str:
     first, *then = result["sentences"]
-    level = "warn" if result["warnings"] else "neutral"
-    against = "".join(f"<p>{escape(one)}</p>" for one in result["warnings"])
+    against = result["warnings"]
+    level, pill, word = ("warn", "part", "look closer") if against else ("neutral", "", "no objection")
+    reason = " ".join(against) or "No check of the plan objects to it."
     return (
         f'<section class="summary {level}" aria-label="Summary"><p><b>{escape(first)}</b> '
-        f"{escape(' '.join(then))}</p>{against}</section>"
+        f'{escape(" ".join(then))}</p><p class="verdict"><span class="pill {pill}">{word}</span> '
+        f"{escape(reason)}</p></section>"
     )
 
 
