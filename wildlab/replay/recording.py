@@ -196,7 +196,7 @@ class _Writer:
                     mat3x3=_turned(views.R_nc[posed]),
                 ),
             )
-            placed = np.isfinite(views.outlines).all(axis=(1, 2))
+            placed = np.atleast_1d(np.isfinite(views.outlines).all(axis=(1, 2)))
             strips = [
                 ned_to_enu(np.vstack([one, one[:1]])) if ok else np.empty((0, 3))
                 for one, ok in zip(views.outlines, placed, strict=True)

@@ -160,7 +160,8 @@ class Scene:
         parts += [self.path.places] if self.path is not None else []
         parts += [self.views.outlines.reshape(-1, 3)] if self.views is not None else []
         parts += [self.points.places] if self.points is not None else []
-        parts += [one.places for one in (*self.tracks, *self.truth)]
+        parts += [one.places for one in self.tracks]
+        parts += [one.places for one in self.truth]
         known = np.concatenate(parts)
         known = known[np.isfinite(known).all(axis=1)]
         if not len(known):

@@ -58,8 +58,8 @@ def operator_view(scene: Scene, t: float, title: str) -> Figure:
         ellipse(ax, one.places[k, 1::-1], one.covariance[k][::-1, ::-1], color=VERMILLION, lw=1.0, alpha=0.9)
         ax.plot(*one.places[k, 1::-1], "x", ms=4, color=VERMILLION, label=None if shown else "tracks, 90 %")
         shown = True
-    for i, one in enumerate(scene.truth):
-        place = _at(one.times, one.places, t, still=one.still)
+    for i, target in enumerate(scene.truth):
+        place = _at(target.times, target.places, t, still=target.still)
         ax.plot(*place[1::-1], "+", ms=6, color=colour("truth"), label=None if i else "truth")
     ax.set_xlim(here[1] - AROUND, here[1] + AROUND)
     ax.set_ylim(here[0] - AROUND, here[0] + AROUND)

@@ -60,9 +60,9 @@ def follow_all(flight: Flight, points: Points, begin: float, end: float) -> tupl
         R = np.concatenate([points.covariance[rows], np.tile(np.eye(2), (len(ticks), 1, 1))])
         order = np.argsort(times, kind="stable")
         times, z, R = times[order], z[order], R[order]
-        track = run_filter(
-            times, z, R, positions(), random_walk, Start(float(times[0]), z[0].copy(), R[0].copy())
-        )
+        start = Start(float(times[0]), z[0].copy(), R[0].copy())
+        z[0] = np.nan  # it is where the track starts, and counts once
+        track = run_filter(times, z, R, positions(), random_walk, start)
         down = np.interp(times, points.times[rows], points.places[rows, 2])
         error = np.full((len(times), 2), np.nan)
         if name in truth:

@@ -58,10 +58,11 @@ class Moments(NamedTuple):
     def of(self, kind: str) -> NDArray[np.bool_]:
         """(N,) which frames are like the screenshot: one of `ONE`, `SINGLE`, `NONE`."""
         if kind == ONE:
-            return (self.in_view == 1) & (self.detected == 1) & self.right & (self.running >= SEVERAL)
+            alone = (self.in_view == 1) & (self.detected == 1)
+            return np.asarray(alone & self.right & (self.running >= SEVERAL))
         if kind == SINGLE:
-            return self.detected == 1
-        return (self.in_view == 0) & (self.detected == 0) & (self.running >= SEVERAL)
+            return np.asarray(self.detected == 1)
+        return np.asarray((self.in_view == 0) & (self.detected == 0) & (self.running >= SEVERAL))
 
 
 def moments_of(flight: Flight) -> Moments:
