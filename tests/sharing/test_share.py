@@ -19,6 +19,7 @@ from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.flight.manifest import manifest_toml
 from wildlab.flight.store import load_flight, save_flight
+from wildlab.reporting.metrics import document, metric
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
@@ -38,8 +39,9 @@ def write_report(folder: Path, flight: Path, body: str, parameters: dict[str, An
     given = parameters or {"source": "Kestrel-log"}
     write_json(folder / "provenance.json", {"flight": provenance_of_flight(flight), "parameters": given})
     write_json(folder / "status.json", {"state": "done"})
-    metrics = [{"name": "error", "subject": "logged-pose", "value": 3.25}]
-    write_json(folder / "metrics.json", {"metrics": metrics, "claims": []})
+    numbers = [metric(name="error", subject="logged-pose", value=3.25, unit="m")]
+    content = document(study="x", flight="x", kind="logged", seed=1, seeds=None, metrics=numbers, claims=[])
+    write_json(folder / "metrics.json", content)
 
 
 def everything(flight: Path) -> str:
@@ -98,7 +100,7 @@ def test_the_sender_is_told_in_a_file_that_others_cannot_read(made: Path) -> Non
     assert stat.S_IMODE(copy.told.stat().st_mode) == 0o600
     assert "\n".join(copy.lines) in told
     assert sorted(path.name for path in made.iterdir()) == [
-        "flight-public.for-the-sender.txt", "flight-public.html", "flights", "reports",
+        "flight-public.html", "flight-public.html.for-the-sender.txt", "flights", "reports",
     ]  # fmt: skip
 
 

@@ -78,6 +78,9 @@ def read_part(report: Path, number: int, *, hashes: bool) -> Part:
     title = soup.h1.get_text(" ", strip=True)
     for unwanted in body.find_all([*_NEVER, "style"]):
         unwanted.decompose()
+    # The way back to the ledger is none here, and the whole page gets its copies for paper once more.
+    for unwanted in body.select("p.kicker, section.paper"):
+        unwanted.decompose()
     for comment in body.find_all(string=lambda text: isinstance(text, Comment)):
         comment.extract()
     footer = body.find("footer")

@@ -119,7 +119,7 @@ def share(
     flights = [source for source in sources if source.logged]
     calls = _calls(sources, exact)
     target = _target(calls[0] if len(sources) == 1 else "reports", tier, out, zipped)
-    told = target.with_name(f"{target.stem}.for-the-sender.txt")
+    told = target.with_name(f"{target.name}.for-the-sender.txt")
     refuse_existing(target, overwrite)
     refuse_existing(told, overwrite)
     around = [source.folders[0].resolve().parent.parent / "flights" for source in flights]
@@ -141,7 +141,11 @@ def share(
         files = {name: page.encode("utf-8") for name, page in _pages(documents, target, zipped).items()}
         for name, content in files.items():
             (pages / name).write_bytes(content)
-        _refuse_leaks(pages, target.name, secrets)
+        # Of a zip the name alone; what is inside is looked through before it may be encrypted.
+        called = work / "called" / target.name
+        called.parent.mkdir()
+        called.touch()
+        _refuse_leaks([*sorted(pages.iterdir()), called], target.name, secrets)
         made = work / "made"
         if zipped:
             write_zip(made, files, password)
@@ -249,7 +253,7 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     return _Document(name, chapter, machine_secrets(), (heading, (removed,)))
 
 
-def _refuse_leaks(pages: Path, name: str, secrets: Secrets) -> None:
+def _refuse_leaks(files: Sequence[Path], name: str, secrets: Secrets) -> None:
     """Look through all that is to be sent, and refuse it where something must not be in it.
 
     Raises
@@ -257,7 +261,7 @@ def _refuse_leaks(pages: Path, name: str, secrets: Secrets) -> None:
     RunFailed
         Naming what was found, how it is written, and where.
     """
-    found = scan(sorted(pages.iterdir()), secrets)
+    found = list(dict.fromkeys(scan(files, secrets)))
     if not found:
         return
     several = "; ".join(f"{one} ({one.found!r})" if one.found else str(one) for one in found[:_MOST])
