@@ -27,7 +27,7 @@ INTO = ROOT / "reports" / "reference"
 ROOMS = (
     *("api", "geometry", "flight", "navigation", "tracking", "simulation", "detection"),
     *("planning", "evaluation", "pipeline"),
-    *("reporting", "replay", "sharing.edition"),
+    *("reporting", "replay", "sharing"),
 )
 
 

@@ -6,6 +6,7 @@ Reports are made by a stand-in that shows all that a flight has; one slow test r
 from __future__ import annotations
 
 import json
+import re
 import stat
 import zipfile
 from pathlib import Path
@@ -270,3 +271,62 @@ def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(ma
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RunFailed, match="there is no copy"):
         share(made / "reports" / "kifaru-ridge", "team")
+
+
+def test_one_sheet_stands_alone_or_beside_the_reports(made: Path) -> None:
+    report = made / "reports" / "kifaru-ridge"
+    text = share(report, "partner", edition="en").file.read_text(encoding="utf-8")
+    assert text.count("<h1>") == 1 and "<h1>Report</h1>" not in text
+    assert all(secret not in text for secret in SECRETS)
+    copy = share(report, "partner", edition="sv", zipped=True)
+    with zipfile.ZipFile(copy.file) as zipped:
+        assert zipped.namelist() == ["flight.html", "flight-one-sheet.html"]
+        assert b'<html lang="sv">' in zipped.read("flight-one-sheet.html")
+
+
+def test_a_sheet_of_what_has_none_is_refused(made: Path) -> None:
+    with pytest.raises(WildlabError, match="the sheet is of one flight"):
+        share(made / "reports" / "kifaru-ridge", "team", edition="en")
+    with pytest.raises(WildlabError, match="there is no language 'xx'"):
+        share(made / "reports" / "kifaru-ridge", edition="xx")
+
+
+def test_a_flight_is_named_for_one_flights_report_alone(made: Path) -> None:
+    folder = made / "reports" / "static-point"
+    folder.mkdir()
+    (folder / "report.html").write_text(page(title="x", body="<h1>Study</h1>"), encoding="utf-8")
+    write_json(folder / "provenance.json", {"flight": None, "parameters": {}})
+    write_json(folder / "status.json", {"state": "done"})
+    with pytest.raises(WildlabError, match="Leave --flight out"):
+        share(folder, flight=made / "flights" / "mine")
+
+
+def test_names_that_are_neutral_already_are_no_leak(
+    tmp_path: Path, made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight = canary(locations={"category": 1})
+    for table in (flight.table("truth"), flight.table("detections")):
+        table["target_id"] = table["target_id"].map(
+            {"Sarah": "target-2", "Thandi": "target-3", "7": "target-1"}
+        )
+    save_flight(flight, made / "flights" / "mine", overwrite=True)
+    write_report(made / "more" / "kifaru-ridge", made / "flights" / "mine", "")
+    text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
+    assert "target-3" in text
+
+
+@pytest.mark.slow
+def test_the_true_reports_of_a_canary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through the notebooks, twice: the numbers of the sender's own report, no secret, the same bytes."""
+    monkeypatch.chdir(tmp_path)
+    flight = canary(locations={"category": 3}, imu=False)
+    save_flight(flight, tmp_path / "flights" / "mine")
+    redrawn.evaluate_flight(tmp_path / "flights" / "mine", reports=tmp_path / "reports")
+    one = share(tmp_path / "reports" / "kifaru-ridge", out=tmp_path / "a.html")
+    other = share(tmp_path / "reports" / "kifaru-ridge", out=tmp_path / "b.html")
+    text = one.file.read_text(encoding="utf-8")
+    assert one.file.read_bytes() == other.file.read_bytes()
+    for secret in SECRETS:
+        assert secret not in text, secret
+    assert "coordinates rounded to 0.01 degrees" in text
+    assert re.search(r"All \d{2,} numbers are those of the report", text)

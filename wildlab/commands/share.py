@@ -28,6 +28,7 @@ VARIABLE = "WILDLAB_SHARE_PASSWORD"
 @click.option("--out", type=FILE, help="The file to make.  [default: flight-public.html, here]")
 @click.option("--zip", "zipped", is_flag=True, help="A zip with a page for each flight and study.")
 @click.option("--encrypt", is_flag=True, help=f"A zip with a password: asked for, or in {VARIABLE}.")
+@click.option("--edition", help="On one sheet in plain words: en, nb, sv, or a file of texts.")
 @click.option("--overwrite", is_flag=True, help="Replace the copy that is there.")
 def share(
     report: Path,
@@ -36,6 +37,7 @@ def share(
     out: Path | None,
     zipped: bool,
     encrypt: bool,
+    edition: str | None,
     overwrite: bool,
 ) -> None:
     """Make one file of REPORT that can be mailed: a report, or a folder of reports.
@@ -51,6 +53,7 @@ def share(
     \b
     Examples:
       wildlab share reports/tuesday
+      wildlab share reports/tuesday --for partner --edition en
       wildlab share reports/tuesday --for partner --encrypt
       wildlab share reports --for team --zip
     """
@@ -68,6 +71,7 @@ def share(
         out=out,
         zipped=zipped,
         password=password,
+        edition=edition,
         overwrite=overwrite,
         console=terminal_console(),
     )

@@ -13,8 +13,9 @@ from wildlab.flight.checksums import CALIBRATION
 from wildlab.flight.learnt import Learnt, parse_learnt, read_learnt, write_learnt
 from wildlab.flight.store import Flight, save_flight
 from wildlab.paths import NOTEBOOKS
+from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.own_flights import ABOUT
+from wildlab.runner.record.own_flights import ABOUT, own_flights
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
 from wildlab.sharing.reports import Source
@@ -33,6 +34,8 @@ class Redrawn(NamedTuple):
         The flight, and what was taken out of it.
     folders
         Of the reports, by the end of their name (`ABOUT`), in order.
+    own
+        The flight with its reports, as the edition takes it.
     agreement
         With the sender's own reports.
     notes
@@ -41,6 +44,7 @@ class Redrawn(NamedTuple):
 
     made: Generalised
     folders: dict[str, Path]
+    own: OwnFlight
     agreement: Agreement
     notes: tuple[str, ...]
 
@@ -115,7 +119,10 @@ def redraw(
     pairs = {
         mine[f"{source.name}{end}"]: there for end, there in folders.items() if f"{source.name}{end}" in mine
     }
-    return Redrawn(made, folders, compare(pairs, made.names), tuple(told["notes"]))
+    lost = [one for one in mine if mine[one] not in pairs]
+    notes = told["notes"] + [f"There is no counterpart of your report {one} in the copy." for one in lost]
+    (own,) = own_flights(reports, ())
+    return Redrawn(made, folders, own, compare(pairs, made.names), tuple(notes))
 
 
 def _told(source: Source, made: Generalised) -> dict[str, Any]:

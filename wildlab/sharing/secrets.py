@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import re
 import socket
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -142,8 +143,9 @@ def _words(m: Manifest, made: Generalised) -> Iterator[str]:
     yield m.camera.name if m.camera is not None else ""
     yield from (m.terrain.source, m.terrain.crs) if m.terrain is not None else ()
     yield from (one.file for one in m.sources)
-    for known in made.names.by_kind.values():
-        yield from _some(known)
+    for kind, known in made.names.by_kind.items():
+        # A true name like target-7 is what a neutral one looks like, and says as little.
+        yield from (name for name in _some(known) if not re.fullmatch(rf"{kind}[-_ ]?\d*", name))
 
 
 def _some(names: Iterable[str]) -> list[str]:

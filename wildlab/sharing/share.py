@@ -18,6 +18,11 @@ from wildlab.runner.catalogue import load_studies
 from wildlab.sharing.agreement import agreement_words
 from wildlab.sharing.cells import generalisation_words, place_words
 from wildlab.sharing.document import Chapter, joined, read_part
+from wildlab.sharing.edition.edition import Place, edition_html
+from wildlab.sharing.edition.facts import facts_of
+from wildlab.sharing.edition.flight_map import map_of
+from wildlab.sharing.edition.language import Language, load_language
+from wildlab.sharing.edition.said import Day
 from wildlab.sharing.package import aside, check_password, put, refuse_existing, write_zip
 from wildlab.sharing.redrawn import Redrawn, redraw
 from wildlab.sharing.reports import Source, flight_folder, sources_of
@@ -59,6 +64,7 @@ class _Document(NamedTuple):
     chapter: Chapter
     secrets: Secrets
     told: tuple[str, tuple[str, ...]]
+    edition: str = ""
 
 
 def share(
@@ -69,6 +75,7 @@ def share(
     out: Path | None = None,
     zipped: bool = False,
     password: str | None = None,
+    edition: str | Path | None = None,
     overwrite: bool = False,
     notebooks: Path = NOTEBOOKS,
     console: Console | None = None,
@@ -89,6 +96,9 @@ def share(
         A zip with a page for each flight and study in place of one page.
     password
         Encrypts; the copy is then a zip.
+    edition
+        A language, or a file of texts: the flight on one sheet in plain words. In a zip it stands beside the
+        reports, otherwise it is the copy.
     overwrite
         Whether a file that is there may be replaced.
     notebooks, console
@@ -116,6 +126,7 @@ def share(
             "a flight is named, and this is not one flight's report", "leave --flight out", field="--flight"
         )
     exact = load_tiers().tier[tier].exact
+    words = _language(edition, sources, exact)
     flights = [source for source in sources if source.logged]
     calls = _calls(sources, exact)
     target = _target(calls[0] if len(sources) == 1 else "reports", tier, out, zipped)
@@ -131,7 +142,7 @@ def share(
     for source, name, folder in zip(sources, calls, folders, strict=True):
         first = 1 + sum(len(document.chapter.parts) for document in documents)
         if folder is not None:
-            documents.append(_generalised(folder, source, tier, name, first, notebooks, console))
+            documents.append(_generalised(folder, source, tier, name, first, words, notebooks, console))
         else:
             documents.append(_copied(source, tier, name, first))
     secrets = all_of([document.secrets for document in documents])
@@ -188,7 +199,10 @@ def _target(name: str, tier: Tier, out: Path | None, zipped: bool) -> Path:
 def _pages(documents: Sequence[_Document], target: Path, zipped: bool) -> dict[str, str]:
     """The pages by name: one of all, or one of each."""
     if zipped:
-        return {f"{one.name}.html": joined([one.chapter], one.chapter.heading) for one in documents}
+        reports = {f"{one.name}.html": joined([one.chapter], one.chapter.heading) for one in documents}
+        return reports | {f"{one.name}-one-sheet.html": one.edition for one in documents if one.edition}
+    if documents[0].edition:
+        return {target.name: documents[0].edition}
     flights = sum(one.secrets.places.size > 0 for one in documents)
     counts = [(flights, "flight"), (len(documents) - flights, "study")]
     said = " and ".join(f"{n} {what if n == 1 else _PLURAL[what]}" for n, what in counts if n)
@@ -199,7 +213,14 @@ _PLURAL = {"flight": "flights", "study": "studies"}
 
 
 def _generalised(
-    folder: Path, source: Source, tier: Tier, name: str, first: int, notebooks: Path, console: Console | None
+    folder: Path,
+    source: Source,
+    tier: Tier,
+    name: str,
+    first: int,
+    words: Language | None,
+    notebooks: Path,
+    console: Console | None,
 ) -> _Document:
     """A flight's reports, drawn again."""
     flight = load_flight(folder)
@@ -223,7 +244,36 @@ def _generalised(
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
     chapter = Chapter(heading, tuple(one.strip() for one in about if one), "", tuple(parts))
     secrets = flight_secrets(flight, made, treatment, source, folder)
-    return _Document(name, chapter, secrets, (f"Flight {source.name}", tuple(_told(drawn, treatment))))
+    told = f"Flight {source.name}", tuple(_told(drawn, treatment))
+    return _Document(
+        name, chapter, secrets, told, "" if words is None else _sheet(drawn, name, treatment, words)
+    )
+
+
+def _sheet(drawn: Redrawn, name: str, treatment: Treatment, words: Language) -> str:
+    """The flight on one sheet, from its generalised copy alone."""
+    made = drawn.made
+    place = Place("withheld")
+    if made.cell is not None:
+        place = Place("generalised", made.cell.uncertainty_m)
+    epoch = made.flight.manifest.time.epoch
+    day = None if epoch is None else Day(epoch.date(), treatment.date == "day")
+    return edition_html(
+        facts_of(drawn.own), name=name, place=place, day=day, picture=map_of(made.flight), language=words
+    )
+
+
+def _language(edition: str | Path | None, sources: Sequence[Source], exact: bool) -> Language | None:
+    """The texts of the sheet, where one is asked for."""
+    if edition is None:
+        return None
+    if exact or len(sources) != 1 or not sources[0].logged:
+        raise WildlabError(
+            "the sheet is of one flight, and for partners or the public",
+            "name one report on a flight, with --for partner or --for public",
+            field="--edition",
+        )
+    return load_language(edition)
 
 
 def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:

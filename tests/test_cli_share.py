@@ -1,0 +1,68 @@
+"""The command `wildlab share`: its words, its password, its exit codes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from wildlab.cli import main, wildlab
+from wildlab.commands.share import VARIABLE
+from wildlab.sharing import share as sharing
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """What the command asks for; nothing is made."""
+    calls: list[dict[str, Any]] = []
+
+    def made(report: Path, tier: str, **given: Any) -> sharing.Shared:
+        calls.append({"report": report, "tier": tier, **given})
+        return sharing.Shared(Path("flight-public.html"), Path("told.txt"), ("origin: '1, 2' -> withheld",))
+
+    monkeypatch.setattr(sharing, "share", made)
+    return calls
+
+
+def test_the_most_careful_is_the_default(asked: list[dict[str, Any]]) -> None:
+    result = CliRunner().invoke(wildlab, ["share", "reports/mine"])
+    assert result.exit_code == 0, result.output
+    assert (asked[0]["tier"], asked[0]["password"], asked[0]["overwrite"]) == ("public", None, False)
+
+
+def test_what_was_removed_is_for_the_terminal_and_the_file_for_the_next_command(
+    asked: list[dict[str, Any]],
+) -> None:
+    result = CliRunner().invoke(wildlab, ["share", "reports/mine"])
+    assert result.stdout == "flight-public.html\n"
+    assert "origin: '1, 2' -> withheld" in result.stderr and "told.txt" in result.stderr
+
+
+def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked: list[dict[str, Any]]) -> None:
+    words = "four words that differ"
+    CliRunner().invoke(wildlab, ["share", "reports/mine", "--encrypt"], env={VARIABLE: words})
+    typed = CliRunner().invoke(
+        wildlab, ["share", "reports/mine", "--encrypt"], input=f"{words}\n{words}\n", env={VARIABLE: ""}
+    )
+    assert [call["password"] for call in asked] == [words, words]
+    assert words not in typed.output
+
+
+def test_no_option_takes_a_password(asked: list[dict[str, Any]]) -> None:
+    """Others on the machine can read what is typed after a command."""
+    result = CliRunner().invoke(wildlab, ["share", "reports/mine", "--password", "x"])
+    assert result.exit_code == 2 and not asked
+
+
+def test_help_has_an_example() -> None:
+    text = CliRunner().invoke(wildlab, ["share", "--help"]).output
+    assert "wildlab share reports/tuesday" in text and "[default: public]" in text
+
+
+def test_a_report_that_is_not_there_is_wrong_use(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["share", str(tmp_path / "none")])
+    assert ended.value.code == 2
+    assert "there is no such report" in capsys.readouterr().err
