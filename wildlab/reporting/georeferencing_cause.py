@@ -136,6 +136,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
                 "is within one standard error of taking nothing off."
             )
         causes = {_SHORT.get(one, one) for model in diagnosis.models for one in model.causes}
+        if not causes:
+            return "No constant error could be tried: these images do not tell one from another."
         tried = listed(sorted(causes), "or")
         return (
             f"No constant error explains it: taking one off ({tried}) gains nothing for certain on images "
