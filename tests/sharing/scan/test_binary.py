@@ -116,7 +116,7 @@ PLANTED: dict[str, Callable[[], bytes]] = {
     "SQLite, deleted": lambda: sqlite("a REAL, b REAL", [(LATITUDE, LONGITUDE)], deleted=True),
     "GeoPackage's points": lambda: sqlite("geom BLOB", [(b"GP\x00\x01\xe6\x10\x00\x00" + WKB,)]),
     "JPEG, GPS": lambda: saved(picture(), "JPEG", exif=_gps()),
-    "PNG, GPS": lambda: saved(picture(), "PNG", exif=_gps()),
+    "PNG, GPS": lambda: saved(picture(), "PNG", exif=_gps().tobytes()),
     "WebP, GPS": lambda: saved(picture(), "WEBP", exif=_gps()),
     "GeoTIFF, degrees": lambda: _map("EPSG:4326", LONGITUDE - 0.3, LATITUDE + 0.4, 0.1),
     "GeoTIFF, UTM": lambda: _map("EPSG:32632", EAST - 5000, NORTH + 5000, 2000.0),
@@ -162,7 +162,7 @@ def test_chance_bytes_are_no_place() -> None:
 
 def test_a_map_elsewhere_and_local_metres_are_none(tmp_path: Path) -> None:
     for name, data in {
-        "elsewhere": _map("EPSG:32632", EAST + 50_000.5, NORTH + 20_000.5, 100.0),
+        "elsewhere": _map("EPSG:32635", EAST + 50_000.5, NORTH + 20_000.5, 100.0),
         "local": _map("", -500.0, 500.0, 125.0),
         "columns": _table(north_m=np.linspace(-500, 500, 999), east_m=np.linspace(300, -300, 999)),
     }.items():

@@ -118,12 +118,12 @@ def plus_of(latitude: float, longitude: float) -> str:
     latitude, longitude
         Of WGS84, deg.
     """
-    code, north, east, step = "", latitude + 90, (longitude + 180) % 360, 400.0
-    for _ in range(PLUS_BEFORE // 2):
-        step /= 20
-        for value in (north, east):
-            code += PLUS[min(int(value / step), 19)]
-        north, east = north % step, east % step
+    # In whole steps of the last letter: fractions of degrees do not divide evenly in binary.
+    steps = [min(int((latitude + 90) * 400 + 1e-9), 71_999), int((longitude + 180) % 360 * 400 + 1e-9)]
+    code = ""
+    for power in (8000, 400, 20, 1):
+        for part in steps:
+            code += PLUS[part // power % 20]
     return code
 
 

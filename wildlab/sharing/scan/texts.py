@@ -27,15 +27,32 @@ _TAG = re.compile(r"<(?:!--|-->|/?[A-Za-z][^<>]{0,2000}>)")
 #: What can be read among bytes that are no text; the same with zeros between the letters.
 _PRINTED = re.compile(rb"[\t\n\r\x20-\x7e]{5,}")
 _WIDE = re.compile(rb"(?:[\x20-\x7e]\x00{1,3}){4,}[\x20-\x7e]?")
+_CONTROL = np.zeros(256, bool)
+_CONTROL[[code for code in range(32) if code not in b"\t\n\r\f\x1b"]] = True
 #: Escapes may stand inside of escapes: a page in a notebook.
 DEEPEST = 3
 
 
 def is_text(data: bytes) -> bool:
-    """Whether bytes are text: nothing below a blank but line ends and tabs."""
-    some = np.frombuffer(data[:65_536] + data[-4096:], np.uint8)
-    control = (some < 32) & ~np.isin(some, np.frombuffer(b"\t\n\r\f\x1b", np.uint8))
-    return not len(some) or float(control.mean()) < 0.002
+    """Whether bytes are text: nothing below a blank but line ends and tabs, and UTF-8 or mostly ASCII.
+
+    Parameters
+    ----------
+    data
+        Any.
+    """
+    head = data[:65_536]
+    some = np.frombuffer(head + data[-4096:], np.uint8)
+    if not len(some):
+        return True
+    if float((_CONTROL[some]).mean()) >= 0.002:
+        return False
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError as error:
+        # A letter may be cut in two at the end of the piece.
+        return error.start >= 65_530 or float((some > 127).mean()) < 0.3
+    return True
 
 
 def texts_of(data: bytes) -> list[str]:
