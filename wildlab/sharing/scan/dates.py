@@ -26,6 +26,8 @@ GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
 #: GPS runs ahead of UTC by this at most, and by nothing at first, s.
 LEAP_S = 20
 DAY_S = 86_400.0
+#: The seconds of a GPS week need so many digits, and stand within so many characters of the week.
+DIGITS, BESIDE = 5, 24
 #: Where days are counted from, and what that is called.
 DAY_ZEROS = (
     (datetime(1970, 1, 1, tzinfo=UTC), 0.0, "days since 1970"),
@@ -201,9 +203,10 @@ def _gps(numbers: Numbers, moments: Sequence[datetime]) -> list[Hit]:
         if not len(weeks):
             continue
         for scale, unit in ((1.0, "seconds"), (1e3, "ms")):
-            near = np.flatnonzero(np.abs(numbers.value - of_week * scale) <= (3600 + LEAP_S) * scale)
+            fits = np.abs(numbers.value - of_week * scale) <= (600 + LEAP_S) * scale
+            near = np.flatnonzero(fits & (numbers.digits >= DIGITS))
             for k in near:
-                beside = weeks[np.abs(numbers.start[weeks] - numbers.start[k]) <= 60]
+                beside = weeks[np.abs(numbers.start[weeks] - numbers.start[k]) <= BESIDE]
                 beside = beside[numbers.start[beside] != numbers.start[k]]
                 if len(beside):
                     start, end = numbers.start[beside[0]], numbers.end[beside[0]]

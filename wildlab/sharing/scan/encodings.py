@@ -78,8 +78,8 @@ def encodings_of(places: Array) -> list[Encoding]:
         ("E6 degrees", 1e6, 0, 0),
         ("milliarcseconds", 3.6e6, 0, 0),
         ("arcseconds", 3600.0, 0, 3),
-        ("arcminutes", 60.0, 2, 4),
-        ("gradians", 10 / 9, 3, 5),
+        ("arcminutes", 60.0, 2, None),
+        ("gradians", 10 / 9, 3, None),
     ):
         around = np.where(longitude < 0, longitude + 360, longitude)
         for east in (longitude, around) if (longitude < 0).any() else (longitude,):

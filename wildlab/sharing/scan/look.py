@@ -74,7 +74,7 @@ class Look:
         runs = runs_of(data)
         if not len(runs.start):
             return
-        numbers = numbers_of(data, runs)
+        numbers = numbers_of(data, runs, grouped=not drawn)
         yield from dates_in(data, text, runs, numbers, self.secrets)
         if not drawn:
             yield from scalars_in(text, numbers, self.numbers)

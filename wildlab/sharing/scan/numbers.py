@@ -105,7 +105,7 @@ def runs_of(data: Bytes) -> Runs:
     return Runs(start, end, value)
 
 
-def numbers_of(data: Bytes, runs: Runs) -> Numbers:
+def numbers_of(data: Bytes, runs: Runs, *, grouped: bool = True) -> Numbers:
     """Whole numbers, decimals with point or comma, with exponents, and with their thousands apart.
 
     Parameters
@@ -114,6 +114,8 @@ def numbers_of(data: Bytes, runs: Runs) -> Numbers:
         As :func:`runs_of` had it.
     runs
         Its digits.
+    grouped
+        Whether thousands may stand apart; among the coordinates of lines they do not.
     """
     if not len(runs.start):
         return nothing()
@@ -121,7 +123,9 @@ def numbers_of(data: Bytes, runs: Runs) -> Numbers:
     whole = _number(runs.start, runs.end, runs.value.astype(float), np.zeros(len(length), np.int64))
     apart = runs.start[1:] - runs.end[:-1] == 1
     between = data[np.minimum(runs.end[:-1], len(data) - 1)]
-    found = [whole]
+    # The digits behind a point are no number of their own.
+    behind = np.concatenate(([False], apart & (between == ord("."))))
+    found = [whole.take(~behind)]
     joined = apart & ((between == ord(".")) | (between == ord(",")))
     found.append(_with_decimals(runs, np.flatnonzero(joined), runs.value.astype(float), runs.start))
     # Thousands apart: 6 656 123.4, 6,656,123, 6'656'123.
@@ -129,6 +133,7 @@ def numbers_of(data: Bytes, runs: Runs) -> Numbers:
     # Not out of the middle of a list of numbers of three digits.
     begins = (runs.length[:-1] <= 3) & (runs.value[:-1] > 0)
     begins[1:] &= ~(spaced[:-1] & (runs.length[:-2] <= 3))
+    begins &= grouped
     chain = np.concatenate((spaced, [False, False, False]))
     begins &= ~(chain[:-3] & chain[1:-2] & chain[2:-1])
     two = np.flatnonzero(spaced & begins)

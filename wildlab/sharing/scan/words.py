@@ -19,6 +19,8 @@ LONG = 4
 MOST = 20
 #: Shorter than this, or of digits only, they are everywhere.
 SHORTEST = 3
+#: Up to so many are looked for one by one.
+FEW = 150
 #: What has no letters of the Latin alphabet to stand for it when signs above letters are lost.
 _PLAIN = {"ø": "o", "æ": "ae", "œ": "oe", "ß": "ss", "ł": "l", "đ": "d", "ð": "d", "þ": "th"}
 _SIGNS = re.compile("[\u0300-\u036f]")
@@ -157,21 +159,16 @@ class Words:
         return hits
 
     def _found(self, small: str) -> list[Hit]:
-        distinct = set(_PARTS.findall(small))
-        haystack = "\n".join(distinct)
+        few = len(self.phrases) <= FEW
+        distinct = set() if few else set(_PARTS.findall(small))
+        # Of many words most are ruled out at once by the different words of the text.
+        haystack = small if few else "\n".join(distinct)
         hits = []
         for phrase in self.phrases:
-            if not self._may_be_there(phrase, distinct, haystack):
+            if not all(part in haystack for part in phrase):
                 continue
             body = r"[\W_]{0,3}".join(re.escape(part) for part in phrase)
             pattern = rf"(?<![^\W_]){body}(?![^\W_])" if len("".join(phrase)) < LONG else body
             matches = islice(re.finditer(pattern, small), MOST)
             hits += [Hit(match.start(), match.end(), "name", "a name") for match in matches]
         return hits
-
-    @staticmethod
-    def _may_be_there(phrase: tuple[str, ...], distinct: set[str], haystack: str) -> bool:
-        if len(phrase) == 1 and len(phrase[0]) < LONG:
-            return phrase[0] in distinct
-        # In one word, or in several: each of its parts is at the edge of some word.
-        return all(part in haystack for part in phrase)
