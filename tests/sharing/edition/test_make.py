@@ -1,0 +1,90 @@
+"""From a folder of reports, and a flight, to the page."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.flight.conftest import make_flight  # noqa: F401 - a fixture of another room
+from wildlab.errors import WildlabError
+from wildlab.flight.store import Flight
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.pipeline.georeference import observe
+from wildlab.reporting.metrics import document, metric, write_metrics
+from wildlab.sharing.edition.edition import Place
+from wildlab.sharing.edition.flight_map import map_of
+from wildlab.sharing.edition.make import make_edition
+
+WITHHELD = Place("withheld")
+
+
+def write_report(folder: Path, flight: str, state: str = "done", **numbers: tuple[str, float]) -> None:
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text("x", encoding="utf-8")
+    (folder / "status.json").write_text(json.dumps({"state": state}), encoding="utf-8")
+    about: dict[str, Any] = {"flight": {"name": flight, "kind": "logged", "files": {}}}
+    (folder / "provenance.json").write_text(json.dumps(about), encoding="utf-8")
+    entries = [metric(name, subject, value, "1", n=50) for name, (subject, value) in numbers.items()]
+    content = document(
+        study="evaluate", flight=flight, kind="logged", seed=None, seeds=None, metrics=entries, claims=[]
+    )
+    write_metrics(folder / "metrics.json", content)
+
+
+def sound(reports: Path) -> None:
+    counts = dict.fromkeys(("problems", "worth_fixing", "troubled", "broken", "alarmed"), ("flight", 0.0))
+    write_report(reports / "f-overview", "f", **counts, reports_beside=("flight", 1.0))
+
+
+def test_the_page_of_a_folder_of_reports(tmp_path: Path) -> None:
+    sound(tmp_path)
+    error = {"horizontal_error_median": ("logged-pose", 6.4), "horizontal_error_p90": ("logged-pose", 9.0)}
+    write_report(tmp_path / "f", "f", **error)
+    html = make_edition(tmp_path, "f", place=WITHHELD, called="flight 1")
+    assert "6.4\u00a0metres (about 9 steps)" in html and "flight 1" in html
+    assert "Nothing to fix was found" in html and "6,4\u00a0meter" in make_edition(
+        tmp_path, "f", place=WITHHELD, language="nb"
+    )
+
+
+def test_a_report_that_failed(tmp_path: Path) -> None:
+    sound(tmp_path)
+    write_report(tmp_path / "f", "f", state="failed")
+    html = make_edition(tmp_path, "f", place=WITHHELD)
+    assert "the work that measures it failed" in html and "metres" not in html.partition("<main>")[2]
+
+
+def test_a_flight_that_was_not_evaluated(tmp_path: Path) -> None:
+    with pytest.raises(WildlabError, match=r"no report on a flight 'g'; there are some of none"):
+        make_edition(tmp_path, "g", place=WITHHELD)
+    sound(tmp_path)
+    with pytest.raises(WildlabError, match=r"there are some on f\. Evaluate it first: wildlab evaluate"):
+        make_edition(tmp_path, "g", place=WITHHELD)
+
+
+def test_the_map_of_a_flight(make_flight: Callable[..., Flight], tmp_path: Path) -> None:  # noqa: F811
+    flight = make_flight()
+    drawn = map_of(flight)
+    assert drawn is not None
+    nav = flight.nav["autopilot"]
+    assert np.array_equal(drawn.path, nav[["north_m", "east_m"]].to_numpy())
+    seen = observe(flight, "autopilot")
+    expected = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
+    assert np.array_equal(drawn.seen, expected, equal_nan=True) and len(drawn.truth) == 3
+    sound(tmp_path)
+    html = make_edition(tmp_path, "f", place=WITHHELD, flight=flight)
+    assert len(re.findall('<path class="way"', html)) == 1 and '<circle class="true"' in html
+
+
+def test_a_flight_with_nothing_to_draw_has_no_map(make_flight: Callable[..., Flight]) -> None:  # noqa: F811
+    flight = make_flight()
+    assert map_of(Flight(flight.manifest, {}, {"frames": flight.table("frames")})) is None
+    # Without poses the truth alone is drawn, and no way of the aircraft is made up from it.
+    drawn = map_of(Flight(flight.manifest, {}, {"truth": flight.table("truth")}))
+    assert drawn is not None and not len(drawn.path) and not len(drawn.seen) and len(drawn.truth) == 3
