@@ -82,7 +82,7 @@ def nees_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.DataFram
         nees_chart(followed, f"{words.capitalize()}: {said}"),
         f"nees-{sensor}",
         f"NEES over time by {words} on a logarithmic axis. Time inside the 95 percent band: {inside}.",
-        f"Inside the band: {inside}. Counterpart of H figures 7.6 and 7.21.",
+        f"Inside the band: {inside}. H draws its own flights so in figures 7.6 and 7.21.",
     )
 
 
@@ -100,7 +100,7 @@ def innovations_shown(sensor: str, followed: Sequence[SensorTrack], tracks: pd.D
         f"Autocorrelation of the innovations by {words}, white noise assumed and differenced, over {LAGS} "
         "lags, with the band of white noise.",
         "In the title: the axis with the larger value at lag one. Grey: where white noise stays with 95 %. "
-        "Counterpart of H figures 7.7 and 7.12.",
+        "H draws its own flights so in figures 7.7 and 7.12.",
     )
 
 
