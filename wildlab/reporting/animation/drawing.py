@@ -302,7 +302,7 @@ class _Instants(NamedTuple):
 
 def _footprint(outlines: Outlines, onto: _Map, when: _Instants) -> str:
     corners = onto.at(_over(when.grid, outlines.times, outlines.corners))
-    there = np.isfinite(corners).all(axis=(1, 2))
+    there = _known(corners)
     if not there.any():
         return ""
     # Nothing is drawn far outside of the picture: a camera that looks towards the horizon sees kilometres.
@@ -330,7 +330,7 @@ def _landing(share: float, place: Array, lasts: float) -> str:
 def _ellipse(held: Ellipses, onto: _Map, when: _Instants, probability: float) -> str:
     centres = _over(when.grid, held.times, held.centres)
     P = _over(when.grid, held.times, held.covariances)
-    there = np.isfinite(centres).all(axis=1) & np.isfinite(P).all(axis=(1, 2))
+    there = _known(centres) & _known(P)
     if not there.any():
         return ""
     long_axis, short_axis, bearing = ellipse_axes(_filled(P, there), probability)
@@ -354,7 +354,7 @@ def _ellipse(held: Ellipses, onto: _Map, when: _Instants, probability: float) ->
 
 def _cross(truth: Course, onto: _Map, when: _Instants) -> str:
     places = _over(when.grid, truth.times, truth.points)
-    there = np.isfinite(places).all(axis=1)
+    there = _known(places)
     if not there.any():
         return ""
     values = [f"{_n(x)} {_n(y)}" for x, y in onto.at(_filled(places, there))]
@@ -394,7 +394,7 @@ def _headings(places: Array) -> Array:
 def _line(course: Course, onto: _Map, grid: Array, name: str) -> str:
     """All of a course, as the moving picture goes along it; broken where it is not known."""
     places = onto.at(_over(grid, course.times, course.points))
-    known = np.isfinite(places).all(axis=1)
+    known = _known(places)
     begins = np.flatnonzero(np.diff(known.astype(int)) != 0) + 1
     drawn = ""
     for part, there in zip(np.split(places, begins), np.split(known, begins), strict=True):
@@ -414,6 +414,11 @@ def _rules(onto: _Map) -> str:
         f'<path class="rule" d="M{WIDTH - 28:g} 48V20m-5 8 5-8 5 8"/>'
         f'<text x="{WIDTH - 28:g}" y="63" text-anchor="middle">N</text>'
     )
+
+
+def _known(values: Array) -> NDArray[np.bool_]:
+    """(N,) rows (N, ...) without a NaN."""
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(axis=1), bool)
 
 
 def _filled(values: Array, there: NDArray[np.bool_]) -> Array:

@@ -133,7 +133,7 @@ def simulated() -> dict[str, Any]:
 
     def part(times: Array, *arrays: Array, every_s: float) -> list[Array]:
         """Rows within the part and beside it on either side, no nearer in time than told."""
-        first, last = np.searchsorted(times, BEGIN, "right") - 1, np.searchsorted(times, end)
+        first, last = int(np.searchsorted(times, BEGIN, "right")) - 1, int(np.searchsorted(times, end))
         rows = np.arange(max(first, 0), min(last + 1, len(times)))
         kept = rows[np.unique(np.floor((times[rows] - BEGIN) / every_s), return_index=True)[1]]
         return [times[kept] - BEGIN, *(one[kept] for one in arrays)]

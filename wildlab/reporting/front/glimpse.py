@@ -95,7 +95,9 @@ def smaller(png: str) -> str:
         if picture is None or picture.dtype != np.uint8:
             return ""
         tall = max(1, min(round(height * WIDE / width), 2 * WIDE))
-        small = cv2.resize(_on_white(picture), (WIDE, tall), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            _on_white(np.asarray(picture, np.uint8)), (WIDE, tall), interpolation=cv2.INTER_AREA
+        )
         written, webp = cv2.imencode(".webp", small, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
     except cv2.error:
         return ""
