@@ -52,7 +52,7 @@ def partners_page(reports: Sequence[str]) -> str:
     )
     body = (
         "<header><h1>A copy that is safe to send</h1>"
-        '<p class="sub">The reports on this computer show where animals are. Whoever gets a copy '
+        '<p class="sub">The reports on this computer can show where animals are. Whoever gets a copy '
         "should see what "
         "was found and how sure that is, and not where.</p></header>"
         f"<ol>{steps}</ol><h2>For whom</h2>"
