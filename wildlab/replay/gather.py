@@ -144,7 +144,7 @@ def _views(flight: Flight, source: str | None, lacks: list[str]) -> Views | None
         lacks.append(f"what the camera looked at: the flight has no {what}")
         return nothing
     try:
-        p, R, _ = poses_at(flight.nav[source], times[rows], ids)
+        p, R, _ = poses_at(flight.nav[source], times[rows], list(ids))
         pan, tilt = (angle[rows] for angle in gimbal_angles(flight))
     except WildlabError as error:
         lacks.append(f"what the camera looked at: {error.problem}")
@@ -260,8 +260,8 @@ def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool
     try:
         seen = observe(flight, source)
         table = georeference(flight, seen, np.random.default_rng(0)) if ellipses else _placed(seen)
-    except WildlabError as error:
-        lacks.append(f"detections on the ground: {error.problem}")
+    except WildlabError as refusal:
+        lacks.append(f"detections on the ground: {refusal.problem}")
         return None
     xyz = table[["north_m", "east_m", "down_m"]].to_numpy(float)
     good = np.isfinite(xyz).all(axis=1) & np.isfinite(table["time_s"].to_numpy(float))
@@ -279,8 +279,8 @@ def _points(flight: Flight, source: str | None, lacks: list[str], ellipses: bool
         try:
             scored = score_points(flight, table.assign(row=np.arange(len(table))))
             error[scored["row"].to_numpy(int)] = scored[["error_north_m", "error_east_m"]].to_numpy(float)
-        except WildlabError as problem:
-            lacks.append(f"errors of the detections: {problem.problem}")
+        except WildlabError as refusal:
+            lacks.append(f"errors of the detections: {refusal.problem}")
     return Points(
         table["time_s"].to_numpy(float),
         table[["north_m", "east_m", "down_m"]].to_numpy(float),

@@ -56,9 +56,7 @@ def save_recording(
     os.close(handle)
     part = FilePath(name)
     try:
-        stream = rr.RecordingStream("wildlab replay", recording_id="replay", send_properties=False)
-        stream.disable_timeline("log_time")
-        stream.disable_timeline("log_tick")
+        stream = _stream(rr)
         stream.save(part, default_blueprint=blueprint_of(scene))
         _Writer(rr, stream, scene).all(shots or {}, tell)
         stream.flush()
@@ -68,6 +66,32 @@ def save_recording(
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+
+
+def log_scene(scene: Scene) -> Any:
+    """A scene as a stream of rerun that a widget shows; nothing is written.
+
+    Parameters
+    ----------
+    scene
+        From `wildlab.replay.gather.scene_of`.
+
+    Returns
+    -------
+    rerun.RecordingStream
+    """
+    import rerun as rr
+
+    stream = _stream(rr)
+    _Writer(rr, stream, scene).all({}, lambda _: None)
+    return stream
+
+
+def _stream(rr: Any) -> Any:
+    stream = rr.RecordingStream("wildlab replay", recording_id="replay", send_properties=False)
+    stream.disable_timeline("log_time")
+    stream.disable_timeline("log_tick")
+    return stream
 
 
 class _Writer:

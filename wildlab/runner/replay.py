@@ -104,7 +104,7 @@ def _with_images(scene: Scene, flight: Path, images: Path | None, tell: Any) -> 
         lacks = "pictures: they are not in the flight folder; --images names where they are"
         return replace(scene, lacks=(*scene.lacks, lacks)), {}
     size = None if scene.camera is None else (scene.camera.width, scene.camera.height)
-    found = read_shots(place, scene.views.ids, size, lambda done, of: tell("reducing images", done, of))
+    found = read_shots(place, list(scene.views.ids), size, lambda done, of: tell("reducing images", done, of))
     return replace(scene, lacks=(*scene.lacks, *found.lacks)), found.by_row
 
 

@@ -1,0 +1,37 @@
+"""A flight inside a notebook: shown by rerun's widget where that is, else what to install is said."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import rerun.notebook as widgets
+
+from wildlab.replay.notebook import show_replay
+from wildlab.simulation.twins import simulate_twin
+
+
+def test_without_the_widget_it_is_said_what_to_install(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(widgets, "HAS_NOTEBOOK", False)
+    show_replay(simulate_twin("large-ship", 1))
+    assert "pip install 'rerun-sdk[notebook]==0.41.*'" in capsys.readouterr().out
+
+
+def test_the_widget_gets_the_flight(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: dict[str, Any] = {}
+
+    def viewer(**arguments: Any) -> Any:
+        given.update(arguments)
+        return SimpleNamespace(display=lambda: given.update(displayed=True))
+
+    monkeypatch.setattr(widgets, "HAS_NOTEBOOK", True)
+    monkeypatch.setattr(widgets, "Viewer", viewer)
+    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
+    show_replay(simulate_twin("large-ship", 1))
+    assert given["displayed"] and given["recording"].get_recording_id() == "replay"
+    assert capsys.readouterr().out == ""
