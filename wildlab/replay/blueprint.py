@@ -24,7 +24,10 @@ def blueprint_of(scene: Scene) -> Any:
         recent = rrb.TimeRangeBoundary.cursor_relative(seq=-3)
     since = rrb.TimeRangeBoundary.infinite()
     low, high = scene.extent
-    middle, size = (low + high) / 2, max(float(np.linalg.norm((high - low)[:2])), 10.0)
+    middle, size = (
+        (low + high) / 2,
+        max(float(np.linalg.norm((high - low)[:2])) + 1.2 * float(high[2] - low[2]), 10.0),
+    )
     target = np.array([middle[1], middle[0], -high[2]])
     views: list[Any] = [
         rrb.Spatial3DView(
