@@ -134,6 +134,7 @@ def test_a_partner_adds_a_language(tmp_path: Path) -> None:
         ('[tile]\nnobody = "x"', "tile.nobody", "no text has this name"),
         ('[alarm]\nleans = "It leans."', "alarm.leans", "other placeholders than the English one"),
         ('[alarm]\nleans = "{size} {where}"', "alarm.leans", r"Use \{size\}"),
+        ('[alarm]\njumps = {one = "It jumps.", many = "{n} {size}"}', "alarm.jumps", "other placeholders"),
         ("[tile]\nseen = 3", "tile.seen", "this is int, and not text"),
         ('[steps]\nsome = "{n}"', "steps.some", "depends on how many"),
         ('[steps]\nsome = {one = "x", many = "y"}', "steps.some", "other placeholders"),
