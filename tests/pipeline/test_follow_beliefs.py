@@ -9,7 +9,7 @@ from tests.pipeline.robots import KNOWN, robot_flight, rows_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import manifest_toml, parse_manifest
-from wildlab.pipeline.following.beliefs import ASSUMED, STATED, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.beliefs import ASSUMED, ROUGH, STATED, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.roughness import roughness
 from wildlab.pipeline.following.tuned import read_tuned, refuse_same, tune_flight, tuned_text
@@ -23,7 +23,7 @@ def test_stated_goes_before_assumed_and_the_page_is_told():
     scans = scans_of(flight, "radar")
     beliefs, said = of_sensor(flight, scans, of_flight(flight))
     assert beliefs.white == pytest.approx([0.5, np.radians(0.3)], rel=0.3)
-    assert all(one.source.startswith(ASSUMED) for one in said)
+    assert all(one.source.startswith((ASSUMED, ROUGH)) for one in said)
     stated = parse_settings(
         KNOWN + "\n[sensors.radar.considered.heading]\nsd_deg = 2.0\ncorrelation_time_s = 60.0\n"
     )

@@ -132,7 +132,7 @@ def _as_measured(flight: Flight) -> Counter[tuple[object, ...]]:
     began = epoch.timestamp() if epoch is not None else 0.0
     # Places match only where they are counted from the same origin; ranges, bearings and pixels in any case.
     values = np.round(seen.reindex(columns=list(_VALUES)).to_numpy(float), 6) + 0.0
-    known = np.isfinite(values).any(axis=1)
+    known = np.asarray(np.isfinite(values).any(axis=1))
     stamps = np.where(np.isfinite(times), np.round(began + times, 3), -1.0)
     rows = zip(seen["source"], stamps, map(bytes, values), strict=True)
     return Counter(row for row, good in zip(rows, known, strict=True) if good)
