@@ -281,11 +281,12 @@ def bands_chart(found: Vibration, title: str) -> Figure:
     place = np.arange(len(found.bands))
     for axis, color in zip(range(3), LINES, strict=False):
         ax.bar(place + 0.26 * (axis - 1), found.rms[:, axis], 0.24, color=color, label="xyz"[axis])
-    ax.set_xticks(place, [f"{low:g}–{high:g}" for low, high in np.round(found.bands)])
+    ax.set_xticks(place, [f"{low:g}–\n{high:g}" for low, high in np.round(found.bands)])
     ax.set_xlabel("band (Hz)")
     ax.set_ylabel("root mean square (m/s²)")
     ax.set_title(title)
-    ax.legend(loc="upper right", ncols=3)
+    # Beside the axes, where it hides nothing.
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return fig
 
 
@@ -306,5 +307,6 @@ def shaking_chart(found: Vibration, times: Array, clock: Clock, title: str) -> F
     ax.set_xlabel(clock.label)
     ax.set_ylabel("shaking above 5 Hz (m/s²)")
     ax.set_title(title)
-    ax.legend(loc="upper right", ncols=3)
+    # Beside the axes, where it hides nothing.
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return fig

@@ -52,7 +52,7 @@ def page_key(notebook: Path, given: Mapping[str, Any], code: str) -> str:
     published, the notebook, and ``given``, whatever the notebook is given."""
     shown = [path for room in ("studies", "reporting") for path in (PACKAGE / room).rglob("*.py")]
     digest = hashlib.sha256(json.dumps([code, dict(given)], sort_keys=True, allow_nan=False).encode())
-    for path in [*sorted([*shown, *(DATA / "published").glob("*.toml")]), notebook]:
+    for path in [*sorted([*shown, DATA / "glossary.toml", *(DATA / "published").glob("*.toml")]), notebook]:
         digest.update(path.name.encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
