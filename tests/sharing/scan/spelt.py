@@ -92,6 +92,7 @@ def _thousands(value: float, sign: str) -> str:
     return f"{value:,.0f}".replace(",", sign)
 
 
+# ruff: noqa: E501 - one spelling a line
 SPELLINGS: dict[str, Callable[[float, float], str]] = {
     "two decimals": lambda a, b: f"{a:.2f}, {b:.2f}",
     "four decimals": lambda a, b: f"{a:.4f} {b:.4f}",

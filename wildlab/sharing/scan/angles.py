@@ -53,7 +53,8 @@ def _marked(data: Bytes, at: Ints) -> NDArray[np.bool_]:
     """Whether what follows a number says degrees: the sign, d, or what it becomes where signs are lost."""
     last = len(data) - 1
     one, two = data[np.minimum(at, last)], data[np.minimum(at + 1, last)]
-    return is_one_of(one, MARKS) | ((one == 32) & is_one_of(two, MARKS))
+    marked: NDArray[np.bool_] = is_one_of(one, MARKS) | ((one == 32) & is_one_of(two, MARKS))
+    return marked
 
 
 def _apart(data: Bytes, runs: Runs, numbers: Numbers, *, seconds: bool) -> Numbers:

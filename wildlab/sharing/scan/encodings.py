@@ -83,7 +83,7 @@ def encodings_of(places: Array) -> list[Encoding]:
     ):
         around = np.where(longitude < 0, longitude + 360, longitude)
         for east in (longitude, around) if (longitude < 0).any() else (longitude,):
-            axes = (
+            axes: tuple[Axis, ...] = (
                 Axis("latitude", np.abs(latitude) * unit, unit / DEGREE_M + 0 * latitude, alone),
                 Axis("longitude", np.abs(east) * unit, unit / across, alone),
             )

@@ -16,7 +16,7 @@ from wildlab.sharing.scan.codes import Codes
 from wildlab.sharing.scan.columns import in_columns
 from wildlab.sharing.scan.dates import dates_in, days_of
 from wildlab.sharing.scan.derived import derived_numbers
-from wildlab.sharing.scan.encodings import encodings_of
+from wildlab.sharing.scan.encodings import Encoding, encodings_of
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.near import Sorted, alone, pairs, reach, within
 from wildlab.sharing.scan.numbers import Numbers, numbers_of, runs_of
@@ -80,20 +80,20 @@ class Look:
             yield from scalars_in(text, numbers, self.numbers)
         if not self.encodings:
             return
-        near_m, cell = self.secrets.near_m, self.secrets.cell_deg
+        cell = self.secrets.cell_deg
         ordered = self._reached(numbers, self.reach)
-        for encoding in self.encodings if ordered else ():
+        for encoding in self.encodings:
             own = cell if encoding.name == "decimal degrees" else 0.0
-            yield from pairs(ordered, encoding, near_m, own)
-            if not drawn:
-                yield from alone(ordered, encoding, own)
+            yield from self._found(ordered, encoding, own, drawn)
         for name, angles in angles_of(data, runs, numbers).items():
             ordered = self._reached(angles, self.reach_of_angles)
-            for encoding in self.degrees if ordered else ():
-                spelt = encoding._replace(name=name)
-                yield from pairs(ordered, spelt, near_m)
-                if not drawn:
-                    yield from alone(ordered, spelt)
+            for encoding in self.degrees:
+                yield from self._found(ordered, encoding._replace(name=name), 0.0, drawn)
+
+    def _found(self, numbers: Sorted | None, encoding: Encoding, cell: float, drawn: bool) -> Iterator[Hit]:
+        if numbers is not None:
+            yield from pairs(numbers, encoding, self.secrets.near_m, cell)
+            yield from () if drawn else alone(numbers, encoding, cell)
 
     @staticmethod
     def _reached(numbers: Numbers, ranges: tuple[Array, Array]) -> Sorted | None:

@@ -53,7 +53,14 @@ class Numbers(NamedTuple):
     half: Array
 
     def take(self, which: NDArray[np.bool_] | Ints) -> Numbers:
-        return Numbers(*(field[which] for field in self))
+        return Numbers(
+            self.start[which],
+            self.end[which],
+            self.value[which],
+            self.decimals[which],
+            self.digits[which],
+            self.half[which],
+        )
 
 
 def is_one_of(data: Bytes, signs: bytes) -> NDArray[np.bool_]:
@@ -188,9 +195,8 @@ def _with_exponents(data: Bytes, runs: Runs, numbers: Numbers) -> Numbers:
     small = runs.value[run] < 30
     which, run, after = which[small], run[small], after[small]
     power = np.where(after == ord("-"), -runs.value[run], runs.value[run])
-    value, decimals, end, half = (
-        field.copy() for field in (numbers.value, numbers.decimals, numbers.end, numbers.half)
-    )
+    value, half = numbers.value.copy(), numbers.half.copy()
+    decimals, end = numbers.decimals.copy(), numbers.end.copy()
     value[which] = value[which] * 10.0**power
     half[which] = half[which] * 10.0**power
     decimals[which] -= power

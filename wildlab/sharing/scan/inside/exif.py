@@ -56,7 +56,8 @@ def tiff(data: bytes, budget: Budget) -> Iterator[Part]:
     (version,) = struct.unpack_from(order + "H", data, 2)
     big = version == 43
     head = struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)[0]
-    todo, seen, said, columns, pieces, boxes = [head], set(), [], [], [], []
+    seen: set[int] = set()
+    todo, said, columns, pieces, boxes = [head], [], [], [], []
     while todo and len(seen) < MOST_DIRECTORIES:
         at = todo.pop()
         if at in seen or not at:

@@ -51,7 +51,8 @@ def png(data: bytes, budget: Budget) -> Iterator[Part]:
             text = inflate(text, budget)[0] if packed == b"\x01" else text
             yield Part(name, b"\n".join((key, language, other, text)))
         elif kind == b"tIME" and length == 7:
-            moment = datetime(*struct.unpack(">H5B", body), tzinfo=UTC)
+            year, month, day, hour, minute, second = struct.unpack(">H5B", body)
+            moment = datetime(year, month, day, hour, minute, min(second, 59), tzinfo=UTC)
             yield Part(name, moments=((moment, "when the picture was last changed"),))
         elif kind == b"tEXt":
             yield Part(name, body.replace(b"\x00", b"\n"))

@@ -200,7 +200,9 @@ class _Steps:
 
 
 def _rows(where: str, names: list[str], rows: list[Any], budget: Budget) -> Iterator[Part]:
-    columns, texts, blobs = [], [], []
+    columns: list[tuple[str, Array]] = []
+    texts: list[bytes] = []
+    blobs: list[bytes] = []
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
         numbers = [cell if isinstance(cell, int | float) else np.nan for cell in cells]
         if not np.isnan(np.array(numbers, float)).all():
