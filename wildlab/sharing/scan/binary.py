@@ -25,6 +25,8 @@ TYPES = (
 )  # fmt: skip
 #: A place is looked for to this, m, at most: beyond, four bytes agree by chance too often.
 CLOSE_M = 200.0
+#: Of whole numbers of four bytes, which have no exponent that must agree as well, to this, m.
+CLOSE_WHOLE_M = 50.0
 #: Two numbers of one place are no further apart than this, bytes.
 TOGETHER = 64
 #: A single number of eight bytes must agree to this, m (of a kind that alone says enough); a time to this, s.
@@ -151,6 +153,7 @@ def _judged(at: Ints, values: Array, needles: list[Needle], size: int, name: str
 
 def _places(kind: str, encodings: Sequence[Encoding], close_m: float) -> Iterator[Needle]:
     """Two numbers of one place."""
+    close_m = min(close_m, CLOSE_WHOLE_M) if kind[1:] == "i4" else close_m
     for group, encoding in enumerate(encodings):
         unit = encoding.axes[0].per_metre.max()
         if (kind[1] == "i") != (unit >= 10):  # whole numbers need a fine unit
