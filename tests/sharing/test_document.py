@@ -39,7 +39,9 @@ def report(folder: Path, body: str = BODY, style: str = "#numbers { color: red }
 def whole(tmp_path: Path, *, hashes: bool = False, times: int = 2) -> str:
     path = report(tmp_path)
     parts = tuple(read_part(path, i, hashes=hashes) for i in range(1, times + 1))
-    return joined([Chapter("A flight, for the public", ("It was <b>somewhere</b>.",), "", parts)], "")
+    return joined(
+        [Chapter("A flight, for the public", "It was <b>somewhere</b>.", ("And <i>so</i>.",), parts)], ""
+    )
 
 
 def test_ids_are_each_once_and_links_lead_somewhere(tmp_path: Path) -> None:
@@ -83,7 +85,8 @@ def test_the_foot_keeps_the_thesis_and_loses_hashes_and_date(tmp_path: Path) -> 
 
 def test_sentences_are_escaped_and_reports_listed(tmp_path: Path) -> None:
     soup = BeautifulSoup(whole(tmp_path), "html.parser")
-    assert "It was <b>somewhere</b>." in soup.section.get_text()  # type: ignore[union-attr]
+    assert "It was <b>somewhere</b>." in soup.header.get_text()  # type: ignore[union-attr]
+    assert "And <i>so</i>." in soup.get_text()
     assert [one.get_text() for one in soup.nav.find_all("a")] == ["How far off & why?"] * 2  # type: ignore[union-attr]
     assert len(soup.find_all("main")) == 1
     assert not BeautifulSoup(whole(tmp_path, times=1), "html.parser").nav

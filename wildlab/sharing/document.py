@@ -141,17 +141,17 @@ class Chapter:
     ----------
     heading
         Its own.
+    lead
+        Where and when it was, in a sentence or two: the first thing read.
     about
-        Sentences on the copy.
-    before
-        HTML that stands before the reports.
+        Sentences on the copy, for whoever asks: the last.
     parts
         Its reports.
     """
 
     heading: str
+    lead: str
     about: tuple[str, ...]
-    before: str
     parts: tuple[Part, ...]
 
 
@@ -177,19 +177,21 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
         listed = "".join(f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in parts)
         contents = f'<nav aria-label="Reports"><h2>In this file</h2><ol>{listed}</ol></nav>'
     body.append(contents if several else "")
+    level = "h2" if several else "h1"
     for chapter in chapters:
-        level = "h2" if several else "h1"
-        told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
         body.append(
-            f'<section aria-label="About this copy"><header><{level}>{escape(chapter.heading)}</{level}>'
-            f"</header><ul>{told}</ul></section>"
+            f"<header><{level}>{escape(chapter.heading)}</{level}>"
+            f'<p class="sub">{escape(chapter.lead)}</p></header>'
         )
-        body += [chapter.before, "" if several else contents]
+        body.append("" if several else contents)
         body += [
             f'<article class="shared" id="r{part.number}-top" aria-label="{escape(part.title)}">\n'
             f"{part.body}\n</article>"
             for part in chapter.parts
         ]
+        told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
+        if told:
+            body.append(f'<section class="shared"><h2>About this copy</h2><ul>{told}</ul></section>')
     styles = dict.fromkeys([*(part.style for part in parts if part.style), _STYLE])
     title = heading if several else chapters[0].heading
     return page(title=title, body="\n".join(filter(None, body)), style="\n".join(styles))

@@ -15,10 +15,10 @@ from wildlab.flight.store import Flight, save_flight
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.own_flights import ABOUT, own_flights
+from wildlab.runner.record.own_flights import own_flights
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
-from wildlab.sharing.reports import Source
+from wildlab.sharing.reports import ENDS, Source
 from wildlab.sharing.tiers import Treatment
 
 #: What `wildlab evaluate` does not set of these, `wildlab track` was told.
@@ -33,7 +33,7 @@ class Redrawn(NamedTuple):
     made
         The flight, and what was taken out of it.
     folders
-        Of the reports, by the end of their name (`ABOUT`), in order.
+        Of the reports, by the end of their name (`ENDS`), in order.
     own
         The flight with its reports, as the edition takes it.
     agreement
@@ -111,9 +111,8 @@ def redraw(
                 "check the flight: wildlab check; then evaluate it and share it again",
                 file=flight.folder,
             )
-    ends = ("-overview", "", "-navigation", "-tracking")
     folders = {
-        end: reports / f"{name}{end}" for end in ends if (reports / f"{name}{end}" / "report.html").is_file()
+        end: reports / f"{name}{end}" for end in ENDS if (reports / f"{name}{end}" / "report.html").is_file()
     }
     mine = {one.name: one for one in source.folders}
     pairs = {
@@ -129,7 +128,7 @@ def _told(source: Source, made: Generalised) -> dict[str, Any]:
     """What the sender's reports were told, in the copy's names."""
     given: Mapping[str, Any] = {}
     notes = []
-    for end in ABOUT:
+    for end in ENDS:
         parameters = source.parameters.get(f"{source.name}{end}", {})
         given = {**{key: value for key, value in parameters.items() if value}, **given}
         if end == "-tracking" and any(parameters.get(key) for key in _TOLD):

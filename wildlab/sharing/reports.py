@@ -15,6 +15,9 @@ from wildlab.runner.record.beside import state_of
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 
+#: What the names of the reports on a flight end in, in the order in which they are read.
+ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking").index))
+
 
 @dataclass(frozen=True)
 class Source:
@@ -122,7 +125,7 @@ def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]
     """All reports on the flight, in their usual order."""
     folders: list[Path] = []
     parameters: dict[str, dict[str, Any]] = {}
-    for end in ABOUT:
+    for end in ENDS:
         folder = reports / f"{source.name}{end}"
         if not (folder / "report.html").is_file():
             continue

@@ -232,9 +232,9 @@ def _generalised(
             for number, one in enumerate(drawn.folders.values(), first)
         ]
     made = drawn.made
+    when = f" Flown {'on' if treatment.date == 'day' else 'in'} {made.when}." if made.when else ""
     about = [
-        place_words(made.cell),
-        f"It was flown in {made.when}; times count from its first sample." if made.when else "",
+        "Times count from the first sample, heights from the ground of the flight.",
         "Names of the flight, of targets, files and sensors are replaced by neutral ones, and photographs "
         "are left out.",
         "Every figure and every number was computed again from generalised data. "
@@ -242,7 +242,9 @@ def _generalised(
         generalisation_words(made.cell, treatment.category),
     ]
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
-    chapter = Chapter(heading, tuple(one.strip() for one in about if one), "", tuple(parts))
+    chapter = Chapter(
+        heading, place_words(made.cell) + when, tuple(one.strip() for one in about), tuple(parts)
+    )
     secrets = flight_secrets(flight, made, treatment, source, folder)
     told = f"Flight {source.name}", tuple(_told(drawn, treatment))
     return _Document(
@@ -297,7 +299,7 @@ def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     about = (
         _EXACT if source.logged else "Simulated, or computed from public data: it has no place to be hidden."
     )
-    chapter = Chapter(f"{name}, {_WORDS[tier]}", (about,), "", tuple(parts))
+    chapter = Chapter(f"{name}, {_WORDS[tier]}", about, (), tuple(parts))
     heading = f"{'Flight' if source.logged else 'Study'} {source.name}"
     removed = "removed: links to files beside the report, and what this machine and its users are called"
     return _Document(name, chapter, machine_secrets(), (heading, (removed,)))
