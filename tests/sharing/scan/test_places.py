@@ -187,3 +187,5 @@ def test_numbers_that_follow_from_the_place_are_found() -> None:
     gravity = float(normal_gravity(np.radians(LATITUDE), 152.738))
     assert "a number that locates" in kinds(f"g = {gravity:.5f} m/s2", secrets())
     assert "a number that locates" not in kinds("g = 9.80665 m/s2, or 9.81", secrets())
+    # Cells of a table in one row, as they are where no tag stands between them.
+    assert "a number that locates" not in kinds("autopilot120010.00.00.0000.0–0frames", secrets())

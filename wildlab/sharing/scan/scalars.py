@@ -41,6 +41,7 @@ def scalars_in(text: str, numbers: Numbers, true: Sequence[float]) -> list[Hit]:
         fits = off <= np.maximum(numbers.half * 1.000001, size * 1e-9)
         fits |= (numbers.value < value) & (off < 2 * numbers.half)
         fits |= (off <= size * 10.0 ** (1 - DIGITS) / 2) & (numbers.digits > DIGITS)
+        fits &= numbers.value > 0  # a zero has no digit that agrees, however many it is written with
         for k in np.flatnonzero(fits & (numbers.digits >= BESIDE)):
             start, end = int(numbers.start[k]), int(numbers.end[k])
             if numbers.digits[k] >= DIGITS:
