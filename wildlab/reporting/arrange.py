@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import re
 
-from bs4 import BeautifulSoup, NavigableString, Tag
-from bs4.element import PageElement
+from bs4 import BeautifulSoup, Tag
+from bs4.element import NavigableString, PageElement
 
 #: What a heading or a block may say it is, in the order of the page; "" is a section like any other.
 HEAD, SUMMARY, ALERT, MAIN, TILES, OPENING, ADVICE, LIMITS, SECTION, METHOD = (
@@ -73,7 +73,7 @@ def arranged(body: str) -> str:
     for part in ORDER:
         for node in groups[part]:
             whole.append(node)
-    for marked in whole.find_all(attrs={"data-part": True}):
+    for marked in whole.select("[data-part]"):
         del marked["data-part"]
     _drop_bare_headings(whole)
     _number_figures(whole)
@@ -87,7 +87,7 @@ def _part_of(node: Tag) -> str | None:
         return str(said)
     if node.name == "header":
         return HEAD
-    classes = node.get("class") or []
+    classes = _classes(node)
     if "summary" in classes:
         return SUMMARY
     if "look" in classes:
@@ -95,6 +95,11 @@ def _part_of(node: Tag) -> str | None:
     if "tiles" in classes:
         return TILES
     return SECTION if node.name == "h2" else None
+
+
+def _classes(node: Tag) -> list[str]:
+    found = node.get("class") or ""
+    return found.split() if isinstance(found, str) else list(found)
 
 
 def _judge(summaries: list[PageElement], verdicts: list[Tag]) -> None:
@@ -105,7 +110,7 @@ def _judge(summaries: list[PageElement], verdicts: list[Tag]) -> None:
     box, last = boxes[0], verdicts[-1]
     level = str(last.get("data-level") or "neutral")
     del last["data-level"]
-    box["class"] = [name for name in box.get("class") or [] if name not in _LEVELS] + [level]
+    box["class"] = " ".join([*(name for name in _classes(box) if name not in _LEVELS), level])
     box.append(last)
 
 
@@ -144,9 +149,7 @@ def _drop_bare_headings(whole: BeautifulSoup) -> None:
     for heading in whole.find_all(["h2", "h3"]):
         after = heading.find_next_sibling()
         closes = after is None or after.name == "h2" or (after.name == "h3" and heading.name == "h3")
-        if closes or (
-            after is not None and after.name == "details" and "method" in (after.get("class") or [])
-        ):
+        if closes or (after is not None and after.name == "details" and "method" in _classes(after)):
             heading.decompose()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from itertools import pairwise
+from typing import Any
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -23,8 +24,8 @@ _FEWEST = 10
 _BESIDE = 60.0
 #: What marks a line's name at its end.
 END_LABEL = "end-label"
-#: Width of a narrow letter of a title as a share of its height: what is shorter than that surely fits.
-_NARROW = 0.5
+#: Width of a usual letter of a title as a share of its height: what is shorter than that is not measured.
+_NARROW = 0.6
 
 
 def least_size(figure: Figure) -> float:
@@ -40,7 +41,7 @@ def least_size(figure: Figure) -> float:
     float
         `LEAST_SIZE` where it has no text.
     """
-    sizes = [text.get_fontsize() for text in figure.findobj(Text) if _is_seen(text)]
+    sizes = [float(text.get_fontsize()) for text in figure.findobj(Text) if _is_seen(text)]
     return 72.0 * LEAST_TEXT / min(sizes) if sizes else float(LEAST_SIZE)
 
 
@@ -109,9 +110,10 @@ def fit_legends(figure: Figure) -> None:
             columns -= 1
             place = places[legend._loc_real]  # type: ignore[attr-defined]
             texts = [text.get_text() for text in legend.get_texts()]
-            handles = list(legend.legend_handles)
+            handles = [one for one in legend.legend_handles if one is not None]
             legend.remove()
-            legend = figure.legend(handles, texts, loc=_place(place, outside), ncols=columns)
+            where: Any = _place(place, outside)
+            legend = figure.legend(handles, texts, loc=where, ncols=columns)
 
 
 def _place(place: str, outside: str | None) -> str:
@@ -136,10 +138,13 @@ def fit_titles(figure: Figure) -> None:
     for axes in figure.get_axes():
         for text in (axes.title, axes._left_title, axes._right_title, axes.xaxis.label):  # type: ignore[attr-defined]
             longest = max(map(len, text.get_text().split("\n")))
-            if longest * _NARROW * text.get_fontsize() > wide / _columns(axes) - _BESIDE:
+            if longest * _NARROW * float(text.get_fontsize()) > wide / _columns(axes) - _BESIDE:
                 long.append((axes, text))
         label, high = axes.yaxis.label, 72 * figure.get_size_inches()[1]
-        if max(map(len, label.get_text().split("\n"))) * _NARROW * label.get_fontsize() > high - _BESIDE:
+        if (
+            max(map(len, label.get_text().split("\n"))) * _NARROW * float(label.get_fontsize())
+            > high - _BESIDE
+        ):
             long.append((axes, label))
     over_all = [figure._suptitle, figure._supxlabel]  # type: ignore[attr-defined]
     for text in filter(None, over_all):
