@@ -142,7 +142,7 @@ def test_wrong_use_is_a_sentence_and_leaves_nothing(capsys, area, tmp_path, give
 
 def test_a_calibrated_camera_is_taken(capsys, area, tmp_path):
     from wildlab.flight.camera_file import BoardPart, CameraFile, EvidencePart, write_camera
-    from wildlab.flight.manifest import CameraPart
+    from wildlab.flight.manifest_parts import CameraPart
 
     content = CameraFile(
         camera=CameraPart(name="a", width_px=640, height_px=512, fx_px=800, fy_px=800, cx_px=320, cy_px=256),

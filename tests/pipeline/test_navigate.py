@@ -8,7 +8,8 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import ImuPart, replace_in_manifest
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.manifest_parts import ImuPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS, LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.geometry.frames import matrix_to_rotation_vector

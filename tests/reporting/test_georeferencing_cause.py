@@ -18,6 +18,7 @@ from wildlab.evaluation.sightings import Averaged
 from wildlab.geometry.calibration import Calibration
 from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting import georeferencing_left as left
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
@@ -222,8 +223,8 @@ def test_images_that_stay_wrong_alike_are_said_to():
 
 
 def test_halves_are_mentioned_only_where_they_disagree():
-    assert cause.halves_sentence(Halves(2.0, 2.2, Interval(0.2, -0.5, 0.9))) == ""
-    said = cause.halves_sentence(Halves(2.0, 6.0, Interval(4.0, 3.0, 5.0)))
+    assert left.halves_sentence(Halves(2.0, 2.2, Interval(0.2, -0.5, 0.9))) == ""
+    said = left.halves_sentence(Halves(2.0, 6.0, Interval(4.0, 3.0, 5.0)))
     assert "2.0 m in the first and 6.0 m in the second" in said
 
 
@@ -237,7 +238,7 @@ def test_halves_are_mentioned_only_where_they_disagree():
     ],
 )
 def test_averaging_is_said_where_it_was_tried(averaged, inside, outside):
-    said = cause.averaging_sentence(averaged)
+    said = left.averaging_sentence(averaged)
     assert inside in said and outside not in said
 
 
@@ -253,7 +254,7 @@ def test_averaging_is_said_where_it_was_tried(averaged, inside, outside):
     ],
 )
 def test_ellipses_get_one_verdict(found, inside):
-    said = cause.ellipse_sentence(found)
+    said = left.ellipse_sentence(found)
     assert inside in said
     every = (
         "**Honest**",
@@ -269,9 +270,9 @@ def test_ellipses_get_one_verdict(found, inside):
 
 
 def test_what_the_nearest_mark_hides():
-    said = " ".join(cause.nearest_sentences(0.3, 10.0, 9.0))
+    said = " ".join(left.nearest_sentences(0.3, 10.0, 9.0))
     assert "30 %" in said and "10.0 m" in said and "may be larger" in said
-    said = " ".join(cause.nearest_sentences(0.0, 10.0, 1.0))
+    said = " ".join(left.nearest_sentences(0.0, 10.0, 1.0))
     assert "ambiguous" not in said and "may be larger" not in said
 
 
@@ -284,11 +285,11 @@ def test_a_cause_that_hangs_on_ambiguous_clicks_is_said_to():
 
 def test_outliers_are_counted_by_kind_with_the_figures_without_them():
     without = summarise(np.tile([0.6, 0.8], (41, 1)))
-    said = cause.outliers_sentence((FAR, CLICK), MANY, without)
+    said = left.outliers_sentence((FAR, CLICK), MANY, without)
     assert said.startswith("1 mark and 1 click are far out")
     assert "9 of 50 points" in said and "1.0 m in place of 5.0 m" in said
-    assert cause.outliers_sentence((FAR,), MANY, without).startswith("1 mark is far out")
-    table = cause.outliers_table((FAR, CLICK))
+    assert left.outliers_sentence((FAR,), MANY, without).startswith("1 mark is far out")
+    table = left.outliers_table((FAR, CLICK))
     assert table["photo"].tolist() == ["several", "P1"]
 
 
@@ -307,17 +308,17 @@ def test_no_cause_is_certain_where_a_third_is_far_out():
 def test_what_is_left_is_sorted_and_in_one_unit():
     image, within = np.array([0.6, 0.8]), np.array([3.0, 4.0])
     scatter = Scatter(0.1, 0.3, 0.6, image, within, np.array([1.2, 1.6]))
-    parts = cause.remaining_parts(scatter)
+    parts = left.remaining_parts(scatter)
     assert ["Single" in parts[0], "all images" in parts[1], "pose" in parts[2]] == [True] * 3
     assert ["5.0 m" in parts[0], "2.0 m" in parts[1], "1.0 m" in parts[2]] == [True] * 3
-    said = cause.remaining_sentence(scatter, ("height",))
+    said = left.remaining_sentence(scatter, ("height",))
     assert f"{np.sqrt(1 + 4 + 25):.1f} m (root mean square) with the height taken off" in said
-    assert "taken off" not in cause.remaining_sentence(scatter, ())
+    assert "taken off" not in left.remaining_sentence(scatter, ())
     assert "%" not in " ".join([said, *parts])
     assert not any(word in " ".join(parts) for word in ("halve", "calibration", "flown"))
     nan = np.full(2, np.nan)
     unknown = Scatter(np.nan, np.nan, np.nan, nan, nan, nan)
-    assert cause.remaining_parts(unknown) == [] and cause.remaining_sentence(unknown, ()) == ""
+    assert left.remaining_parts(unknown) == [] and left.remaining_sentence(unknown, ()) == ""
 
 
 def test_an_axis_is_constant_by_its_interval():

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
 from wildlab.flight.clocks import frame_times
-from wildlab.flight.manifest import LocationsPart
+from wildlab.flight.manifest_parts import LocationsPart
 from wildlab.flight.store import Flight, save_flight
 from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import integrate_strapdown

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pyproj import Geod
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import LocationsPart
+from wildlab.flight.manifest_parts import LocationsPart
 from wildlab.sharing import tiers
 from wildlab.sharing.cells import Cell, cell_of, generalisation_words, half_diagonal, place_words, round_up
 from wildlab.sharing.tiers import TIERS, load_tiers, treatment_of

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from wildlab.errors import WildlabError
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, parse_toml, read_toml
-from wildlab.flight.manifest import CameraPart
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.toml import dump_toml
 
 WHAT = "what `wildlab camera` wrote"

@@ -12,7 +12,8 @@ from pydantic import Field, model_validator
 from wildlab.errors import WildlabError, system_error
 from wildlab.files import write_atomic
 from wildlab.flight.files import Strict, check_model, read_toml
-from wildlab.flight.manifest import CameraPart, Manifest, MountPart, Spread
+from wildlab.flight.manifest import Manifest
+from wildlab.flight.manifest_parts import CameraPart, MountPart, Spread
 from wildlab.flight.toml import dump_toml
 
 #: Focal lengths and principal points that differ by no more than this share of the focal length are the same.

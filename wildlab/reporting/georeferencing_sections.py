@@ -13,6 +13,7 @@ from wildlab.pipeline.diagnose import Diagnosis
 from wildlab.pipeline.overviews.worth_fixing import FIX, LOOK, MEND, SOUND, UNJUDGED
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_cause as cause
+from wildlab.reporting import georeferencing_left as left
 from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.ground import ground_height_words
 from wildlab.reporting.report import Report
@@ -106,7 +107,7 @@ def cause_section(report: Report, found: Accuracy) -> None:
     diagnosis = found.diagnosis
     if diagnosis is None:
         return
-    said = [cause.size_sentence(diagnosis.calibration, diagnosis.counts), cause.halves_sentence(found.halves)]
+    said = [cause.size_sentence(diagnosis.calibration, diagnosis.counts), left.halves_sentence(found.halves)]
     report.section("The cause", " ".join(filter(None, said)))
     report.table(
         cause.models_table(diagnosis),
@@ -154,7 +155,7 @@ def cause_section(report: Report, found: Accuracy) -> None:
     if found.nearest is not None:
         report.subsection("What the nearest mark hides")
         share = float(found.nearest.ambiguous.mean())
-        said = cause.nearest_sentences(share, found.nearest.visible_m, found.summary.p90)
+        said = left.nearest_sentences(share, found.nearest.visible_m, found.summary.p90)
         if found.unambiguous is not None:
             said.append(f"Without ambiguous clicks: {cause.cause_sentence(found.unambiguous)}")
         report.points(said)
@@ -164,9 +165,9 @@ def _far_out(report: Report, diagnosis: Diagnosis) -> None:
     if not diagnosis.outliers:
         return
     with_, without = diagnosis.held_summary(), diagnosis.held_summary(diagnosis.inliers)
-    report.subsection("Far out", cause.outliers_sentence(diagnosis.outliers, with_, without))
+    report.subsection("Far out", left.outliers_sentence(diagnosis.outliers, with_, without))
     report.table(
-        cause.outliers_table(diagnosis.outliers),
+        left.outliers_table(diagnosis.outliers),
         columns={"kind": "what", "photo": "photo", "mark": "mark", "points": "points", "off": "off by (m)"},
         digits={"points": 0, "off": 1},
         caption="Farther off than its like, the cause above taken off where it is certain. No cause was "
@@ -178,10 +179,10 @@ def left_section(report: Report, found: Accuracy, more: Sequence[str] = ()) -> N
     """What the errors are made of once the cause is taken off, what averaging gained, and ``more``."""
     diagnosis = found.diagnosis
     taken = diagnosis.winner.causes if diagnosis is not None and diagnosis.counts else ()
-    said, parts = cause.averaging_sentence(found.averaged), list(more)
+    said, parts = left.averaging_sentence(found.averaged), list(more)
     if found.summary.n:
-        said = " ".join(filter(None, (cause.remaining_sentence(found.remaining, taken), said)))
-        parts = [*cause.remaining_parts(found.remaining), *parts]
+        said = " ".join(filter(None, (left.remaining_sentence(found.remaining, taken), said)))
+        parts = [*left.remaining_parts(found.remaining), *parts]
     if parts:
         report.section("What is left", said, part=ADVICE)
         report.points(parts, ordered=True)
@@ -203,7 +204,7 @@ def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) 
     report.section("Does it know how wrong it is?")
     how = words.ellipse_words(found.scored, terrain=ground is not None)
     report.text(
-        f"{cause.ellipse_sentence(found.ellipses)}\n\nOf {len(found.scored)} ellipses {how}. The uncertainty "
+        f"{left.ellipse_sentence(found.ellipses)}\n\nOf {len(found.scored)} ellipses {how}. The uncertainty "
         f"of the pose is {pose}: {words.assumed_words(found.assumed)}."
         f"{ground_height_words(ground, found.assumed)}"
     )

@@ -195,8 +195,7 @@ def strip(n: Number) -> str:
 
 
 def claims_table(claims: list[Claim], flights: str = "flights", study: str = "") -> str:
-    """Claims of a study, the verdict on each, and on how many flights it is true; nothing where there are
-    none."""
+    """Claims of a study, the verdict on each, and on how many flights it is true; "" where there are none."""
     if not claims:
         return ""
     label = escape(f"Claims of {study}" if study else "Claims")

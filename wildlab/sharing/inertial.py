@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.clocks import poses_at
-from wildlab.flight.manifest import MagnetometerPart
+from wildlab.flight.manifest_parts import MagnetometerPart
 from wildlab.flight.schema import COVARIANCE_COLUMNS
 from wildlab.geometry.frames import Array
 from wildlab.geometry.gravity import Earth

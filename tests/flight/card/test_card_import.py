@@ -19,7 +19,7 @@ from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight.card.importing import import_card, read_card, recipe_beside
 from wildlab.flight.card.proposal import Wishes
-from wildlab.flight.manifest import CameraPart
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import load_flight
 

@@ -11,7 +11,8 @@ import pytest
 
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.inertial_data import FORCE, RATE
-from wildlab.flight.manifest import IMU_NOISE, replace_in_manifest
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.manifest_parts import IMU_NOISE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import geodetic_to_ned
 from wildlab.simulation.twins import simulate_twin

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
-from wildlab.flight.manifest import CameraPart
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.photos.folder import camera_of, of_camera
 from wildlab.flight.time.matching import match_triggers

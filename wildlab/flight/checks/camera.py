@@ -10,7 +10,7 @@ import pandas as pd
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import POSITION, Finding, count, first_row
 from wildlab.flight.clocks import frame_poses
-from wildlab.flight.manifest import CameraPart
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.schema import DETECTION_KINDS
 from wildlab.flight.store import Flight
 

@@ -19,14 +19,8 @@ from wildlab.flight.checks.check import find
 from wildlab.flight.clocks import poses_at
 from wildlab.flight.files import TOML_LIMIT, check_model, inside
 from wildlab.flight.learnt import read_learnt, refuse_other_camera
-from wildlab.flight.manifest import (
-    CameraPart,
-    GnssPart,
-    ImuPart,
-    MagnetometerPart,
-    Manifest,
-    make_manifest,
-)
+from wildlab.flight.manifest import Manifest, make_manifest
+from wildlab.flight.manifest_parts import CameraPart, GnssPart, ImuPart, MagnetometerPart
 from wildlab.flight.recipe.model import Recipe, read_recipe
 from wildlab.flight.recipe.poses import Fixes, Places, PoseRows, read_poses
 from wildlab.flight.recipe.raw import Nanoseconds, RawFiles, nanoseconds, plain_numbers

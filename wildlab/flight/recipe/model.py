@@ -13,7 +13,7 @@ from pydantic import AwareDatetime, Field, field_validator, model_validator
 
 from wildlab.flight.files import Strict, check_model, is_safe_name, read_toml
 from wildlab.flight.following import SensorPart, TargetsPart
-from wildlab.flight.manifest import (
+from wildlab.flight.manifest_parts import (
     CameraPart,
     ClocksPart,
     LocationsPart,

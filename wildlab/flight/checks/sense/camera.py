@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.manifest import CameraPart
+from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.store import Flight
 
 #: Fields of view (deg) across the image that a camera of a drone may have: long telephoto to fisheye.
