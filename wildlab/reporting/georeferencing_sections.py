@@ -79,8 +79,8 @@ def verdict_words(
     if gain >= cause.SMALL:
         said.append(f"a constant error is {percent(gain, 0)} of the mean error")
     if diagnosis is not None and diagnosis.outliers:
-        count = len(diagnosis.outliers)
-        said.append("1 thing is far out" if count == 1 else f"{count} things are far out")
+        far_out = len(diagnosis.outliers)
+        said.append("1 thing is far out" if far_out == 1 else f"{far_out} things are far out")
     if ellipses.word == "too small":
         said.append("the stated uncertainty is too small")
     if logged.n < words.FEW:

@@ -194,7 +194,7 @@ def report_page(
 
 
 def _first_look(soup: BeautifulSoup, notice: str) -> None:
-    for one in soup.find_all(attrs={"data-part": VERDICT}):
+    for one in soup.select(f"[data-part={VERDICT}]"):
         one.decompose()
     said = BeautifulSoup(notice, "html.parser")
     if soup.find("section", class_="summary") is not None and said.p is not None:
