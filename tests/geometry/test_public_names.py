@@ -36,10 +36,14 @@ def test_every_argument_and_result_is_described(name):
 
 
 def test_all_that_is_public_is_offered():
-    """But for what F names as frames does, clocks of cameras, which the pipeline offers, and what is inside:
-    compiled loops, compiling, and checks."""
+    """But for what F names as frames does, clocks of cameras, which the pipeline offers, what other rooms
+    look up (quantiles, attitudes between two), and what is inside: compiled loops, compiling, and checks."""
     beside = {"flodell.camera_rotation", "georeference.matching"}
     beside |= {f"{name}.{name}" for name in ("clock_by_points", "clock_by_motion")}
+    beside |= {f"turns.between_attitudes{how}" for how in ("", "_by_scipy")}
+    beside |= {f"quantiles.{name}_quantile" for name in ("chi2", "normal", "student")} | {
+        "quantiles.chi2_beyond"
+    }
     offered = {f"{one.__module__.rpartition('.')[2]}.{one.__name__}" for one in FUNCTIONS.values()}
     there = set()
     for path in Path(geometry.__file__).parent.glob("*.py"):

@@ -64,23 +64,45 @@ def write_points(flight: Flight, points: pd.DataFrame, path: Path, source: str =
     WildlabError
         Where it ends otherwise.
     """
-    table = with_axes(points).assign(
-        level=LEVEL,
-        method=_methods(flight, points),
-        vertical_reference="down from the flight's origin" if path.suffix == ".csv" else ELLIPSOID,
-        source=source,
-        flight=flight.name,
-    )
+    vertical = "down from the flight's origin" if path.suffix == ".csv" else ELLIPSOID
+    table = _described(flight, points, vertical, source)
     if path.suffix == ".csv":
         write_csv(path, table, "%.3f")
     elif path.suffix == ".geojson":
-        write_atomic(path, json.dumps(_geojson(flight, table), allow_nan=False))
+        write_atomic(path, points_geojson(flight, points, source))
     elif path.suffix == ".gpkg":
         write_geopackage(path, _layers(flight, table))
     else:
         raise WildlabError(
             f"nobody knows how to write {path.suffix!r}", f"end it with {' or '.join(SUFFIXES)}", file=path
         )
+
+
+def points_geojson(flight: Flight, points: pd.DataFrame, source: str = "") -> str:
+    """Points as the text of a GeoJSON file, as `write_points` writes it: exact places.
+
+    Parameters
+    ----------
+    flight, points, source
+        As for `write_points`.
+
+    Returns
+    -------
+    str
+        One feature for each point that has a place.
+    """
+    table = _described(flight, points, ELLIPSOID, source)
+    return json.dumps(_geojson(flight, table), allow_nan=False, separators=(",", ":"))
+
+
+def _described(flight: Flight, points: pd.DataFrame, vertical: str, source: str) -> pd.DataFrame:
+    return with_axes(points).assign(
+        level=LEVEL,
+        method=_methods(flight, points),
+        vertical_reference=vertical,
+        source=source,
+        flight=flight.name,
+    )
 
 
 def _methods(flight: Flight, points: pd.DataFrame) -> list[str]:

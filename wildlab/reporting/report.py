@@ -273,6 +273,10 @@ class Report:
         html += f"<figcaption>{label}</figcaption></figure>" if label else "</figure>"
         self._show(f"<details><summary>{inline(fold)}</summary>{html}</details>" if fold else html)
 
+    def files(self, intro: str, links: Sequence[str]) -> None:
+        """Files that the page itself hands over, each from `wildlab.reporting.tables.data_link`."""
+        self._show(f'<p>{inline(intro)} <span class="get">{" ".join(links)}</span></p>')
+
     def math(self, latex: str) -> None:
         """A formula on a line of its own."""
         self._show(maths(latex, block=True))

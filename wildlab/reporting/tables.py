@@ -12,7 +12,7 @@ from wildlab.files import csv_text
 from wildlab.reporting.text import NOTHING, escape, inline, number, slug
 
 #: Bytes of a file that is put into a link; larger ones are not embedded.
-MOST_BYTES = 200_000
+MOST_BYTES = 500_000
 #: Columns of a table that still fits a phone beside one another.
 NARROW = 3
 #: Columns that say where on Earth something is: they are in no link.
