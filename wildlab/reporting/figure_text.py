@@ -18,6 +18,8 @@ FULL_SIZE, LEAST_SIZE = 128, 80
 LEAST_TEXT = 11.0
 #: A share of the figure that a title has at least, and where it begins to have it, pixels from the edge.
 _NARROWEST, _EDGE = 0.7, 8.0
+#: How often the whole is laid out again at most.
+_ROUNDS = 4
 #: Letters that a line of a title has at least.
 _FEWEST = 10
 #: What stands beside a title, points.
@@ -171,6 +173,30 @@ def fit_titles(figure: Figure) -> None:
             middle = (panel.x0 + panel.x1) / 2
             room = panel.width if _columns(axes) > 1 else 2 * min(middle, edge - middle)
         _break(text, room)
+    _inside(figure)
+
+
+def _inside(figure: Figure) -> None:
+    """Break once more what leaves the figure: where a title's lines change, the panels move below it."""
+    for _ in range(_ROUNDS):
+        figure.draw_without_rendering()
+        off = False
+        for axes in figure.get_axes():
+            for text in (axes.title, axes._left_title, axes._right_title, axes.xaxis.label):  # type: ignore[attr-defined]
+                box = text.get_window_extent()
+                over = max(box.x1 - figure.bbox.x1, figure.bbox.x0 - box.x0)
+                if text.get_text() and over > 0:
+                    off = True
+                    # What stands in the middle gives way on both sides.
+                    sides = 1 if text.get_horizontalalignment() == "left" else 2
+                    _break(text, box.width - sides * (over + _EDGE / 2))
+            label, box = axes.yaxis.label, axes.yaxis.label.get_window_extent()
+            over = max(box.y1 - figure.bbox.y1, figure.bbox.y0 - box.y0)
+            if label.get_text() and over > 0:
+                off = True
+                _break(label, box.height - 2 * (over + _EDGE / 2), upwards=True)
+        if not off:
+            return
 
 
 def _break(text: Text, room: float, *, upwards: bool = False) -> None:

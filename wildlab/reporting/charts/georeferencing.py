@@ -115,11 +115,15 @@ def aircraft_map(
     ax.plot(path[:, 1], path[:, 0], color=GREY, lw=0.9)
     ax.plot(seen[:, 1], seen[:, 0], ".", color=ORANGE, ms=2)
     ax.plot(below[:, 1], below[:, 0], color=colour("truth"), lw=2.2)
+    # Towards the middle of the map, away from title and axis.
+    north = np.concatenate([one[:, 0] for one in (path, seen, below)])
+    high = below[-1, 0] > (np.nanmin(north) + np.nanmax(north)) / 2
     ax.annotate(
         name,
         below[-1, ::-1],
-        (6, 6),
+        (6, -6 if high else 6),
         textcoords="offset points",
+        va="top" if high else "bottom",
         fontsize=10,
         bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
     )

@@ -177,7 +177,7 @@ def varied_shown(varied: pd.DataFrame, published: Mapping[str, float], reading: 
         ax.plot(varied[form], y + shift, "o", color=_COLOURS[form], ms=5, label=NAMES[form])
     ax.set_yticks(y, varied["variation"])
     title = words.varied_title(varied, reading)
-    ax.set(xlabel="right associations (%), dashed: published")
+    ax.set(xlabel="right associations (%)\ndashed: published")
     # Above the names of the variations too: the axes alone are too narrow for it.
     fig.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
     fig.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3)
