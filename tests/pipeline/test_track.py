@@ -38,6 +38,14 @@ def seen(flight: Flight) -> Sighting:
     return sighting(flight, "mekf")
 
 
+def test_the_truth_of_a_sighting_is_that_of_its_target(flight: Flight, seen: Sighting) -> None:
+    assert flight.truth is not None and flight.truth["target_id"].nunique() == 1
+    for column, name in enumerate(("north_m", "east_m")):
+        known = np.interp(seen.times, flight.truth["time_s"], flight.truth[name])
+        inside = (seen.times >= flight.truth["time_s"].min()) & (seen.times <= flight.truth["time_s"].max())
+        np.testing.assert_allclose(seen.truth[inside, column], known[inside], atol=0.5)
+
+
 def test_the_sighting_holds_every_frame_between_first_and_last_detection(
     flight: Flight, seen: Sighting
 ) -> None:

@@ -143,12 +143,12 @@ def sighting(flight: Flight, source: str, target: str | None = None) -> Sighting
     row = place[pd.Index(frames["frame_id"]).get_indexer(pd.Index(seen.table["frame_id"]))]
     first, last = int(row.min()), int(row.max()) + 1
     times, ids = stamps[order][first:last], frames["frame_id"].iloc[order[first:last]]
-    name, nav = flight.pose_source(source)
+    poses_name, nav = flight.pose_source(source)
     p_nb, R_nb, covariance = poses_at(nav, times, ids)
     pan, tilt = (angle[order][first:last] for angle in gimbal_angles(flight))
     manifest = flight.manifest
     poses = CameraPoses(
-        manifest.geometry_camera(), manifest.geometry_mount(name), p_nb, R_nb, pan, tilt, covariance
+        manifest.geometry_camera(), manifest.geometry_mount(poses_name), p_nb, R_nb, pan, tilt, covariance
     )
     uv = np.full((len(times), 2), np.nan)
     # Over terrain a ray that meets no ground is no sighting: whatever plane it were put on would be invented.

@@ -54,6 +54,8 @@ def table_html(
     labels = [f' data-label="{escape(_plain(title))}"' for title in titles]
     head = "".join(
         f'<th role="columnheader" scope="col"{style}>{inline(title)}</th>'
+        if title.strip()
+        else '<td role="cell"></td>'  # a heading that says nothing is none
         for title, style in zip(titles, classes, strict=True)
     )
     rows = "".join(
