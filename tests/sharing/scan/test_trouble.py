@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -89,7 +90,9 @@ CLOSED: dict[str, Callable[[], bytes]] = {
     "half a WebP": lambda: saved(picture(), "WEBP")[:-20],
     "half a Parquet file": lambda: parquet(__import__("pyarrow").table({"a": [1]}))[:-12],
     "a damaged SQLite file": lambda: sqlite("a TEXT", [("x",)])[:90] + b"\xff" * 4000,
-    "a PDF with a damaged stream": lambda: figure("x", "pdf").replace(b"stream\nx\x9c", b"stream\nyy", 1),
+    "a PDF with a damaged stream": lambda: re.sub(
+        rb"stream\nx.", b"stream\nyy", figure("x", "pdf"), count=1, flags=re.DOTALL
+    ),
 }
 
 
