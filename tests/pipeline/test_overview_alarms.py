@@ -143,6 +143,8 @@ def test_a_gain_that_is_possible_is_not_sound(make_flight: Callable[..., Flight]
     html, content = page_of(flight, tmp_path / "a", numbers=beside(1.6), judged=1)
     assert "Look closer: taking a constant error off may gain 1.6 m (0.3 to 2.9) of a mean error of" in html
     assert "No gain is certain." in html and values(content)["troubled", "flight"] == 1
+    assert "georeferencing: a constant error may be 36 % of the mean error." in html
+    assert "thing amiss" not in html
     html, content = page_of(flight, tmp_path / "b", numbers=beside(0.3), judged=1)
     assert values(content)["troubled", "flight"] == 0 and "worth 10 % of its error or data." in html
 

@@ -17,8 +17,10 @@ from wildlab.evaluation.runs import Interval
 from wildlab.evaluation.sightings import Averaged
 from wildlab.geometry.calibration import Calibration
 from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.pipeline.overviews.worth_fixing import WORTH, gains_of, possible_gain, verdict_of
 from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting import georeferencing_left as left
+from wildlab.reporting.georeferencing_sections import verdict_words
 from wildlab.reporting.report import open_report
 
 MANY = summarise(np.tile([3.0, 4.0], (50, 1)))
@@ -164,7 +166,8 @@ def test_lost_points_have_their_denominator():
     [
         (0, "honest", NOTHING, "good"),
         (0, "honest", LITTLE, "good"),
-        (0, "honest", UNSURE, "good"),
+        (0, "honest", UNSURE, "warn"),
+        (0, "honest", SLIGHT, "warn"),
         (0, "honest", PART, "warn"),
         (0, "too small", NOTHING, "warn"),
         (13, "honest", NOTHING, "bad"),
@@ -355,3 +358,19 @@ def test_a_flight_that_contradicts_itself_is_said_only_where_a_problem_says_so()
     assert cause.amiss_sentence([]) == "" == cause.amiss_sentence(["warning: nav: a. Do b."])
     assert "one thing does not fit" in cause.amiss_sentence(["problem: nav: a. Do b.", "warning: c: d. E."])
     assert "2 things do not fit" in cause.amiss_sentence(["problem: a: b. C."] * 2)
+
+
+@pytest.mark.parametrize("gain", [0.2, 0.49, 0.51, 3.0])
+@pytest.mark.parametrize("half", [0.01, 4.0])
+def test_the_parts_of_a_flight_come_to_the_same_verdict(gain, half):
+    """The overview knows the numbers alone, the report on the georeferencing all of it: one rule for both."""
+    found = diagnosis(model(["boresight"], 5.0, 5.0 - gain, half))
+    numbers = {("gain", "winner"): {"value": gain, "low": gain - half, "high": gain + half},
+               ("horizontal_error_mean", "logged-pose"): {"value": MANY.mean}}  # fmt: skip
+    if found.counts:
+        numbers["horizontal_error_mean", "calibrated-pose"] = {"value": 5.0 - gain}
+    ours, reason = verdict_words(MANY, 0, verdict("honest"), found)
+    worth = sum(one.share >= WORTH for one in gains_of(SimpleNamespace(lost=()), numbers))
+    assert verdict_of(0, worth, int(possible_gain(numbers) is not None), 1) == ours
+    assert (cause.verdict_level(MANY, 0, verdict("honest"), found, 10) == "good") == (ours == "sound")
+    assert ("may gain" in reason) == (possible_gain(numbers) is not None)

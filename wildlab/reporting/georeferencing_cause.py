@@ -14,6 +14,7 @@ from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
 from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.pipeline.overviews.worth_fixing import is_possible
 from wildlab.reporting.report import Report
 
 #: Beyond this share of lost points the verdict is bad.
@@ -80,9 +81,17 @@ def verdict_level(
     amiss = diagnosis is not None and (
         bool(diagnosis.outliers) or (diagnosis.counts and gained_share(diagnosis.winner.gain) >= SMALL)
     )
-    if amiss or ellipses.word == "too small" or logged.n < few:
+    if amiss or possible_share(logged, diagnosis) or ellipses.word == "too small" or logged.n < few:
         return "warn"
     return "good" if diagnosis is not None else "neutral"
+
+
+def possible_share(logged: ErrorSummary, diagnosis: Diagnosis | None) -> float:
+    """What taking the cause off may gain, as a share of the mean error; 0 where certain, or too small."""
+    if diagnosis is None or not diagnosis.winner.causes:
+        return 0.0
+    gain = diagnosis.winner.gain.gain.estimate
+    return gain / logged.mean if is_possible(gain, logged.mean, certain=diagnosis.counts) else 0.0
 
 
 def amiss_sentence(amiss: Sequence[str]) -> str:

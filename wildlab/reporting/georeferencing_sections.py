@@ -78,6 +78,8 @@ def verdict_words(
     gain = cause.gained_share(diagnosis.winner.gain) if diagnosis is not None and diagnosis.counts else 0.0
     if gain >= cause.SMALL:
         said.append(f"a constant error is {percent(gain, 0)} of the mean error")
+    if possible := cause.possible_share(logged, diagnosis):
+        said.append(f"taking a constant error off may gain {percent(possible, 0)} of the mean error")
     if diagnosis is not None and diagnosis.outliers:
         far_out = len(diagnosis.outliers)
         said.append("1 thing is far out" if far_out == 1 else f"{far_out} things are far out")

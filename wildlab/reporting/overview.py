@@ -62,7 +62,7 @@ def show_overview(
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
     measured = error_measured(numbers)
     said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible)
-    report.summary(said, level=LEVELS[word], verdict=(word, words.reason_words(**counts)))
+    report.summary(said, level=LEVELS[word], verdict=(word, words.reason_words(**counts, possible=possible)))
     report.tiles(sections.tiles(overview))
     report.section("Most worth fixing", words.first_of(gains, possible), part=ADVICE)
     if gains:

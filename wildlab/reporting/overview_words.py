@@ -111,8 +111,15 @@ def gain_sentence(gain: Gain) -> str:
     return f"**{gain_title(gain)}.** {gain_measured(gain)} {_REMEDIES[gain.key]}"
 
 
-def reason_words(problems: int, worth: int, troubled: int, judged: int, broken: int, alarmed: int) -> str:
-    """Why the verdict is what it is: what was counted, most pressing first; parameters of `verdict_of`."""
+def reason_words(
+    problems: int, worth: int, troubled: int, judged: int, broken: int, alarmed: int,
+    possible: Gain | None = None,
+) -> str:  # fmt: skip
+    """Why the verdict is what it is: what was counted, most pressing first; parameters of `verdict_of`.
+
+    ``possible``: a gain that is not certain, one of those that are ``troubled``.
+    """
+    troubled -= possible is not None
     said = [
         f"{count} {one if count == 1 else many}"
         for count, one, many in (
@@ -124,6 +131,8 @@ def reason_words(problems: int, worth: int, troubled: int, judged: int, broken: 
         )
         if count
     ]
+    if possible is not None:
+        said.append(f"georeferencing: a constant error may be {percent(possible.share, 0)} of the mean error")
     if said:
         return f"{', '.join(said)}."
     if not judged:

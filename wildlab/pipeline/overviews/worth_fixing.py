@@ -141,6 +141,30 @@ def error_measured(numbers: Numbers) -> bool:
     return any(name == "horizontal_error_mean" and _known(one["value"]) for (name, _), one in numbers.items())
 
 
+def is_possible(gain_m: float, mean_m: float, *, certain: bool) -> bool:
+    """Whether a gain that is not certain is large enough to look closer: the rule of all parts of a flight.
+
+    Parameters
+    ----------
+    gain_m
+        Estimate of what taking a constant error off gains.
+    mean_m
+        The mean error as logged.
+    certain
+        Whether the gain is certain.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_possible(0.3, 1.7, certain=False), is_possible(0.1, 1.7, certain=False)
+    (True, False)
+    """
+    return not certain and mean_m > 0 and gain_m >= WORTH * mean_m
+
+
 def possible_gain(numbers: Numbers) -> Gain | None:
     """What taking a constant error off may gain, where that is not certain; None where it is, or is small.
 
@@ -157,11 +181,12 @@ def possible_gain(numbers: Numbers) -> Gain | None:
     gain, before = numbers.get(("gain", "winner")), numbers.get(("horizontal_error_mean", "logged-pose"))
     if gain is None or before is None or not _known(gain["value"], before["value"]):
         return None
-    if ("horizontal_error_mean", "calibrated-pose") in numbers or gain["value"] < WORTH * before["value"]:
+    certain = ("horizontal_error_mean", "calibrated-pose") in numbers
+    if not is_possible(gain["value"], before["value"], certain=certain):
         return None
     low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
     value, of = float(gain["value"]), float(before["value"])
-    return Gain("possible", (), value, low, high, "m", of, "mean error", value / of if of > 0 else 0.0, "")
+    return Gain("possible", (), value, low, high, "m", of, "mean error", value / of, "")
 
 
 def verdict_of(
