@@ -258,7 +258,7 @@ def diagnose(
         best = models[_rank(models, blocks, inliers).winner]
         # Only where the whole of it gained something: the best parameter of a chance gain would look certain.
         told = with_covariance(best.fit, images_of, blocks) if best.gain.counts else None
-        if told is not None and (only := _told_from_zero(told)):
+        if told is not None and (only := _told_from_zero(told, models)):
             models.append(model(tuple(c for c in best.causes if set(CAUSES[c]) & set(only)), only))
         ranked = _rank(models, blocks, inliers)
         winner = models[ranked.winner]
@@ -368,9 +368,14 @@ def _nonzero(calibration: Calibration) -> tuple[str, ...]:
     return tuple(name for name, (low, high) in intervals.items() if low > 0 or high < 0)
 
 
-def _told_from_zero(calibration: Calibration) -> tuple[str, ...]:
-    """The parameters whose 95 % interval leaves zero out, where there are some and others do not."""
+def _told_from_zero(calibration: Calibration, models: list[Model]) -> tuple[str, ...]:
+    """The parameters whose 95 % interval leaves zero out, where there are some and others do not.
+
+    None where a model of just these was tried already.
+    """
     told = _nonzero(calibration)
+    if any(set(one.fit.names) == set(told) for one in models):
+        return ()
     return told if 0 < len(told) < len(calibration.names) else ()
 
 

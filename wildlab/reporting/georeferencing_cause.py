@@ -13,7 +13,7 @@ from wildlab.evaluation.causes import Gain
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary
 from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Calibration
-from wildlab.pipeline.diagnose import Diagnosis
+from wildlab.pipeline.diagnose import CAUSES, Diagnosis
 from wildlab.pipeline.overviews.worth_fixing import is_possible
 from wildlab.reporting.report import Report
 
@@ -58,6 +58,22 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
 def causes_in_words(causes: Sequence[str]) -> str:
     """Causes as they stand in a sentence."""
     return listed([_CAUSES[cause] for cause in causes])
+
+
+def causes_told(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The winner's causes that have a parameter told from zero; all of them where none has.
+
+    Only these are named: what a fit takes along without being able to tell it from zero is not blamed.
+    """
+    told = {name for name in diagnosis.calibration.names if _told(diagnosis.calibration, name)}
+    causes = diagnosis.winner.causes
+    return tuple(cause for cause in causes if told & set(CAUSES[cause])) or causes
+
+
+def _told(calibration: Calibration, name: str) -> bool:
+    """Whether the interval of a parameter leaves zero out."""
+    low, high = calibration.interval(name)
+    return bool(low > 0 or high < 0)
 
 
 def metres(value: float, low: float | None = None, high: float | None = None) -> str:
@@ -150,9 +166,10 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             f"No constant error explains it: taking one off ({tried}) gains nothing for certain on images "
             "that it was not estimated from."
         )
-    what = causes_in_words(winner.causes)
-    it = "it"
-    if others := simplest_rivals(diagnosis):
+    told = causes_told(diagnosis)
+    what, it = causes_in_words(told), "it"
+    # One that holds all that is named does not explain it by something else.
+    if others := [one for one in simplest_rivals(diagnosis) if not set(told) <= set(one)]:
         what += f" or, explaining it as well, of {listed([causes_in_words(one) for one in others], 'or')}"
         it = "the first"
     digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
@@ -162,6 +179,8 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
         f"{gain.with_:.{digits}f} m on images that it was not estimated from (gain {low} to {high} m"
         f"{_with_far_out(diagnosis)})"
     )
+    if unsure := [cause for cause in winner.causes if cause not in told]:
+        figures += f"; fitted with it, {causes_in_words(unsure)} could not be told from zero"
     if not diagnosis.counts and gained_share(gain) < SMALL:
         return f"No constant error explains it. The nearest is one of {what}: {figures}."
     if not diagnosis.counts:

@@ -29,6 +29,7 @@ def test_errors_and_gains() -> None:
         ("gain", "winner"): {"value": 1.5, "n": 40, "low": 1.0, "high": 2.0},
         ("horizontal_error_mean", "calibrated-pose"): {"value": 2.5, "n": 40},
         ("clock_offset", "calibration"): {"value": 0.2},
+        ("down_offset", "calibration"): {"value": 0.2, "low": -0.5, "high": 0.9},
     })  # fmt: skip
     seen = overview(
         {"worth_fixing": 2}, gain_share__cause={"value": 0.375},

@@ -87,6 +87,37 @@ def numbers_of(documents: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], 
     return found
 
 
+def causes_told(numbers: Numbers) -> tuple[str, ...]:
+    """The causes of a calibration that have a parameter told from zero; all of them where none has.
+
+    Parameters
+    ----------
+    numbers
+        From `numbers_of`, with those of the calibration and their intervals.
+
+    Returns
+    -------
+    tuple of str
+        Of `CAUSES`. A parameter without an interval counts as told.
+
+    Examples
+    --------
+    >>> size = {"value": -1.1, "low": -2.7, "high": 0.5}
+    >>> both = {("down_offset", "calibration"): size, ("clock_offset", "calibration"): {**size, "high": -1.0}}
+    >>> causes_told(both)
+    ("camera's clock",)
+    """
+    fitted = {name: entry for (name, subject), entry in numbers.items() if subject == "calibration"}
+
+    def told(name: str) -> bool:
+        low, high = fitted[name].get("low"), fitted[name].get("high")
+        return low is None or high is None or not low <= 0 <= high
+
+    there = [cause for cause, names in CAUSES.items() if fitted.keys() & set(names)]
+    named = [cause for cause in there if any(map(told, fitted.keys() & set(CAUSES[cause])))]
+    return tuple(named or there)
+
+
 def gains_of(overview: Overview, numbers: Numbers) -> list[Gain]:
     """Everything that was measured to be worth something, most first.
 
@@ -110,8 +141,7 @@ def _metres(numbers: Numbers) -> Iterable[Gain]:
     # The mean error afterwards is only recorded where the gain is certain.
     if gain is not None and after is not None and _known(gain["value"], after["value"]):
         before = gain["value"] + after["value"]
-        fitted = {name for name, subject in numbers if subject == "calibration"}
-        causes = tuple(cause for cause, names in CAUSES.items() if fitted & set(names))
+        causes = causes_told(numbers)
         low, high = (math.nan if gain[end] is None else float(gain[end]) for end in ("low", "high"))
         share = gain["value"] / before if before > 0 else 0.0
         yield Gain("cause", causes, gain["value"], low, high, "m", before, "mean error", share, "")

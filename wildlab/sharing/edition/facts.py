@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from wildlab.pipeline.overviews.alarms import ALARMS
 from wildlab.pipeline.overviews.overview import TROUBLES
-from wildlab.pipeline.overviews.worth_fixing import CAUSES, WORTH, possible_gain
+from wildlab.pipeline.overviews.worth_fixing import WORTH, causes_told, possible_gain
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -164,8 +164,7 @@ def _lacking(flight: OwnFlight) -> set[str]:
 
 
 def _causes(flight: OwnFlight) -> tuple[str, ...]:
-    fitted = {name for one in flight.reports for name, subject in one.numbers if subject == "calibration"}
-    return tuple(cause for cause, names in CAUSES.items() if fitted & set(names))
+    return causes_told({key: entry for one in flight.reports for key, entry in one.numbers.items()})
 
 
 def _gains(flight: OwnFlight) -> tuple[Gain, ...]:
