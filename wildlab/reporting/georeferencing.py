@@ -13,6 +13,7 @@ from wildlab.evaluation.errors import ErrorSummary, summarise
 from wildlab.evaluation.pose_noise import PoseNoise
 from wildlab.pipeline.accuracy import Accuracy
 from wildlab.pipeline.evaluate import errors_of
+from wildlab.reporting import known_positions as truths
 from wildlab.reporting.report import Report
 
 #: Fewer points than this say little about a flight.
@@ -324,14 +325,19 @@ def assumed_words(stated: Mapping[str, float]) -> str:
     )
 
 
-def noise_table(noise: PoseNoise, stated: Mapping[str, float]) -> pd.DataFrame:
-    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels."""
+def noise_table(
+    noise: PoseNoise, stated: Mapping[str, float], known: truths.KnownPositions = truths.EXACT
+) -> pd.DataFrame:
+    """Assumed and estimated standard deviations, one row each, in degrees, metres and pixels.
+
+    ``known``: what the errors were held against.
+    """
     rows = []
     for kind, (key, label, unit) in _NOISE.items():
         value = np.degrees(noise.sd[kind]) if unit == "deg" else noise.sd[kind]
         rows.append(
             {
-                "what": label,
+                "what": truths.noise_label(label, known),
                 "assumed": stated[key],
                 "estimated": value,
                 "unit": unit,
@@ -351,14 +357,19 @@ def limits_of(
     enough: bool,
     certain: bool = False,
     terrain: bool = False,
+    known: truths.KnownPositions = truths.EXACT,
 ) -> list[str]:
-    """What a report on these points does not tell; ``certain``: a cause gained something for certain."""
-    ground = "an elevation map" if terrain else "the survey of each target" if labelled else "the log"
+    """What a report on these points does not tell; ``certain``: a cause gained something for certain.
+
+    ``known``: what the errors were held against.
+    """
+    ground = "an elevation map" if terrain else truths.ground_words(known) if labelled else "the log"
     missed = int(points["north_m"].isna().sum())
     limits = [
         "Whoever or whatever marked the points is part of these errors; another observer or detector "
         "adds its own.",
         f"The height of the ground was taken from {ground}; where it is not known, the error grows.",
+        *truths.known_limits(known),
     ]
     if np.isfinite(height_m).any():
         limits.insert(

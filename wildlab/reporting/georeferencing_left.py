@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.blocks import Halves
+from wildlab.evaluation.blocks import Halves, Neighbours
 from wildlab.evaluation.ellipses import EllipseVerdict
 from wildlab.evaluation.errors import ErrorSummary, Scatter
 from wildlab.evaluation.outliers import Outlier
 from wildlab.evaluation.sightings import Averaged
 from wildlab.reporting.georeferencing_cause import causes_in_words, listed, metres
+from wildlab.reporting.known_positions import EXACT, KnownPositions, also_own_error
 
 
 def outliers_table(outliers: Sequence[Outlier]) -> pd.DataFrame:
@@ -85,25 +86,40 @@ def remaining_sentence(scatter: Scatter, taken_off: Sequence[str]) -> str:
     )
 
 
-def remaining_parts(scatter: Scatter) -> list[str]:
-    """What the rest of the error is made of, in metres, largest first; nothing where it cannot be told."""
+def remaining_parts(
+    scatter: Scatter, known: KnownPositions = EXACT, neighbours: Neighbours | None = None
+) -> list[str]:
+    """What the rest of the error is made of, in metres, largest first; nothing where it cannot be told.
+
+    ``known``: what the errors were held against; ``neighbours``: how alike images are that follow each other,
+    as far as that is known.
+    """
     if not np.isfinite(scatter.whole_m):
         return []
     bias, image, within = scatter.parts_m
     parts = [
         (
             image,
-            f"**The pose of each image**, {metres(image)}, that all points of an image share and the next "
-            "image does not.",
+            f"**The pose of each image**, {metres(image)}, that all points of an image "
+            f"share{_next_image(neighbours)}.",
         ),
         (
             within,
             f"**Single points**, {metres(within)}, that differs from point to point in an image: marking, "
-            "lens, uneven ground.",
+            f"lens, uneven ground{also_own_error(known)}.",
         ),
         (bias, f"**The same in north and east for all images**, {metres(bias)}."),
     ]
     return [text for _, text in sorted(parts, key=lambda part: -part[0])]
+
+
+def _next_image(neighbours: Neighbours | None) -> str:
+    """Whether the next image shares what an image has in common, as measured; nothing where it was not."""
+    if neighbours is None or not np.isfinite(neighbours.correlation):
+        return ""
+    if neighbours.alike:
+        return f", and in part the next image too (correlation {neighbours.correlation:.2f})"
+    return " and the next image does not"
 
 
 def ellipse_sentence(verdict: EllipseVerdict) -> str:

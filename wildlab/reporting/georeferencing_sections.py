@@ -16,6 +16,7 @@ from wildlab.reporting import georeferencing_cause as cause
 from wildlab.reporting import georeferencing_left as left
 from wildlab.reporting.arrange import ADVICE
 from wildlab.reporting.ground import ground_height_words
+from wildlab.reporting.known_positions import EXACT, KnownPositions
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import percent
 
@@ -177,21 +178,34 @@ def _far_out(report: Report, diagnosis: Diagnosis) -> None:
     )
 
 
-def left_section(report: Report, found: Accuracy, more: Sequence[str] = ()) -> None:
-    """What the errors are made of once the cause is taken off, what averaging gained, and ``more``."""
+def left_section(
+    report: Report, found: Accuracy, more: Sequence[str] = (), known: KnownPositions = EXACT
+) -> None:
+    """What the errors are made of once the cause is taken off, what averaging gained, and ``more``.
+
+    ``known``: what the errors were held against.
+    """
     diagnosis = found.diagnosis
     taken = diagnosis.winner.causes if diagnosis is not None and diagnosis.counts else ()
     said, parts = left.averaging_sentence(found.averaged), list(more)
     if found.summary.n:
         said = " ".join(filter(None, (left.remaining_sentence(found.remaining, taken), said)))
-        parts = [*left.remaining_parts(found.remaining), *parts]
+        parts = [
+            *left.remaining_parts(found.remaining, known, diagnosis.neighbours() if diagnosis else None),
+            *parts,
+        ]
     if parts:
         report.section("What is left", said, part=ADVICE)
         report.points(parts, ordered=True)
 
 
-def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) -> None:
-    """The verdict on the ellipses, what they come from, and what noise the errors themselves tell."""
+def ellipse_section(
+    report: Report, found: Accuracy, *, learnt_elsewhere: bool, known: KnownPositions = EXACT
+) -> None:
+    """The verdict on the ellipses, what they come from, and what noise the errors themselves tell.
+
+    ``known``: what the errors were held against.
+    """
     if not found.summary.n:
         return
     own = found.observations.poses.covariance is not None and not learnt_elsewhere
@@ -218,7 +232,7 @@ def ellipse_section(report: Report, found: Accuracy, *, learnt_elsewhere: bool) 
         "with a factor near 3 is one the data could not decide; it stays near what was assumed."
     )
     report.table(
-        words.noise_table(found.noise, found.assumed),
+        words.noise_table(found.noise, found.assumed, known),
         columns={
             "what": "standard deviation of",
             "assumed": "used above",
