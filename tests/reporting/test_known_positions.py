@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 
 from wildlab.evaluation.blocks import Neighbours
-from wildlab.evaluation.errors import Scatter
+from wildlab.evaluation.errors import Scatter, summarise
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.reporting import georeferencing as words
 from wildlab.reporting import georeferencing_left as left
-from wildlab.reporting.known_positions import EXACT, known_positions
+from wildlab.reporting.georeferencing_sections import summary_section
+from wildlab.reporting.known_positions import EXACT, known_positions, offset_sentence
 
 SCATTER = Scatter(0.1, 0.3, 0.6, *(np.array([a, a]) for a in (0.6, 3.0, 1.2)))
 
@@ -78,3 +79,27 @@ def test_clicks_and_lens_are_not_blamed_for_the_target_s_receiver():
 def test_whether_the_next_image_shares_an_error_is_what_was_measured(neighbours, there, not_there):
     said = " ".join(left.remaining_parts(SCATTER, EXACT, neighbours))
     assert there in said and not_there not in said
+
+
+def corrected(offset, kind="logged"):
+    clocks = SimpleNamespace(camera_offset_s=offset)
+    return offset_sentence(SimpleNamespace(manifest=SimpleNamespace(kind=kind, clocks=clocks)))
+
+
+def test_an_offset_of_the_camera_s_clock_is_said_to_flatter():
+    assert "corrected by +1.58 s beside a zone of -12.75 h" in corrected(-45898.42)
+    assert "corrected by -0.40 s, and nothing says" in corrected(-0.4) and "flatter" in corrected(-0.4)
+    # A zone is read from the hours of the flight, and no point is fitted.
+    assert corrected(0.0) == corrected(-45900.0) == corrected(0.4, "twin") == ""
+
+
+@pytest.mark.parametrize("clock", ["The clock was corrected.", ""])
+def test_the_first_sentences_have_the_offset(clock):
+    found = SimpleNamespace(
+        summary=summarise(np.ones((20, 2))), scored=range(20), diagnosis=None, lost=0,
+        ellipses=SimpleNamespace(word="honest"),
+    )  # fmt: skip
+    said = []
+    report = SimpleNamespace(summary=lambda sentences, **_: said.extend(sentences))
+    summary_section(report, found, clock=clock)
+    assert said[1:] == [one for one in [clock] if one]

@@ -21,7 +21,9 @@ from wildlab.reporting.report import Report
 from wildlab.reporting.text import percent
 
 
-def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = ()) -> None:
+def summary_section(
+    report: Report, found: Accuracy, applied: str = "", amiss: Sequence[str] = (), clock: str = ""
+) -> None:
     """The summary: how far off, how many points are lost, the cause and what to do.
 
     Parameters
@@ -34,10 +36,14 @@ def summary_section(report: Report, found: Accuracy, applied: str = "", amiss: S
         What is to be said of the calibration that was applied, where one was.
     amiss
         What does not fit together in the flight: `wildlab.flight.checks.sense.sense.sense_sentences`.
+    clock
+        What is to be said of the offset of the camera's clock that was applied, where one was.
     """
     logged, total, diagnosis = found.summary, len(found.scored), found.diagnosis
     said, lost = words.headline(logged, total), cause.lost_sentence(found.lost, total)
     said = [lost, *said] if found.lost > cause.MANY_LOST * total else [*said, lost]
+    if logged.n:
+        said.append(clock)
     if diagnosis is not None and logged.n >= words.FEW:
         unsure = cause.ambiguity_sentence(diagnosis, found.unambiguous)
         said.append(cause.cause_sentence(diagnosis))

@@ -107,3 +107,32 @@ def ground_words(known: KnownPositions) -> str:
     if known.tracked and known.marked:
         return "the survey of the marks and the receiver's track of each other target"
     return "the receiver's track of each target" if known.tracked else "the survey of each target"
+
+
+#: Zones are whole quarters of an hour, s.
+ZONE_S = 900.0
+
+
+def offset_sentence(flight: Flight) -> str:
+    """That an offset of the camera's clock was applied, which flatters where it was fitted on these points.
+
+    Parameters
+    ----------
+    flight
+        Its manifest has the offset, and does not say where it came from.
+
+    Returns
+    -------
+    str
+        Nothing for a simulated flight, without an offset, and where it is a zone alone.
+    """
+    offset = flight.manifest.clocks.camera_offset_s
+    zone = ZONE_S * round(offset / ZONE_S)
+    if flight.manifest.kind == "twin" or abs(offset - zone) < 1e-6:
+        return ""
+    beside = f" beside a zone of {zone / 3600:+g} h" if zone else ""
+    return (
+        f"The camera's clock was corrected by {offset - zone:+.2f} s{beside}, and nothing says where that "
+        "came from. If it was fitted on these same points, as what `wildlab check` proposes is, these "
+        "figures flatter: another flight would tell."
+    )

@@ -78,10 +78,22 @@ class Coverage(NamedTuple):
 
 
 def ground_height(flight: Flight) -> tuple[float, str] | None:
-    """Down coordinate of level ground, and where it is from: the truth, else the detections; None without."""
+    """Down coordinate of level ground, and where it is from: the truth, else the detections; None without.
+
+    Of a truth it is the mean of the points that never move, as an import has it, and the tracks of targets,
+    whose heights are a receiver's, only where there are none.
+    """
     truth, detections = flight.truth, flight.detections
     if truth is not None and np.isfinite(truth["down_m"]).any():
-        return float(np.nanmedian(truth["down_m"])), "level ground at the median height of the truth"
+        known = truth[np.isfinite(truth["down_m"])]
+        fixed = known[known["time_s"].isna()]
+        if len(fixed):
+            what = "surveyed point" if flight.manifest.kind == "logged" else "fixed point"
+            words = f"level ground at the mean height of {len(fixed)} {what}{'' if len(fixed) == 1 else 's'}"
+            return float(fixed["down_m"].mean()), words
+        tracks = known["target_id"].nunique()
+        of = "the track of one target" if tracks == 1 else f"the tracks of {tracks} targets"
+        return float(known["down_m"].median()), f"level ground at the median height of {of}"
     if detections is not None and "plane_down_m" in detections:
         stated = detections["plane_down_m"].to_numpy(float)
         if np.isfinite(stated).any():
