@@ -42,8 +42,10 @@ def test_a_rival_that_holds_all_that_is_named_is_no_other_explanation():
     found = diagnosis(BOTH, same, other, rivals=(same,))
     found = replace(found, calibration=SURE.calibration)
     assert "explaining it as well" not in cause.cause_sentence(found)
+    assert "what else has a part" in cause.advice(found, True)
     found = replace(diagnosis(BOTH, same, other, rivals=(other,)), calibration=SURE.calibration)
     assert "explaining it as well, of the position" in cause.cause_sentence(found)
+    assert "which of these it is" in cause.advice(found, True)
 
 
 @pytest.mark.parametrize("high", [0.5, -0.1])

@@ -168,8 +168,7 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
         )
     told = causes_told(diagnosis)
     what, it = causes_in_words(told), "it"
-    # One that holds all that is named does not explain it by something else.
-    if others := [one for one in simplest_rivals(diagnosis) if not set(told) <= set(one)]:
+    if others := _others(diagnosis):
         what += f" or, explaining it as well, of {listed([causes_in_words(one) for one in others], 'or')}"
         it = "the first"
     digits = 1 if min(gain.without, gain.with_) >= 0.95 and abs(gain.gain.estimate) >= 0.95 else 2
@@ -208,6 +207,12 @@ def simplest_rivals(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     rivals = [one for one in diagnosis.rivals if one.causes and one.causes != diagnosis.winner.causes]
     simple = [one for one in rivals if not any(set(other.causes) < set(one.causes) for other in rivals)]
     return [one.causes for one in sorted(simple, key=lambda one: one.gain.with_)][:2]
+
+
+def _others(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """Rivals that explain it by something else: one that holds all that is named does not."""
+    told = set(causes_told(diagnosis))
+    return [one for one in simplest_rivals(diagnosis) if not told <= set(one)]
 
 
 def neighbours_sentence(neighbours: Neighbours) -> str:
@@ -260,6 +265,9 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
         said.append(
             "Images from other heights, speeds and directions would tell which of these it is; there the "
             "wrong one, taken off, does harm."
+            if learnt_here and _others(diagnosis)
+            else "Images from other heights, speeds and directions would tell what else has a part in it: what "
+            "these do not tell from zero, taken off there, may do harm."
             if learnt_here and simplest_rivals(diagnosis)
             else "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
