@@ -266,8 +266,8 @@ def advice(diagnosis: Diagnosis, learnt_here: bool) -> str:
             "Images from other heights, speeds and directions would tell which of these it is; there the "
             "wrong one, taken off, does harm."
             if learnt_here and _others(diagnosis)
-            else "Images from other heights, speeds and directions would tell what else has a part in it: what "
-            "these do not tell from zero, taken off there, may do harm."
+            else "Images from other heights, speeds and directions would tell what else has a part in it: "
+            "what these do not tell from zero, taken off there, may do harm."
             if learnt_here and simplest_rivals(diagnosis)
             else "Keep it with `wildlab calibrate`, and judge it on another flight with `--calibration`."
             if learnt_here
