@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -69,22 +69,22 @@ def test_two_places_give_the_same_copy_where_the_place_is_withheld() -> None:
 def test_two_days_of_a_month_give_the_same_copy() -> None:
     one, other = made(canary()), made(canary(epoch=datetime(2023, 9, 2, 3, 0, 0, tzinfo=UTC)))
     assert one.flight.manifest == other.flight.manifest
-    assert one.when == other.when == "September 2023"
+    assert one.when == other.when == "September 2023 (UTC)"
     for name, values in numbers_of(one.flight).items():
         np.testing.assert_array_equal(values, numbers_of(other.flight)[name])
 
 
 def test_the_day_is_told_only_where_the_table_says_so() -> None:
     flight = canary(locations={"category": 3})
-    assert made(flight, "public").when == "September 2023"
-    assert made(flight, "partner").when == "17 September 2023"
+    assert made(flight, "public").when == "September 2023 (UTC)"
+    assert made(flight, "partner").when == "17 September 2023 (UTC)"
     assert made(flight, "partner").flight.manifest.time.epoch == datetime(2023, 9, 17, tzinfo=UTC)
     assert made(flight).flight.manifest.time.epoch == datetime(2023, 9, 1, tzinfo=UTC)
 
 
 def test_a_flight_over_midnight_has_the_date_of_its_first_sample() -> None:
     # The epoch is a month before the first sample.
-    assert made(canary(epoch=datetime(2023, 8, 31, 23, 0, tzinfo=UTC))).when == "September 2023"
+    assert made(canary(epoch=datetime(2023, 8, 31, 23, 0, tzinfo=UTC))).when == "September 2023 (UTC)"
 
 
 @pytest.mark.parametrize("category", [1, 2, 3, 4])
@@ -156,6 +156,21 @@ def test_a_field_of_which_nothing_is_stated_is_left_out() -> None:
     assert "magnetometer" not in found.flight.tables
     assert found.flight.manifest.magnetometer.declination_deg is None
     assert any(one.what == "table" and one.was == "magnetometer" for one in found.removed)
+
+
+def test_the_day_is_that_of_the_aircrafts_first_pose() -> None:
+    """A tracker on the ground that was started before midnight moves no flight to the day before."""
+    midnight = datetime(2023, 9, 17, tzinfo=UTC)
+    flight = canary(epoch=midnight - timedelta(seconds=START - 60), locations={"category": 3})
+    truth = flight.table("truth")
+    early = truth.iloc[:1].assign(time_s=START - 180 - flight.manifest.clocks.truth_offset_s)
+    flight.tables["truth"] = pd.concat([early, truth], ignore_index=True)
+    moment = midnight + timedelta(seconds=first_stamp(flight) - START + 60)
+    assert moment.day == 16, "the first stamp is of the day before"
+    copy = made(flight, "partner")
+    assert copy.when == "17 September 2023 (UTC)"
+    assert copy.flight.manifest.time.epoch == midnight
+    assert first_stamp(copy.flight) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path: Path) -> None:

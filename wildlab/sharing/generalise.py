@@ -52,7 +52,8 @@ class Generalised:
     cell
         None where the place is withheld.
     when
-        ``"May 2024"``, ``"3 May 2024"``, or nothing where the log knows no date.
+        ``"May 2024 (UTC)"``, ``"3 May 2024 (UTC)"``: the day on which the aircraft's poses begin. Nothing
+        where the log knows no date.
     names
         Neutral names by the true ones.
     removed
@@ -114,7 +115,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         tables[key] = table.drop(columns="time_onboard_s", errors="ignore")
     field = manifest.magnetometer.hard_iron_ut
     iron = None if field is None or "magnetometer" not in tables else tuple(stretch * one for one in field)
-    epoch, when = _date(manifest, start, treatment)
+    epoch, when = _date(manifest, first_pose(flight), treatment)
     data = _manifest(manifest, names, clocks, name)
     data["origin"] = {"latitude_deg": there[0], "longitude_deg": there[1], "height_m": 0.0}
     data["time"] = {"kind": manifest.time.kind} | ({"epoch": epoch} if epoch else {})
@@ -168,6 +169,15 @@ def first_stamp(flight: Flight) -> float:
     return float(min(stamps, default=0.0))
 
 
+def first_pose(flight: Flight) -> float:
+    """When the aircraft's own poses begin, in flight time, s; without any, the first stamp of all tables.
+
+    What others carried is often started before take-off, and midnight may lie between.
+    """
+    stamps = [nav["time_s"].min() for nav in flight.nav.values() if nav["time_s"].notna().any()]
+    return float(min(stamps)) if stamps else first_stamp(flight)
+
+
 def neutral_learnt(learnt: Learnt) -> Learnt:
     """A calibration from another flight, without that flight's name and what it is told by."""
     data = learnt.model_dump(exclude_none=True)
@@ -205,13 +215,13 @@ def _moved(table: pd.DataFrame, shift: Array, start: float) -> pd.DataFrame:
     return table.assign(**changed)
 
 
-def _date(manifest: Manifest, start: float, treatment: Treatment) -> tuple[datetime | None, str]:
+def _date(manifest: Manifest, began: float, treatment: Treatment) -> tuple[datetime | None, str]:
     """The epoch of the copy, and the date in words."""
     if manifest.time.epoch is None:
         return None, ""
-    true = datetime.fromtimestamp(manifest.time.epoch.timestamp() + start, UTC)
+    true = datetime.fromtimestamp(manifest.time.epoch.timestamp() + began, UTC)
     day = true.day if treatment.date == "day" else 1
-    words = f"{true:%B %Y}"
+    words = f"{true:%B %Y} (UTC)"
     return datetime(
         true.year, true.month, day, tzinfo=UTC
     ), f"{day} {words}" if treatment.date == "day" else words

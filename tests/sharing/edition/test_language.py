@@ -79,9 +79,9 @@ def test_translations_are_translated() -> None:
         ("sv", Quantity("area", 2.5e6), "2,5 km²"),
         ("en", Quantity("angle", 3.141592653589793), "180 degrees"),
         ("en", Quantity("number", -12.0), "−12"),
-        ("en", Day(date(2026, 3, 14), True), "14 March 2026"),
-        ("nb", Day(date(2026, 3, 14), True), "14. mars 2026"),
-        ("sv", Day(date(2026, 3, 14), False), "mars 2026"),
+        ("en", Day(date(2026, 3, 14), True), "14 March 2026 (UTC)"),
+        ("nb", Day(date(2026, 3, 14), True), "14. mars 2026 (UTC)"),
+        ("sv", Day(date(2026, 3, 14), False), "mars 2026 (UTC)"),
     ],
 )  # fmt: skip
 def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
