@@ -257,7 +257,8 @@ def _sheet(drawn: Redrawn, name: str, treatment: Treatment, words: Language) -> 
     made = drawn.made
     place = Place("withheld")
     if made.cell is not None:
-        place = Place("generalised", made.cell.uncertainty_m)
+        middle = made.cell.latitude_deg, made.cell.longitude_deg
+        place = Place("generalised", made.cell.uncertainty_m, middle_deg=middle)
     epoch = made.flight.manifest.time.epoch
     day = None if epoch is None else Day(epoch.date(), treatment.date == "day")
     return edition_html(

@@ -59,7 +59,7 @@ def longest_story(language: Language) -> Story:
     why = longest(language, "lost.cause", "why.", "alarm.")[0]
     tiles = longest(language, "tile.")
     return Story(
-        longest(language, "verdict.")[0], why, longest(language, "next.")[0], False,
+        longest(language, "verdict.")[0], why, longest(language, "next.", "do.")[0], False,
         tuple((length(8888.8), one) for one in (*tiles, tiles[0])), longest(language, "measured."),
         (*longest(language, "alarm.", "trouble.", "lost.", "wrong."), MORE),
         (*longest(language, "do."), MORE),
@@ -100,7 +100,8 @@ def test_the_longest_texts_of_a_language_fit_one_sheet(
     facts = WHOLE._replace(twin=True, verdict="went wrong")
     for picture in (MAP, None):
         html = edition_html(
-            facts, name="a-flight-with-a-long-name", place=Place("generalised", 11_100.0, "x" * 120),
+            facts, name="a-flight-with-a-long-name",
+            place=Place("generalised", 11_100.0, "x" * 120, (-58.755, -116.455)),
             day=Day(date(2026, 9, 30), True), picture=picture, language=language,
         )  # fmt: skip
         assert sheets(pages(html)) == 1
@@ -162,14 +163,22 @@ def test_names_are_harmless() -> None:
 
 
 def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
-    told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded."))
-    assert "within 1.6\u00a0km" in told and "Rounded." in told and "2026" not in told
+    told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded.", (-24.9, 31.5)))
+    assert "near 24.9° S, 31.5° E, and up to 1.6\u00a0km from that point" in told
+    assert "Rounded." in told and "2026" not in told
     month = edition_html(WHOLE, name="f", place=Place("withheld"), day=Day(date(2026, 3, 14), False))
     assert (
         "March 2026" in month
         and "14" not in re.sub(r"<style>.*?</style>", "", month, flags=re.S).split("<h1>")[0]
     )
     assert "left out on purpose" in month
+    # A distance from what is not shown says nothing.
+    nowhere = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0))
+    assert "left out on purpose" in nowhere and "1.6" not in nowhere.partition("<main>")[2]
+    norwegian = edition_html(
+        WHOLE, name="f", place=Place("generalised", 920.0, "", (58.66, -16.4)), language="nb"
+    )
+    assert "58,66° N, 16,4° V" in norwegian
 
 
 def test_what_is_not_translated_is_said(tmp_path: Path) -> None:

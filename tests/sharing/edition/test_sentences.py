@@ -32,10 +32,13 @@ def test_a_flight_of_which_all_is_known() -> None:
     assert keys(story.measured) == ["measured.error_steps", "measured.track", "measured.things"]
     assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose"]
     assert keys(story.wrong) == ["trouble.few_satellites", "lost.images_without_pose"]
-    assert story.trusted and story.verdict.key == "verdict.fix" and story.next.key == "next.fix_error"
+    assert story.trusted and story.verdict.key == "verdict.fix" and story.next == story.advice[0]
     english = load_language()
     assert "3.5 metres (about 5 steps)" in say(english, story.measured[0]).replace("\u00a0", " ")
-    assert "39%" in say(english, story.next) and "120 of 812" in say(english, story.wrong[1])
+    assert "which way the camera really points" in say(english, story.next) and "39%" in say(
+        english, story.next
+    )
+    assert "120 of 812" in say(english, story.wrong[1])
 
 
 def test_a_flight_of_which_nothing_is_known() -> None:
@@ -88,8 +91,30 @@ def test_a_sound_flight_may_still_gain() -> None:
 def test_what_the_verdict_says_is_not_said_twice() -> None:
     gains = (Gain("images_without_pose", (), 400.0, 812.0, 0.49), *WHOLE.gains[:1])
     story = tell(WHOLE._replace(gains=gains, troubles=()))
-    assert story.next.key == "next.fix_data" and keys(story.wrong) == ["lost.cause"]
+    assert story.next.key == "do.images_without_pose" and keys(story.wrong) == ["lost.cause"]
     assert story.advice[0].key == "do.images_without_pose"
+
+
+def test_what_went_wrong_does_not_contradict_the_verdict() -> None:
+    """That nothing is wrong is said only where the verdict counts nothing."""
+    alone = tell(WHOLE._replace(gains=WHOLE.gains[:1], troubles=()))
+    assert alone.verdict.key == "verdict.fix" and keys(alone.wrong) == ["wrong.above"]
+    possible = Gain("possible", (), 1.0, 4.0, 0.25)
+    look = tell(WHOLE._replace(verdict="look closer", gains=(), troubles=(), possible=possible))
+    assert look.why.key == "why.possible" and keys(look.wrong) == ["wrong.above"]
+    small = tell(WHOLE._replace(verdict="sound", gains=(WHOLE.gains[0]._replace(share=0.04),), troubles=()))
+    assert keys(small.wrong) == ["wrong.small"] and keys(small.advice) == ["do.cause_boresight"]
+    assert keys(tell(WHOLE._replace(verdict="sound", gains=(), troubles=())).wrong) == ["wrong.none"]
+
+
+@pytest.mark.parametrize("verdict", ["sound", "worth fixing"])
+def test_the_verdict_names_what_to_do_or_the_heading_of_the_list(verdict: str) -> None:
+    """It stands far above the list."""
+    gains = tuple(one._replace(share=0.04 if verdict == "sound" else one.share) for one in WHOLE.gains)
+    story = tell(WHOLE._replace(verdict=verdict, gains=gains))
+    for language in LANGUAGES:
+        said, heading = say(language, story.next), str(language.texts["heading.advice"])
+        assert (said == say(language, story.advice[0])) if verdict == "worth fixing" else heading in said
 
 
 @pytest.mark.parametrize(("sure", "said"), [(1.6, True), (1.4, False), (NAN, False)])

@@ -33,11 +33,15 @@ class Place(NamedTuple):
         Of a generalised place, how far off it may be shown, m.
     note
         More on it, in any words; "" for nothing.
+    middle_deg
+        Latitude and longitude of the point that is told for a generalised place; without it no place is
+        told, and the page says what it says of one that is withheld.
     """
 
     kind: str
     uncertainty_m: float = 0.0
     note: str = ""
+    middle_deg: tuple[float, float] | None = None
 
 
 def edition_html(
@@ -100,7 +104,7 @@ def edition_html(
         _section(said, "heading.advice", story.advice or (Said("next.nothing"),), ranked=True),
         _section(said, "heading.unknown", story.unknown),
         "</div>",
-        f'<p class="place">{_place(place, said)}</p>',
+        f'<p class="place">{_place(place, words, said)}</p>',
         "</main>",
         f"<footer><p>{said(Said('page.footer'))} {_untranslated(words, said)}</p></footer>",
     ]
@@ -136,10 +140,25 @@ def _section(said: _Say, heading: str, items: Sequence[Said], *, ranked: bool = 
     return f'<section class="{name}"><h2>{said(Said(heading))}</h2><{tag}>{listed}</{tag}>{below}</section>'
 
 
-def _place(place: Place, said: _Say) -> str:
-    values = {"uncertainty": length(place.uncertainty_m)} if place.kind == "generalised" else {}
+def _place(place: Place, words: Language, said: _Say) -> str:
     note = f" {escape(place.note)}" if place.note else ""
-    return said(Said(f"place.{place.kind}", values)) + note
+    if place.kind != "generalised":
+        return said(Said(f"place.{place.kind}")) + note
+    if place.middle_deg is None:
+        return said(Said("place.withheld")) + note
+    latitude, longitude = place.middle_deg
+    values: dict[str, Value] = {
+        "latitude": _side(latitude, "north", "south", words),
+        "longitude": _side(longitude, "east", "west", words),
+        "uncertainty": length(place.uncertainty_m),
+    }
+    return said(Said("place.generalised", values)) + note
+
+
+def _side(value: float, positive: str, negative: str, words: Language) -> Said:
+    """A coordinate with the letter of its side: all its digits, since these say how coarse it is."""
+    digits = f"{abs(value):.6f}".rstrip("0").rstrip(".").replace(".", str(words.texts["format.decimal"]))
+    return Said(f"format.{positive if value >= 0 else negative}", {"degrees": digits})
 
 
 def _untranslated(words: Language, said: _Say) -> str:

@@ -139,12 +139,12 @@ def _next(facts: Facts, advice: tuple[Said, ...]) -> Said:
     if facts.verdict in (ALARM, MEND, LOOK):
         return Said(f"next.{VERDICTS[facts.verdict]}")
     if facts.verdict == FIX and facts.gains:
-        first = facts.gains[0]
-        what = "next.fix_error" if first.key in ("cause", "far_out") else "next.fix_data"
-        return Said(what, {"share": share(first.share)})
+        # The thing itself: the list stands far below.
+        return _do(facts.gains[0])
+    listed: dict[str, Value] = {"list": Said("heading.advice")}
     if facts.verdict == SOUND:
-        return Said("next.sound_more" if advice else "next.sound")
-    return Said("next.unjudged" if advice else "next.nothing")
+        return Said("next.sound_more", listed) if advice else Said("next.sound")
+    return Said("next.unjudged", listed) if advice else Said("next.nothing")
 
 
 def _tiles(facts: Facts) -> tuple[tuple[Value, Said], ...]:
@@ -220,13 +220,21 @@ def _wrong(facts: Facts) -> tuple[Said, ...]:
         if seconds >= 1 and not (what == "shaken" and "shakes" in told):
             found.append(_trouble(facts, what, seconds))
     # What the verdict says already is not said again, nor what the troubles say of time.
-    for gain in facts.gains[1 if facts.verdict == FIX else 0 :]:
+    gains = facts.gains[1 if facts.verdict == FIX else 0 :]
+    for gain in gains:
         counted = gain.key.startswith(("images", "detections"))
         if counted or (gain.key in ("cause", "far_out") and gain.share >= WORTH):
             found.append(_gained(gain))
+    # Where no trouble says it of the time, the gain does.
+    found = found or [_gained(gain) for gain in gains if gain.share >= WORTH]
     if found:
         return tuple(found)
-    return (Said("wrong.none"),) if facts.verdict is not None else (Said("wrong.unlooked"),)
+    if facts.verdict is None:
+        return (Said("wrong.unlooked"),)
+    if facts.verdict in (FIX, LOOK, ALARM, MEND):
+        return (Said("wrong.above"),)
+    small = bool(facts.gains) or facts.possible is not None
+    return (Said("wrong.small", {"share": share(WORTH)}),) if small else (Said("wrong.none"),)
 
 
 def _gained(gain: Gain) -> Said:
@@ -251,16 +259,7 @@ def _advice(facts: Facts) -> tuple[Said, ...]:
     found = [Said(f"do.{one.what}") for one in facts.alarms]
     if facts.problems:
         found.append(Said("do.problems", {}, facts.problems))
-    for gain in facts.gains:
-        if gain.key != "cause":
-            found.append(Said(f"do.{gain.key}", {"share": share(gain.share)}))
-            continue
-        for cause in gain.causes[:1]:
-            key = cause.replace("'", "").replace(" ", "_")
-            found.append(Said(f"do.cause_{key}" if len(gain.causes) == 1 else "do.causes",
-                              {"share": share(gain.share)}))  # fmt: skip
-        if not gain.causes:
-            found.append(Said("do.causes", {"share": share(gain.share)}))
+    found += [_do(gain) for gain in facts.gains]
     if facts.possible is not None:
         found.append(Said("do.possible", {"gain": length(facts.possible.value)}))
     if not facts.compared and "georeferencing" not in facts.failed:
@@ -270,6 +269,15 @@ def _advice(facts: Facts) -> tuple[Said, ...]:
     if facts.failed:
         found.append(Said("do.failed", {}, len(facts.failed)))
     return tuple(found)
+
+
+def _do(gain: Gain) -> Said:
+    """What to do about one thing."""
+    key = gain.key
+    if key == "cause":
+        one = gain.causes[0].replace("'", "").replace(" ", "_") if len(gain.causes) == 1 else ""
+        key = f"cause_{one}" if one else "causes"
+    return Said(f"do.{key}", {"share": share(gain.share)})
 
 
 def _unknown(facts: Facts) -> tuple[Said, ...]:
