@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +51,18 @@ def test_a_password_comes_from_the_environment_or_is_asked_for_twice(asked: list
     )
     assert [call["password"] for call in asked] == [words, words]
     assert words not in typed.output
+
+
+def test_without_a_terminal_the_variable_is_named(tmp_path: Path) -> None:
+    """In a process of its own session, which has no terminal: one sentence, no warning of Python's."""
+    done = subprocess.run(
+        [sys.executable, "-m", "wildlab", "share", "reports/mine", "--encrypt"],
+        cwd=tmp_path, env={**os.environ, VARIABLE: ""}, stdin=subprocess.DEVNULL, start_new_session=True,
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2 and not done.stdout
+    assert f"there is no terminal to ask for the password at. Put it into {VARIABLE}" in done.stderr
+    assert "Warning" not in done.stderr and "Stopped" not in done.stderr
 
 
 def test_no_option_takes_a_password(asked: list[dict[str, Any]]) -> None:

@@ -124,7 +124,11 @@ def test_a_zip_is_encrypted_and_lists_neutral_names(made: Path) -> None:
         with pytest.raises(RuntimeError):
             zipped.read("flight.html")
         assert b"September 2023" in zipped.read("flight.html", pwd=words.encode())
-    assert words not in copy.told.read_text(encoding="utf-8")
+    told = copy.told.read_text(encoding="utf-8")
+    assert words not in told and "7-Zip" in told and "7-Zip" in "".join(copy.lines)
+    assert "method 99" in told
+    plain = share(made / "reports" / "kifaru-ridge", zipped=True, overwrite=True)
+    assert "7-Zip" not in "".join(plain.lines)
 
 
 @pytest.mark.parametrize(

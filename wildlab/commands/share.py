@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import getpass
 import os
+import warnings
 from pathlib import Path
 
 import click
 
 from wildlab.commands.shared import FILE, FOLDER, terminal_console
+from wildlab.errors import WildlabError
 from wildlab.terminal import shown
 
 #: Where a password may stand that nobody types: never on the command line, which others can see.
@@ -27,7 +30,11 @@ VARIABLE = "WILDLAB_SHARE_PASSWORD"
 @click.option("--flight", type=FOLDER, help="The flight's folder.  [default: found in flights/]")
 @click.option("--out", type=FILE, help="The file to make.  [default: flight-public.html, here]")
 @click.option("--zip", "zipped", is_flag=True, help="A zip with a page for each flight and study.")
-@click.option("--encrypt", is_flag=True, help=f"A zip with a password: asked for, or in {VARIABLE}.")
+@click.option(
+    "--encrypt",
+    is_flag=True,
+    help=f"A zip with a password: asked for, or in {VARIABLE}.",
+)
 @click.option("--edition", help="On one sheet in plain words: en, nb, sv, or a file of texts.")
 @click.option("--overwrite", is_flag=True, help="Replace the copy that is there.")
 def share(
@@ -48,6 +55,9 @@ def share(
     data; then every byte is looked through, and where something is found there is no copy. The team gets
     the reports as they are, without the names of this machine.
 
+    7-Zip, WinZip, Keka and The Unarchiver open what --encrypt makes (AES-256); `unzip`, and often what
+    Windows or macOS has built in, do not.
+
     What was removed is printed, and kept beside the copy in a file for you alone.
 
     \b
@@ -61,9 +71,7 @@ def share(
 
     password = None
     if encrypt:
-        password = os.environ.get(VARIABLE) or click.prompt(
-            "Password", hide_input=True, confirmation_prompt=True
-        )
+        password = os.environ.get(VARIABLE) or _asked()
     made = make(
         report,
         tier,  # type: ignore[arg-type]  # click has checked it
@@ -79,3 +87,26 @@ def share(
         click.echo(line, err=True)
     click.echo(shown(made.told), err=True)
     click.echo(shown(made.file))
+
+
+def _asked() -> str:
+    """The password, typed twice where nobody sees it.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no terminal to type it at.
+    """
+    with warnings.catch_warnings():
+        # Without a terminal it would be read from wherever, and shown.
+        warnings.simplefilter("error", getpass.GetPassWarning)
+        try:
+            typed: str = click.prompt("Password", hide_input=True, confirmation_prompt=True, err=True)
+        except getpass.GetPassWarning:
+            click.echo(err=True)
+            raise WildlabError(
+                "there is no terminal to ask for the password at",
+                f"put it into {VARIABLE}",
+                field="--encrypt",
+            ) from None
+    return typed

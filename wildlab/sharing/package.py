@@ -15,6 +15,12 @@ from wildlab.errors import WildlabError
 
 #: Of every file in a zip: no zip can be older, and this one says nothing of when it was made.
 _TIME = (1980, 1, 1, 0, 0, 0)
+#: For the sender, to be passed on: method 99 is AES, which came to zips late.
+OPENED_WITH = (
+    "It is encrypted with AES-256. 7-Zip, WinZip, Keka and The Unarchiver open it; do not count on what "
+    'Windows or macOS has built in, and `unzip` says "unsupported compression method 99". Tell those who get '
+    "it, and send them the password by another way than the file."
+)
 #: A password is tried offline, as often as whoever has the file can pay for.
 SHORTEST = 12
 

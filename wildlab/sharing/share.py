@@ -23,7 +23,7 @@ from wildlab.sharing.edition.facts import facts_of
 from wildlab.sharing.edition.flight_map import map_of
 from wildlab.sharing.edition.language import Language, load_language
 from wildlab.sharing.edition.said import Day
-from wildlab.sharing.package import aside, check_password, put, refuse_existing, write_zip
+from wildlab.sharing.package import OPENED_WITH, aside, check_password, put, refuse_existing, write_zip
 from wildlab.sharing.redrawn import Redrawn, redraw
 from wildlab.sharing.reports import Source, flight_folder, sources_of
 from wildlab.sharing.scan import Secrets, not_searched, scan
@@ -162,7 +162,7 @@ def share(
             write_zip(made, files, password)
         else:
             (pages / target.name).replace(made)
-        notes = [*left_out, *not_searched(secrets)]
+        notes = [*left_out, *not_searched(secrets), *([] if password is None else [OPENED_WITH])]
         lines = sender_list(
             target.name, [document.told for document in documents], notes, generalised=any(folders)
         )

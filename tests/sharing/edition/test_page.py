@@ -164,7 +164,7 @@ def test_names_are_harmless() -> None:
 
 def test_places_and_days_are_said_as_far_as_they_are_given() -> None:
     told = edition_html(WHOLE, name="f", place=Place("generalised", 1600.0, "Rounded.", (-24.9, 31.5)))
-    assert "near 24.9° S, 31.5° E, and up to 1.6\u00a0km from that point" in told
+    assert "near 24.9° S, 31.5° E, up to 1.6\u00a0km from that point" in told
     assert "Rounded." in told and "2026" not in told
     month = edition_html(WHOLE, name="f", place=Place("withheld"), day=Day(date(2026, 3, 14), False))
     assert (
