@@ -242,6 +242,30 @@ def test_the_report_of_another_flight_of_the_same_name_is_not_replaced(
     assert outcome.state == "done"
 
 
+def test_flights_that_share_marks_and_terrain_alone_are_two(
+    tmp_path: Path, make_flight: Callable[..., Flight]
+) -> None:
+    where: dict[str, Any] = {"notebooks": studies(tmp_path / "notebooks"), "reports": tmp_path / "reports"}
+    raw = {name: {"file": f"{name}.bin", "sha256": name * 64} for name in "abc"}
+    save_flight(make_flight(sources=[raw["a"], raw["b"]]), tmp_path / "monday")
+    evaluate_flight(tmp_path / "monday", **where)
+    # On Tuesday another log, with the same true places of the same marks, and their file.
+    other = make_flight(sources=[raw["b"], raw["c"]])
+    for name, table in (*other.nav.items(), *other.tables.items()):
+        if name != "truth":
+            numbers = [one for one in table if table[one].dtype == float and one[:2] != "q_"]
+            table[numbers] = table[numbers] + 0.25
+    save_flight(other, tmp_path / "tuesday")
+    with pytest.raises(WildlabError, match="share none of the aircraft's tables, and have other raw files"):
+        evaluate_flight(tmp_path / "tuesday", **where)
+    # Imported again with one file more it is the same flight, whatever its tables are now.
+    again = load_flight(tmp_path / "tuesday")
+    more = make_flight(sources=list(raw.values()))
+    save_flight(Flight(more.manifest, again.nav, again.tables), tmp_path / "again")
+    _, outcome = evaluate_flight(tmp_path / "again", **where)
+    assert outcome.state == "done"
+
+
 def several(folder: Path, **more: str) -> Path:
     show = (
         'report.head("Title")\nfrom wildlab.flight.store import load_flight\n'

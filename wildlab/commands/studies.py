@@ -218,18 +218,24 @@ def evaluate(
       wildlab evaluate flights/antenna --source autopilot
       wildlab evaluate flights/wednesday --calibration calibration.toml
     """
-    from wildlab.runner.evaluate import evaluate_flight
+    from wildlab.runner.evaluate import evaluate_flight, left_from_before
 
+    reports = reports_folder(out)
     outcomes = evaluate_flight(
         flight,
         source=source,
         calibration=calibration,
-        reports=reports_folder(out),
+        reports=reports,
         timeout_s=None if timeout is None else timeout * 60,
         console=terminal_console(),
     )
     for outcome in outcomes:
         if outcome.folder is not None:
             click.echo(shown(outcome.folder / "report.html"))
+    for folder in left_from_before(flight, reports):
+        click.echo(
+            f"{shown(folder)} is of an earlier evaluation, and was not made again: flights.html says so.",
+            err=True,
+        )
     if any(outcome.state == "failed" for outcome in outcomes):
         sys.exit(1)

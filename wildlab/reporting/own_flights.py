@@ -53,11 +53,15 @@ class OwnReport(NamedTuple):
 
 
 class OwnFlight(NamedTuple):
-    """A flight with its reports, the overview first; ``kind`` is ``logged`` or ``twin``."""
+    """A flight with its reports, the overview first; ``kind`` is ``logged`` or ``twin``.
+
+    ``earlier`` are reports that the newest evaluation did not make again, or that are of other tables.
+    """
 
     name: str
     kind: str
     reports: tuple[OwnReport, ...]
+    earlier: tuple[OwnReport, ...] = ()
 
     def report(self, about: str) -> OwnReport | None:
         """The report on something, where there is one."""
@@ -136,7 +140,7 @@ def flights_page(flights: Sequence[OwnFlight], comparison: str = "") -> str:
     judged = sum(flight.verdict not in (None, UNJUDGED) for flight in flights)
     parts = [
         "<header><h1>Flights evaluated here</h1>",
-        f'<p class="sub">{len(flights)} flights, {judged} of them judged. '
+        f'<p class="sub">{len(flights)} flight{"s" * (len(flights) != 1)}, {judged} of them judged. '
         '<a href="ledger.html">The ledger of the theses</a> is another page.</p></header>',
     ]
     if flights:
@@ -173,6 +177,8 @@ def _row(flight: OwnFlight) -> str:
         + ("" if one.state == "done" else f" ({escape(one.state)})")
         for one in flight.reports
     )
+    old = ", ".join(f'<a href="{address(one.folder)}">{escape(one.about)}</a>' for one in flight.earlier)
+    links += f'<br><span class="dim">of an earlier evaluation: {old}</span>' if old else ""
     length = duration_words(flight.length_s) if flight.length_s == flight.length_s else NOTHING
     cells = (
         verdict_pill(flight),

@@ -22,9 +22,12 @@ from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
 
+#: Files of a flight that two flights may have in common.
+_SHARED = ("flight", "truth", "terrain", "calibration")
 #: What is judged beside the overview, by how long it takes on a flight of 25 minutes.
 LONGEST_FIRST = ("navigation.ipynb", "tracking.ipynb", "georeferencing.ipynb", "repeat-sightings.ipynb")
 
@@ -152,8 +155,10 @@ def cores() -> int:
 
 
 def refuse_other_flight(folder: Path, report: Path) -> None:
-    """Two flights of one name are told apart by their content: what shares neither a raw file nor a table is
-    another flight.
+    """Two flights of one name are told apart by their content.
+
+    The same flight, perhaps imported again, is one whose raw files are all among the other's, or that has
+    one of the aircraft's tables in common with it. Marks, trackers and terrain are shared by flights.
 
     Parameters
     ----------
@@ -169,19 +174,49 @@ def refuse_other_flight(folder: Path, report: Path) -> None:
     """
     there = read_provenance(report).get("flight") or {}
     mine = provenance_of_flight(folder)
-    old, new = _contents(there), _contents(mine)
-    if old and not old & new:
+    if _contents(there) and not _same(there, mine):
         raise WildlabError(
-            f"there is a report of another flight named {mine['name']!r}: no table and no raw file is the "
-            "same",
+            f"there is a report of another flight named {mine['name']!r}: they share none of the aircraft's "
+            "tables, and have other raw files",
             "give this flight another name in flight.toml, the report another folder with --out, or move the "
             "old report away",
             file=report,
         )
 
 
+def left_from_before(folder: Path, reports: Path) -> list[Path]:
+    """Reports on a flight that its newest evaluation did not make again.
+
+    Parameters
+    ----------
+    folder
+        Of the flight.
+    reports
+        The folder of all reports.
+
+    Returns
+    -------
+    list of Path
+    """
+    name = load_flight(folder).name
+    return [
+        reports / one.folder for own in own_flights(reports, ()) if own.name == name for one in own.earlier
+    ]
+
+
 def _contents(flight: Mapping[str, Any]) -> set[str]:
     return {*flight.get("files", {}).values(), *flight.get("sources", ())}
+
+
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    raw, theirs = set(one.get("sources", ())), set(other.get("sources", ()))
+    if raw and theirs and (raw <= theirs or theirs <= raw):
+        return True
+    carried = [
+        {digest for name, digest in flight.get("files", {}).items() if Path(name).stem not in _SHARED}
+        for flight in (one, other)
+    ]
+    return bool(carried[0] & carried[1])
 
 
 def lacking_for_tracking(flight: Flight, use: Use, source: str | None = None) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from wildlab.flight.manifest import FILE_NAME
 from wildlab.pipeline.overviews.worth_fixing import numbers_of
 from wildlab.reporting.own_flights import OwnFlight, OwnReport
 from wildlab.runner.record.beside import finished_metrics, state_of
@@ -36,6 +37,7 @@ def own_flights(reports: Path, studies: Collection[str]) -> list[OwnFlight]:
         A report that failed is among them; a folder that nothing can be read of is not.
     """
     found: dict[str, list[OwnReport]] = {}
+    made_from: dict[str, dict[str, Any]] = {}
     kinds: dict[str, str] = {}
     for status in sorted(reports.glob("*/status.json")) if reports.is_dir() else []:
         folder = status.parent
@@ -48,13 +50,53 @@ def own_flights(reports: Path, studies: Collection[str]) -> list[OwnFlight]:
         if any(folder.name == f"{study}-{flight['name']}" for study in studies):
             continue  # a study on another flight than its own
         found.setdefault(flight["name"], []).append(_report(folder, flight["name"], provenance))
+        made_from[folder.name] = provenance
         kinds[flight["name"]] = str(flight.get("kind", ""))
     order = list(ABOUT.values())
     flights = []
     for name, ones in sorted(found.items()):
         ones.sort(key=lambda one: (order.index(one.about) if one.about in order else len(order), one.folder))
-        flights.append(OwnFlight(name, kinds[name], tuple(ones)))
+        old = _earlier(ones, made_from)
+        current = tuple(one for one in ones if one.folder not in old)
+        flights.append(OwnFlight(name, kinds[name], current, tuple(one for one in ones if one.folder in old)))
     return flights
+
+
+def _earlier(ones: Sequence[OwnReport], made_from: Mapping[str, Mapping[str, Any]]) -> set[str]:
+    """Folders of reports that are not of the newest evaluation.
+
+    They are older than another report that is made from other tables, or older than the overview, which lists
+    what was evaluated with it and does not list them.
+    """
+    newest = max(ones, key=lambda one: one.finished)
+    tables = _tables(made_from[newest.folder])
+    old = {
+        one.folder
+        for one in ones
+        if one.finished < newest.finished and _differ(_tables(made_from[one.folder]), tables)
+    }
+    overview = next((one for one in ones if one.about == "overview" and one.folder not in old), None)
+    parameters = made_from[overview.folder].get("parameters") if overview is not None else None
+    beside = parameters.get("beside") if isinstance(parameters, dict) else None
+    if overview is None or not isinstance(beside, list):
+        return old
+    known = {"georeferencing", "navigation", "tracking"}
+    return old | {
+        one.folder
+        for one in ones
+        if one.about in known and one.folder not in beside and one.finished < overview.finished
+    }
+
+
+def _differ(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    return bool(one) and bool(other) and one != other
+
+
+def _tables(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """What the tables of a flight are told by; its manifest may be corrected."""
+    flight = provenance.get("flight")
+    files = flight.get("files") if isinstance(flight, dict) else None
+    return {name: one for name, one in files.items() if name != FILE_NAME} if isinstance(files, dict) else {}
 
 
 def _report(folder: Path, flight: str, provenance: dict[str, Any]) -> OwnReport:
