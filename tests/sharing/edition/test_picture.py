@@ -59,6 +59,20 @@ def test_a_point_that_is_far_out_does_not_shrink_the_map() -> None:
     assert max(x for x, _, _ in drawn) - min(x for x, _, _ in drawn) > 60
 
 
+def test_one_who_walked_elsewhere_does_not_shrink_the_map() -> None:
+    """The flight and what was seen set the extent: a tracker may run for long before and after."""
+    path = np.array([[0.0, 0.0], [0.0, 100.0], [50.0, 100.0]])
+    walk = np.stack([np.linspace(0, 3000, 200), np.full(200, 50.0)], axis=1)
+    alone = picture_html(MapPicture(path, NONE, NONE), EMPTY, EN)
+    walked = picture_html(MapPicture(path, NONE, walk), EMPTY, EN)
+    assert circles(walked, "start") == circles(alone, "start")
+    assert 0 < len(circles(walked, "true")) < 10
+    # What is not on the map is not in its legend.
+    assert "really was" in walked
+    away = picture_html(MapPicture(path, NONE, walk + 9000.0), EMPTY, EN)
+    assert not circles(away, "true") and "really was" not in away
+
+
 def test_a_pause_of_the_way_is_not_bridged() -> None:
     path = np.array([[0.0, 0.0], [0.0, 9.0], [NAN, NAN], [9.0, 9.0], [9.0, 0.0]])
     way = re.search(r'class="way" d="([^"]+)"', picture_html(MapPicture(path, NONE, NONE), EMPTY, EN))

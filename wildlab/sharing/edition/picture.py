@@ -133,8 +133,8 @@ def _known(points: Array) -> Array:
 def _map(picture: MapPicture, language: Language) -> str:
     seen, truth = _known(picture.seen), _known(picture.truth)
     path = np.asarray(picture.path, float).reshape(-1, 2)
-    # No point that is kilometres off, of whatever it is, shrinks the rest.
-    near = np.concatenate([_usual(one) for one in (_known(path), seen, truth) if len(one)])
+    # No point that is kilometres off, of whatever it is, shrinks the rest; nor does one who walked elsewhere.
+    near = np.concatenate([_usual(one) for one in (_known(path), seen) if len(one)])
     low, high = near.min(axis=0), near.max(axis=0)
     size = np.maximum(high - low, 5.0)
     room = np.array([HEIGHT - FOOT - 2 * MARGIN, WIDTH - 2 * MARGIN])
@@ -149,7 +149,8 @@ def _map(picture: MapPicture, language: Language) -> str:
     # An inner picture cuts off what is outside of it.
     way = f'<path class="way" d="{_line(place(path))}"/>'
     drawn.append(f'<svg width="{WIDTH:g}" height="{HEIGHT - FOOT:g}">{way}</svg>')
-    drawn += [_dots(place(seen), "seen", 4.2), _dots(place(truth), "true", 3.0)]
+    true = _dots(place(truth), "true", 3.0)
+    drawn += [_dots(place(seen), "seen", 4.2), true]
     begin = _known(path)
     if len(begin):
         x, y = place(begin[:1])[0]
@@ -159,7 +160,7 @@ def _map(picture: MapPicture, language: Language) -> str:
     wide = length(float(size[1]))
     alt = say(language, Said("picture.map_alt", {"way": wide, "seen": number(len(seen))}))
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
-    keys += [("true", "truth")] * bool(len(truth))
+    keys += [("true", "truth")] * bool(true)
     legend = "".join(
         f'<li><i class="{name}"></i>{escape(say(language, Said(f"picture.{key}")))}</li>'
         for name, key in keys
