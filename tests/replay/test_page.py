@@ -39,6 +39,18 @@ def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
 
 
+def test_a_narrow_screen_is_told_what_stands_in_for_it() -> None:
+    """In plain HTML, above the picture and not over it; a wide screen does not see it."""
+    html = page(
+        b"recording",
+        Viewer("0", "var wasm_bindgen = '</script><script>alert(1)//<!--';", b"\0asm and more"),
+        "f",
+    )
+    before = html.partition('<canvas id="canvas"')[0]
+    assert '<p id="narrow">This wants a wide screen' in before and "moving picture" in before
+    assert "#narrow{display:none" in html and "#narrow{display:block}canvas{top:6rem" in html
+
+
 def test_where_the_viewer_is_missing_it_is_said_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

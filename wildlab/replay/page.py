@@ -22,6 +22,9 @@ body{background:#f6f8f9;color:#18222d;font:16px/1.5 system-ui,sans-serif}
 canvas{position:absolute;inset:0;width:100%;height:100%}
 #said{position:absolute;inset:0;display:grid;place-content:center;padding:1.5rem;text-align:center}
 #said p{max-width:34rem;margin:.4rem auto}
+#narrow{display:none;box-sizing:border-box;height:6rem;margin:0;padding:.5rem .8rem;overflow:auto;
+  font-size:14px}
+@media(max-width:44rem){#narrow{display:block}canvas{top:6rem;height:calc(100% - 6rem)}#said{top:6rem}}
 [hidden]{display:none!important}
 """
 
@@ -97,6 +100,8 @@ def page(recording: bytes, viewer: Viewer, name: str) -> str:
         '<meta name="viewport" content="width=device-width,initial-scale=1">',
         '<meta name="referrer" content="no-referrer"><link rel="icon" href="data:,">',
         f"<title>{title}</title><style>{STYLE}</style></head><body>",
+        '<p id="narrow">This wants a wide screen: its panels stand side by side, and are cut off here. The '
+        "moving picture in the flight's report shows the same path on a narrow one.</p>",
         f'<div id="said" role="status"><p><b>{title}</b></p><p>It takes some seconds to open.</p>'
         '<p id="why" hidden></p><noscript><p>This file plays a flight with a script of its own, and they are '
         "off here.</p></noscript></div>",
