@@ -120,6 +120,35 @@ def test_overwriting_takes_a_word(tmp_path: Path):
     assert load_flight(tmp_path / "flight").name == "flight"
 
 
+def write_clamped(card: Path) -> None:
+    """The marks as most programs write placemarks: without a word on what their heights count from."""
+    (card / "marks.csv").unlink()
+    marks = "".join(
+        f"<Placemark><name>{name}</name><Point><coordinates>{lon:.9f},{lat:.9f},12.0</coordinates></Point>"
+        "</Placemark>"
+        for name, (lat, lon) in ((name, geodetic(*where)) for name, where in MARKS.items())
+    )
+    (card / "marks.kml").write_text(
+        f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{marks}</Document></kml>', encoding="utf-8"
+    )
+
+
+def test_marks_without_a_height_are_left_out_with_a_sentence(tmp_path: Path) -> None:
+    write_card(tmp_path / "card")
+    write_clamped(tmp_path / "card")
+    arguments = ["import", str(tmp_path / "card"), "--dry-run", "--zone", "UTC"]
+    result = CliRunner().invoke(wildlab, arguments)
+    assert result.exit_code == 0, result.exception
+    said = " ".join(result.stderr.split())
+    assert f"{len(MARKS)} of {len(MARKS)} heights are not used" in said
+    assert "write <altitudeMode>absolute</altitudeMode>" in said
+    recipe = tomllib.loads(result.stdout)
+    assert "truth" not in recipe and len(recipe["detections"]) == 1
+    stated = CliRunner().invoke(wildlab, [*arguments, "--role", "marks.kml=marks"])
+    assert isinstance(stated.exception, WildlabError)
+    assert "marks.kml is to be 'marks', and has no points that can be used" in str(stated.exception)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -6,15 +6,27 @@ from typing import Any
 
 import numpy as np
 
-from wildlab.flight.card.roles import Choice
+from wildlab.errors import WildlabError
+from wildlab.flight.card.roles import PARTS_SHOWN, Choice
 from wildlab.flight.readers.logs.log import Stream
 
 
 def stream_of(choice: Choice, part: str) -> Stream:
-    """A part that is known to be there."""
+    """A part that a role asks for.
+
+    Raises
+    ------
+    WildlabError
+        Where no row of it can be used, as where a role was stated that the file does not have the data for.
+    """
     stream = choice.found.part(part)
     if stream is None:
-        raise ValueError(f"{choice.found.name} has no {part}")
+        raise WildlabError(
+            f"{choice.found.shown} is to be {choice.role!r}, and has no {PARTS_SHOWN.get(part, part)} that "
+            "can be used",
+            f"say what else it is, or leave it out: --role {choice.found.name}=nothing",
+            field="--role",
+        )
     return stream
 
 

@@ -117,8 +117,10 @@ def _first(one: Found, stated: tuple[str, str] | None) -> Choice:
     if one.log is None:
         return Choice(one, "nothing", one.problem)
     for part, role in (("photos", "images"), ("marks", "marks"), ("clicks", "clicks")):
+        if part in one.log.parts and one.part(part) is None:
+            return Choice(one, "nothing", _useless(one))
         if part in one.log.parts:
-            return Choice(one, role, f"it has {len(one.log.parts[part])} {_PARTS[part]}")
+            return Choice(one, role, f"it has {len(one.log.parts[part])} {PARTS_SHOWN[part]}")
     if one.part("poses") is None and one.part("gnss") is None:
         if one.part("triggers") is not None:
             return Choice(
@@ -128,7 +130,8 @@ def _first(one: Found, stated: tuple[str, str] | None) -> Choice:
     return Choice(one, "", "")
 
 
-_PARTS = {"photos": "images", "marks": "points", "clicks": "pixels"}
+#: What a role needs, in words.
+PARTS_SHOWN = {"photos": "images", "marks": "points", "clicks": "pixels"}
 
 
 def _useless(one: Found) -> str:

@@ -48,5 +48,11 @@ def read(path: Path, data: bytes, zone: str | None = None) -> RawLog:
             f"{ground} of {len(points)} heights are not used: their altitudeMode is not absolute, so that "
             "they count from the ground, or not at all"
         )
+    if not absolute.all():
+        notes.append(
+            f"{int((~absolute).sum())} of {len(points)} points have no height above sea level: where theirs "
+            "count from sea level, write <altitudeMode>absolute</altitudeMode> before <coordinates>; or give "
+            "a table with the columns name, latitude, longitude and height_sea"
+        )
     lost = [f"{others} lines, areas or models: only points are marks"] if others else []
     return marks_log("marks-kml", part, lost, notes)
