@@ -179,6 +179,29 @@ def test_a_report_that_fails_on_the_copy_stops_it(made: Path, monkeypatch: pytes
         share(made / "reports" / "kifaru-ridge")
 
 
+def test_a_report_that_is_not_done_here_need_not_be_in_the_copy(
+    made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It fails there as it did here: the copy says that there is none, and not why."""
+    clean = redrawn.evaluate_flight
+
+    def failed(folder: Path, *, reports: Path, **more: Any) -> list[Outcome]:
+        write_report(reports / "flight-navigation", folder, "<h2>half a report</h2>")
+        lost = Outcome("flight-navigation", "failed", 1.0, "lost near Letaba.")
+        return [*clean(folder, reports=reports, **more), lost]
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", failed)
+    copy = share(made / "reports" / "kifaru-ridge")
+    text = copy.file.read_text(encoding="utf-8")
+    assert "There is no report on navigation: it could not be made." in text
+    assert "half a report" not in text and "Letaba" not in text
+    assert "There is no report on navigation in the copy, as there is none here." in "\n".join(copy.lines)
+    here = made / "reports" / "kifaru-ridge"
+    write_report(made / "reports" / "kifaru-ridge-navigation", made / "flights" / "mine", "x")
+    with pytest.raises(RunFailed, match="flight-navigation could not be made from generalised data"):
+        share(here, overwrite=True)
+
+
 def test_without_its_flight_a_report_is_refused_with_what_to_type(made: Path) -> None:
     (made / "flights").rename(made / "elsewhere")
     with pytest.raises(WildlabError, match=r"wildlab share .*kifaru-ridge --flight FOLDER"):

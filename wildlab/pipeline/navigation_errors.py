@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import chi_square_interval, nees, share_inside
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
+from wildlab.flight.checks.flown import FLYING
 from wildlab.flight.clocks import covariances, gnss_times, poses_at
 from wildlab.flight.store import Flight
 from wildlab.pipeline.navigate import (
@@ -30,7 +31,7 @@ from wildlab.pipeline.navigate import (
     navigate_mekf,
     navigate_observer,
 )
-from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY
+from wildlab.pipeline.navigation_inputs import VELOCITY
 from wildlab.pipeline.receiver import Receiver, receiver_noise
 
 Array = NDArray[np.float64]

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.flown import FLYING
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.schema import LEVER_COLUMNS, SECOND_COLUMNS
 from wildlab.flight.store import Flight
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 POSITION = ["north_m", "east_m", "down_m"]
 VELOCITY = ["v_north_m_s", "v_east_m_s", "v_down_m_s"]
 FIELD = ("field_x_ut", "field_y_ut", "field_z_ut")
-#: Level speed from which an airframe counts as flying, and its course as a heading, m/s.
-FLYING = 8.0
 #: Share of the magnetic field's turning that gyros in the same axes explain at least; it is nearer one.
 TURNED = 0.6
 #: How much wider than the fixes behind it the heading at the start is taken to be.

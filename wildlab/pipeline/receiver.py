@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.flown import FLYING
 from wildlab.flight.clocks import gnss_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.gravity import Earth, local_earth
@@ -21,7 +22,7 @@ from wildlab.navigation.noise import AxisErrors, ImuNoise
 from wildlab.navigation.receiver import Candidate, ReceiverNoise, Scale, SourceNoise, choose, tell
 from wildlab.navigation.scoring import gaussian_log_likelihood, maximise
 from wildlab.navigation.timeline import ImuSamples
-from wildlab.pipeline.navigation_inputs import FLYING, VELOCITY, Inputs, axis_errors, imu_noise, inputs_of
+from wildlab.pipeline.navigation_inputs import VELOCITY, Inputs, axis_errors, imu_noise, inputs_of
 
 Array = NDArray[np.float64]
 

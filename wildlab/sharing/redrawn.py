@@ -15,7 +15,7 @@ from wildlab.flight.store import Flight, save_flight
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
-from wildlab.runner.record.own_flights import own_flights
+from wildlab.runner.record.own_flights import ABOUT, own_flights
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
 from wildlab.sharing.reports import ENDS, Source
@@ -40,6 +40,8 @@ class Redrawn(NamedTuple):
         With the sender's own reports.
     notes
         Sentences for the sender.
+    missing
+        What no report could be made on, in words of the report.
     """
 
     made: Generalised
@@ -47,6 +49,7 @@ class Redrawn(NamedTuple):
     own: OwnFlight
     agreement: Agreement
     notes: tuple[str, ...]
+    missing: tuple[str, ...]
 
 
 def redraw(
@@ -83,7 +86,7 @@ def redraw(
     Raises
     ------
     RunFailed
-        Where a report could not be made again.
+        Where a report could not be made again that is done here.
     """
     made = generalise(flight, treatment, name)
     copy, reports = work / name, work / "reports"
@@ -103,16 +106,19 @@ def redraw(
         notebooks=notebooks,
         console=console,
     )
-    for outcome in outcomes:
-        if outcome.state == "failed":
+    done = {one.name for one in source.folders}
+    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
+    for outcome in failed:
+        if f"{source.name}{outcome.name.removeprefix(name)}" in done:
             why = outcome.reason.rstrip(".")
             raise RunFailed(
                 f"the report {outcome.name} could not be made from generalised data ({why})",
                 "check the flight: wildlab check; then evaluate it and share it again",
                 file=flight.folder,
             )
+    ends = [end for end in ENDS if f"{name}{end}" not in {outcome.name for outcome in failed}]
     folders = {
-        end: reports / f"{name}{end}" for end in ENDS if (reports / f"{name}{end}" / "report.html").is_file()
+        end: reports / f"{name}{end}" for end in ends if (reports / f"{name}{end}" / "report.html").is_file()
     }
     mine = {one.name: one for one in source.folders}
     pairs = {
@@ -120,8 +126,10 @@ def redraw(
     }
     lost = [one for one in mine if mine[one] not in pairs]
     notes = told["notes"] + [f"There is no counterpart of your report {one} in the copy." for one in lost]
+    missing = tuple(ABOUT[end] for end in ENDS if end not in ends)
+    notes += [f"There is no report on {one} in the copy, as there is none here." for one in missing]
     (own,) = own_flights(reports, ())
-    return Redrawn(made, folders, own, compare(pairs, made.names), tuple(notes))
+    return Redrawn(made, folders, own, compare(pairs, made.names), tuple(notes), missing)
 
 
 def _told(source: Source, made: Generalised) -> dict[str, Any]:

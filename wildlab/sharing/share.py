@@ -234,6 +234,7 @@ def _generalised(
     made = drawn.made
     when = f" Flown {'on' if treatment.date == 'day' else 'in'} {made.when}." if made.when else ""
     about = [
+        *(f"There is no report on {one}: it could not be made." for one in drawn.missing),
         "Times count from the first sample, heights from the ground of the flight.",
         "Names of the flight, of targets, files and sensors are replaced by neutral ones, and photographs "
         "are left out.",

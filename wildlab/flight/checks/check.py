@@ -11,6 +11,7 @@ from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
 from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.checks.sense.sense import sense
 from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checksums import manifest_changed
@@ -140,6 +141,7 @@ def usable_for(flight: Flight) -> list[Use]:
         *([] if imu else ["inertial measurements (imu)"]),
         *([] if gnss else ["satellite positions (gnss)"]),
     ]
+    slow = "" if navigation else why_no_start(flight)
     unstated = ""
     if flight.manifest.twin is None and (missing := flight.manifest.imu.unstated_noise()):
         unstated = (
@@ -151,8 +153,8 @@ def usable_for(flight: Flight) -> list[Use]:
         Use("tracking", tracks, tracking or "detections with times, and truth to judge by"),
         Use(
             "navigation",
-            not navigation,
-            f"it lacks {_and(navigation)}" if navigation else f"imu and gnss are there{unstated}",
+            not navigation and not slow,
+            f"it lacks {_and(navigation)}" if navigation else slow or f"imu and gnss are there{unstated}",
         ),
     ]
 
