@@ -186,6 +186,16 @@ def test_where_images_are_looked_for(tmp_path: Path, capsys: Any) -> None:
     ]
 
 
+def test_images_of_a_flight_are_looked_for_in_the_folders_of_a_card(tmp_path: Path) -> None:
+    flight = simulate(Survey(images=4))
+    save_flight(flight, tmp_path / "flight")
+    names = [f"{one}.png" for one in flight.table("frames")["frame_id"]]
+    write_images(tmp_path / "DCIM" / "100CANON", *names[:3], "other.png")
+    write_images(tmp_path / "DCIM" / "101CANON", *names[3:])
+    found = open_session(tmp_path / "flight", tmp_path / "DCIM").images
+    assert sorted(one.name for one in found) == sorted(names)
+
+
 # -- the command, as it is typed
 
 

@@ -35,9 +35,9 @@ def clock(
 ) -> None:
     """Estimate what has to be added to the stamps of FLIGHT's images so that they meet the log.
 
-    With --images, from the motion of the images against the turning that the log has; without, from known
-    points that were seen. --offset takes a number that is known otherwise (F 6.3.3). An offset that does not
-    stand out is said to be uncertain, and --set refuses it.
+    With --images, from the motion of the images against the turning that the log has; without, or where that
+    does not tell it, from known points that were seen. --offset takes a number that is known otherwise (F
+    6.3.3). An offset that does not stand out is said to be uncertain, and --set refuses it.
 
     \b
     Examples:
@@ -83,7 +83,31 @@ def _estimate(flight: Flight, images: Path | None, source: str | None) -> Camera
         return by_points_in_words(flight, source)
     from wildlab.flight.readers.frames import open_frames
 
-    return by_motion_in_words(flight, open_frames(images), source)
+    ids = [] if flight.frames is None else [str(one) for one in flight.frames["frame_id"]]
+    frames = open_frames(images, ids=ids)
+    try:
+        found = by_motion_in_words(flight, frames, source)
+    except WildlabError as error:
+        why = f"By the motion of the images it cannot be told: {error.problem}."
+        other = _by_points(flight, source)
+        if other is None:
+            raise
+    else:
+        why = found.sentence
+        other = None if found.numbers["certain"] else _by_points(flight, source)
+        if other is None or not other.numbers["certain"]:
+            return found
+    return other._replace(sentence=f"{why} So known points are used: {other.sentence}")
+
+
+def _by_points(flight: Flight, source: str | None) -> CameraClock | None:
+    """The estimate from known points; None where there is none."""
+    from wildlab.pipeline.camera_clock import by_points_in_words
+
+    try:
+        return by_points_in_words(flight, source)
+    except WildlabError:
+        return None
 
 
 def _set(flight: Flight, folder: Path, offset: float) -> None:

@@ -25,7 +25,9 @@ TERRAIN = "terrain.tif"
 CALIBRATION = "calibration.toml"
 #: The part of `flight.toml`, and its line.
 PART = "checksums"
-_HEADER = re.compile(rf"^[ \t]*\[[ \t]*{PART}[ \t]*\].*$", re.MULTILINE)
+#: The part on how sensitive places are: stated by hand whenever that is known, so its change is no damage.
+STATED = "locations"
+_HEADERS = {part: re.compile(rf"^[ \t]*\[[ \t]*{part}[ \t]*\].*$", re.MULTILINE) for part in (PART, STATED)}
 _NEXT = re.compile(r"^[ \t]*\[", re.MULTILINE)
 
 
@@ -135,7 +137,8 @@ def accept_changes(folder: Path) -> list[str]:
 
 
 def manifest_changed(folder: Path) -> bool | None:
-    """Whether `flight.toml` is another text than the one that was written; None where that cannot be told.
+    """Whether `flight.toml`, but for its part ``[locations]``, is another text than the one that was written;
+    None where that cannot be told.
 
     Raises
     ------
@@ -144,7 +147,8 @@ def manifest_changed(folder: Path) -> bool | None:
     """
     path = inside(folder, FILE_NAME, file=folder, field=FILE_NAME)
     stated = read_manifest(path).checksums.get(FILE_NAME)
-    return None if stated is None else stated != _of_text(_text(path))
+    text = _text(path)
+    return None if stated is None else stated not in (_of_text(text), _of_whole_text(text))
 
 
 def _text(path: Path) -> str:
@@ -152,12 +156,17 @@ def _text(path: Path) -> str:
 
 
 def _of_text(text: str) -> str:
-    """SHA-256 of a manifest's text but for the checksums."""
+    """SHA-256 of a manifest's text but for the checksums and what is `STATED` of places."""
+    return hashlib.sha256(_without(_without(text), STATED).encode("utf-8")).hexdigest()
+
+
+def _of_whole_text(text: str) -> str:
+    """As `_of_text`, with what is stated of places: so flights were written before that was left out."""
     return hashlib.sha256(_without(text).encode("utf-8")).hexdigest()
 
 
-def _without(text: str) -> str:
-    header = _HEADER.search(text)
+def _without(text: str, part: str = PART) -> str:
+    header = _HEADERS[part].search(text)
     if header is not None:
         rest = _NEXT.search(text, header.end())
         text = text[: header.start()] + (text[rest.start() :] if rest is not None else "")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,6 +12,7 @@ from tests.flight.card.test_images import START, TAKEN, images, own
 from tests.flight.card.test_roles import log
 from wildlab.flight.card.images import clock_of_images
 from wildlab.flight.card.roles import choose_roles
+from wildlab.flight.readers.logs.log import Clock
 from wildlab.flight.time.whole_hours import whole_hours
 
 
@@ -37,6 +40,13 @@ def test_images_a_zone_off_say_what_to_type(hours: float, words: str) -> None:
     assert f"They are {words} the flight's log" in clock.said
     assert f"--camera-offset {-3600.0 * hours:g} " in clock.said
     assert clock.offset_s == 0.0  # whose clock it is nobody knows: it is said, and not done
+    assert "own stamps are in UTC" in clock.said and "one of the two clocks has another zone" in clock.said
+    zoned = images(stamps, stamps)
+    assert zoned.log is not None
+    told = Clock("local time of the zone +13:45")
+    said = clock_of_images(replace(zoned, log=replace(zoned.log, clock=told)), own(), None).said
+    assert "taken for local time of the zone that you gave, +13:45" in said
+    assert "that zone may be wrong (--zone)" in said and "in UTC" not in said
     after = clock_of_images(images(stamps, stamps), own(), -3600.0 * hours)
     assert "another zone" not in after.said
     assert "another zone" not in clock_of_images(images(TAKEN, TAKEN), own(), None).said

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wildlab.errors import WildlabError
 from wildlab.flight.card.found import Found
 from wildlab.flight.card.roles import span_of
+from wildlab.flight.files import printable
 from wildlab.flight.manifest_parts import CameraPart
 from wildlab.flight.readers.logs.log import Stream
 from wildlab.flight.readers.photos.folder import camera_of, of_camera
@@ -176,6 +177,18 @@ def _by_focal_length(photos: Stream, focal_px: float) -> tuple[CameraPart | None
     )
 
 
+#: What the clock of images says of a zone that was stated, in front of it.
+_ZONED = "local time of the zone "
+
+
+def _stated_zone(images: Found) -> str | None:
+    """That the stamps are local time of a zone that the user stated, in words; None where they are not."""
+    clock = None if images.log is None else images.log.clock
+    if clock is None or not clock.base.startswith(_ZONED):
+        return None
+    return f"local time of the zone that you gave, {printable(clock.base.removeprefix(_ZONED))}"
+
+
 def clock_of_images(
     images: Found,
     own: Found | None,
@@ -216,13 +229,17 @@ def clock_of_images(
             return clock
     flown = _flown(own, others)
     if len(utc):
-        said = "The images' own stamps are in UTC." + _added(offset)
+        zone = _stated_zone(images)
+        own_utc = "The images' own stamps are in UTC."
+        said = own_utc if zone is None else f"The images' stamps are taken for {zone}."
+        said += _added(offset)
+        why = "one of the two clocks has another zone" if zone is None else "that zone may be wrong (--zone)"
         taken = (float(utc.min()) + offset, float(utc.max()) + offset)
         if (by := whole_hours(taken, flown)) is not None:
             said += (
                 f" They are {hours_words(by)} {'ahead of' if by < 0 else 'behind'} the flight's log: none "
-                "was taken on it, and with that taken off they were, so one of the two clocks has another "
-                f"zone. Give --camera-offset {offset + by:g} if it is the camera's."
+                f"was taken on it, and with that taken off they were, so {why}. Give --camera-offset "
+                f"{offset + by:g} if it is the camera's."
             )
         return ImageClock("utc", offset, said)
     if not len(wall):

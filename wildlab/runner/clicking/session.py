@@ -16,6 +16,7 @@ from wildlab.files import write_atomic
 from wildlab.flight.files import printable, read_regular, unreadable
 from wildlab.flight.manifest import FILE_NAME
 from wildlab.flight.readers.clicks import clicks as click_files
+from wildlab.flight.readers.frames.below import images_below
 from wildlab.flight.readers.frames.frame import file_name
 from wildlab.flight.readers.frames.image import SUFFIXES
 from wildlab.flight.readers.marks.text_table import guarded
@@ -135,7 +136,8 @@ def open_session(folder: Path, images: Path | None = None) -> Session:
     folder
         Of the flight; or of images, where it holds no flight.
     images
-        Folder of the images; left out, ``images`` in the flight.
+        Folder of the images, or the one above those that a flight's are in; left out, ``images`` in the
+        flight.
 
     Returns
     -------
@@ -150,18 +152,22 @@ def open_session(folder: Path, images: Path | None = None) -> Session:
         raise WildlabError("there is no such folder", "name a flight, or a folder of images", file=folder)
     is_flight = (folder / FILE_NAME).is_file()
     where = images or (folder / "images" if is_flight or (folder / "images").is_dir() else folder)
-    if not is_photos(where):
+    flight = load_flight(folder) if is_flight else None
+    below: list[Path] = []
+    if flight is not None and flight.frames is not None and where.is_dir() and not is_photos(where):
+        below = images_below(where, [str(one) for one in flight.frames["frame_id"]])
+    if not below and not is_photos(where):
         ends = ", ".join(sorted(SUFFIXES))
         fix = f"name the folder of its images with --images; they end in {ends}"
         raise WildlabError("there are no images in this folder", fix, file=where)
     try:
-        files = [one for one in where.iterdir() if one.suffix.lower() in SUFFIXES and one.is_file()]
+        files = below or [one for one in where.iterdir() if one.suffix.lower() in SUFFIXES and one.is_file()]
     except OSError as error:
         raise unreadable(error, where) from None
     files = sorted(files, key=lambda one: (natural_key(one.name), one.name))[:MOST_IMAGES]
     names: list[str] = []
-    if is_flight:
-        truth = load_flight(folder).tables.get("truth")
+    if flight is not None:
+        truth = flight.tables.get("truth")
         if truth is not None:
             names = [str(one)[:MOST_LETTERS] for one in dict.fromkeys(truth["target_id"]) if str(one)]
     table = table_of(folder)

@@ -17,6 +17,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.files import printable
 from wildlab.flight.readers.frames import image as images
 from wildlab.flight.readers.frames import video as videos
+from wildlab.flight.readers.frames.below import images_below
 from wildlab.flight.readers.frames.cptv import SUFFIX, open_cptv, read_cptv
 from wildlab.flight.readers.frames.frame import Frame, Polarity, frame_name, spoilt
 from wildlab.flight.readers.frames.image import read_image
@@ -250,17 +251,22 @@ class Frames:
             capture.release()
 
 
-def open_frames(path: Path, *, polarity: Polarity = "unknown", even: bool = False) -> Frames:
+def open_frames(
+    path: Path, *, polarity: Polarity = "unknown", even: bool = False, ids: Collection[str] = ()
+) -> Frames:
     """Open a folder of images, one image, or a video.
 
     Parameters
     ----------
     path
-        Folder: its images in the order of their names, no folders below it.
+        Folder: its images in the order of their names. Where it has none itself, those in the folders below
+        it that `ids` names.
     polarity
         Of the camera, where its files do not say it.
     even
         Whether to take off that corners are darker, where the frames tell by how much (`measure_vignetting`).
+    ids
+        What a flight calls its frames: names of files, with or without their endings.
 
     Returns
     -------
@@ -270,11 +276,13 @@ def open_frames(path: Path, *, polarity: Polarity = "unknown", even: bool = Fals
     Raises
     ------
     WildlabError
-        Where there is nothing, or nothing that is an image or a video.
+        Where there is nothing, or nothing that is an image or a video; as `images_below`.
     """
     kinds = ", ".join(sorted(images.SUFFIXES | videos.SUFFIXES | {SUFFIX}))
     if path.is_dir():
         found = sorted(one for one in path.iterdir() if one.suffix.lower() in images.SUFFIXES)[:MOST_FILES]
+        if not found and ids:
+            found = images_below(path, ids)
         if not found:
             clips = sorted(
                 one.name for one in path.iterdir() if one.suffix.lower() in videos.SUFFIXES | {SUFFIX}

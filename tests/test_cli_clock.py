@@ -1,0 +1,64 @@
+"""`wildlab clock`: what is used where the motion of the images does not tell the offset."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from tests.clicking import write_images
+from tests.pipeline.survey_twin import Survey, simulate
+from wildlab.cli import wildlab
+from wildlab.errors import WildlabError
+from wildlab.flight.store import save_flight
+from wildlab.pipeline import camera_clock
+from wildlab.pipeline.camera_clock import CameraClock
+
+
+def clock(sentence: str, certain: bool) -> CameraClock:
+    return CameraClock({"certain": certain, "method": sentence}, pd.DataFrame(), f"{sentence} say so.")
+
+
+@pytest.mark.parametrize(
+    ("motion", "points", "said"),
+    [
+        (None, clock("points", True), "cannot be told: no pairs. So known points are used: points say so."),
+        (clock("motion", False), clock("points", True), "motion say so. So known points are used: points"),
+        (clock("motion", False), clock("points", False), "motion say so."),
+        (clock("motion", True), clock("points", True), "motion say so."),
+        (clock("motion", False), None, "motion say so."),
+        (None, None, "no pairs"),
+    ],
+)
+def test_known_points_tell_it_where_motion_does_not(
+    motion: CameraClock | None,
+    points: CameraClock | None,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    save_flight(simulate(Survey(images=4)), tmp_path / "flight")
+    write_images(tmp_path / "images", "a.png")
+
+    def estimate(found: CameraClock | None, problem: str) -> Any:
+        def told(*_: Any) -> CameraClock:
+            if found is None:
+                raise WildlabError(problem, "fly longer")
+            return found
+
+        return told
+
+    monkeypatch.setattr(camera_clock, "by_motion_in_words", estimate(motion, "no pairs"))
+    monkeypatch.setattr(camera_clock, "by_points_in_words", estimate(points, "no points"))
+    call = ["clock", str(tmp_path / "flight"), "--images", str(tmp_path / "images"), "--json"]
+    ran = CliRunner().invoke(wildlab, call)
+    if motion is None and points is None:
+        assert isinstance(ran.exception, WildlabError) and ran.exception.problem == said
+        return
+    told = json.loads(ran.stdout)["sentence"]
+    assert said in told
+    assert ("points" in told) == (told != "motion say so.")
