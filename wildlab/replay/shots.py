@@ -71,7 +71,7 @@ def read_shots(
     WildlabError
         Where the folder is not there, or holds no image of these frames.
     """
-    frames = open_frames(folder, ids=ids)
+    frames = open_frames(folder, ids=[str(one) for one in ids])
     names: Iterable[str]
     if frames.files:
         names = [file_name(path) for path in frames.files]
