@@ -22,6 +22,8 @@ from wildlab.geometry.gravity import local_earth
 from wildlab.navigation.strapdown import integrate_strapdown
 from wildlab.navigation.timeline import ImuSamples
 from wildlab.pipeline.georeference import observe
+from wildlab.pipeline.navigation_errors import REFERENCES, reference_of
+from wildlab.pipeline.overviews.overview import PREFERRED
 from wildlab.sharing.generalise import NOWHERE, QUARTER, Generalised, first_stamp, generalise, new_origin
 from wildlab.sharing.tiers import treatment_of
 
@@ -286,3 +288,19 @@ def test_a_flight_without_positions_or_stamps_is_no_trouble() -> None:
     assert found.flight.table("frames")["frame_id"].iloc[0] == "frame-01"
     assert re.fullmatch(r"frame-\d\d", found.flight.table("frames")["frame_id"].iloc[-1])
     assert EPOCH.year == 2023
+
+
+def test_poses_that_a_report_looks_up_keep_their_names() -> None:
+    """By another name they would be held against another reference, and the verdict may turn round."""
+    for name in (*REFERENCES, *PREFERRED):
+        flight = canary()
+        nav = {name: flight.nav["autopilot" if "autopilot" in flight.nav else next(iter(flight.nav))]}
+        assert list(made(dataclasses.replace(flight, nav=nav)).flight.nav) == [name]
+    flight = canary()
+    table = next(iter(flight.nav.values()))
+    both = dataclasses.replace(flight, nav={"truth-payload": table, "autopilot": table, "truth-Jonas": table})
+    copied = made(both).flight
+    assert reference_of(copied) == reference_of(both) == "truth-payload"
+    # Of a name that is somebody's, it stays that it is a truth.
+    assert [name.startswith("truth") for name in copied.nav] == [True, False, True]
+    assert "truth-Jonas" not in copied.nav

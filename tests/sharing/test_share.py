@@ -14,19 +14,20 @@ from typing import Any
 
 import pytest
 import pyzipper
+from bs4 import BeautifulSoup
 
 from tests.sharing.canary import HASH, canary
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
 from wildlab.flight.manifest import manifest_toml
 from wildlab.flight.store import load_flight, save_flight
-from wildlab.reporting.metrics import document, metric
+from wildlab.reporting.metrics import AGAINST, document, metric
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.sharing import redrawn
-from wildlab.sharing.share import share
+from wildlab.sharing.share import BEWARE, share
 
 SECRETS = (
     *("kifaru", "Olifants", "Letaba", "Skukuza", "Jonas", "Kestrel", "Thandi", "873165", "486297", "13.57"),
@@ -236,6 +237,50 @@ def test_numbers_that_differ_are_said(made: Path) -> None:
     copy = share(made / "reports" / "kifaru-ridge")
     assert "Of 1 numbers, 0 are those of the report" in copy.file.read_text(encoding="utf-8")
     assert any("error of logged-pose is 3.315, in the copy 3.25" in line for line in copy.lines)
+
+
+@pytest.mark.parametrize(
+    ("original", "against", "said"),
+    [
+        ("too sure of itself", "truth-payload", 'answers "too sure of itself", and this copy "sound"'),
+        ("sound", "onboard", "compares with onboard, and this copy with truth-payload"),
+        ("sound", "truth-payload", ""),
+        # Of before it was recorded.
+        ("sound", "", ""),
+    ],
+)
+def test_a_copy_that_says_otherwise_says_so_at_its_top(
+    original: str, against: str, said: str, made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def judged(folder: Path, word: str, reference: str) -> None:
+        path = folder / "report.html"
+        text = path.read_text(encoding="utf-8")
+        pill = f'<p class="verdict"><span class="pill">{word}</span></p>'
+        path.write_text(text.replace("</h1>", f"</h1>{pill}", 1), encoding="utf-8")
+        content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        if reference:
+            content["metrics"].append(metric(name=AGAINST, subject=reference, value=10, unit="1"))
+        write_json(folder / "metrics.json", content)
+
+    clean = redrawn.evaluate_flight
+
+    def evaluate(folder: Path, **given: Any) -> list[Outcome]:
+        outcomes = clean(folder, **given)
+        judged(given["reports"] / "flight", "sound", "truth-payload")
+        return outcomes
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
+    report = made / "reports" / "kifaru-ridge"
+    judged(report, original, against)
+    copy = share(report)
+    top = BeautifulSoup(copy.file.read_text(encoding="utf-8"), "html.parser").select_one("header .sub")
+    assert top is not None and said in top.get_text() and (BEWARE in top.get_text()) == bool(said)
+    if said:
+        assert any(said in line for line in copy.lines)
+        with pytest.raises(RunFailed, match="would not say what your reports say"):
+            share(report, "partner", edition="en")
+    else:
+        assert share(report, "partner", edition="en").file.is_file()
 
 
 def test_nothing_is_overwritten_without_being_asked(made: Path) -> None:

@@ -34,6 +34,9 @@ KINDS = ("logged", "twin", "computed")
 VERDICTS = (*SHARE_VERDICTS, NO_PREMISE, UNDECIDABLE, FITTED)
 NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
+#: The metric that tells by its subject which poses others were held against; its value is at how many times.
+AGAINST = "compared_with"
+
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _SUBJECT = re.compile(r"\S+")
 

@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bs4 import BeautifulSoup
+
+from wildlab.reporting.metrics import AGAINST
 from wildlab.runner.record.beside import finished_metrics
 from wildlab.sharing.names import Names
 
@@ -27,12 +30,15 @@ class Agreement(NamedTuple):
         Greatest difference as a share of the greater number; 0 without any.
     which
         The number that has it, for the sender; "" without any.
+    otherwise
+        Sentences: where a report of the copy says something else than the sender's.
     """
 
     compared: int
     same: int
     worst: float
     which: str
+    otherwise: tuple[str, ...] = ()
 
 
 def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
@@ -51,8 +57,10 @@ def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
     """
     compared = same = 0
     worst, which = 0.0, ""
+    otherwise: list[str] = []
     for mine, theirs in pairs.items():
         here, there = _numbers(mine), _numbers(theirs)
+        otherwise += _otherwise(_said(mine, here), _said(theirs, there))
         for (name, subject), value in here.items():
             other = there.get((name, _neutral(subject, names)))
             if other is None:
@@ -65,7 +73,44 @@ def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
                     difference,
                     f"{mine.name}: {name} of {subject} is {value:.6g}, in the copy {other:.6g}",
                 )
-    return Agreement(compared, same, worst, which)
+    return Agreement(compared, same, worst, which, tuple(otherwise))
+
+
+class _Report(NamedTuple):
+    """What a report asks, what it answers in a word, and what it held its flight against."""
+
+    title: str
+    verdict: str
+    against: tuple[str, ...]
+
+
+def _said(report: Path, numbers: Mapping[tuple[str, str], float]) -> _Report:
+    soup = BeautifulSoup((report / "report.html").read_text(encoding="utf-8"), "html.parser")
+    title, word = soup.h1, soup.select_one("p.verdict .pill")
+    against = tuple(subject for name, subject in numbers if name == AGAINST)
+    return _Report(
+        "" if title is None else title.get_text(" ", strip=True),
+        "" if word is None else word.get_text(" ", strip=True),
+        against,
+    )
+
+
+def _otherwise(mine: _Report, theirs: _Report) -> list[str]:
+    """Where a copy says something else than the report that it was made from."""
+    found = []
+    about = theirs.title.rstrip("?. ") or "a report"
+    if mine.title != theirs.title:
+        found.append(f'One report is called "{mine.title}" in the original, and "{theirs.title}" here.')
+    if mine.verdict != theirs.verdict:
+        found.append(
+            f'To "{about}" the original answers "{mine.verdict or "nothing"}", and this copy '
+            f'"{theirs.verdict or "nothing"}".'
+        )
+    # A report of before it was recorded does not say.
+    if mine.against and mine.against != theirs.against:
+        one, other = (" and ".join(report.against) or "nothing" for report in (mine, theirs))
+        found.append(f'For "{about}" the original compares with {one}, and this copy with {other}.')
+    return found
 
 
 def share_apart(one: float, other: float) -> float:

@@ -8,11 +8,16 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from wildlab.flight.schema import NAV, TABLES
+from wildlab.pipeline.navigation_errors import REFERENCES
+from wildlab.pipeline.overviews.overview import PREFERRED
 
-#: Names that say what a thing is and nothing of where: wildlab's own, and those of kinds of sensors.
+#: Names that say what a thing is and nothing of where: wildlab's own, and those of kinds of sensors. Poses
+#: that a report looks up by name keep it: by another name they would be held against another reference.
 PLAIN = frozenset(
     (
-        *("logged", "autopilot", "truth", "onboard", "mekf", "observer", "ekf", "gnss", "imu", "gimbal"),
+        *REFERENCES,
+        *PREFERRED,
+        *("truth", "mekf", "observer", "ekf", "gnss", "imu", "gimbal"),
         *("detector", "click", "clicks", "camera", "thermal", "infrared", "ir", "visible", "rgb", "optical"),
         *("eo", "radar", "lidar", "ais", "sonar"),
     )
@@ -42,11 +47,18 @@ class Names:
         """
         known = sorted({name for name in names if name} - PLAIN)
         digits = len(str(len(known)))
-        self.by_kind[kind] = {name: f"{kind}-{i:0{digits}d}" for i, name in enumerate(known, start=1)}
+        self.by_kind[kind] = {
+            name: f"{_begins(kind, name)}-{i:0{digits}d}" for i, name in enumerate(known, start=1)
+        }
 
     def of(self, kind: str, name: str) -> str:
         """The neutral name; of nothing, nothing."""
         return name if not name or name in PLAIN else self.by_kind.get(kind, {}).get(name, kind)
+
+
+def _begins(kind: str, name: str) -> str:
+    """What a neutral name begins with; poses that are a twin's own truth are known by it."""
+    return "truth" if kind == "poses" and name.startswith("truth") else kind
 
 
 def learn_names(

@@ -35,6 +35,8 @@ from wildlab.sharing.told import removed_lines, sender_list
 _MOST = 5
 #: What is said of a copy whose flight is as it was.
 _EXACT = "For the team: places, dates and names are the true ones. Do not pass it on."
+#: Before all else, where a copy does not say what the reports it was made from say.
+BEWARE = "Beware: this copy does not say what the original says."
 _WORDS = {"public": "for the public", "partner": "for partners", "team": "for the team"}
 
 
@@ -243,9 +245,15 @@ def _generalised(
         generalisation_words(made.cell, treatment.category),
     ]
     heading = f"{'A flight' if name == 'flight' else name.replace('-', ' ').capitalize()}, {_WORDS[tier]}"
-    chapter = Chapter(
-        heading, place_words(made.cell) + when, tuple(one.strip() for one in about), tuple(parts)
-    )
+    otherwise = drawn.agreement.otherwise
+    if words is not None and otherwise:
+        raise RunFailed(
+            f"the sheet would not say what your reports say: {' '.join(otherwise)}",
+            "share the reports without --edition: they say at their top where they differ",
+            file=source.folders[0],
+        )
+    lead = " ".join([*([BEWARE, *otherwise] if otherwise else []), place_words(made.cell) + when])
+    chapter = Chapter(heading, lead, tuple(one.strip() for one in about), tuple(parts))
     secrets = flight_secrets(flight, made, treatment, source, folder)
     told = f"Flight {source.name}", tuple(_told(drawn, treatment))
     return _Document(
@@ -289,6 +297,7 @@ def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
         yield f"{a.same} of {a.compared} numbers are those of your report, to 0.1 % or better"
     if a.which:
         yield f"the one that differs most ({a.worst:.2g} of it): {a.which}"
+    yield from a.otherwise
     yield from drawn.notes
 
 
