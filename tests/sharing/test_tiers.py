@@ -133,3 +133,9 @@ def test_a_table_that_is_wrong_is_refused(change: tuple[str, str], said: str, tm
     path.write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(WildlabError, match=said):
         load_tiers(path)
+
+
+def test_only_heights_above_the_sea_are_said_to_be_withheld() -> None:
+    """Heights above ground are shown in every copy."""
+    said = generalisation_words(cell_of(-24.9, 31.5, 0.1, 500.0), 2), generalisation_words(None, 1)
+    assert all("heights above sea level" in one and "terrain withheld" in one for one in said)

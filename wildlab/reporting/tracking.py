@@ -390,6 +390,17 @@ def _are(count: int) -> str:
     return "is" if count == 1 else "are"
 
 
+def band_name(name: str, end: str) -> str:
+    """The metric of an end of the band in which the mean of a consistent filter lies.
+
+    Examples
+    --------
+    >>> band_name("nees", "high")
+    'nees_band_high'
+    """
+    return f"{name}_band_{end}"
+
+
 def record(report: Report, rows: pd.DataFrame) -> None:
     """The numbers of every track, for ``metrics.json``."""
     for _, row in rows.iterrows():
@@ -397,8 +408,8 @@ def record(report: Report, rows: pd.DataFrame) -> None:
         for name, unit, low, high, n in (
             ("rmse", "m", None, None, "compared"),
             ("rmse_without", "m", None, None, "without"),
-            ("nees", "1", "nees_low", "nees_high", "compared"),
-            ("nis", "1", "nis_low", "nis_high", "detections"),
+            ("nees", "1", None, None, "compared"),
+            ("nis", "1", None, None, "detections"),
             ("fraction_nees_inside", "1", "inside_low", "inside_high", "compared"),
             ("lag1_autocorrelation", "1", None, None, "detections"),
             ("share_followed", "1", None, None, None),
@@ -407,14 +418,19 @@ def record(report: Report, rows: pd.DataFrame) -> None:
                       "share_followed": "followed"}.get(name, name)  # fmt: skip
             if not np.isfinite(row[column]):
                 continue
+            if name in ("nees", "nis"):
+                # Of a consistent filter; an interval of the value it is not.
+                for end in ("low", "high"):
+                    if np.isfinite(row[f"{name}_{end}"]):
+                        report.metric(band_name(name, end), subject, float(row[f"{name}_{end}"]), "1")
             report.metric(
                 name,
                 subject,
                 float(row[column]),
                 unit,
                 n=None if n is None else int(row[n]),
-                low=None if low is None or name in ("nees", "nis") else float(row[low]),
-                high=None if high is None or name in ("nees", "nis") else float(row[high]),
+                low=None if low is None else float(row[low]),
+                high=None if high is None else float(row[high]),
             )
 
 

@@ -102,7 +102,8 @@ def generalisation_words(cell: Cell | None, category: int) -> str:
         return f"informationWithheld: coordinates, heights above sea level and terrain withheld {of}."
     return (
         f"dataGeneralizations: coordinates rounded to {cell.size_deg:g} degrees {of}; "
-        f"coordinateUncertaintyInMeters {cell.uncertainty_m:.0f}; heights and terrain withheld."
+        f"coordinateUncertaintyInMeters {cell.uncertainty_m:.0f}; heights above sea "
+        "level and terrain withheld."
     )
 
 

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
+from tests.pipeline.robots import KNOWN, robot_flight
 from tests.sharing.edition.flights import flight, overview, report
+from wildlab.flight.following import parse_settings
+from wildlab.pipeline.following.follow import follow_targets
+from wildlab.pipeline.following.judged import judged
+from wildlab.pipeline.overviews.worth_fixing import numbers_of
+from wildlab.reporting import tracking
+from wildlab.reporting.metrics import read_metrics
+from wildlab.reporting.report import open_report
+from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import Alarm, Gain, facts_of
 
 ERROR = {
@@ -76,7 +86,8 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
         subject = f"{sensor}/boat/{name}"
         return {
             ("rmse", subject): {"value": rmse},
-            ("nees", subject): {"value": nees, "low": 1.0, "high": 4.0},
+            ("nees", subject): {"value": nees},
+            ("nees_band_high", subject): {"value": 4.0},
         }
 
     tracking = report("tracking", {
@@ -86,6 +97,28 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
     facts = facts_of(flight(overview(), tracking))
     assert (facts.tracks, facts.track_error) == (2, 4.0)
     assert facts.track_sure == pytest.approx((0.5 + 5.0) / 2)
+
+
+@pytest.mark.parametrize("off_deg", [2.0, 0.0])
+def test_the_page_says_what_the_tracking_report_found_of_a_filter(off_deg: float, tmp_path: Path) -> None:
+    """Through the report's own metrics.json: a filter that knows of no error of the heading."""
+    settings = parse_settings(KNOWN)
+    followed = follow_targets(robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=settings)
+    made = open_report(study="f-tracking", kind="logged", flight="f", out=str(tmp_path))
+    rows = judged(followed)
+    tracking.record(made, rows)
+    made.head("Tracks")
+    said, level = tracking.summary(rows, [], None)
+    made.summary(said, level=level, verdict=tracking.verdict_of(rows, level))
+    made.save()
+    numbers = numbers_of([read_metrics(tmp_path / "metrics.json")])
+    there = report("tracking")._replace(numbers=numbers)
+    facts = facts_of(flight(overview(), there))
+    sure = float((rows["nees"] / rows["nees_high"]).iloc[0])
+    assert facts.track_sure == pytest.approx(sure)
+    assert set(rows["verdict"]) == ({"overconfident"} if off_deg else {"consistent"})
+    page = edition_html(facts, name="x", place=Place("withheld"))
+    assert ("The computer was too sure of itself" in page) == bool(off_deg)
 
 
 def test_a_number_that_could_not_be_computed_is_not_known() -> None:

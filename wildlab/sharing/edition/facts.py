@@ -194,7 +194,7 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     report = flight.report("tracking")
     if report is None:
         return []
-    from wildlab.reporting.tracking import leading
+    from wildlab.reporting.tracking import band_name, leading
 
     rows = [(subject, entry) for (name, subject), entry in report.numbers.items() if name == "rmse"]
     filters = list(dict.fromkeys(subject.rsplit("/", 1)[-1] for subject, _ in rows))
@@ -205,9 +205,11 @@ def _leading_tracks(flight: OwnFlight) -> list[tuple[float, float]]:
     for subject, entry in rows:
         if subject.rsplit("/", 1)[-1] != best or entry["value"] is None:
             continue
-        nees = report.numbers.get(("nees", subject))
-        high = None if nees is None else nees["high"]
-        sure = float(nees["value"]) / float(high) if nees is not None and nees["value"] and high else NAN
+        nees, high = (
+            report.numbers.get((name, subject), {}).get("value")
+            for name in ("nees", band_name("nees", "high"))
+        )
+        sure = NAN if nees is None or not high else float(nees) / float(high)
         found.append((float(entry["value"]), sure))
     return found
 
