@@ -13,12 +13,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.robots import KNOWN, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.evaluation.streams import pace_of, runs_of
 from wildlab.evaluation.vibration import FLOOR_HZ, vibration_of
+from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.following.follow import follow_targets
+from wildlab.pipeline.following.judged import judged as judged_tracks
 from wildlab.pipeline.overviews.image_coverage import cover_images
 from wildlab.pipeline.overviews.overview import TROUBLES, best_source, look_over
 from wildlab.pipeline.overviews.worth_fixing import (
@@ -36,6 +40,7 @@ from wildlab.pipeline.overviews.worth_fixing import (
 from wildlab.reporting.overview import show_overview
 from wildlab.reporting.overview_words import gain_measured
 from wildlab.reporting.report import open_report
+from wildlab.reporting.tracking_sections import head_section
 from wildlab.simulation.twins import simulate_twin
 
 
@@ -410,3 +415,26 @@ def test_points_that_are_far_out_are_listed_with_what_stays(make_flight: Callabl
     assert (
         said == "2 of 90 points are far out; without them the mean error is 1.5 m and not 2.0 m: 25 % less."
     )
+
+
+@pytest.mark.parametrize("off_deg", [2.0, 0.0])
+def test_tracks_that_their_own_report_doubts_are_not_sound_here(
+    off_deg: float, make_flight: Callable[..., Flight], tmp_path: Path
+) -> None:
+    """The verdict of a true report on tracking, through its metrics.json, is in that of the overview."""
+    followed = follow_targets(
+        robot_flight(0, heading_off_deg=off_deg), filters=("ekf",), settings=parse_settings(KNOWN)
+    )
+    rows = judged_tracks(followed)
+    (tmp_path / "tracking").mkdir()
+    (tmp_path / "overview").mkdir()
+    tracking = open_report(study="tracking", kind="logged", flight="f", out=str(tmp_path / "tracking"))
+    head_section(tracking, followed, rows, [], None)
+    tracking.save()
+    numbers = numbers_of([json.loads((tmp_path / "tracking" / "metrics.json").read_text())])
+    doubted = "overconfident" in " ".join(tracking.parts)
+    assert doubted == bool(off_deg)
+    html, content = page_of(make_flight(n_images=8), tmp_path / "overview", numbers=numbers, judged=1)
+    assert ("Look closer: the report on tracking asks for it." in html) == doubted
+    assert ("nothing in them worth fixing" in html) != doubted
+    assert values(content)["troubled", "flight"] == int(doubted)

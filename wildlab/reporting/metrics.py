@@ -36,6 +36,10 @@ NUMBERS = ("value", "published", "low", "high", "fraction", "below")
 
 #: The metric that tells by its subject which poses others were held against; its value is at how many times.
 AGAINST = "compared_with"
+#: The metric of what a report on a flight comes to, by what the report is about: of `VERDICT_LEVELS`.
+VERDICT_LEVEL = "verdict_level"
+#: The colours of a summary as numbers: from 1 on, the report asks for a closer look.
+VERDICT_LEVELS = {"good": 0, "neutral": 0, "warn": 1, "bad": 2}
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _SUBJECT = re.compile(r"\S+")

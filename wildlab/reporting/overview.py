@@ -18,6 +18,7 @@ from wildlab.pipeline.overviews.worth_fixing import (
     WORTH,
     Gain,
     Numbers,
+    doubted,
     error_measured,
     possible_gain,
     verdict_of,
@@ -56,12 +57,13 @@ def show_overview(
     """
     problems = overview.problems + sum(one.startswith("problem") for one in amiss)
     possible = possible_gain(numbers)
-    counts = counts_of(overview, gains, problems, judged, possible)
+    doubts = doubted(numbers)
+    counts = counts_of(overview, gains, problems, judged, possible, doubts)
     word = verdict_of(**counts)
     shown = overview.flight.manifest.locations.sensitivity == "open"
     report.head("What happened on this flight, and what is worth fixing?", words.subtitle(overview))
     measured = error_measured(numbers)
-    said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible)
+    said = words.summary_sentences(overview, word, gains, problems, lacking, measured, possible, doubts)
     report.summary(said, level=LEVELS[word], verdict=(word, words.reason_words(**counts, possible=possible)))
     report.tiles(sections.tiles(overview))
     report.section("Most worth fixing", words.first_of(gains, possible), part=ADVICE)
@@ -85,7 +87,12 @@ def show_overview(
 
 
 def counts_of(
-    overview: Overview, gains: Sequence[Gain], problems: int, judged: int, possible: Gain | None
+    overview: Overview,
+    gains: Sequence[Gain],
+    problems: int,
+    judged: int,
+    possible: Gain | None,
+    doubts: Sequence[str] = (),
 ) -> dict[str, int]:
     """What the verdict follows from: the arguments of `verdict_of`."""
     long = troubled_for(overview, WORTH)
@@ -93,7 +100,7 @@ def counts_of(
     return {
         "problems": problems,
         "worth": sum(gain.share >= WORTH for gain in gains),
-        "troubled": len(long) + len(paused) + (possible is not None),
+        "troubled": len(long) + len(paused) + (possible is not None) + len(doubts),
         "judged": judged,
         "broken": sum(one.broken for one in overview.alarms),
         "alarmed": sum(not one.broken for one in overview.alarms),

@@ -177,6 +177,7 @@ def headline(
     problems: int,
     measured: bool = True,
     possible: Gain | None = None,
+    doubts: Sequence[str] = (),
 ) -> str:
     """The first sentence: what the flight comes to."""
     if word == ALARM:
@@ -198,7 +199,9 @@ def headline(
         ]
         if longest:
             return f"Look closer: {_lasting(overview, longest[0])}."
-        return f"Look closer: {_possible_words(possible)}." if possible else "Look closer."
+        if possible:
+            return f"Look closer: {_possible_words(possible)}."
+        return f"Look closer: {doubt_words(doubts)}." if doubts else "Look closer."
     if word == SOUND and not measured:
         return (
             f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its data; how far off "
@@ -207,6 +210,13 @@ def headline(
     if word == SOUND:
         return f"Nothing was measured on this flight that is worth {percent(WORTH, 0)} of its error or data."
     return "This flight is shown, not judged: none of the other reports could be made of it."
+
+
+def doubt_words(doubts: Sequence[str]) -> str:
+    """Which other reports are not at ease, as a clause."""
+    what = "report" if len(doubts) == 1 else "reports"
+    asks = "asks" if len(doubts) == 1 else "ask"
+    return f"the {what} on {listed(list(doubts))} {asks} for it"
 
 
 def _problem_words(problems: int) -> str:
@@ -239,13 +249,14 @@ def summary_sentences(
     lacking: Sequence[str],
     measured: bool = True,
     possible: Gain | None = None,
+    doubts: Sequence[str] = (),
 ) -> list[str]:
     """The summary: the verdict, its measure, and what could not be judged.
 
     ``measured``: whether any report measured how far off positions are; ``possible``: a gain that is not
-    certain.
+    certain; ``doubts``: other reports that ask for a closer look.
     """
-    first = headline(overview, word, gains, problems, measured, possible)
+    first = headline(overview, word, gains, problems, measured, possible, doubts)
     said = [first]
     more = [clause for one in overview.alarms if (clause := alarm_words(one, overview)) not in first]
     if more:
@@ -263,6 +274,9 @@ def summary_sentences(
     lasting = [one for one in overview.troubles if one.seconds >= 1 and one.what not in first]
     if lasting:
         said.append(f"Along the path: {_lasting(overview, max(lasting, key=lambda one: one.seconds))}.")
+    if doubts and doubt_words(doubts) not in first:
+        what = "report" if len(doubts) == 1 else "reports"
+        said.append(f"Look at the {what} on {listed(list(doubts))} too: not all is well there.")
     if lacking:
         said.append(f"Not judged: {'; '.join(lacking)}.")
     return said

@@ -11,6 +11,7 @@ from wildlab.pipeline.following.judged import Apart, verdict
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting import tracking as words
 from wildlab.reporting.charts import following as charts
+from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
 
 #: Targets by sensors that are drawn; the table has all.
@@ -31,6 +32,7 @@ def head_section(
     report.head(title, f"{of} followed by {by}{ways}")
     said, level = words.summary(rows, pairs, tuned)
     report.summary(said, level=level, verdict=words.verdict_of(rows, level))
+    report.metric(VERDICT_LEVEL, "tracking", VERDICT_LEVELS[level], "1")
     if followed.notes:
         report.points(followed.notes)
 

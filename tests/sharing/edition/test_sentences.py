@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import unescape
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from tests.sharing.edition.flights import EMPTY, NAN, WHOLE
 from wildlab.pipeline.overviews.alarms import ALARMS
 from wildlab.pipeline.overviews.worth_fixing import CAUSES, LEVELS
+from wildlab.sharing.edition.edition import Place, edition_html
 from wildlab.sharing.edition.facts import _TROUBLES, PARTS, Alarm, Facts, Gain
 from wildlab.sharing.edition.language import languages, load_language, say
 from wildlab.sharing.edition.said import Said
@@ -30,7 +32,7 @@ def keys(items: tuple[Said, ...]) -> list[str]:
 def test_a_flight_of_which_all_is_known() -> None:
     story = tell(WHOLE)
     assert keys(story.measured) == ["measured.error_steps", "measured.track", "measured.things"]
-    assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose"]
+    assert keys(story.advice) == ["do.cause_boresight", "do.images_without_pose", "do.trouble_few_satellites"]
     assert keys(story.wrong) == ["trouble.few_satellites", "lost.images_without_pose"]
     assert story.trusted and story.verdict.key == "verdict.fix" and story.next == story.advice[0]
     english = load_language()
@@ -85,7 +87,8 @@ def test_what_does_not_fit_is_counted() -> None:
 
 def test_a_sound_flight_may_still_gain() -> None:
     assert tell(WHOLE._replace(verdict="sound")).next.key == "next.sound_more"
-    assert tell(WHOLE._replace(verdict="sound", gains=())).next.key == "next.sound"
+    assert tell(WHOLE._replace(verdict="sound", gains=())).next.key == "next.sound_more"
+    assert tell(WHOLE._replace(verdict="sound", gains=(), troubles=())).next.key == "next.sound"
 
 
 def test_what_the_verdict_says_is_not_said_twice() -> None:
@@ -187,3 +190,29 @@ def test_whatever_is_known_every_text_is_there_and_filled(known: Facts) -> None:
         for said in said_of(story):
             text = say(language, said)
             assert text and "{" not in text and "nan" not in text.lower().split()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "trusted"),
+    [("look closer", False), ("not judged", False), (None, False), ("worth fixing", True), ("sound", True)],
+)
+def test_only_what_was_judged_is_called_reliable(verdict: str | None, trusted: bool) -> None:
+    page = edition_html(WHOLE._replace(verdict=verdict), name="x", place=Place("withheld"))
+    assert ("What you can rely on" in page) == trusted == tell(WHOLE._replace(verdict=verdict)).trusted
+
+
+@pytest.mark.parametrize("language", ["en", "nb", "sv"])
+@pytest.mark.parametrize("what", [*_TROUBLES.values(), "sure", "tracking", "navigation"])
+def test_what_is_told_to_be_wrong_has_advice(what: str, language: str) -> None:
+    """Never a list of troubles, and then "fly as before"."""
+    calm = WHOLE._replace(gains=(), troubles=(), verdict="look closer")
+    changes = {"sure": {"track_sure": 5.0}, "tracking": {"doubted": ("tracking",)},
+               "navigation": {"doubted": ("navigation",)}}  # fmt: skip
+    facts = calm._replace(**changes.get(what, {"troubles": ((what, 700.0),)}))
+    story = tell(facts)
+    assert story.wrong[0].key != "wrong.none" and story.why.key != "why.alarm" and story.advice
+    page = edition_html(facts, name="x", place=Place("withheld"), language=language)
+    words = load_language(language)
+    assert not words.missing and say(words, Said("next.nothing")) not in page
+    assert say(words, story.advice[0]) in unescape(page)
+    assert not tell(calm).advice

@@ -219,6 +219,25 @@ def possible_gain(numbers: Numbers) -> Gain | None:
     return Gain("possible", (), value, low, high, "m", of, "mean error", value / of, "")
 
 
+def doubted(numbers: Numbers) -> tuple[str, ...]:
+    """Which of the other reports ask for a closer look themselves: ``tracking``, ``navigation``.
+
+    Parameters
+    ----------
+    numbers
+        From `numbers_of`. What a report comes to is a number there from 1 on where it is not at ease.
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(
+        about
+        for about in ("tracking", "navigation")
+        if (numbers.get(("verdict_level", about), {}).get("value") or 0) >= 1
+    )
+
+
 def verdict_of(
     problems: int, worth: int, troubled: int, judged: int, broken: int = 0, alarmed: int = 0
 ) -> str:
@@ -232,7 +251,7 @@ def verdict_of(
         Gains of `WORTH` or more.
     troubled
         Things that ask for a closer look: wrong along the path for that share of the time or more, poses
-        that pause, gains that are possible and not certain.
+        that pause, gains that are possible and not certain, other reports that ask for it (`doubted`).
     judged
         Its other reports.
     broken, alarmed

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from wildlab.pipeline.overviews.alarms import ALARMS
 from wildlab.pipeline.overviews.overview import TROUBLES
-from wildlab.pipeline.overviews.worth_fixing import WORTH, causes_told, possible_gain
+from wildlab.pipeline.overviews.worth_fixing import WORTH, causes_told, doubted, possible_gain
 from wildlab.reporting.own_flights import OwnFlight
 
 NAN = math.nan
@@ -69,6 +69,8 @@ class Facts(NamedTuple):
         Worst first; trouble and its seconds, longest first; by share.
     possible
         A gain that is not certain.
+    doubted
+        Reports that ask for a closer look themselves: ``tracking``, ``navigation``.
     failed, lacking
         Those of `PARTS`, and ``overview``, that failed, and that the records do not allow.
     """
@@ -96,6 +98,7 @@ class Facts(NamedTuple):
     possible: Gain | None
     failed: tuple[str, ...]
     lacking: tuple[str, ...]
+    doubted: tuple[str, ...] = ()
 
 
 def facts_of(flight: OwnFlight) -> Facts:
@@ -150,6 +153,7 @@ def facts_of(flight: OwnFlight) -> Facts:
         possible=None if possible is None else _possible(flight, possible.value, possible.of),
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
         lacking=tuple(sorted(_lacking(flight), key=PARTS.index)),
+        doubted=doubted(numbers),
     )
 
 

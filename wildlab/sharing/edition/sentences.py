@@ -27,6 +27,14 @@ VERDICTS = {
 }
 
 
+#: Troubles by the gain that is had by doing the same.
+_SAME_REMEDY = {
+    "poses": "time_without_poses",
+    "satellites": "time_without_satellites",
+    "inertial": "time_without_inertial",
+}
+
+
 class Story(NamedTuple):
     """All that is said of a flight.
 
@@ -74,7 +82,7 @@ def tell(facts: Facts) -> Story:
         Said(f"verdict.{key}"),
         _why(facts),
         _next(facts, advice),
-        facts.verdict not in (ALARM, MEND),
+        facts.verdict in (FIX, SOUND),
         _tiles(facts)[:4],
         _measured(facts)[:MOST],
         _cut(_wrong(facts)),
@@ -128,7 +136,9 @@ def _why(facts: Facts) -> Said:
             return Said(
                 "why.possible", {"gain": length(facts.possible.value), "of": length(facts.possible.of)}
             )
-        return Said("why.alarm")
+        if _too_sure(facts):
+            return Said("wrong.too_sure")
+        return Said(f"why.doubt_{facts.doubted[0]}" if facts.doubted else "why.alarm")
     if facts.verdict == SOUND:
         measured = facts.compared > 0 or facts.tracks > 0
         return Said("why.sound" if measured else "why.sound_unmeasured", {"share": share(WORTH)})
@@ -208,17 +218,31 @@ def _trouble(facts: Facts, what: str, seconds: float) -> Said:
     return Said(f"trouble_time.{what}", values)
 
 
+def _too_sure(facts: Facts) -> bool:
+    return facts.tracks > 0 and facts.track_sure > NEAR_THE_BAND
+
+
+def _lasting(facts: Facts) -> list[tuple[str, float]]:
+    """Troubles that are told: jumps are instants; an alarm has said them, and that it shakes."""
+    told = {one.what for one in facts.alarms}
+    return [
+        (what, seconds)
+        for what, seconds in facts.troubles
+        if seconds >= 1 and not (what == "shaken" and "shakes" in told)
+    ]
+
+
 def _wrong(facts: Facts) -> tuple[Said, ...]:
     found = [_alarm(one) for one in facts.alarms]
     if facts.problems:
         found.append(Said("wrong.problems", {}, facts.problems))
-    if facts.tracks and facts.track_sure > NEAR_THE_BAND:
+    if _too_sure(facts):
         found.append(Said("wrong.too_sure"))
-    told = {one.what for one in facts.alarms}
-    for what, seconds in facts.troubles:
-        # Jumps are instants; an alarm has said them, and that it shakes.
-        if seconds >= 1 and not (what == "shaken" and "shakes" in told):
-            found.append(_trouble(facts, what, seconds))
+    elif "tracking" in facts.doubted:
+        found.append(Said("why.doubt_tracking"))
+    if "navigation" in facts.doubted:
+        found.append(Said("why.doubt_navigation"))
+    found += [_trouble(facts, what, seconds) for what, seconds in _lasting(facts)]
     # What the verdict says already is not said again, nor what the troubles say of time.
     gains = facts.gains[1 if facts.verdict == FIX else 0 :]
     for gain in gains:
@@ -268,6 +292,13 @@ def _advice(facts: Facts) -> tuple[Said, ...]:
         found.append(Said("do.more_places", {"few": number(FEW)}))
     if facts.failed:
         found.append(Said("do.failed", {}, len(facts.failed)))
+    # What a gain asks for already is not asked for twice.
+    asked = {one.key.removeprefix("do.") for one in found}
+    for what, _ in _lasting(facts):
+        if _SAME_REMEDY.get(what) not in asked and what not in asked:
+            found.append(Said(f"do.trouble_{what}"))
+    found += [Said("do.tracks")] if _too_sure(facts) or "tracking" in facts.doubted else []
+    found += [Said("do.navigation")] if "navigation" in facts.doubted else []
     return tuple(found)
 
 
