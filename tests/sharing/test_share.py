@@ -9,6 +9,7 @@ import json
 import re
 import stat
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from bs4 import BeautifulSoup
 from tests.sharing.canary import HASH, canary
 from wildlab.errors import RunFailed, WildlabError
 from wildlab.files import write_json
-from wildlab.flight.manifest import manifest_toml
+from wildlab.flight.manifest import Manifest, manifest_toml
 from wildlab.flight.store import load_flight, save_flight
 from wildlab.reporting.metrics import AGAINST, document, metric
 from wildlab.reporting.page import page
@@ -27,7 +28,9 @@ from wildlab.reporting.text import escape
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.sharing import redrawn
+from wildlab.sharing.reports import of_a_study
 from wildlab.sharing.share import BEWARE, share
+from wildlab.simulation.parameters import load_twin
 
 SECRETS = (
     *("kifaru", "Olifants", "Letaba", "Skukuza", "Jonas", "Kestrel", "Thandi", "873165", "486297", "13.57"),
@@ -323,18 +326,49 @@ def test_a_study_is_copied_as_it_is(made: Path) -> None:
     twin = {"name": "static-antenna-1", "kind": "twin", "files": {}, "sources": []}
     folder.mkdir()
     body = '<h1>Study</h1><p>63.6 N <a href="../index.html">back</a></p>'
-    (folder / "report.html").write_text(page(title="x", body=body), encoding="utf-8")
+    foot = "<p>data <code>c0ffee42</code> · made 2026-11-22 10:15 UTC</p>"
+    (folder / "report.html").write_text(page(title="x", body=body, footer=foot), encoding="utf-8")
     write_json(folder / "provenance.json", {"flight": twin, "parameters": {}})
     write_json(folder / "status.json", {"state": "done"})
     copy = share(folder)
     assert copy.file.name == "static-point-public.html"
     text = copy.file.read_text(encoding="utf-8")
     assert "63.6 N" in text and "index.html" not in text
+    assert "c0ffee42" not in text and "10:15" not in text
+    assert "c0ffee42" in share(folder, "team").file.read_text(encoding="utf-8")
     both = share(made / "reports", zipped=True)
     with zipfile.ZipFile(both.file) as zipped:
         assert sorted(zipped.namelist()) == ["flight.html", "static-point.html"]
     whole = share(made / "reports").file.read_text(encoding="utf-8")
     assert "Reports on 1 flight and 1 study" in whole
+
+
+def test_a_twin_that_does_not_come_with_wildlab_is_hidden_like_a_flight(made: Path) -> None:
+    own = canary(locations={"category": 2})
+    data = own.manifest.model_dump() | {"kind": "twin", "twin": {"name": "Olifants-patrol", "seed": 873165}}
+    save_flight(
+        replace(own, manifest=Manifest.model_validate(data)), made / "flights" / "mine", overwrite=True
+    )
+    write_report(made / "more" / "kifaru-ridge", made / "flights" / "mine", "")
+    text = share(made / "more" / "kifaru-ridge").file.read_text(encoding="utf-8")
+    assert all(secret not in text for secret in SECRETS) and "24.9° S" in text
+
+
+def test_a_twin_is_not_taken_for_a_study_of_its_name(made: Path) -> None:
+    """It is compared with where the packaged one is."""
+    place = load_twin("static-antenna").place
+    study = {"name": "static-antenna-1", "kind": "twin"}
+    reports = made / "reports"
+    assert of_a_study(study, reports)
+    assert not of_a_study(study | {"name": "Olifants-1"}, reports)
+    assert not of_a_study(study | {"kind": "logged"}, reports)
+    for latitude, packaged in ((place.latitude.number, True), (place.latitude.number + 0.01, False)):
+        own = canary()
+        origin = {"latitude_deg": latitude, "longitude_deg": place.longitude.number, "height_m": 0.0}
+        data = own.manifest.model_dump() | {"name": "static-antenna-1", "origin": origin}
+        manifest = Manifest.model_validate(data)
+        save_flight(replace(own, manifest=manifest), made / "flights" / "other", overwrite=True)
+        assert of_a_study(study, reports) == packaged
 
 
 def test_a_copy_with_this_machines_folders_in_it_is_refused_even_for_the_team(made: Path) -> None:

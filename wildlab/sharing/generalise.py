@@ -245,6 +245,9 @@ def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: 
             "cell_m": (manifest.terrain.step_m, manifest.terrain.step_m),
         }  # fmt: skip
     parts["sensors"] = {names.of("sensor", key): _sensor(part) for key, part in manifest.sensors.items()}
+    if manifest.twin is not None:
+        # That nobody flew it stays; its parameters and its seed would make it again, with its place.
+        parts["twin"] = {"name": "twin", "seed": 0}
     return parts | {
         "name": name,
         "kind": manifest.kind,

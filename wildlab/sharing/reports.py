@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from wildlab.errors import WildlabError
-from wildlab.flight.manifest import FILE_NAME
+from wildlab.flight.manifest import FILE_NAME, read_manifest
 from wildlab.paths import ROOT
 from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.beside import state_of
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.
 ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking").index))
@@ -105,7 +106,7 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
     given = provenance.get("parameters")
     parameters = {folder.name: given if isinstance(given, dict) else {}}
     entry = studies.get(folder.name)
-    if not isinstance(flight, dict) or flight.get("kind") == "twin":
+    if not isinstance(flight, dict) or (entry is not None and of_a_study(flight, folder.parent)):
         return Source(folder.name, (folder,), False, {}, parameters)
     if entry is not None and (entry.dataset is not None or entry.twin is not None):
         # Of the catalogue: everybody has the data.
@@ -119,6 +120,31 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
             file=folder,
         )
     return Source(name, (folder,), True, flight, parameters)
+
+
+def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
+    """Whether it is a twin that comes with wildlab, whose place everybody knows.
+
+    Any other twin is somebody's: its place may be a true one, and so is its name.
+    """
+    name = str(flight.get("name", ""))
+    twin = name.rpartition("-")[0]
+    if flight.get("kind") != "twin" or twin not in twin_names():
+        return False
+    place = load_twin(twin).place
+    packaged = (place.latitude.number, place.longitude.number)
+    for folder in candidates(name, [reports.resolve().parent / "flights"]):
+        try:
+            manifest = read_manifest(folder / FILE_NAME)
+        except WildlabError:
+            continue
+        # Of one that is called so and lies elsewhere, it may be the one that is meant.
+        if (
+            manifest.name == name
+            and (manifest.origin.latitude_deg, manifest.origin.longitude_deg) != packaged
+        ):
+            return False
+    return True
 
 
 def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> Source:

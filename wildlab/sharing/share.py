@@ -304,7 +304,7 @@ def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
 def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     """A study's reports, or a flight's for those who have it, as they are."""
     parts = [
-        read_part(one / "report.html", number, hashes=True)
+        read_part(one / "report.html", number, hashes=load_tiers().tier[tier].exact)
         for number, one in enumerate(source.folders, first)
     ]
     about = (
