@@ -435,4 +435,5 @@ def test_the_true_reports_of_a_canary(tmp_path: Path, monkeypatch: pytest.Monkey
     for secret in SECRETS:
         assert secret not in text, secret
     assert "coordinates rounded to 0.01 degrees" in text
-    assert re.search(r"All \d{2,} numbers are those of the report", text)
+    found = re.search(r"(All|Of) \d{2,} numbers[^<]*", text)
+    assert found is not None and found[1] == "All", found

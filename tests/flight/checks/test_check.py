@@ -390,7 +390,7 @@ def test_imu_and_gnss_make_navigation_possible(make_flight: Callable[..., Flight
     zeros = ["f_x_m_s2", "f_y_m_s2", "f_z_m_s2", "w_x_rad_s", "w_y_rad_s", "w_z_rad_s"]
     flight.tables["imu"] = pd.DataFrame(times).assign(**dict.fromkeys(zeros, 0.0))
     flight.tables["imu"]["f_z_m_s2"] = -9.81
-    flight.tables["gnss"] = pd.DataFrame(times).assign(north_m=0.0, east_m=0.0, down_m=0.0)
+    flight.tables["gnss"] = pd.DataFrame(times).assign(north_m=[0.0, 20.0], east_m=0.0, down_m=0.0)
     assert usable_for(flight)[2].usable
     flight.tables["imu"].loc[1, "time_s"] = 0.0
     assert not usable_for(flight)[2].usable
@@ -409,7 +409,7 @@ def test_navigation_says_what_a_report_on_it_lacks(make_flight: Callable[..., Fl
     )
     flight.tables["imu"] = table
     flight.tables["gnss"] = pd.DataFrame(
-        {"time_s": [0.0, 1.0], "north_m": [0.0, 0.0], "east_m": [0.0, 0.0], "down_m": [0.0, 0.0]}
+        {"time_s": [0.0, 1.0], "north_m": [0.0, 20.0], "east_m": [0.0, 0.0], "down_m": [0.0, 0.0]}
     )
     use = {one.purpose: one for one in usable_for(flight)}["navigation"]
     assert use.usable and "but no report on it, for imu.velocity_random_walk_m_s_sqrt_h" in use.why

@@ -176,6 +176,7 @@ facts = st.builds(
     gains=st.lists(gains, max_size=4).map(tuple),
     possible=st.one_of(st.none(), gains.filter(lambda one: one.value == one.value)),
     failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple), lacking=st.just(()),
+    doubted=st.lists(st.sampled_from(["tracking", "navigation"]), unique=True).map(tuple),
 )  # fmt: skip
 
 
