@@ -20,6 +20,8 @@ from tests.notebooks import write
 from wildlab.errors import WildlabError
 from wildlab.paths import NOTEBOOKS, ROOT
 from wildlab.reporting import new_figure, with_alt
+from wildlab.reporting.figure_text import FULL_SIZE
+from wildlab.reporting.figures import WIDTH
 from wildlab.reporting.text import maths
 from wildlab.reporting.tutorial import tutorial_page
 from wildlab.runner import tutorials
@@ -151,7 +153,9 @@ def test_a_page_shows_code_prints_values_and_pictures(
     assert [text.strip() for text in said] == ["x = 1\n\ny = 2", "a <print>", "a value"]
     assert "a warning" not in whole and "scoped" not in whole
     assert soup.img is not None and soup.img["alt"] == 'A "line" <b>.'
-    assert soup.img["width"] == "464" and soup.img.find_parent("figure") is not None
+    assert (
+        soup.img["width"] == f"{4.0 * WIDTH * FULL_SIZE:.0f}" and soup.img.find_parent("figure") is not None
+    )
     assert soup.table is not None and soup.table.parent is not None
     assert soup.table.parent["class"] == ["scroll"] and not soup.table.has_attr("border")
     assert soup.find(attrs={"http-equiv": "Content-Security-Policy"}) is not None

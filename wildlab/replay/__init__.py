@@ -3,3 +3,7 @@
 `scene` says what is shown, `gather` takes it from a flight, `recording` writes it for rerun's viewer, `page`
 puts that and the viewer itself into one file that opens from disk.
 """
+
+from wildlab.replay.notebook import show_replay
+
+__all__ = ["show_replay"]

@@ -71,11 +71,13 @@ def area_words(area_m2: float) -> str:
 
 
 def way_of(overview: Overview) -> float:
-    """Length of the path over the ground, m; NaN without one. Steps below a tenth of a second are joined."""
+    """Length of the path over the ground, m; NaN without one. Steps below half a second are joined: what
+    shakes is no way. They are counted from the first pose, so that no clock has a say in it."""
     path = overview.path
     if path is None or len(path.times) < 2:
         return float("nan")
-    keep = np.concatenate([[0], np.flatnonzero(np.diff(np.floor(path.times * 2)) > 0) + 1])
+    since = path.times - path.times[0] + 1e-6
+    keep = np.concatenate([[0], np.flatnonzero(np.diff(np.floor(since * 2)) > 0) + 1])
     place = path.place[keep if path.timed else slice(None), :2]
     return float(np.linalg.norm(np.diff(place, axis=0), axis=1).sum())
 

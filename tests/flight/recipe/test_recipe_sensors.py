@@ -89,7 +89,8 @@ def test_axes_and_units(sensors: Any) -> None:
     assert flight.manifest.imu.name == "box"
     assert flight.manifest.imu.angle_random_walk_deg_sqrt_h == 0.1
     assert {source.file for source in flight.manifest.sources} >= {"imu.csv", "gps.csv"}
-    assert usable_for(flight)[2].usable
+    # All is there for navigation but the speed that its heading is told by: 10 knots are 5.1 m/s.
+    assert not usable_for(flight)[2].usable and "moves at 5.1 m/s" in usable_for(flight)[2].why
 
 
 def test_only_fresh_fixes(sensors: Any) -> None:
