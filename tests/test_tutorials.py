@@ -30,7 +30,17 @@ TUTORIALS = tutorials.tutorial_notebooks()
 MOST_LINES = 10
 PACKAGES = {"numpy", "pandas", "matplotlib"}
 #: Rooms below the face; those without a list of what they offer may be looked into by file.
-ROOMS = ("geometry", "flight", "navigation", "tracking", "simulation", "evaluation", "pipeline", "reporting")
+ROOMS = (
+    "replay",
+    "geometry",
+    "flight",
+    "navigation",
+    "tracking",
+    "simulation",
+    "evaluation",
+    "pipeline",
+    "reporting",
+)
 
 
 def cells(notebook: Path, kind: str) -> Iterator[str]:
