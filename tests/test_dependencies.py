@@ -19,7 +19,6 @@ from wildlab import paths
 NOT_IMPORTED = {
     "ipykernel": "the kernel that runs the notebooks; Jupyter starts it by name",
     "jupyterlab": "what `make lab` opens",
-    "rerun-sdk": "replay of a flight in time and space; given from the start for that",
 }
 
 
