@@ -72,8 +72,8 @@ NOTHING = model(())
         (PART, "Part of it is a constant error of the boresight"),
         (LITTLE, "is certain and small"),
         (UNSURE, "is possible, not certain"),
-        (SLIGHT, "No constant error explains it. The nearest is one of the boresight"),
-        (NOTHING, "No constant error explains it"),
+        (SLIGHT, "No constant error is certain to explain it. The nearest is one of the boresight"),
+        (NOTHING, "No constant error is certain: taking one off"),
     ],
 )
 def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
@@ -84,7 +84,7 @@ def test_the_cause_is_named_by_its_measured_gain_alone(winner, words):
         "Part of it",
         "certain and small",
         "possible, not certain",
-        "No constant error explains",
+        "No constant error is certain",
     }
     assert sum(one in said for one in others) == 1
     assert "No calibration" not in said

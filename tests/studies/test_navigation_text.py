@@ -22,6 +22,16 @@ def test_the_axes_are_taken_together_and_the_point_moves_by_roll_and_pitch() -> 
     assert verdict == ("within what it states", "From the truth it differs by 0.5 times what it states.")
 
 
+@pytest.mark.parametrize(
+    ("yaw", "word"), [(2.3, "within what it states"), (2.7, "not far beyond what it states")]
+)
+def test_within_is_said_only_of_what_is(yaw: float, word: str) -> None:
+    errors = {name: value * 2 for name, value in FOUND.items() if name.startswith("rms")}
+    *_, verdict = text.summary(found() | errors | {"rms_yaw": yaw}, "in the air", True)
+    off, stated = np.hypot(1.0, yaw), np.linalg.norm([0.6, 0.8, 2.4])
+    assert verdict is not None and verdict[0] == word and (off <= stated) == word.startswith("within")
+
+
 @pytest.mark.parametrize("times", [0.2, 5.0])
 def test_surer_than_the_difference_allows_only_where_it_is(times: float) -> None:
     sure = {name: value * (1 / times if name.startswith("rms") else 1) for name, value in found().items()}

@@ -43,7 +43,7 @@ def axes_of(
     -------
     dict
         ``north``, ``east``; ``away from the camera`` and ``to the right of the line of sight``, on the
-        ground; where the poses have times, ``along the track`` and ``to the right of the track``. NaN where
+        ground; where the poses have times, ``along the course`` and ``to the right of the course``. NaN where
         a point has no such axis.
     """
     rows = pd.Index(observations.table["detection_id"]).get_indexer(pd.Index(scored["detection_id"]))
@@ -64,7 +64,7 @@ def axes_of(
         after, before = (poses_at(nav, times + shift)[0][:, :2] for shift in (0.5, -0.5))
         track = _unit(after - before, np.full(len(times), SLOWEST_M_S))
         if np.isfinite(track).any():
-            axes |= {"along the track": track, "to the right of the track": _right(track)}
+            axes |= {"along the course": track, "to the right of the course": _right(track)}
     return axes
 
 

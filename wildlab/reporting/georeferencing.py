@@ -366,7 +366,7 @@ def limits_of(
     ground = "an elevation map" if terrain else truths.ground_words(known) if labelled else "the log"
     missed = int(points["north_m"].isna().sum())
     limits = [
-        "Whoever or whatever marked the points is part of these errors; another observer or detector "
+        "Whoever or whatever marked the points is part of these errors; another person or detector "
         "adds its own.",
         f"The height of the ground was taken from {ground}; where it is not known, the error grows.",
         *truths.known_limits(known),

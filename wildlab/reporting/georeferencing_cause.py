@@ -163,7 +163,7 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
             return "No constant error could be tried: these images do not tell one from another."
         tried = listed(sorted(causes), "or")
         return (
-            f"No constant error explains it: taking one off ({tried}) gains nothing for certain on images "
+            f"No constant error is certain: taking one off ({tried}) gains nothing for certain on images "
             "that it was not estimated from."
         )
     told = causes_told(diagnosis)
@@ -181,7 +181,7 @@ def cause_sentence(diagnosis: Diagnosis) -> str:
     if unsure := [cause for cause in winner.causes if cause not in told]:
         figures += f"; fitted with it, {causes_in_words(unsure)} could not be told from zero"
     if not diagnosis.counts and gained_share(gain) < SMALL:
-        return f"No constant error explains it. The nearest is one of {what}: {figures}."
+        return f"No constant error is certain to explain it. The nearest is one of {what}: {figures}."
     if not diagnosis.counts:
         return f"A constant error of {what} is possible, not certain: {figures}."
     share = gained_share(gain)

@@ -99,7 +99,17 @@ def verdict_words(
         return FIX if gain >= cause.SMALL else LOOK, f"{reason[0].upper()}{reason[1:]}."
     if diagnosis is None:
         return UNJUDGED, "Nobody could look for a cause: there are too few images with known points."
-    return SOUND, f"No constant error worth taking off, nothing far out; the ellipses are {ellipses.word}."
+    return SOUND, f"{_small(diagnosis)}, nothing far out; the ellipses are {ellipses.word}."
+
+
+def _small(diagnosis: Diagnosis) -> str:
+    """Why no constant error is worth taking off: it is certain and small, or none is certain."""
+    if diagnosis.counts:
+        share = percent(cause.gained_share(diagnosis.winner.gain), 0)
+        return f"The constant error that is certain is small, {share} of the mean error"
+    if diagnosis.winner.causes:
+        return f"A constant error of {cause.causes_in_words(diagnosis.winner.causes)} is not certain"
+    return "No constant error is certain"
 
 
 def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
@@ -144,7 +154,8 @@ def cause_section(report: Report, found: Accuracy) -> None:
             },
             digits={"value": 2},
             caption=f"From {diagnosis.calibration.n_points} points in {diagnosis.calibration.n_images} images"
-            f"{', without what is far out' if diagnosis.outliers else ''}.",
+            f"{', without what is far out' if diagnosis.outliers else ''}. The intervals hold where the "
+            "error is of these kinds alone; one of another kind is taken for them.",
         )
     if alike := cause.alike_sentences(diagnosis):
         report.points(alike)
@@ -158,7 +169,7 @@ def cause_section(report: Report, found: Accuracy) -> None:
             "verdict": "verdict",
         },
         digits={"mean": 1, "share": 0},
-        caption="Errors along axes of the world, of the camera and of the track, nothing taken off.",
+        caption="Errors along axes of the world, of the camera and of the course, nothing taken off.",
     )
     _far_out(report, diagnosis)
     if found.nearest is not None:

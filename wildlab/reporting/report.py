@@ -32,7 +32,7 @@ from wildlab.reporting.arrange import ALERT, LIMITS, METHOD, VERDICT
 from wildlab.reporting.figures import png_bytes, save_figure
 from wildlab.reporting.page import TAGS
 from wildlab.reporting.pictures import figure_html
-from wildlab.reporting.published import published_rows
+from wildlab.reporting.published import load_claims, published_rows
 from wildlab.reporting.standing import Standing, standing
 from wildlab.reporting.tables import csv_link, table_html
 from wildlab.reporting.text import escape, inline, maths, prose, slug
@@ -133,7 +133,9 @@ class Report:
 
     def head(self, title: str, subtitle: str = "") -> None:
         """``<h1>``, and below it what is shown: flight, logged or simulated, ``subtitle``."""
-        about = f"Flight <b>{escape(self.flight)}</b> " if self.flight else ""
+        # A flight that is called so, as in copies for others, has no name.
+        named = self.flight not in ("", "flight")
+        about = f"Flight <b>{escape(self.flight)}</b> " if named else ""
         tag = f'<span class="tag {self.kind}">{TAGS[self.kind]}</span>'
         self._show(
             f"<header><h1>{inline(title)}</h1>", f'<p class="sub">{about}{tag}{inline(subtitle)}</p></header>'
@@ -370,9 +372,10 @@ class Report:
         recorded, printed = self.recorded, self.published
         rows = [row for row in self._published.values() if not row["again"]]
         compared = [judge(row, recorded, printed) for row in rows]
-        return standing(
-            [one.verdict for one in compared if one is not None], [one["verdict"] for one in self._claims]
-        )
+        # What is a sentence of ours is no word of the thesis.
+        own = {claim["id"] for claim in load_claims(self.study) if claim.get("own")}
+        claims = [one["verdict"] for one in self._claims if one["id"] not in own]
+        return standing([one.verdict for one in compared if one is not None], claims)
 
     def save(self) -> None:
         """Say how the numbers stand, unless the summary did, and write ``metrics.json`` into the report's

@@ -113,14 +113,14 @@ def verdict_words(one: StudyStatus) -> Standing:
     """What a study's numbers and claims come to, as its report says it; a first look comes to nothing yet."""
     if one.state == FIRST_LOOK:
         return Standing("first look", f"{one.first_look}: not counted yet.", "warn")
-    return standing((n.verdict for n in one.counted), (c.verdict for c in one.claims))
+    return standing((n.verdict for n in one.counted), (c.verdict for c in one.claims if not c.own))
 
 
 def _without_strip(one: StudyStatus) -> str:
     if drawable(one.counted):
         return ""
     if not one.counted:
-        return "The thesis prints no number of it." if one.study.section.startswith(("H", "F")) else ""
+        return "No printed number of it is compared."
     return "Its printed numbers have no ratio: they are signed, or zero."
 
 

@@ -52,8 +52,15 @@ class FrontFlight(NamedTuple):
 
     @property
     def images(self) -> int:
-        """Images that show the target."""
-        return 0 if self.shown.points is None else len(self.shown.points.times)
+        """Images that show the target in that part of the flight; the file has one more on either side."""
+        return int(self._inside.sum())
+
+    @property
+    def _inside(self) -> NDArray[np.bool_]:
+        times, path = np.zeros(0), self.shown.path.times
+        if self.shown.points is not None:
+            times = self.shown.points.times
+        return np.asarray((times >= path[0]) & (times <= path[-1]))
 
     @property
     def off(self) -> float:
@@ -61,7 +68,8 @@ class FrontFlight(NamedTuple):
         points, (truth,) = self.shown.points, self.shown.truth
         if points is None:
             return float("nan")
-        return float(np.median(np.hypot(*(points.points - _between(truth, points.times)).T)))
+        missed = (points.points - _between(truth, points.times))[self._inside]
+        return float(np.median(np.hypot(*missed.T)))
 
     @property
     def held(self) -> float:

@@ -116,11 +116,11 @@ def flight_words(flight: FrontFlight) -> str:
 
 def _top(flight: FrontFlight) -> str:
     alt = (
-        f"Map of a simulated flight. An aircraft flies rounds at {flight.height:.0f} metres over a "
-        f"drifting vessel. "
+        f"Map of a simulated flight. An aircraft flies for {flight.seconds:.0f} seconds at "
+        f"{flight.height:.0f} metres over a vessel. "
         "The outline of its camera's image sweeps over the water; where the vessel is seen, a dot "
         "lands on the map; "
-        "an ellipse around the estimate shrinks while it is seen and grows while it is not. A cross "
+        "an ellipse around the estimate is as large as the filter takes its error to be. A cross "
         "shows where the "
         "vessel truly is."
     )
@@ -137,7 +137,7 @@ def _top(flight: FrontFlight) -> str:
 def _doors(studies: Sequence[StudyStatus], flights: int, cases: int, learn: Sequence[Learn]) -> str:
     done = sum(one.state == "done" for one in studies)
     looks = sum(one.state == FIRST_LOOK for one in studies)
-    theses = f"{len(studies)} studies of two theses" + (f" with {cases} cases" if cases else "")
+    theses = f"{len(studies)} studies" + (f", for {cases} cases of two theses" if cases else "")
     ran = [f"{done} done"] if done or not looks else []
     ran += [f"{looks} at a first look"] if looks else []
     mine = f"{flights} flight{'s' * (flights > 1)} evaluated here" if flights else "none yet: how to begin"
@@ -187,8 +187,8 @@ def _theses(studies: Sequence[StudyStatus], shown: Sequence[Card]) -> str:
     if any(one.numbers for one in shown):
         parts.append(
             "<p>Each card opens a report. Its strip shows our numbers divided by the printed ones: "
-            "in the shaded "
-            "middle they are close.</p>"
+            f"the shaded middle is within a factor of {ratios.CLOSE:g}. What is calculated must agree to the "
+            "last printed digit, and may differ there, too.</p>"
         )
         parts.append(ratios.legend(n.verdict for one in shown for n in one.numbers))
     if shown:

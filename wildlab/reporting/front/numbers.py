@@ -1,4 +1,4 @@
-"""Every printed number at once: a row of marks for each study, counts beside, and the same on one sheet."""
+"""The printed numbers at once: a row of marks for each study, counts beside, and the same on one sheet."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ padding:.12rem 0}
 def numbers_section(studies: Sequence[StudyStatus]) -> str:
     """The section of the front page."""
     counts = counted(studies)
-    head = '<section><h2 id="numbers">Every printed number at once</h2>'
+    head = '<section><h2 id="numbers">The printed numbers at once</h2>'
     rows = number_rows(studies)
     if not rows:
         return (
-            f'{head}<p class="empty">{counts.all} numbers are in print; no study of them was run '
+            f'{head}<p class="empty">{counts.all} printed numbers are kept here; no study of them was run '
             f"yet.</p></section>"
         )
     verdicts = [n.verdict for one in studies if one.ran for n in ratios.drawable(one.counted)]
@@ -99,11 +99,13 @@ def _notes(counts: Counts) -> list[str]:
     rest = counts.all - counts.of
     if rest:
         reasons = "; ".join(f"{n} {why}" for why, n in counts.others.items())
-        said.append(f"{rest} of the {counts.all} numbers in print are not among them: {reasons}.")
+        said.append(
+            f"{rest} of the {counts.all} printed numbers that are kept here are not among them: {reasons}."
+        )
     if counts.undrawn:
         said.append(
-            f"{counts.undrawn} of those judged are signed or zero, and have no ratio: they were compared by "
-            "their difference."
+            f"{counts.undrawn} of those judged cannot be drawn, being signed or zero without a ratio: "
+            "compared by their difference."
         )
     return said
 
@@ -128,12 +130,12 @@ def poster_page(studies: Sequence[StudyStatus]) -> str:
     str
         HTML; it works with no study run.
     """
-    way = '<a href="index.html">wildlab</a> › every printed number'
-    body = f'<h1 class="unseen">Every printed number at once</h1>{_sheet(studies)}'
+    way = '<a href="index.html">wildlab</a> › the printed numbers'
+    body = f'<h1 class="unseen">The printed numbers at once</h1>{_sheet(studies)}'
     style = f"{ratios.STYLE}\n{_POSTER_STYLE}\n.unseen{{position:absolute;left:-99rem}}"
     made = datetime.now(UTC).strftime("%Y-%m-%d")
     footer = f"<p>Put together {made}. Print it on A4, or larger: it is drawn in lines.</p>"
-    return page(title="Every printed number at once", body=body, kicker=way, footer=footer, style=style)
+    return page(title="The printed numbers at once", body=body, kicker=way, footer=footer, style=style)
 
 
 def _sheet(studies: Sequence[StudyStatus]) -> str:
@@ -141,7 +143,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     rows = [(one, ratios.drawable(one.counted)) for one in studies if one.ran]
     rows = [(one, shown) for one, shown in rows if shown]
     if not rows:
-        return f"<p>{counts.all} numbers are in print; no study of them was run yet.</p>"
+        return f"<p>{counts.all} printed numbers are kept here; no study of them was run yet.</p>"
     scale = 0.36
     width = (AXIS_END - NAMES_END) / scale
     notes = [line for said in _notes(counts) for line in textwrap.wrap(said, 118)]
@@ -149,7 +151,7 @@ def _sheet(studies: Sequence[StudyStatus]) -> str:
     ranks = [ratios.levels_for(shown, width, 7) for _, shown in rows]
     levels = [max(one + 0.8, 2.2) for one in ranks]
     unit = min((bottom - top) / sum(levels), 5.2)
-    parts = [_text(0, 10, "Every printed number of two theses, beside ours", 6.4, weight=650)]
+    parts = [_text(0, 10, "Printed numbers of two theses, beside ours", 6.4, weight=650)]
     judged = " · ".join(f"{n} {WORDS[verdict]}" for verdict, n in counts.judged.items() if n)
     lead = f"{judged}, of {counts.of} that were judged." if counts.of else "None is judged yet."
     parts.append(_text(0, 18.5, lead, 4.4))

@@ -233,7 +233,7 @@ def words_on_placement(found: Placement, stated: ArrayLike) -> str:
         words += f" and the antenna at {arms[0]} m (SD {arms[1]}; stated {arms[2]})"
     if not off.any():
         return f"{words}: as stated, within {FAR:.0f} SD."
-    write = [f"latency_s = {likely[0]:.2f}"] if off[0] else []
+    write = [f"latency_s = {likely[0]:.3f}"] if off[0] else []
     if off[1:].any():
         write.append(f"lever_arm_m = [{', '.join(f'{value:.2f}' for value in likely[1:])}]")
     return (

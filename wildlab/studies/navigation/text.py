@@ -79,7 +79,9 @@ def summary(
     reason = f"From {against} it differs by {off / stated:.1f} times what it states."
     if too_sure:
         return sentences, "warn", ("too sure of itself", reason)
-    return sentences, "neutral", ("within what it states" if true else "not contradicted", reason)
+    # What is told apart here is no test: up to twice what is stated, one flight does not show it wrong.
+    word = "within what it states" if off <= stated else "not far beyond what it states"
+    return sentences, "neutral", (word if true else "not contradicted", reason)
 
 
 _PAIR = ("rms", "mean_sd")
