@@ -133,7 +133,8 @@ def test_a_flight_imported_with_a_calibration_keeps_it_and_is_judged_with_it(
     assert load_flight(tmp_path / "f").calibration is None
 
     jobs = []
-    monkeypatch.setattr("wildlab.runner.evaluate.run_all", lambda groups, *rest: jobs.extend(groups[0]) or [])
+    kept = "wildlab.runner.evaluate.run_all"
+    monkeypatch.setattr(kept, lambda groups, *_, **__: jobs.extend(groups[0]) or [])
     save_flight(load_flight(folder / "tilted"), tmp_path / "g", calibration=learnt)
     save_flight(load_flight(tmp_path / "g"), tmp_path / "h")
     for name, expected in (("g", True), ("h", True), ("tilted", False)):

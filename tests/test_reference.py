@@ -80,11 +80,12 @@ def test_every_name_that_is_offered_has_its_place(reference: Path, room: str) ->
 
 
 @pytest.mark.slow
-def test_the_first_page_opens_in_a_browser(reference: Path, faults: Callable[[Path], list[str]]) -> None:
+def test_the_first_page_opens_in_a_browser(reference: Path, faults: Callable[..., list[str]]) -> None:
     index = (reference / "index.html").read_text(encoding="utf-8")
     assert all(f">{room}</a>" in index for room in DOCUMENTED if room.count(".") < 2)
     for page in ("index.html", "wildlab.html", "wildlab/flight.html", "wildlab/pipeline/track.html"):
-        assert faults(reference / page) == [], page
+        # The look of these pages is pdoc's.
+        assert faults(reference / page, axe=False) == [], page
 
 
 def test_a_request_is_found() -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.conftest import find_chromium
 from wildlab.errors import WildlabError
 from wildlab.flight.store import save_flight
 from wildlab.replay import viewer as viewers
@@ -97,24 +96,11 @@ def test_the_program_listens_to_this_machine_alone_and_counts_nobody(
 
 
 @pytest.fixture(scope="module")
-def graphics() -> Iterator[Any]:
+def graphics(launch: Callable[..., Any]) -> Iterator[Any]:
     """A browser that draws three dimensions without a graphics card."""
-    program = find_chromium()
-    if program is None:
-        pytest.skip("needs Chromium: install it, or name one in WILDLAB_CHROMIUM")
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (the extra `dev`)")
-    with playwright.sync_playwright() as play:
-        chromium = play.chromium.launch(
-            executable_path=program,
-            args=[
-                "--no-sandbox",
-                "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader",
-                "--ignore-gpu-blocklist",
-            ],
-        )
-        yield chromium
-        chromium.close()
+    chromium = launch("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+    yield chromium
+    chromium.close()
 
 
 @pytest.mark.slow

@@ -111,3 +111,17 @@ def test_all_sensors_together_stand_beside_the_best_one(rmse: float, level: str,
         f"All sensors together are off by {words.length(rmse)} from boat, radar alone by"
     )
     assert said[1].endswith(end)
+
+
+def test_a_verdict_on_little_says_how_little() -> None:
+    """ "About as far as stated: overconfident" contradicts itself unless the factor stands beside it."""
+    blind = rows().assign(
+        compared=0, nees=np.nan, verdict="not judged", nis=2.42, nis_verdict="overconfident"
+    )
+    said, level = words.summary(blind[blind["filter"] == "ekf"], [], None)
+    assert level == "warn"
+    assert "as it states (1.10 times; more than by chance all the same): overconfident" in said[0]
+    fine = blind.assign(nis_verdict="consistent")
+    assert "times" not in words.summary(fine[fine["filter"] == "ekf"], [], None)[0][0]
+    near, _ = words.summary(rows(nees=2.4, verdict="overconfident"), [], None)
+    assert "about as large as stated (1.10 times; more than by chance all the same): overconfident" in near[0]

@@ -266,14 +266,16 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(tmp_path: Path, cluster: Cluster) -> None:
-    folder = make(tmp_path, seconds=0.4, seeds=12)
+    folder = make(tmp_path, seconds=0.8, seeds=12)
     for _ in range(2):
         cluster.add_worker()
     cluster.wait_for_workers(2)
+    # Long enough for a worker that is slow to begin to have its share.
     program = start(folder, "walks", "--out", "cluster", "--scheduler", cluster.address)
-    wait_for(lambda: 2 <= len(kept(folder, "cluster")) < 8)
+    both = {worker.pid for worker in cluster.workers}
+    wait_for(lambda: len(kept(folder, "cluster")) >= 2 and {process for _, process in flown(folder)} == both)
+    assert program.poll() is None
     victim = cluster.workers[0]
-    assert {process for _, process in flown(folder)} == {worker.pid for worker in cluster.workers}
     victim.kill()
     begun = len(flown(folder))
     text = program.communicate(timeout=120)[0]

@@ -166,10 +166,11 @@ def _with_truth(rows: pd.DataFrame) -> tuple[list[str], str]:
     what = "The track" if len(mine) == 1 else f"The {len(mine)} tracks"
     are = "is" if len(mine) == 1 else "are"
     looks = int(mine["compared"].sum() + mine["without"].sum())
+    size = float(mine["nees"].median())
     said.append(
         f"{what} of the filter with {filter_words(best)} {are} off by {_far(mine)} where the target is seen, "
         f"at {int(mine['compared'].sum())} of {looks} looks, and the errors there are "
-        f"{size_words(float(mine['nees'].median()))}: {_counts(mine)}."
+        f"{size_words(size)}{_by_little(float(np.sqrt(size / 2)), mine['verdict'])}: {_counts(mine)}."
     )
     unseen = mine[mine["without"] > 0]
     if len(unseen):
@@ -278,7 +279,7 @@ def _without_truth(rows: pd.DataFrame, pairs: Sequence[Apart]) -> tuple[list[str
     factor = float(np.sqrt((mine["nis"] / mine["dof"]).mean()))
     said = [
         f"Detections fall {_off(factor)} from where the filter with {filter_words(name)} expects them as it "
-        f"states: {_counts(mine, 'nis_verdict')}.",
+        f"states{_by_little(factor, mine['nis_verdict'])}: {_counts(mine, 'nis_verdict')}.",
         "How far off the tracks are cannot be said without the targets' true places.",
     ]
     used = [one for one in pairs if one.filter == name]
@@ -295,6 +296,13 @@ def _off(factor: float) -> str:
     if factor < 1 / ALIKE:
         return f"{factor:.2f} times as far"
     return "about as far"
+
+
+def _by_little(factor: float, verdicts: pd.Series) -> str:
+    """What reconciles "about as far" with a verdict that says otherwise: many values tell a small excess."""
+    if 1 / ALIKE <= factor <= ALIKE and len(verdicts) == 1 and verdicts.isin([OVERCONFIDENT, CAUTIOUS]).all():
+        return f" ({factor:.2f} times; more than by chance all the same)"
+    return ""
 
 
 def apart_sentence(one: Apart) -> str:

@@ -64,6 +64,9 @@ def tutorial_page(notebook: nbformat.NotebookNode, *, name: str, footer: str = "
     for i, table in enumerate(soup.find_all("table"), start=1):
         table.attrs.pop("border", None)
         table.wrap(_box(soup, f"Table {i}"))
+        for cell in table.find_all("th"):
+            if not cell.get_text(strip=True):
+                cell.name = "td"  # over the names of rows pandas leaves a heading of nothing
     for i, block in enumerate(soup.find_all("pre"), start=1):
         # What scrolls sideways must be reached without a mouse.
         block.attrs |= {"tabindex": "0", "role": "region", "aria-label": f"Code or output {i}"}

@@ -78,7 +78,7 @@ def paced(stamps: ArrayLike) -> str:
     Examples
     --------
     >>> paced(np.concatenate([np.arange(0, 60, 0.1), np.arange(90, 150, 0.1)]))
-    ' at 10 Hz (1 pause, 30 s)'
+    ' at 10 Hz (1 pause, 30.1 s)'
     >>> paced(np.repeat(np.arange(0, 60, 0.5), 5) + np.tile(np.arange(5) * 1e-3, 120))  # five at once
     ' at 10 Hz'
     """

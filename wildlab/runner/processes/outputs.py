@@ -53,8 +53,9 @@ def leave_failure(job: Job, failure: Failure, cell: int | None, status: dict[str
     clear_folder(folder / "figures")
     beside = [name for name in ("provenance.json", "notebook.ipynb") if (folder / name).is_file()]
     ended = str(status["finished"]).replace("T", " ").replace("+00:00", " UTC")
-    links = [f'<a href="{name}">{name}</a>' for name in beside]
-    footer = f"<p>{' · '.join([f'ended {ended}', *links])}</p>"
+    # Words, not links: the page is passed on alone.
+    names = " and ".join(f"<code>{name}</code>" for name in beside)
+    footer = f"<p>ended {ended}{f'. Beside this page: {names}' if names else ''}.</p>"
     details = failure.details or log_of(job)
     write_atomic(
         folder / "report.html",
