@@ -8,7 +8,7 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `nees`, `nis`, `average`, `chi_square_interval`: is a filter consistent?
 - `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
 - `track_errors.track_errors`, `summarise_track`: how far is a track from the truth?
-- `ospa`, `gospa`: how far is a set of tracks?
+- `ospa`, `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
@@ -47,6 +47,7 @@ from wildlab.evaluation.errors import (
     scatter_by_image,
     summarise,
 )
+from wildlab.evaluation.identities import Identities, Scan, compare_identities, scan_gospa
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
@@ -72,6 +73,7 @@ __all__ = [
     "Gain",
     "Gospa",
     "Halves",
+    "Identities",
     "Interval",
     "Linear",
     "Neighbours",
@@ -79,6 +81,7 @@ __all__ = [
     "Outlier",
     "PoseNoise",
     "Ranked",
+    "Scan",
     "Scatter",
     "Spread",
     "TrackErrors",
@@ -91,6 +94,7 @@ __all__ = [
     "bootstrap_interval",
     "chi_square_interval",
     "compare_halves",
+    "compare_identities",
     "compare_neighbours",
     "effective_sample_size",
     "estimate_pose_noise",
@@ -110,6 +114,7 @@ __all__ = [
     "portmanteau",
     "position_nees",
     "rank_models",
+    "scan_gospa",
     "scatter_by_image",
     "share_inside",
     "share_interval",

@@ -1,0 +1,281 @@
+"""Tracks with identities against targets: closed cases, what permutations leave alone, brute force."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.identities import Scan, compare_identities, scan_gospa
+from wildlab.evaluation.sets import gospa
+
+CUTOFF = 20.0
+
+
+def scan(time, tracks, targets, hidden=(), ignored=(), P=4.0):
+    """Tracks and targets by name, each at (x, y)."""
+    return Scan(
+        time,
+        np.array(list(tracks.values()), float).reshape(-1, 2),
+        np.broadcast_to(P * np.eye(2), (len(tracks), 2, 2)),
+        list(tracks),
+        np.array(list(targets.values()), float).reshape(-1, 2),
+        list(targets),
+        [name not in hidden for name in targets],
+        [name in ignored for name in targets],
+    )
+
+
+def test_a_perfect_track():
+    found = compare_identities([scan(t, {1: (t, 2)}, {"A": (t, 0)}) for t in range(60)], CUTOFF)
+    assert (found.swaps, found.breaks, found.false_tracks_per_minute) == (0, 0, 0)
+    assert found.targets["A"] == (60, 1.0, 0.0, 0, 0)
+    assert found.tracks[1] == (60, 60, 1.0, False)
+    assert all(one.distance == pytest.approx(2) for one in found.gospa)
+
+
+def test_a_swap_counts_for_each_track_when_the_targets_are_apart_again():
+    """Targets cross at t = 10; tracks turn back there. They hold on to their targets up to the cut-off."""
+    found = compare_identities(
+        [
+            scan(t, {1: (10 - abs(10 - t), 0), 2: (10 + abs(10 - t), 0)}, {"A": (t, 0), "B": (20 - t, 0)})
+            for t in range(31)
+        ],
+        CUTOFF,
+    )
+    assert (found.swaps, found.breaks) == (2, 0)
+    assert found.followed[19] == {"A": 1, "B": 2}
+    # 2 (t - 10) reaches the cut-off at t = 20.
+    assert found.followed[20] == {"A": 2, "B": 1}
+    assert [found.targets[name].swaps for name in "AB"] == [1, 1]
+    # GOSPA has no memory and sees nothing wrong.
+    assert all(one.distance == 0 for one in found.gospa)
+
+
+def test_noise_beside_another_target_is_no_swap():
+    """The tracks are for a moment nearer to each other's target."""
+    wrong = scan(1, {1: (6, 0), 2: (4, 0)}, {"A": (0, 0), "B": (10, 0)})
+    right = scan(0, {1: (1, 0), 2: (9, 0)}, {"A": (0, 0), "B": (10, 0)})
+    found = compare_identities([right, wrong, right._replace(time=2.0)], CUTOFF)
+    assert (found.swaps, found.followed[1]) == (0, {"A": 1, "B": 2})
+
+
+def test_a_break_is_a_new_identity_on_the_same_target():
+    tracks = [{1: (0, 0)}, {}, {2: (0, 0)}, {2: (0, 0)}, {1: (0, 0)}]
+    found = compare_identities([scan(t, one, {"A": (0, 0)}) for t, one in enumerate(tracks)], CUTOFF)
+    assert (found.swaps, found.breaks) == (0, 2)
+    assert found.targets["A"] == (5, 0.8, 0.0, 0, 2)
+    assert not any(track.false for track in found.tracks.values())
+
+
+def test_a_track_that_leaves_for_a_target_that_had_none_swaps_and_its_old_target_breaks():
+    targets = {"A": (0, 0), "B": (100, 0)}
+    found = compare_identities(
+        [scan(0, {1: (0, 0)}, targets), scan(1, {1: (100, 0), 2: (0, 0)}, targets)], CUTOFF
+    )
+    assert (found.swaps, found.breaks) == (1, 1)
+    assert (found.targets["B"].swaps, found.targets["A"].breaks) == (1, 1)
+    assert found.targets["B"].time_to_confirm == 1
+
+
+def test_false_tracks_by_the_minute():
+    """Two of three tracks are false: one always, one at two of its three scans; the time is half a minute."""
+    target = {"A": (0, 0)}
+    found = compare_identities(
+        [
+            scan(0, {1: (0, 0), 2: (50, 0), 3: (50, 50)}, target),
+            scan(15, {1: (0, 0), 3: (50, 50)}, target),
+            scan(30, {3: (0, 0)}, target),
+        ],
+        CUTOFF,
+    )
+    assert [found.tracks[one].false for one in (1, 2, 3)] == [False, True, True]
+    assert found.false_tracks_per_minute == pytest.approx(4)
+    assert np.isnan(compare_identities([scan(0, {}, target)], CUTOFF).false_tracks_per_minute)
+
+
+def test_time_to_confirm_counts_from_when_it_is_visible():
+    near, far = {"A": (0, 0)}, {"A": (500, 0)}
+    found = compare_identities(
+        [
+            scan(0, {1: (500, 0)}, far, hidden="A"),
+            scan(3, {}, near),
+            scan(4, {}, near),
+            scan(8, {1: (0, 0)}, near, hidden="A"),
+            scan(9, {1: (0, 0)}, near),
+        ],
+        CUTOFF,
+    )
+    assert found.targets["A"].time_to_confirm == 5
+    assert found.targets["A"].tracked == pytest.approx(1 / 3)
+    never = compare_identities([scan(0, {}, near)], CUTOFF).targets["A"]
+    assert np.isnan(never.time_to_confirm)
+    assert never.tracked == 0
+
+
+def test_a_target_never_visible_has_no_share():
+    life = compare_identities([scan(0, {1: (0, 0)}, {"A": (0, 0)}, hidden="A")], CUTOFF).targets["A"]
+    assert life.visible == 0
+    assert np.isnan(life.tracked)
+
+
+@pytest.mark.parametrize("how", ["hidden", "ignored"])
+def test_a_track_on_a_target_that_nobody_asks_for_costs_nothing(how):
+    targets = {"A": (0, 0), "B": (100, 0)}
+    alone = scan_gospa(scan(0, {1: (3, 0)}, targets, **{how: "B"}), CUTOFF)
+    both = scan_gospa(scan(0, {1: (3, 0), 2: (110, 0)}, targets, **{how: "B"}), CUTOFF)
+    assert alone == both
+    assert (alone.distance, alone.n_missed, alone.n_false) == (pytest.approx(3), 0, 0)
+    # As far off as the cut-off it is on nothing.
+    assert scan_gospa(scan(0, {1: (3, 0), 2: (120, 0)}, targets, **{how: "B"}), CUTOFF).n_false == 1
+    # One target takes one track.
+    doubled = scan(0, {1: (3, 0), 2: (99, 0), 3: (101, 0)}, targets, **{how: "B"})
+    assert scan_gospa(doubled, CUTOFF).n_false == 1
+
+
+def test_a_track_is_not_excused_by_a_target_further_off_than_its_own():
+    """It is on A, which is visible; B beside it is don't-care."""
+    found = scan_gospa(scan(0, {1: (4, 0)}, {"A": (0, 0), "B": (15, 0)}, ignored="B"), CUTOFF)
+    assert (found.distance, found.n_missed) == (pytest.approx(4), 0)
+
+
+def test_dont_care_takes_no_part_in_swaps_breaks_and_anees_and_hidden_does():
+    def run(how):
+        target = {"A": (0, 0)}
+        return compare_identities(
+            [
+                scan(0, {1: (0, 0)}, target),
+                scan(1, {2: (10, 0)}, target, **{how: "A"}),
+                scan(2, {1: (0, 2)}, target),
+            ],
+            CUTOFF,
+        )
+
+    assert run("ignored").breaks == 0
+    assert run("hidden").breaks == 2
+    assert np.isnan(run("ignored").tracks[2].anees)
+    assert run("hidden").tracks[2].anees == pytest.approx(25)
+    assert run("ignored").tracks[1].anees == pytest.approx(0.5)
+
+
+def test_anees_is_that_of_the_errors_and_leaves_out_unknown_covariances():
+    rng = np.random.default_rng(3)
+    errors = rng.multivariate_normal([0, 0], [[4, 1], [1, 2]], 4000)
+    P = np.array([[4.0, 1], [1, 2]])
+    scans = [scan(t, {1: tuple(e)}, {"A": (0, 0)}) for t, e in enumerate(errors)]
+    found = compare_identities([one._replace(covariances=P[None]) for one in scans], 100.0)
+    assert found.tracks[1].anees == pytest.approx(
+        np.mean(np.einsum("ni,ij,nj->n", errors, np.linalg.inv(P), errors))
+    )
+    assert found.tracks[1].anees == pytest.approx(2, abs=0.15)
+    unknown = scans[0]._replace(covariances=np.full((1, 2, 2), np.nan))
+    mixed = compare_identities([unknown, scans[1]._replace(covariances=P[None])], 100.0)
+    assert mixed.tracks[1].anees == pytest.approx(errors[1] @ np.linalg.inv(P) @ errors[1])
+    assert np.isnan(compare_identities([unknown], 100.0).tracks[1].anees)
+
+
+coordinates = st.tuples(st.integers(-30, 30), st.integers(-30, 30))
+places = st.lists(coordinates, max_size=4)
+runs = st.lists(
+    st.tuples(places, places, st.lists(st.sampled_from("vhi"), min_size=4, max_size=4)),
+    min_size=1,
+    max_size=5,
+)
+
+
+def scans_of(run, names="ABCD", tracks=(0, 1, 2, 3)):
+    return [
+        scan(
+            t,
+            dict(zip(tracks, x, strict=False)),
+            dict(zip(names, y, strict=False)),
+            hidden=[name for name, kind in zip(names, kinds, strict=True) if kind == "h"],
+            ignored=[name for name, kind in zip(names, kinds, strict=True) if kind == "i"],
+        )
+        for t, (x, y, kinds) in enumerate(run)
+    ]
+
+
+@given(runs, st.permutations(range(4)))
+def test_permuted_identities_change_nothing_but_names(run, order):
+    """Other identities for all time, whatever their order in a scan was, are other names alone."""
+    one = compare_identities(scans_of(run), CUTOFF)
+    other = compare_identities(scans_of(run, tracks=order), CUTOFF)
+    assert other.gospa == one.gospa
+    assert other.followed == [{name: order[track] for name, track in at.items()} for at in one.followed]
+    assert (other.swaps, other.breaks, other.targets) == (one.swaps, one.breaks, one.targets)
+    assert repr({order[track]: life for track, life in one.tracks.items()}) == repr(other.tracks)
+    assert other.false_tracks_per_minute == pytest.approx(one.false_tracks_per_minute, nan_ok=True)
+
+
+@given(places, places)
+def test_gospa_of_a_scan_is_gospa_and_symmetric_where_all_are_visible(x, y):
+    there = scan_gospa(scan(0, dict(enumerate(x)), dict(enumerate(y))), CUTOFF)
+    back = scan_gospa(scan(0, dict(enumerate(y)), dict(enumerate(x))), CUTOFF)
+    assert there == gospa(y, x, CUTOFF)
+    assert (there.distance, there.n_missed) == (pytest.approx(back.distance), back.n_false)
+
+
+def every_pairing(x, y):
+    """All sets of pairs of rows of ``x`` and of ``y``."""
+    for size in range(min(len(x), len(y)) + 1):
+        for rows in itertools.combinations(range(len(x)), size):
+            for columns in itertools.permutations(range(len(y)), size):
+                yield list(zip(rows, columns, strict=True))
+
+
+@given(places, places, st.lists(st.booleans(), min_size=4, max_size=4))
+def test_dont_care_against_every_pairing(x, y, flags):
+    """What the best pairing with all targets leaves, when what lies on don't-care leaves with it."""
+    ignored = flags[: len(y)]
+
+    def cost(pairs):
+        return sum(np.hypot(*np.subtract(x[i], y[j])) ** 2 for i, j in pairs) + CUTOFF**2 / 2 * (
+            len(x) + len(y) - 2 * len(pairs)
+        )
+
+    def rest(pairs):
+        kept = [pair for pair in pairs if not ignored[pair[1]]]
+        lost = len(y) - sum(ignored) - len(kept)
+        return sum(np.hypot(*np.subtract(x[i], y[j])) ** 2 for i, j in kept) + CUTOFF**2 / 2 * (
+            lost + len(x) - len(pairs)
+        )
+
+    ways = list(every_pairing(x, y))
+    least = min(map(cost, ways))
+    possible = [rest(way) for way in ways if cost(way) <= least + 1e-6]
+    hidden = [name for name, flag in zip(range(4), flags, strict=True) if flag]
+    found = scan_gospa(scan(0, dict(enumerate(x)), dict(enumerate(y)), ignored=hidden), CUTOFF)
+    assert np.isclose(found.distance**2, possible, atol=1e-6).any()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"identities": [1, 1]}, "The track 1 is there twice at 0 s"),
+        ({"names": ["A", "A"]}, "The target 'A' is there twice at 0 s"),
+        ({"positions": [[0, 0], [np.nan, 0]]}, "A position at 0 s is not finite"),
+        ({"truth": [[0, 0], [np.inf, 0]]}, "A position at 0 s is not finite"),
+        ({"covariances": np.eye(2)}, "do not fit each other"),
+        ({"visible": [True]}, "do not fit each other"),
+        ({"positions": [[0, 0, 0], [0, 0, 1]]}, "do not fit each other"),
+    ],
+)
+def test_what_is_refused(change, words):
+    good = scan(0, {1: (0, 0), 2: (9, 9)}, {"A": (0, 0), "B": (9, 9)})
+    with pytest.raises(WildlabError, match=words):
+        compare_identities([good._replace(**change)], CUTOFF)
+    with pytest.raises(WildlabError, match=words):
+        scan_gospa(good._replace(**change), CUTOFF)
+
+
+def test_scans_out_of_order_are_refused():
+    one = scan(1, {}, {})
+    for scans in ([], [one, scan(0, {}, {})], [scan(np.nan, {}, {})]):
+        with pytest.raises(WildlabError, match="not in the order of time"):
+            compare_identities(scans, CUTOFF)
+    assert compare_identities([one, one], CUTOFF).targets == {}

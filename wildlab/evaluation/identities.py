@@ -1,0 +1,384 @@
+"""How tracks that carry identities compare with true targets over many scans: who follows whom, and how long.
+
+At every scan the tracks that are *confirmed* are held against the targets that exist. A target is of one of
+three kinds at a scan:
+
+- **visible**: it could be seen. Without a track it is missed.
+- **not visible**: nobody asks for a track of it, and one that is there costs nothing; who follows it is
+  remembered, so that a track that comes back as another one is found out.
+- **don't-care**: as not visible, and neither swaps, breaks nor NEES are taken from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.consistency import nees
+from wildlab.evaluation.sets import Gospa, gospa
+
+Array = NDArray[np.float64]
+#: Row of an estimate and row of the target it follows.
+Pairs = list[tuple[int, int]]
+
+
+class Scan(NamedTuple):
+    """Tracks and targets at one moment, positions in one frame and unit (m).
+
+    Attributes
+    ----------
+    time
+        Seconds.
+    positions, covariances
+        Of the tracks, (N, k) and (N, k, k); a covariance of NaN is one that is not known.
+    identities
+        (N,), which track each is; none twice.
+    truth
+        Of the targets, (M, k).
+    names
+        (M,), which target each is; none twice.
+    visible
+        (M,) bools: whether it could be seen.
+    ignored
+        (M,) bools: whether it is don't-care.
+    """
+
+    time: float
+    positions: ArrayLike
+    covariances: ArrayLike
+    identities: Sequence[Hashable]
+    truth: ArrayLike
+    names: Sequence[Hashable]
+    visible: ArrayLike
+    ignored: ArrayLike
+
+
+class TargetLife(NamedTuple):
+    """What became of one target.
+
+    Attributes
+    ----------
+    visible
+        Scans at which it was visible, and not don't-care.
+    tracked
+        Share of these with a track on it; NaN where there are none.
+    time_to_confirm
+        From the first of these to the first scan from then on with a track on it, s; NaN if there is none.
+    swaps, breaks
+        As in `Identities`, on this target.
+    """
+
+    visible: int
+    tracked: float
+    time_to_confirm: float
+    swaps: int
+    breaks: int
+
+
+class TrackLife(NamedTuple):
+    """What became of one track.
+
+    Attributes
+    ----------
+    scans
+        At which it was there.
+    on_target
+        Of them, those at which it followed a target, of any kind.
+    anees
+        Mean over the scans on a target that is not don't-care of the NEES of its position, not divided by
+        its degrees of freedom: k where it is consistent; NaN where none is known.
+    false
+        Whether it was on no target at more than half of its scans.
+    """
+
+    scans: int
+    on_target: int
+    anees: float
+    false: bool
+
+
+class Identities(NamedTuple):
+    """Tracks against targets over all scans.
+
+    Attributes
+    ----------
+    gospa
+        One for each scan.
+    followed
+        One for each scan: by the target's name, which track is on it.
+    swaps
+        Times a track is on another target than the last one it was on. Two tracks that exchange their
+        targets are two swaps; one that goes to a target that had none is one.
+    breaks
+        Times a target's track is another one than its last, without the swaps: the new one was on no other
+        target before, or comes back.
+    false_tracks_per_minute
+        Tracks that are false, over the minutes from the first scan to the last; NaN where no time passes.
+    targets, tracks
+        By name and by identity, in the order of their first scan.
+    """
+
+    gospa: list[Gospa]
+    followed: list[dict[Hashable, Hashable]]
+    swaps: int
+    breaks: int
+    false_tracks_per_minute: float
+    targets: dict[Hashable, TargetLife]
+    tracks: dict[Hashable, TrackLife]
+
+
+class _Checked(NamedTuple):
+    """A scan as arrays."""
+
+    time: float
+    x: Array
+    P: Array
+    identities: list[Hashable]
+    truth: Array
+    names: list[Hashable]
+    visible: NDArray[np.bool_]
+    ignored: NDArray[np.bool_]
+
+
+def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
+    """GOSPA of one scan, in which tracks on targets that nobody asks for cost nothing.
+
+    The tracks are assigned to all targets as in `gospa`. Those on targets that are not visible or don't-care
+    then leave with them, and such targets without a track leave too; what remains is assigned best as it is.
+    A target takes one track: a second one beside a don't-care target is a false one.
+
+    Parameters
+    ----------
+    scan
+        Tracks and targets.
+    cutoff, order
+        As in `gospa`.
+
+    Returns
+    -------
+    Gospa
+        `gospa` itself where every target is visible.
+
+    Raises
+    ------
+    WildlabError
+        If the scan's parts do not fit each other, a name or identity is there twice, or as `gospa`.
+    """
+    return _gospa(_checked(scan), cutoff, order)
+
+
+def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0) -> Identities:
+    """What became of tracks and targets over scans in the order of time.
+
+    Who follows whom is settled as by CLEAR MOT (Bernardin and Stiefelhagen 2008): a track stays on its target
+    of the scan before while it is nearer than the cut-off, for a moment's noise beside another target is no
+    swap; the rest are paired by GOSPA's assignment. GOSPA itself has no such memory. So a swap counts at the
+    scan at which the two targets are far enough apart for it to be seen.
+
+    Parameters
+    ----------
+    scans
+        Of confirmed tracks alone, times not falling.
+    cutoff
+        Distance from which a track does not follow a target, in the unit of the positions.
+    order
+        p of GOSPA.
+
+    Returns
+    -------
+    Identities
+
+    Raises
+    ------
+    WildlabError
+        If there are no scans, their times fall, or as `scan_gospa`.
+
+    Examples
+    --------
+    Two targets cross, and their tracks are exchanged:
+
+    >>> def scan(t, a, b):
+    ...     truth, seen, ignored = [[t], [9 - t]], [True, True], [False, False]
+    ...     return Scan(t, [[a], [b]], np.ones((2, 1, 1)), [7, 8], truth, "AB", seen, ignored)
+    >>> found = compare_identities([scan(t, min(t, 9 - t), max(t, 9 - t)) for t in range(10)], 3)
+    >>> found.swaps, found.breaks, sorted(found.followed[-1].items())
+    (2, 0, [('A', 8), ('B', 7)])
+    """
+    given = [_checked(scan) for scan in scans]
+    times = np.array([one.time for one in given])
+    if not len(given) or not np.isfinite(times).all() or (np.diff(times) < 0).any():
+        raise WildlabError(
+            "the scans are none, or not in the order of time", "give them by rising time", field="scans"
+        )
+    pairs: list[Pairs] = []
+    before: dict[Hashable, Hashable] = {}
+    for one in given:
+        found = _follow(one, before, cutoff, order)
+        pairs.append(found)
+        before = {one.identities[row]: one.names[column] for row, column in found}
+    swaps, breaks = _changes(given, pairs)
+    tracks = _track_lives(given, pairs)
+    minutes = (times[-1] - times[0]) / 60
+    n_false = sum(track.false for track in tracks.values())
+    return Identities(
+        [_gospa(one, cutoff, order) for one in given],
+        [
+            {one.names[column]: one.identities[row] for row, column in found}
+            for one, found in zip(given, pairs, strict=True)
+        ],
+        sum(swaps.values()),
+        sum(breaks.values()),
+        n_false / minutes if minutes > 0 else np.nan,
+        _target_lives(given, pairs, swaps, breaks),
+        tracks,
+    )
+
+
+def _checked(scan: Scan) -> _Checked:
+    x, truth = (np.asarray(points, float) for points in (scan.positions, scan.truth))
+    size = max(points.shape[1] if points.ndim == 2 else 0 for points in (x, truth))
+    x, truth = (points.reshape(0, size) if points.size == 0 else points for points in (x, truth))
+    P = np.asarray(scan.covariances, float)
+    P = P.reshape(0, size, size) if P.size == 0 else P
+    visible, ignored = (np.asarray(flags, bool) for flags in (scan.visible, scan.ignored))
+    names, identities = list(scan.names), list(scan.identities)
+    shapes = (x.shape, P.shape, (len(identities),), truth.shape, (len(names),), visible.shape, ignored.shape)
+    n, m = len(x), len(truth)
+    if shapes != ((n, size), (n, size, size), (n,), (m, size), (m,), (m,), (m,)):
+        raise WildlabError(
+            f"the parts of the scan at {scan.time:g} s do not fit each other: shapes {shapes}",
+            "give (N, k), (N, k, k) and (N,) for the tracks, (M, k) and three times (M,) for the targets",
+        )
+    for words, these in (("track", identities), ("target", names)):
+        twice = next((one for index, one in enumerate(these) if one in these[:index]), None)
+        if twice is not None:
+            raise WildlabError(
+                f"the {words} {twice!r} is there twice at {scan.time:g} s", "give every one a name of its own"
+            )
+    if not (np.isfinite(x).all() and np.isfinite(truth).all()):
+        raise WildlabError(
+            f"a position at {scan.time:g} s is not finite", "leave out tracks and targets without a position"
+        )
+    return _Checked(float(scan.time), x, P, identities, truth, names, visible, ignored)
+
+
+def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
+    asked = one.visible & ~one.ignored
+    excused = {row for row, column in _assign(one.x, one.truth, cutoff, order) if not asked[column]}
+    kept = [row for row in range(len(one.x)) if row not in excused]
+    return gospa(one.truth[asked], one.x[kept], cutoff, order)
+
+
+def _assign(x: Array, truth: Array, cutoff: float, order: float) -> Pairs:
+    """GOSPA's pairs: of those nearer than the cut-off, what costs least."""
+    if not (len(x) and len(truth)):
+        return []
+    cost = np.minimum(cdist(x, truth), cutoff) ** order
+    rows, columns = linear_sum_assignment(cost)
+    near = cost[rows, columns] < cutoff**order
+    return list(zip(rows[near].tolist(), columns[near].tolist(), strict=True))
+
+
+def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float, order: float) -> Pairs:
+    """Pairs of the scan before that still hold, then the best of the rest."""
+    column_of = {name: column for column, name in enumerate(one.names)}
+    kept: Pairs = []
+    for row, identity in enumerate(one.identities):
+        column = column_of.get(before.get(identity, object()))
+        if column is not None and np.linalg.norm(one.x[row] - one.truth[column]) < cutoff:
+            kept.append((row, column))
+    rows = [row for row in range(len(one.x)) if row not in {pair[0] for pair in kept}]
+    columns = [column for column in range(len(one.truth)) if column not in {pair[1] for pair in kept}]
+    rest = _assign(one.x[rows], one.truth[columns], cutoff, order)
+    return sorted(kept + [(rows[row], columns[column]) for row, column in rest])
+
+
+def _changes(
+    given: Sequence[_Checked], pairs: Sequence[Pairs]
+) -> tuple[dict[Hashable, int], dict[Hashable, int]]:
+    """Swaps and breaks by target."""
+    names = [name for one in given for name in one.names]
+    swaps: dict[Hashable, int] = dict.fromkeys(names, 0)
+    breaks: dict[Hashable, int] = dict.fromkeys(names, 0)
+    last_target: dict[Hashable, Hashable] = {}
+    last_track: dict[Hashable, Hashable] = {}
+    for one, found in zip(given, pairs, strict=True):
+        for row, column in found:
+            if one.ignored[column]:
+                continue
+            identity, name = one.identities[row], one.names[column]
+            if last_target.get(identity, name) != name:
+                swaps[name] += 1
+            elif last_track.get(name, identity) != identity:
+                breaks[name] += 1
+            last_target[identity], last_track[name] = name, identity
+    return swaps, breaks
+
+
+def _target_lives(
+    given: Sequence[_Checked],
+    pairs: Sequence[Pairs],
+    swaps: dict[Hashable, int],
+    breaks: dict[Hashable, int],
+) -> dict[Hashable, TargetLife]:
+    first: dict[Hashable, float] = {}
+    confirmed: dict[Hashable, float] = {}
+    seen, had = dict.fromkeys(swaps, 0), dict.fromkeys(swaps, 0)
+    for one, found in zip(given, pairs, strict=True):
+        with_track = {column for _, column in found}
+        for column, name in enumerate(one.names):
+            asked = bool(one.visible[column] and not one.ignored[column])
+            if asked:
+                first.setdefault(name, one.time)
+                seen[name] += 1
+                had[name] += column in with_track
+            if name in first and column in with_track and not one.ignored[column]:
+                confirmed.setdefault(name, one.time)
+    return {
+        name: TargetLife(
+            seen[name],
+            had[name] / seen[name] if seen[name] else np.nan,
+            confirmed[name] - first[name] if name in confirmed else np.nan,
+            swaps[name],
+            breaks[name],
+        )
+        for name in swaps
+    }
+
+
+def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hashable, TrackLife]:
+    scans: dict[Hashable, int] = {}
+    on: dict[Hashable, int] = {}
+    errors: dict[Hashable, list[tuple[Array, Array]]] = {}
+    for one, found in zip(given, pairs, strict=True):
+        for identity in one.identities:
+            scans[identity] = scans.get(identity, 0) + 1
+        for row, column in found:
+            identity = one.identities[row]
+            on[identity] = on.get(identity, 0) + 1
+            if not one.ignored[column]:
+                error = one.truth[column] - one.x[row]
+                errors.setdefault(identity, []).append((error, one.P[row]))
+    return {
+        identity: TrackLife(
+            count,
+            on.get(identity, 0),
+            _anees(errors.get(identity, [])),
+            2 * on.get(identity, 0) < count,
+        )
+        for identity, count in scans.items()
+    }
+
+
+def _anees(errors: Sequence[tuple[Array, Array]]) -> float:
+    if not errors:
+        return np.nan
+    values = nees(*(np.array(part) for part in zip(*errors, strict=True)))
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan
