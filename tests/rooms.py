@@ -21,7 +21,13 @@ LAZY = (
 DOCUMENTED = (
     *LAZY,
     *("wildlab.geometry", "wildlab.navigation", "wildlab.simulation"),
-    *("wildlab.tracking", "wildlab.evaluation", "wildlab.detection", "wildlab.planning"),
+    *(
+        "wildlab.tracking",
+        "wildlab.tracking.many",
+        "wildlab.evaluation",
+        "wildlab.detection",
+        "wildlab.planning",
+    ),
 )
 #: Rooms whose examples are run.
 WITH_EXAMPLES = (

@@ -1,0 +1,116 @@
+"""Association over a matrix: every permutation tried, and what follows from the definitions."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.tracking.many.assignment import global_nearest, nearest
+
+entries = st.one_of(st.integers(-5, 30), st.sampled_from([np.nan, np.inf]))
+matrices = st.tuples(st.integers(0, 4), st.integers(0, 4)).flatmap(
+    lambda shape: st.lists(entries, min_size=shape[0] * shape[1], max_size=shape[0] * shape[1]).map(
+        lambda values: np.array(values, float).reshape(shape)
+    )
+)
+gates = st.integers(-5, 30)
+
+
+def every_assignment(d, gate):
+    """All sets of pairs that are possible."""
+    n, m = d.shape
+    for size in range(min(n, m) + 1):
+        for rows in itertools.combinations(range(n), size):
+            for columns in itertools.permutations(range(m), size):
+                pairs = list(zip(rows, columns, strict=True))
+                if all(np.isfinite(d[pair]) and d[pair] <= gate for pair in pairs):
+                    yield pairs
+
+
+def pairs_of(assignment):
+    return [(row, int(column)) for row, column in enumerate(assignment.track) if column >= 0]
+
+
+@given(matrices, gates)
+def test_with_a_gate_against_every_permutation(d, gate):
+    found = global_nearest(d, gate)
+    ways = list(every_assignment(d, gate))
+    assert pairs_of(found) in ways
+
+    def cost(pairs):
+        return sum(d[pair] for pair in pairs) - gate * len(pairs)
+
+    assert cost(pairs_of(found)) == pytest.approx(min(map(cost, ways)))
+
+
+@given(matrices)
+def test_without_a_gate_as_many_as_possible_and_the_least_among_those(d):
+    found = pairs_of(global_nearest(d, np.inf))
+    ways = list(every_assignment(d, np.inf))
+    assert found in ways
+    most = max(map(len, ways))
+    assert len(found) == most
+    least = min(sum(d[pair] for pair in way) for way in ways if len(way) == most)
+    assert sum(d[pair] for pair in found) == pytest.approx(least)
+
+
+@given(matrices, gates)
+def test_both_sides_agree_and_the_transposed_problem_is_as_good(d, gate):
+    found, back = global_nearest(d, gate), global_nearest(d.T, gate)
+    for row, column in pairs_of(found):
+        assert found.measurement[column] == row
+    assert (found.measurement >= 0).sum() == len(pairs_of(found))
+    assert sum(d[pair] - gate for pair in pairs_of(found)) == pytest.approx(
+        sum(d.T[pair] - gate for pair in pairs_of(back))
+    )
+
+
+@given(matrices, gates)
+def test_nearest_is_the_least_of_each_column(d, gate):
+    found = nearest(d, gate)
+    for column, row in enumerate(found):
+        inside = [value for value in d[:, column] if np.isfinite(value) and value <= gate]
+        assert (row == -1) == (not inside)
+        if inside:
+            assert d[row, column] == min(inside)
+
+
+def test_the_gate_itself_is_inside():
+    assert global_nearest([[9.0]], 9.0).track.tolist() == [0]
+    assert nearest([[9.0]], 9.0).tolist() == [0]
+    assert global_nearest([[9.1]], 9.0).track.tolist() == [-1]
+    assert nearest([[9.1]], 9.0).tolist() == [-1]
+
+
+def test_two_measurements_in_the_gate_of_one_track():
+    """Scipy alone finds this infeasible."""
+    found = global_nearest([[3.0, np.inf], [2.0, np.inf]], 9.0)
+    assert found.track.tolist() == [-1, 0]
+    assert found.measurement.tolist() == [1, -1]
+
+
+def test_a_far_pair_is_not_forced_to_save_another():
+    """Two pairs at 4 cost less than one at 0 and a gate of 9 for the two left over, not one of 5."""
+    d = [[0.0, 4.0], [4.0, np.inf]]
+    assert global_nearest(d, 9.0).track.tolist() == [1, 0]
+    assert global_nearest(d, 5.0).track.tolist() == [0, -1]
+
+
+@pytest.mark.parametrize(
+    ("distances", "gate", "words"),
+    [
+        ([1.0, 2.0], 9.0, "no matrix"),
+        ([[-np.inf]], 9.0, "no size"),
+        ([[1.0]], np.nan, "no size"),
+        ([[1.0]], -np.inf, "no size"),
+    ],
+)
+def test_what_is_refused(distances, gate, words):
+    for function in (global_nearest, nearest):
+        with pytest.raises(WildlabError, match=words):
+            function(distances, gate)

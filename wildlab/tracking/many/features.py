@@ -1,0 +1,167 @@
+"""What targets look like as a help in association: H 3.3.1 and 6.4.4.
+
+A track keeps what its target looked like when it was started. H names size, intensity and the first of Hu's
+invariants, and prints neither weights nor spreads: both are the caller's to choose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.tracking.many.assignment import Assignment
+
+Array = NDArray[np.float64]
+
+
+def image_features(area: ArrayLike, intensity: ArrayLike, hu: ArrayLike, metres_per_px: ArrayLike) -> Array:
+    """Size, intensity and first Hu moment of detections, on scales whose spread hardly depends on the value.
+
+    Size is taken on the ground, so that it stays the same while the distance changes.
+
+    Parameters
+    ----------
+    area
+        (N,) px^2.
+    intensity
+        (N,) mean of each region less the background's, in any unit.
+    hu
+        (N, 7) or (N,), of which the first invariant counts.
+    metres_per_px
+        (N,) or one: how long a pixel is at the target, m.
+
+    Returns
+    -------
+    (N, 3)
+        Natural logarithm of the size in m^2, intensity, natural logarithm of the Hu moment; NaN where a size
+        or a moment is not positive.
+
+    Examples
+    --------
+    >>> image_features([100.0], [12.0], [0.2], 0.5).round(2).tolist()
+    [[3.22, 12.0, -1.61]]
+    """
+    first = np.asarray(hu, float)
+    first = first[:, 0] if first.ndim == 2 else first
+    size = np.asarray(area, float) * np.asarray(metres_per_px, float) ** 2
+    columns = (_logarithm(size), np.asarray(intensity, float), _logarithm(first))
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, weights: ArrayLike) -> Array:
+    """Weighted sum of squared differences of features, each in units of its spread.
+
+    With all weights 1 and features that are normal and independent it is chi-square, as (3.9) is, so that the
+    two may be added.
+
+    Parameters
+    ----------
+    measured
+        (N, f) of measurements.
+    stored
+        (M, f) of tracks.
+    sd
+        (f,) standard deviation of the difference between a measurement of a target and what its track keeps.
+    weights
+        (f,), not negative; zero leaves a feature out.
+
+    Returns
+    -------
+    (N, M)
+        A feature that is not known, NaN, on either side adds nothing.
+
+    Raises
+    ------
+    WildlabError
+        If the shapes do not fit each other, a spread is not positive or a weight is negative.
+
+    Examples
+    --------
+    >>> feature_distances([[3.0, 1.0]], [[1.0, 1.0], [3.0, 4.0]], sd=[1.0, 3.0], weights=[1.0, 0.5]).tolist()
+    [[4.0, 0.5]]
+    """
+    new, kept, spread, w = (np.asarray(one, float) for one in (measured, stored, sd, weights))
+    f = spread.shape[0] if spread.ndim == 1 else -1
+    if new.ndim != 2 or kept.ndim != 2 or (new.shape[1], kept.shape[1], w.shape) != (f, f, (f,)):
+        raise WildlabError(
+            f"features of shapes {new.shape} and {kept.shape} do not go with spreads of shape {spread.shape} "
+            f"and weights of shape {w.shape}",
+            "give (N, f), (M, f), (f,) and (f,)",
+        )
+    if not (np.isfinite(spread) & (spread > 0)).all():
+        raise WildlabError(f"a spread of {spread.tolist()}", "give positive ones", field="sd")
+    if not (np.isfinite(w) & (w >= 0)).all():
+        raise WildlabError(
+            f"weights of {w.tolist()}", "give none below zero; zero leaves a feature out", field="weights"
+        )
+    apart = (new[:, None] - kept) / spread
+    return np.asarray(np.where(np.isnan(apart), 0.0, w * apart**2).sum(axis=-1))
+
+
+def with_features(distances: ArrayLike, features: ArrayLike, gate: float) -> Array:
+    """Physical and feature distance together, H 6.4.4: the gate is one of the physical distance alone.
+
+    Parameters
+    ----------
+    distances
+        (N, M), by (3.9).
+    features
+        (N, M), from `feature_distances`.
+    gate
+        The largest physical distance of a pair.
+
+    Returns
+    -------
+    (N, M)
+        Their sum; infinite outside the gate. To be assigned without a gate.
+
+    Examples
+    --------
+    >>> with_features([[1.0, 20.0]], [[3.0, 0.0]], gate=9.21).tolist()
+    [[4.0, inf]]
+    """
+    d = np.asarray(distances, float)
+    return np.asarray(np.where(d <= gate, d + np.asarray(features, float), np.inf))
+
+
+def veto(assignment: Assignment, features: ArrayLike, limit: float) -> Assignment:
+    """Undo the pairs that do not look alike: features as a veto after an association by distance.
+
+    Parameters
+    ----------
+    assignment
+        By distance.
+    features
+        (N, M), from `feature_distances`.
+    limit
+        The largest feature distance of a pair.
+
+    Returns
+    -------
+    Assignment
+        Its pairs within the limit; measurements and tracks of the others have none.
+
+    Raises
+    ------
+    WildlabError
+        If the features are not as many as the assignment has measurements and tracks.
+    """
+    f = np.asarray(features, float)
+    track, measurement = (one.copy() for one in assignment)
+    if f.shape != (len(track), len(measurement)):
+        raise WildlabError(
+            f"features of shape {f.shape} do not go with {len(track)} measurements and {len(measurement)} "
+            "tracks",
+            "give (N, M)",
+            field="features",
+        )
+    rows = np.flatnonzero(track >= 0)
+    undone = rows[~(f[rows, track[rows]] <= limit)]
+    measurement[track[undone]] = -1
+    track[undone] = -1
+    return Assignment(track, measurement)
+
+
+def _logarithm(values: Array) -> Array:
+    return np.log(np.where(values > 0, values, np.nan))
