@@ -1,28 +1,43 @@
-"""Several targets at once: which measurement is whose, and when a track begins and ends.
+"""Several targets at once: which measurement is whose, whether a target is there, and how large it is.
 
 A matrix of distances has a row for each measurement and a column for each track, H (3.10).
 
+- `run_many`: all targets of all sensors, by joint probabilities with existence, visibility and hulls (H 8.2).
+- `association_probabilities`, `belief_propagation`: which measurement is probably whose.
 - `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
 - `pair_scans`, `judge_start`, `outlived`: the life of a track.
 """
 
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
+from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
+from wildlab.tracking.many.probabilities import association_probabilities, belief_propagation
+from wildlab.tracking.many.run import Shown, follow_many, run_many
 
 __all__ = [
     "CONFIRMED",
     "DROPPED",
+    "POINT",
     "UNDECIDED",
     "Assignment",
+    "Hull",
+    "Scan",
+    "SensorBeliefs",
+    "Shown",
+    "TargetBeliefs",
+    "association_probabilities",
+    "belief_propagation",
     "feature_distances",
+    "follow_many",
     "global_nearest",
     "image_features",
     "judge_start",
     "nearest",
     "outlived",
     "pair_scans",
+    "run_many",
     "veto",
     "with_features",
 ]

@@ -1,0 +1,161 @@
+"""All targets at once: one alone is the single filter, two that meet stay two, clutter is nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.errors import WildlabError
+from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.maritime import white_acceleration
+
+EYE = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
+POINTS = TargetBeliefs(
+    (POINT,), density=0.1, start_speed_m_s=3.0, lifetime_s=500.0, birth=0.1, visible_s=100.0, hidden_s=5.0,
+    gate=4.5, confirmed=0.9, hits=3, shown=0.5, forgotten=0.01, lost_m=50.0, fastest_m_s=30.0, moves_m=0.0,
+    over_s=15.0, apart_m=1.0,
+)  # fmt: skip
+R = np.eye(2)
+
+
+def looks(places: np.ndarray, rng: np.random.Generator, clutter: int = 0, seen: float = 1.0) -> list[Scan]:
+    """Scans of (N, T, 2) places, a second apart, in no order."""
+    found = []
+    for t, now in enumerate(places):
+        own = now[rng.random(len(now)) < seen]
+        z = np.concatenate([own + rng.normal(size=own.shape), rng.uniform(-100, 100, (clutter, 2))])
+        found.append(
+            Scan(float(t), 0, np.array([0.0, -500.0]), rng.permutation(z), np.tile(R, (len(z), 1, 1)))
+        )
+    return found
+
+
+def lines(starts: np.ndarray, velocities: np.ndarray, steps: int) -> np.ndarray:
+    return starts + velocities * np.arange(steps)[:, None, None]
+
+
+@given(st.integers(0, 1000))
+@settings(max_examples=20)
+def test_one_target_without_clutter_is_the_kalman_filter(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sure = EYE._replace(detection=1 - 1e-12, clutter=1e-30)
+    scans = looks(lines(np.array([[5.0, 8.0]]), np.array([[1.0, -2.0]]), 15), rng)
+    targets = POINTS._replace(gate=1e3, lifetime_s=1e12, hidden_s=1e-9)
+    x, P = np.array([*scans[0].z[0], 0.0, 0.0]), np.diag([1.0, 1.0, 9.0, 9.0])
+    for scan, (tracks, _) in zip(scans, follow_many(scans, [sure], targets), strict=True):
+        if scan.time:
+            prior = predict(x, P, *white_acceleration(1.0, targets.density))
+            after = update(*prior, scan.z[0], np.eye(2, 4), R)
+            x, P = after.x, after.P
+        assert tracks.count == 1
+        assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
+
+
+def test_two_that_cross_keep_their_names() -> None:
+    starts, velocities = np.array([[-30.0, -5.0], [-30.0, 5.0]]), np.array([[2.0, 0.4], [2.0, -0.4]])
+    kept = []
+    for seed in range(30):
+        truth = lines(starts, velocities, 40)
+        shown = run_many(looks(truth, np.random.default_rng(seed), clutter=1, seen=0.95), [EYE], POINTS)
+        begin, end = shown[8], shown[-1]
+        names = []
+        for at, one in ((8, begin), (-1, end)):
+            near = np.linalg.norm(one.x[:, None, :2] - truth[at][None], axis=2)
+            names.append([int(one.identity[i]) for i in near.argmin(axis=0)] if len(one.x) >= 2 else [])
+        kept.append(names[0] == names[1] and len(set(names[0])) == 2)
+    assert np.mean(kept) > 0.8
+
+
+def test_clutter_alone_is_no_target() -> None:
+    rng = np.random.default_rng(4)
+    scans = looks(np.zeros((100, 0, 2)), rng, clutter=4)
+    assert sum(len(one.identity) for one in run_many(scans, [EYE], POINTS)) <= 4
+
+
+def test_what_hides_for_a_while_keeps_its_name() -> None:
+    rng = np.random.default_rng(2)
+    scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 60), rng)
+    scans = [s if not 30 <= s.time < 38 else s._replace(z=s.z[:0], R=s.R[:0]) for s in scans]
+    shown = run_many(scans, [EYE], POINTS)
+    assert [len(one.identity) for one in shown[34:38]] == [0] * 4, "not shown while nobody sees it"
+    assert shown[29].identity.tolist() == shown[45].identity.tolist() != []
+
+
+def test_order_of_scans_does_not_matter() -> None:
+    rng = np.random.default_rng(3)
+    scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 20), rng, clutter=2)
+    shuffled = [scans[i] for i in rng.permutation(len(scans))]
+    for one, other in zip(run_many(scans, [EYE], POINTS), run_many(shuffled, [EYE], POINTS), strict=True):
+        assert one.time == other.time and np.array_equal(one.x, other.x)
+
+
+def test_many_at_once_and_none() -> None:
+    """A scan of thousands, an empty one, and places that are no numbers."""
+    rng = np.random.default_rng(5)
+    crowd = rng.uniform(-3000, 3000, (3000, 2))
+    crowd[7] = np.nan
+    scans = [
+        Scan(0.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
+        Scan(1.0, 0, np.zeros(2), crowd, np.tile(R, (len(crowd), 1, 1))),
+        Scan(2.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
+    ]
+    *_, (tracks, shown) = follow_many(scans, [EYE], POINTS)
+    assert not len(shown.identity) and np.isfinite(tracks.x).all()
+    assert run_many([], [EYE], POINTS) == []
+
+
+def test_what_stays_is_not_shown_where_targets_move() -> None:
+    rng = np.random.default_rng(6)
+    places = lines(np.array([[0.0, 0.0], [40.0, 0.0]]), np.array([[0.0, 0.0], [1.5, 0.0]]), 40)
+    shown = run_many(looks(places, rng), [EYE], POINTS._replace(moves_m=10.0))
+    assert len(shown[-1].identity) == 1 and shown[-1].x[0, 0] > 90
+
+
+SHIP = Hull("ship", 30.0, 8.0, 0.4)
+BOTH = POINTS._replace(hulls=(POINT._replace(share=0.6), SHIP), apart_m=4.0)
+LONG = SensorBeliefs("long", 0.9, 1e-5, 0.0, 1e6, 3.0, (0.0, 1.0), (0.0, 6.0), (0.0, 3.0), several=True)
+
+
+def ship(seed: int, steps: int = 40) -> tuple[np.ndarray, list[Scan]]:
+    """A ship of 30 m that gives two or three measurements from its near side in every scan."""
+    rng = np.random.default_rng(seed)
+    middle = lines(np.array([[-60.0, 30.0]]), np.array([[3.0, 0.0]]), steps)[:, 0]
+    scans = []
+    for t, place in enumerate(middle):
+        along = rng.uniform(-13, 13, rng.integers(2, 4))
+        z = np.stack([place[0] + along, np.full(len(along), place[1] - 3.0)], axis=1)
+        z += 0.3 * rng.normal(size=z.shape)
+        scans.append(Scan(float(t), 0, np.array([0.0, -100.0]), z, np.tile(0.1 * R, (len(z), 1, 1))))
+    return middle, scans
+
+
+def test_a_long_hull_is_one_target_and_its_middle_is_found() -> None:
+    as_one, off = [], []
+    for seed in range(10):
+        middle, scans = ship(seed)
+        shown = run_many(scans, [LONG], BOTH)[15:]
+        as_one += [len(one.identity) == 1 and one.kinds[0, 1] > 0.5 for one in shown]
+        off += [
+            np.linalg.norm(one.x[0, :2] - place)
+            for one, place in zip(shown, middle[15:], strict=True)
+            if len(one.x)
+        ]
+    assert np.mean(as_one) > 0.9 and np.mean(off) < 5.0
+
+
+def test_two_boats_abreast_are_not_one_hull() -> None:
+    rng = np.random.default_rng(1)
+    places = lines(np.array([[-60.0, 0.0], [-60.0, 12.0]]), np.array([[3.0, 0.0], [3.0, 0.0]]), 40)
+    shown = run_many(looks(places, rng), [LONG._replace(rough_m=(0.0, 1.0))], BOTH)
+    assert np.mean([len(one.identity) == 2 for one in shown[15:]]) > 0.8
+
+
+@pytest.mark.parametrize(("change", "words"), [({"time": np.nan}, "no time"), ({"sensor": 3}, "there are 1")])
+def test_scans_that_cannot_be_are_said(change: dict[str, float], words: str) -> None:
+    scan = Scan(0.0, 0, np.zeros(2), np.zeros((1, 2)), R[None])
+    with pytest.raises(WildlabError, match=words):
+        run_many([scan._replace(**change)], [EYE], POINTS)

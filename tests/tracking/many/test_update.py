@@ -1,0 +1,80 @@
+"""One target without clutter is the Kalman filter; a mixture has the moments of its parts."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wildlab.tracking.kalman import update as kalman_update
+from wildlab.tracking.many.update import compare, update
+
+H = np.eye(2, 4)
+
+
+def spread(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    A = rng.normal(size=(*shape, shape[-1]))
+    return A @ np.swapaxes(A, -1, -2) + np.eye(shape[-1])
+
+
+@given(st.integers(0, 10_000))
+def test_one_measurement_that_is_its_own_is_the_kalman_filter(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, P, z, R = rng.normal(size=(1, 1, 4)), spread(rng, 1, 1, 4), rng.normal(size=(1, 2)), spread(rng, 1, 2)
+    offset, noise = rng.normal(size=(1, 1, 2)), spread(rng, 1, 1, 2)
+    found = update(x, P, [[1.0]], [[0.0, 1.0]], compare(x, P, offset, noise, z, R, 1e9))
+    right = kalman_update(x[0, 0], P[0, 0], z[0] - offset[0, 0], H, R[0] + noise[0, 0])
+    assert np.allclose(found.x[0, 0], right.x) and np.allclose(found.P[0, 0], right.P)
+    unseen = update(x, P, [[1.0]], [[1.0, 0.0]], compare(x, P, offset, noise, z, R, 1e9))
+    assert np.allclose(unseen.x, x) and np.allclose(unseen.P, P)
+
+
+@given(st.integers(0, 10_000))
+def test_the_mixture_has_the_moments_of_its_parts(seed: int) -> None:
+    """Each way alone by a Kalman filter, weighed by Bayes' rule, summed: mean, covariance and kinds."""
+    rng = np.random.default_rng(seed)
+    K, M = 2, 3
+    x, P, z, R = rng.normal(size=(1, K, 4)), spread(rng, 1, K, 4), rng.normal(size=(M, 2)), spread(rng, M, 2)
+    offset, noise = rng.normal(size=(1, K, 2)), spread(rng, 1, K, 2)
+    kinds, own = rng.dirichlet(np.ones(K)), rng.dirichlet(np.ones(1 + M))
+    compared = compare(x, P, offset, noise, z, R, 1e9)
+    found = update(x, P, kinds[None], own[None], compared)
+    weight, mean, second = np.zeros(K), np.zeros((K, 4)), np.zeros((K, 4, 4))
+    for k in range(K):
+        for j in range(-1, M):
+            if j < 0:
+                w, m, V = kinds[k] * own[0], x[0, k], P[0, k]
+            else:
+                likely = compared.likelihood[0, :, j]
+                w = own[1 + j] * kinds[k] * likely[k] / (kinds @ likely)
+                one = kalman_update(x[0, k], P[0, k], z[j] - offset[0, k], H, R[j] + noise[0, k])
+                m, V = one.x, one.P
+            weight[k] += w
+            mean[k] += w * m
+            second[k] += w * (V + np.outer(m, m))
+    mean, second = mean / weight[:, None], second / weight[:, None, None]
+    assert np.allclose(found.kinds[0], weight / weight.sum())
+    assert np.allclose(found.x[0], mean)
+    assert np.allclose(found.P[0], second - mean[..., :, None] * mean[..., None, :], atol=1e-9)
+
+
+@given(st.integers(0, 10_000))
+def test_likelihoods_are_densities_of_the_gate(seed: int) -> None:
+    from scipy.stats import multivariate_normal
+
+    rng = np.random.default_rng(seed)
+    x, P, z, R = (
+        rng.normal(size=(2, 1, 4)),
+        spread(rng, 2, 1, 4),
+        3 * rng.normal(size=(4, 2)),
+        spread(rng, 4, 2),
+    )
+    zero = np.zeros((2, 1, 2)), np.zeros((2, 1, 2, 2))
+    gate = 1.2
+    found = compare(x, P, *zero, z, R, gate)
+    for i in range(2):
+        for j in range(4):
+            S = P[i, 0, :2, :2] + R[j]
+            d = z[j] - x[i, 0, :2]
+            inside = d @ np.linalg.solve(S, d) < gate**2
+            assert np.isclose(found.likelihood[i, 0, j], inside * multivariate_normal(cov=S).pdf(d))

@@ -1,0 +1,146 @@
+"""What a tracker of many targets is told of them, of their hulls and of the sensors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Hull(NamedTuple):
+    """A kind of target by its size.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    length_m, beam_m
+        Its length and breadth.
+    share
+        How many of all targets are of this kind, before anything was seen of one.
+    """
+
+    name: str
+    length_m: float
+    beam_m: float
+    share: float = 1.0
+
+
+class SensorBeliefs(NamedTuple):
+    """One sensor. Those with K elements have one for each kind of hull.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    detection
+        Probability that a target that is visible is detected in a scan.
+    clutter
+        False measurements for each square metre and scan, above zero.
+    near_m, far_m
+        Between which distances it sees; measurements from elsewhere are not used, and targets there are not
+        missed.
+    patience_s
+        For how long a target is shown that it could have seen and did not.
+    rough_m
+        (K,) standard deviation of each axis that a hull adds to the noise of a measurement: which part of it
+        is seen.
+    along_m
+        (K,) the same along the hull, which points where it goes.
+    near_side_m
+        (K,) how far on this side of the hull's middle the part lies that is seen.
+    several
+        Whether one hull may give several measurements in a scan.
+    """
+
+    name: str
+    detection: float
+    clutter: float
+    near_m: float
+    far_m: float
+    patience_s: float
+    rough_m: tuple[float, ...]
+    along_m: tuple[float, ...]
+    near_side_m: tuple[float, ...]
+    several: bool = False
+
+
+class TargetBeliefs(NamedTuple):
+    """The targets.
+
+    Attributes
+    ----------
+    hulls
+        The K kinds.
+    density
+        m/s per square root of a second: standard deviation of each axis of the velocity that grows in one.
+    start_speed_m_s
+        Standard deviation of each axis of the velocity of a new track.
+    lifetime_s
+        For how long a target is there, in the mean.
+    birth
+        Probability that a measurement that nobody takes is a new target.
+    visible_s, hidden_s
+        For how long a target within reach can be seen, and cannot, in the mean.
+    gate
+        How many standard deviations a measurement may be off.
+    confirmed, hits
+        From which probability of existence and how many scans with a measurement on a track is confirmed.
+    shown
+        A confirmed track is shown while it exists with a higher probability.
+    forgotten
+        Below which probability it ends; ``lost_m`` standard deviation of its position above which it does.
+    fastest_m_s
+        A track that is faster follows no target.
+    moves_m, over_s
+        A track is shown once it has moved so far within so long: what stays is a buoy or the shore.
+    apart_m
+        Tracks nearer to each other than this, and alike in velocity, are one.
+    """
+
+    hulls: tuple[Hull, ...]
+    density: float
+    start_speed_m_s: float
+    lifetime_s: float
+    birth: float
+    visible_s: float
+    hidden_s: float
+    gate: float
+    confirmed: float
+    hits: int
+    shown: float
+    forgotten: float
+    lost_m: float
+    fastest_m_s: float
+    moves_m: float
+    over_s: float
+    apart_m: float
+
+
+class Scan(NamedTuple):
+    """One look of one sensor.
+
+    Attributes
+    ----------
+    time
+        s.
+    sensor
+        Which of the sensors, by its place among them.
+    platform
+        (2,) north, east in n, m.
+    z, R
+        (M, 2) and (M, 2, 2): places in n with their covariances, m and m^2.
+    """
+
+    time: float
+    sensor: int
+    platform: Array
+    z: Array
+    R: Array
+
+
+#: One kind of target, as small as a point.
+POINT = Hull("point", 0.0, 0.0)

@@ -1,0 +1,144 @@
+"""Targets that are no points: which part of a hull is seen, and several measurements of one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.tracking.many.beliefs import Hull, SensorBeliefs
+
+Array = NDArray[np.float64]
+
+#: At this speed, m/s, a target's course is half believed to be its heading; a slower one points anywhere.
+STEERS_M_S = 0.5
+#: No scan makes a kind of hull more probable than by this factor, however many measurements it has.
+MOST_TOLD = 20.0
+#: A kind of hull never gets less probable than this: what was wrongly merged once must find its way back.
+LEAST_KIND = 0.02
+
+
+def near_side(x: ArrayLike, platform: ArrayLike, sensor: SensorBeliefs) -> Array:
+    """Where on its hull a target is seen, from the hull's middle.
+
+    Parameters
+    ----------
+    x
+        (T, K, 4) north, east and velocities, for each kind of hull.
+    platform
+        (2,) where it is looked from.
+
+    Returns
+    -------
+    (T, K, 2) m, towards the platform; never more than half-way to it.
+    """
+    to = np.asarray(platform, float) - np.asarray(x, float)[..., :2]
+    distance = np.linalg.norm(to, axis=-1, keepdims=True)
+    length = np.minimum(np.asarray(sensor.near_side_m)[:, None], distance / 2)
+    return np.asarray(np.divide(to, distance, out=np.zeros_like(to), where=distance > 0) * length)
+
+
+def hull_noise(x: ArrayLike, sensor: SensorBeliefs) -> Array:
+    """Covariances (T, K, 2, 2), m^2, of which part of a hull is seen; ``x`` (T, K, 4).
+
+    Along the hull it is longer. Where a target hardly moves its heading is not known: half of it is then
+    along either axis.
+    """
+    v = np.asarray(x, float)[..., 2:]
+    square = (v**2).sum(axis=-1)[..., None, None]
+    steers = square / (square + STEERS_M_S**2)
+    outer = v[..., :, None] * v[..., None, :]
+    heading = np.divide(outer, square, out=np.zeros_like(outer), where=square > 0)
+    along = steers * heading + (1 - steers) * np.eye(2) / 2
+    rough, length = np.asarray(sensor.rough_m), np.asarray(sensor.along_m)
+    return np.asarray(rough[:, None, None] ** 2 * np.eye(2) + length[:, None, None] ** 2 * along)
+
+
+class Gathered(NamedTuple):
+    """Measurements with those of one hull merged.
+
+    ``z`` (M', 2) and ``R`` (M', 2, 2); ``kinds`` (T, K) of the tracks, which several measurements tell
+    something of.
+    """
+
+    z: Array
+    R: Array
+    kinds: Array
+
+
+def gather(
+    z: Array,
+    R: Array,
+    mean: Array,
+    kinds: Array,
+    established: NDArray[np.bool_],
+    likelihood: Array,
+    sensor: SensorBeliefs,
+    hulls: tuple[Hull, ...],
+) -> Gathered:
+    """Merge the measurements of a scan that lie along one large hull to the middle of their extent.
+
+    Each measurement goes to the established track that it is likeliest of, or where no gate takes it, to the
+    one whose hull it may lie on. Where one track has two and more, it is of the largest kind, or the others
+    are clutter: the kinds learn the ratio of both densities. They are merged where the largest is likelier.
+
+    Parameters
+    ----------
+    z, R
+        (M, 2) and (M, 2, 2).
+    mean
+        (T, 2) where tracks of the largest kind would be.
+    kinds
+        (T, K) probabilities.
+    established
+        (T,) tracks that may have a hull; a new one is too young for it.
+    likelihood
+        (T, K, M).
+    """
+    largest = int(np.argmax([hull.length_m for hull in hulls]))
+    hull = hulls[largest]
+    if not sensor.several or len(z) < 2 or not established.any() or hull.length_m <= 0:
+        return Gathered(z, R, kinds)
+    kinds = kinds.copy()
+    of_any = np.einsum("tk,tkm->tm", kinds, likelihood)
+    whose = of_any.argmax(axis=0)
+    taken = of_any.max(axis=0) > 0
+    free = np.ones(len(z), bool)
+    merged_z, merged_R = [], []
+    further = 1.0 / (hull.length_m * max(hull.beam_m, 1.0)) / sensor.clutter
+    for track in np.flatnonzero(established):
+        on_hull = np.linalg.norm(z - mean[track], axis=1) < 0.6 * hull.length_m
+        mine = (taken & (whose == track) & (likelihood[track, largest] > 0)) | (~taken & on_hull)
+        rows = np.flatnonzero(mine & free)
+        if len(rows) < 2:
+            continue
+        low, high = z[rows].min(axis=0), z[rows].max(axis=0)
+        if np.linalg.norm(high - low) >= hull.length_m:
+            continue
+        kinds[track, largest] *= min(further ** (len(rows) - 1), MOST_TOLD)
+        kinds[track] /= kinds[track].sum()
+        if kinds[track, largest] > 0.5:
+            free[rows] = False
+            merged_z.append((low + high) / 2)
+            merged_R.append(R[rows].mean(axis=0))
+    if not merged_z:
+        return Gathered(z, R, kinds)
+    return Gathered(
+        np.concatenate([z[free], np.array(merged_z)]), np.concatenate([R[free], np.array(merged_R)]), kinds
+    )
+
+
+def on_one_hull(x: ArrayLike, other: ArrayLike, hull: Hull) -> bool:
+    """Whether two tracks (4,) with like velocities lie along the course of the first, on one hull."""
+    a, b = np.asarray(x, float), np.asarray(other, float)
+    speed = float(np.linalg.norm(a[2:]))
+    if speed <= STEERS_M_S or np.linalg.norm(a[2:] - b[2:]) >= ALIKE_M_S:
+        return False
+    ahead, apart = a[2:] / speed, b[:2] - a[:2]
+    across = abs(ahead[0] * apart[1] - ahead[1] * apart[0])
+    return bool(abs(apart @ ahead) < hull.length_m and across < max(hull.beam_m, 1.0) / 2 + 1.0)
+
+
+#: Velocities of two parts of one hull differ by less than this, m/s.
+ALIKE_M_S = 1.5

@@ -1,0 +1,246 @@
+"""Which measurement of a scan is whose: probabilities over all ways to deal them out.
+
+A way deals each measurement to at most one target and to each target at most one measurement; its weight is
+the product of its pairs' weights and of the weights of the targets left without. Targets that compete for no
+measurement are independent, so that sums are taken cluster by cluster.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from wildlab.errors import WildlabError
+from wildlab.geometry.compilation import announced, compiled
+
+Array = NDArray[np.float64]
+
+#: Clusters with more targets and more measurements than this are summed by belief propagation: the exact sum
+#: has two to the power of the smaller number terms.
+MOST_EXACT = 12
+#: Belief propagation ends where no message changes by more, or after so many rounds.
+CLOSE, MOST_ROUNDS = 1e-9, 1000
+
+
+def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int = MOST_EXACT) -> Array:
+    """How probable each measurement is each target's own, and that a target has none.
+
+    Parameters
+    ----------
+    weights
+        (T, M) of a target with a measurement, not below zero: detection probability times likelihood over the
+        density of clutter; zero outside of the gate.
+    missed
+        (T,) of a target without one, not below zero.
+    most
+        Clusters in which the smaller of both numbers is larger are approximated, by belief propagation
+        (Williams and Lau, Approximate evaluation of marginal association probabilities with belief
+        propagation, IEEE Transactions on Aerospace and Electronic Systems 50, 2014); others are exact.
+
+    Returns
+    -------
+    (T, 1 + M), rows sum to one: the first column is that of no measurement.
+
+    Raises
+    ------
+    WildlabError
+        Where the shapes do not fit, a weight is negative or not finite, or a target has no way at all.
+
+    Examples
+    --------
+    Two targets that both want the first measurement; one of them has another choice:
+
+    >>> np.round(association_probabilities([[8.0, 0.0], [8.0, 8.0]], [1.0, 1.0]), 2)
+    array([[0.2 , 0.8 , 0.  ],
+           [0.11, 0.09, 0.8 ]])
+    """
+    w, w0 = np.asarray(weights, float), np.asarray(missed, float)
+    if w.ndim != 2 or w0.shape != w.shape[:1]:
+        raise WildlabError(
+            f"weights of shape {w.shape} and {w0.shape} do not fit",
+            "give (targets, measurements) and (targets,)",
+        )
+    if not (np.isfinite(w).all() and np.isfinite(w0).all() and (w >= 0).all() and (w0 >= 0).all()):
+        raise WildlabError("a weight is negative or not a number", "give weights from zero up")
+    found = np.zeros((len(w), 1 + w.shape[1]))
+    for targets, measurements in _clusters(w > 0):
+        if not len(measurements):
+            found[targets, 0] = 1.0
+            continue
+        # A target's weights may be scaled as one likes; near one, no product leaves what a float holds.
+        part, none = w[np.ix_(targets, measurements)], w0[targets]
+        scale = np.maximum(part.max(axis=1), none)
+        part, none = part / scale[:, None], none / scale
+        if min(part.shape) <= most:
+            with announced("whose a measurement is"):
+                own = _exact(part, none) if part.shape[1] <= part.shape[0] else _exact_by_targets(part, none)
+        else:
+            own = belief_propagation(part, none)
+        total = own.sum(axis=1)
+        if not (total > 0).all():
+            raise WildlabError(
+                "targets that cannot be missed share too few measurements: there is no way to deal them out",
+                "give every target a weight above zero of being missed",
+            )
+        own /= total[:, None]
+        found[targets, 0] = own[:, 0]
+        found[np.ix_(targets, 1 + measurements)] = own[:, 1:]
+    return found
+
+
+def _clusters(linked: NDArray[np.bool_]) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Targets and measurements that hang together; each target is in one."""
+    n, m = linked.shape
+    row, column = np.nonzero(linked)
+    graph = coo_matrix((np.ones(len(row)), (row, n + column)), shape=(n + m, n + m))
+    _, label = connected_components(graph, directed=False)
+    groups = []
+    for name in np.unique(label[:n]):
+        mine = np.flatnonzero(label == name)
+        groups.append((mine[mine < n], mine[mine >= n] - n))
+    return groups
+
+
+@compiled
+def _exact(w: Array, w0: Array) -> Array:
+    """(T, 1 + M) sums over all ways: target after target, over the sets of measurements that are taken."""
+    n, m = w.shape
+    size = 1 << m
+    ahead = np.zeros((n + 1, size))
+    ahead[0, 0] = 1.0
+    for i in range(n):
+        for taken in range(size):
+            value = ahead[i, taken]
+            if value == 0.0:
+                continue
+            ahead[i + 1, taken] += value * w0[i]
+            for j in range(m):
+                if w[i, j] > 0.0 and not taken >> j & 1:
+                    ahead[i + 1, taken | 1 << j] += value * w[i, j]
+        ahead[i + 1] /= max(ahead[i + 1].max(), 1e-300)
+    found = np.zeros((n, 1 + m))
+    behind = np.ones(size)
+    for i in range(n - 1, -1, -1):
+        before = np.zeros(size)
+        for taken in range(size):
+            value = ahead[i, taken]
+            none = w0[i] * behind[taken]
+            found[i, 0] += value * none
+            before[taken] = none
+            for j in range(m):
+                if w[i, j] > 0.0 and not taken >> j & 1:
+                    one = w[i, j] * behind[taken | 1 << j]
+                    found[i, 1 + j] += value * one
+                    before[taken] += one
+        behind = before / max(before.max(), 1e-300)
+    return found
+
+
+@compiled
+def _exact_by_targets(w: Array, w0: Array) -> Array:
+    """The same, measurement after measurement, over the sets of targets that have one."""
+    n, m = w.shape
+    size = 1 << n
+    ahead = np.zeros((m + 1, size))
+    ahead[0, 0] = 1.0
+    for j in range(m):
+        for served in range(size):
+            value = ahead[j, served]
+            if value == 0.0:
+                continue
+            ahead[j + 1, served] += value
+            for i in range(n):
+                if w[i, j] > 0.0 and not served >> i & 1:
+                    ahead[j + 1, served | 1 << i] += value * w[i, j]
+        ahead[j + 1] /= max(ahead[j + 1].max(), 1e-300)
+    behind = np.ones(size)
+    for served in range(size):
+        for i in range(n):
+            if not served >> i & 1:
+                behind[served] *= w0[i]
+    found = np.zeros((n, 1 + m))
+    total = 0.0
+    for served in range(size):
+        total += ahead[m, served] * behind[served]
+    for i in range(n):
+        for served in range(size):
+            if not served >> i & 1:
+                found[i, 0] += ahead[m, served] * behind[served] / total
+    for j in range(m - 1, -1, -1):
+        here = np.zeros(n)
+        total = 0.0
+        before = np.zeros(size)
+        for served in range(size):
+            value = ahead[j, served]
+            before[served] = behind[served]
+            for i in range(n):
+                if w[i, j] > 0.0 and not served >> i & 1:
+                    one = w[i, j] * behind[served | 1 << i]
+                    here[i] += value * one
+                    before[served] += one
+            total += value * before[served]
+        found[:, 1 + j] = here / total
+        behind = before / max(before.max(), 1e-300)
+    return found
+
+
+def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
+    """The same as `association_probabilities` for clusters of any size, near enough and not exact.
+
+    Messages run between targets and measurements until they settle. Exact where no loop of targets and
+    measurements competes.
+
+    Parameters
+    ----------
+    weights, missed
+        (T, M) and (T,) as there; those missed above zero.
+
+    Returns
+    -------
+    (T, 1 + M), rows sum to one.
+
+    Raises
+    ------
+    WildlabError
+        Where a target cannot be missed: the messages would not settle.
+    """
+    w, w0 = np.asarray(weights, float), np.asarray(missed, float)
+    if not (w0 > 0).all():
+        raise WildlabError(
+            "a target in a large cluster cannot be missed", "give it a weight above zero of being missed"
+        )
+    odds = w / w0[:, None]
+    free = np.ones_like(odds)  # from each measurement to each target: how free it is
+    for _ in range(MOST_ROUNDS):
+        wanted = odds * free
+        asks = odds / (1 + wanted.sum(axis=1, keepdims=True) - wanted)
+        new = 1 / (1 + asks.sum(axis=0) - asks)
+        moved = np.abs(new - free).max(initial=0.0)
+        free = new
+        if moved < CLOSE:
+            break
+    all_of = np.concatenate([np.ones((len(w), 1)), odds * free], axis=1)
+    return np.asarray(all_of / all_of.sum(axis=1, keepdims=True))
+
+
+def association_probabilities_by_enumeration(weights: ArrayLike, missed: ArrayLike) -> Array:
+    """The same as `association_probabilities`, way by way: what the fast sums are held against.
+
+    Parameters and result as there; for a handful of targets.
+    """
+    w, w0 = np.asarray(weights, float), np.asarray(missed, float)
+    n, m = w.shape
+    found = np.zeros((n, 1 + m))
+    # None of the measurements is there once for each target.
+    choices = [*range(1, 1 + m), *([0] * n)]
+    for way in set(permutations(choices, n)):
+        weight = 1.0
+        for target, choice in enumerate(way):
+            weight *= w0[target] if choice == 0 else w[target, choice - 1]
+        for target, choice in enumerate(way):
+            found[target, choice] += weight
+    return np.asarray(found / found.sum(axis=1, keepdims=True))

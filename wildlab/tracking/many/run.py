@@ -1,0 +1,204 @@
+"""All targets of a flight at once: scan after scan, whichever sensor it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
+from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
+from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.tracks import (
+    Tracks,
+    alive,
+    begin,
+    both,
+    judged_by_motion,
+    later,
+    no_tracks,
+    without_doubles,
+)
+from wildlab.tracking.many.update import compare, update
+
+Array = NDArray[np.float64]
+
+#: A measurement less probable than this to be of any track is of none of them.
+TAKEN = 0.3
+#: A target is as good as there at this probability; one more certain could not be doubted any more.
+CERTAIN = 0.999
+
+
+class Shown(NamedTuple):
+    """What is believed after a scan: N confirmed targets that move and were seen not long ago.
+
+    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K).
+    """
+
+    time: float
+    sensor: int
+    identity: NDArray[np.int64]
+    x: Array
+    P: Array
+    existence: Array
+    kinds: Array
+
+
+def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: TargetBeliefs) -> list[Shown]:
+    """Follow all targets of all sensors, by joint integrated data association with visibility and hulls.
+
+    Parameters
+    ----------
+    scans
+        In any order; those of one time are taken as they come.
+    sensors
+        S of them; `Scan.sensor` is a place among them.
+
+    Returns
+    -------
+    list[Shown]
+        One for each scan, in order of time.
+
+    Raises
+    ------
+    WildlabError
+        Where a scan has no time, or is of a sensor that is not there.
+    """
+    return [shown for _, shown in follow_many(scans, sensors, targets)]
+
+
+def follow_many(
+    scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: TargetBeliefs
+) -> Iterator[tuple[Tracks, Shown]]:
+    """The same scan by scan, with all tracks: also those that are not believed yet."""
+    eyes = tuple(sensors)
+    for scan in scans:
+        if not np.isfinite(scan.time):
+            raise WildlabError("a scan has no time", "leave it out, or give it one")
+        if not 0 <= scan.sensor < len(eyes):
+            raise WildlabError(
+                f"a scan is of sensor {scan.sensor}, and there are {len(eyes)}", "name them all"
+            )
+    tracks, first, before = no_tracks(len(targets.hulls), len(eyes)), 0, None
+    for scan in sorted(scans, key=lambda one: one.time):
+        dt = 0.0 if before is None else scan.time - before
+        before = scan.time
+        tracks, first = step(tracks, scan, dt, eyes, targets, first)
+        yield tracks, _shown(tracks, scan, eyes, targets)
+
+
+def step(
+    tracks: Tracks,
+    scan: Scan,
+    dt: float,
+    sensors: tuple[SensorBeliefs, ...],
+    targets: TargetBeliefs,
+    first: int,
+) -> tuple[Tracks, int]:
+    """Tracks after a scan that comes ``dt`` s after the one before, and the next free identity."""
+    sensor = sensors[scan.sensor]
+    tracks = later(tracks, dt, targets.density)
+    z, R = _within_reach(scan, sensor)
+    mean, _ = tracks.estimate()
+    inside = _sees(mean[:, :2], scan, sensor)
+    rows, away = np.flatnonzero(inside), np.flatnonzero(~inside)
+    watched, rest = tracks.only(rows), tracks.only(away)
+    watched = watched._replace(existence=still_there(watched.existence, dt, targets.lifetime_s))
+    watched, z, R, taken = _corrected(watched, z, R, scan, sensor, targets)
+    new = (taken < TAKEN) & ~_on_a_known_one(z, watched, targets)
+    fresh = begin(z[new], R[new], scan.time, scan.platform, sensors, scan.sensor, targets, first)
+    everyone = both(both(watched, rest), fresh)
+    everyone = without_doubles(alive(everyone, targets), targets, sensor.several)
+    return judged_by_motion(everyone, scan.time, targets), first + int(new.sum())
+
+
+def _corrected(
+    tracks: Tracks, z: Array, R: Array, scan: Scan, sensor: SensorBeliefs, targets: TargetBeliefs
+) -> tuple[Tracks, Array, Array, Array]:
+    """Tracks after the measurements, these with those of one hull merged, and how much of each is taken."""
+    if not tracks.count:
+        return tracks, z, R, np.zeros(len(z))
+    offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
+    compared = compare(tracks.x, tracks.P, offset, noise, z, R, targets.gate)
+    largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
+    established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
+    gathered = gather(
+        z, R, tracks.x[:, largest, :2], tracks.kinds, established, compared.likelihood, sensor, targets.hulls
+    )
+    if len(gathered.z) != len(z):
+        z, R = gathered.z, gathered.R
+        compared = compare(tracks.x, tracks.P, offset, noise, z, R, targets.gate)
+    kinds = gathered.kinds
+    which = scan.sensor
+    visible = visible_later(
+        tracks.visible[:, which], scan.time - tracks.looked[:, which], targets.visible_s, targets.hidden_s
+    )
+    likelihood = np.einsum("tk,tkm->tm", kinds, compared.likelihood)
+    pairs, none = weights(tracks.existence, visible, sensor.detection, likelihood, sensor.clutter)
+    p = association_probabilities(pairs, none)
+    existence, visible, own = after_scan(tracks.existence, visible, sensor.detection, p)
+    x, P, kinds = update(tracks.x, tracks.P, kinds, own, compared)
+    kinds = np.maximum(kinds, LEAST_KIND if kinds.shape[1] > 1 else 0.0)
+    seen = own[:, 1:].sum(axis=1) > 0.5
+    all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
+    all_visible[:, which], looked[:, which] = visible, scan.time
+    existence, hits = np.minimum(existence, CERTAIN), tracks.hits + seen
+    place = np.einsum("tk,tki->ti", kinds / kinds.sum(axis=1, keepdims=True), x)
+    trail = tuple(
+        np.concatenate([old, [[scan.time, *place[row, :2]]]]) if seen[row] else old
+        for row, old in enumerate(tracks.trail)
+    )
+    tracks = tracks._replace(
+        x=x,
+        P=P,
+        kinds=kinds / kinds.sum(axis=1, keepdims=True),
+        existence=existence,
+        visible=all_visible,
+        looked=looked,
+        hits=hits,
+        last=np.where(seen, scan.time, tracks.last),
+        confirmed=tracks.confirmed | ((existence > targets.confirmed) & (hits >= targets.hits)),
+        trail=trail,
+    )
+    return tracks, z, R, p[:, 1:].sum(axis=0)
+
+
+def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:
+    z, R = np.asarray(scan.z, float).reshape(-1, 2), np.asarray(scan.R, float).reshape(-1, 2, 2)
+    distance = np.linalg.norm(z - scan.platform, axis=1)
+    good = np.isfinite(z).all(axis=1) & (distance > sensor.near_m) & (distance < sensor.far_m)
+    return z[good], R[good]
+
+
+def _sees(places: Array, scan: Scan, sensor: SensorBeliefs) -> NDArray[np.bool_]:
+    return np.asarray(np.linalg.norm(places - scan.platform, axis=1) < sensor.far_m)
+
+
+def _on_a_known_one(z: Array, tracks: Tracks, targets: TargetBeliefs) -> NDArray[np.bool_]:
+    """(M,) measurements on a confirmed target's hull: parts of it, and no targets of their own."""
+    sure = np.flatnonzero(tracks.confirmed)
+    if not len(sure) or not len(z):
+        return np.zeros(len(z), bool)
+    mean, _ = tracks.estimate()
+    length = tracks.kinds[sure] @ np.array([hull.length_m for hull in targets.hulls])
+    apart = np.linalg.norm(z[:, None] - mean[sure, :2][None], axis=2)
+    return np.asarray((apart < np.maximum(0.7 * length, targets.apart_m)).any(axis=1))
+
+
+def _shown(tracks: Tracks, scan: Scan, sensors: tuple[SensorBeliefs, ...], targets: TargetBeliefs) -> Shown:
+    mean, _ = tracks.estimate()
+    reach = max(sensor.far_m for sensor in sensors)
+    rows = np.flatnonzero(
+        tracks.confirmed
+        & (tracks.existence > targets.shown)
+        & (tracks.moving | (targets.moves_m <= 0))
+        & (scan.time - tracks.last < sensors[scan.sensor].patience_s)
+        & (np.linalg.norm(mean[:, :2] - scan.platform, axis=1) < reach)
+    )
+    mine = tracks.only(rows)
+    x, P = mine.estimate()
+    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds)

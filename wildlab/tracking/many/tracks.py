@@ -1,0 +1,235 @@
+"""Tracks of many targets as arrays: begun, moved on, ended, and told from what does not move."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs
+from wildlab.tracking.many.hulls import near_side, on_one_hull
+from wildlab.tracking.maritime import white_acceleration
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: A hit within so many metres is on a track however differently both seem to move.
+TOUCHING_M = 2.0
+#: Two tracks this near move alike if their velocities differ by less than this, m/s.
+MOVE_ALIKE_M_S = 3.0
+#: Squared distance of two velocities, in units of their covariance, up to which they may be the same: what a
+#: chi-square of two degrees of freedom stays below with 95 %.
+SAME_VELOCITY = 5.99
+#: Slower than this over the time it is watched, m/s, a track stays where it is.
+STAYS_M_S = 0.5
+
+
+class Tracks(NamedTuple):
+    """T tracks, each of K kinds of hull at once, seen by S sensors.
+
+    Attributes
+    ----------
+    x, P
+        (T, K, 4) north, east and their velocities, and (T, K, 4, 4); m and s.
+    kinds
+        (T, K) probabilities.
+    existence
+        (T,) probability.
+    visible, looked
+        (T, S) probability that a sensor can see it, and when that was so, s.
+    identity, hits
+        (T,) its number, and how many scans had a measurement of it.
+    born, last
+        (T,) s, of its first and last measurement.
+    confirmed, moving
+        (T,) whether it is believed, and whether it was seen to move.
+    trail
+        For each track (L, 3) times and places where it was seen.
+    """
+
+    x: Array
+    P: Array
+    kinds: Array
+    existence: Array
+    visible: Array
+    looked: Array
+    identity: NDArray[np.int64]
+    hits: NDArray[np.int64]
+    born: Array
+    last: Array
+    confirmed: Flags
+    moving: Flags
+    trail: tuple[Array, ...]
+
+    @property
+    def count(self) -> int:
+        """T."""
+        return len(self.existence)
+
+    def only(self, rows: NDArray[np.intp]) -> Tracks:
+        """These, in this order."""
+        trail = tuple(self.trail[row] for row in rows)
+        return Tracks(*(one[rows] for one in self[:-1]), trail)  # type: ignore[arg-type]
+
+    def estimate(self) -> tuple[Array, Array]:
+        """(T, 4) and (T, 4, 4): the kinds merged to one."""
+        mean = np.einsum("tk,tki->ti", self.kinds, self.x)
+        apart = self.x - mean[:, None]
+        P = self.P + apart[..., :, None] * apart[..., None, :]
+        return mean, np.einsum("tk,tkij->tij", self.kinds, P)
+
+
+def no_tracks(kinds: int, sensors: int) -> Tracks:
+    """None yet."""
+    whole, flag = np.zeros(0, np.int64), np.zeros(0, bool)
+    one = np.zeros(0)
+    of_kinds, of_sensors = np.zeros((0, kinds)), np.zeros((0, sensors))
+    x, P = np.zeros((0, kinds, 4)), np.zeros((0, kinds, 4, 4))
+    return Tracks(x, P, of_kinds, one, of_sensors, of_sensors, whole, whole, one, one, flag, flag, ())
+
+
+def both(tracks: Tracks, more: Tracks) -> Tracks:
+    """One after the other."""
+    joined = (np.concatenate(pair) for pair in zip(tracks[:-1], more[:-1], strict=True))
+    return Tracks(*joined, tracks.trail + more.trail)  # type: ignore[arg-type]
+
+
+def later(tracks: Tracks, dt: float, density: float) -> Tracks:
+    """Estimates ``dt`` s later, driven by white acceleration."""
+    F, Q = white_acceleration(dt, density)
+    return tracks._replace(x=tracks.x @ F.T, P=F @ tracks.P @ F.T + Q)
+
+
+def begin(
+    z: Array,
+    R: Array,
+    time: float,
+    platform: ArrayLike,
+    sensors: tuple[SensorBeliefs, ...],
+    sensor: int,
+    targets: TargetBeliefs,
+    first: int,
+) -> Tracks:
+    """A track on each of M measurements (M, 2) with (M, 2, 2); identities from ``first`` on.
+
+    It may go anywhere: which part of a hull is seen, and along which heading, is half known for each axis.
+    """
+    count, K = len(z), len(targets.hulls)
+    mine = sensors[sensor]
+    at = np.concatenate([z, np.zeros((count, 2))], axis=1)[:, None].repeat(K, axis=1)
+    at[..., :2] -= near_side(at, platform, mine)
+    rough, along = np.asarray(mine.rough_m), np.asarray(mine.along_m)
+    P = np.zeros((count, K, 4, 4))
+    P[..., :2, :2] = R[:, None] + (rough**2 + along**2 / 2)[:, None, None] * np.eye(2)
+    P[..., [2, 3], [2, 3]] = targets.start_speed_m_s**2
+    share = np.array([hull.share for hull in targets.hulls])
+    lasting = targets.visible_s / (targets.visible_s + targets.hidden_s)
+    visible = np.full((count, len(sensors)), lasting)
+    visible[:, sensor] = 1.0
+    return Tracks(
+        at,
+        P,
+        np.tile(share / share.sum(), (count, 1)),
+        np.full(count, targets.birth),
+        visible,
+        np.full((count, len(sensors)), time),
+        np.arange(first, first + count),
+        np.ones(count, np.int64),
+        np.full(count, time),
+        np.full(count, time),
+        np.zeros(count, bool),
+        np.zeros(count, bool),
+        tuple(np.array([[time, *place]]) for place in z),
+    )
+
+
+def alive(tracks: Tracks, targets: TargetBeliefs) -> Tracks:
+    """Those that may exist, whose place is known at all, and whose speed is possible."""
+    mean, P = tracks.estimate()
+    good = np.trace(P[:, :2, :2], axis1=1, axis2=2) / 2 < targets.lost_m**2
+    good &= (tracks.existence > targets.forgotten) & (
+        np.linalg.norm(mean[:, 2:], axis=1) < targets.fastest_m_s
+    )
+    return tracks.only(np.flatnonzero(good))
+
+
+def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tracks:
+    """One track for each target: of two on one place or, where ``several``, on one hull, the older stays.
+
+    Parameters
+    ----------
+    several
+        Whether the sensor of this scan may see one hull as several things.
+    """
+    if tracks.count < 2:
+        return tracks
+    mean, P = tracks.estimate()
+    largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
+    hull = targets.hulls[largest]
+    kinds = tracks.kinds.copy()
+    order = sorted(range(tracks.count), key=lambda row: (-int(tracks.confirmed[row]), -int(tracks.hits[row])))
+    kept: list[int] = []
+    for row in order:
+        if not any(_is_of(tracks, mean, P, kinds, row, one, targets, several, largest) for one in kept):
+            kept.append(row)
+            continue
+        for one in kept:
+            apart = float(np.linalg.norm(mean[row, :2] - mean[one, :2]))
+            if several and apart > targets.apart_m and on_one_hull(mean[one], mean[row], hull):
+                # Two that go along one line at one speed are the ends of something long.
+                kinds[one] = 0.1 / max(len(targets.hulls) - 1, 1)
+                kinds[one, largest] = 0.9
+                break
+    return tracks._replace(kinds=kinds).only(np.array(sorted(kept), np.intp))
+
+
+def _is_of(
+    tracks: Tracks,
+    mean: Array,
+    P: Array,
+    kinds: Array,
+    row: int,
+    one: int,
+    targets: TargetBeliefs,
+    several: bool,
+    largest: int,
+) -> bool:
+    """Whether a track is the same target as another that stays."""
+    hull = targets.hulls[largest]
+    apart = float(np.linalg.norm(mean[row, :2] - mean[one, :2]))
+    differ = float(np.linalg.norm(mean[row, 2:] - mean[one, 2:]))
+    old = tracks.hits[row] >= targets.hits and tracks.hits[one] > targets.hits
+    if several and old and on_one_hull(mean[one], mean[row], hull):
+        return True
+    long = kinds[one, largest] >= 0.5 and hull.length_m > 0
+    reach = 0.6 * hull.length_m if long else targets.apart_m
+    if apart >= reach or (differ >= MOVE_ALIKE_M_S and apart >= TOUCHING_M):
+        return False
+    if not tracks.confirmed[row]:
+        return True
+    # Two that are believed are targets that pass each other, unless they move alike and share what is seen.
+    share = min(tracks.last[row], tracks.last[one]) < tracks.last.max()
+    return bool(apart <= targets.apart_m and share and _as_fast(mean[row], mean[one], P[row] + P[one]))
+
+
+def _as_fast(x: Array, other: Array, P: Array) -> bool:
+    v = x[2:] - other[2:]
+    return bool(v @ np.linalg.solve(P[2:, 2:], v) < SAME_VELOCITY)
+
+
+def judged_by_motion(tracks: Tracks, time: float, targets: TargetBeliefs) -> Tracks:
+    """Which of them move: what stays is a buoy, a moored boat or the shore."""
+    moving, trails = tracks.moving.copy(), []
+    for row, trail in enumerate(tracks.trail):
+        recent = trail[trail[:, 0] > time - targets.over_s]
+        trails.append(recent)
+        if len(recent) < 2:
+            continue
+        gone = float(np.linalg.norm(recent[-1, 1:] - recent[0, 1:]))
+        lasted = float(recent[-1, 0] - recent[0, 0])
+        if gone > targets.moves_m and gone / lasted > STAYS_M_S:
+            moving[row] = True
+        elif lasted > 0.8 * targets.over_s and gone < 0.6 * targets.moves_m:
+            moving[row] = False
+    return tracks._replace(moving=moving, trail=tuple(trails))
