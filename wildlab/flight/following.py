@@ -20,8 +20,57 @@ CONSIDERED: dict[str, str] = {
     "roll": "deg", "pitch": "deg", "heading": "deg", "clock": "s", "range_bias": "m",
 }  # fmt: skip
 
+#: A kind of target of which many are followed at once has at most so many fellows.
+MOST_HULLS = 5
+
 Above = Annotated[float, Field(gt=0, le=1e6)]
 Share = Annotated[float, Field(ge=0, lt=1)]
+Probability = Annotated[float, Field(gt=0, lt=1)]
+Lengths = tuple[Annotated[float, Field(ge=0, le=1000)], ...]
+
+
+class HullPart(Strict):
+    """A kind of target by its size: how long and broad it is, and how many of all targets are so."""
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+    length_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    beam_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    share: Above = 1.0
+
+
+class ManyTargetsPart(Strict):
+    """What a tracker of many targets is told of them, see `wildlab.tracking.many.beliefs.TargetBeliefs`."""
+
+    hulls: Annotated[tuple[HullPart, ...], Field(max_length=MOST_HULLS)] = ()
+    lifetime_s: Above | None = None
+    birth: Probability | None = None
+    visible_s: Above | None = None
+    hidden_s: Above | None = None
+    gate: Above | None = None
+    confirmed: Probability | None = None
+    hits: Annotated[int, Field(ge=1, le=1000)] | None = None
+    shown: Share | None = None
+    forgotten: Probability | None = None
+    lost_m: Above | None = None
+    fastest_m_s: Above | None = None
+    moves_m: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    over_s: Above | None = None
+    apart_m: Above | None = None
+
+
+class ManySensorPart(Strict):
+    """What it is told of a sensor, see `wildlab.tracking.many.beliefs.SensorBeliefs`; those of hulls have one
+    number for each kind."""
+
+    detection: Probability | None = None
+    clutter_per_m2: Above | None = None
+    near_m: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    far_m: Above | None = None
+    patience_s: Above | None = None
+    several: bool | None = None
+    rough_m: Lengths = ()
+    along_m: Lengths = ()
+    near_side_m: Lengths = ()
 
 
 class ConsideredPart(Strict):
@@ -72,6 +121,7 @@ class SensorPart(Strict):
     range_m: Above | None = None
     range_sd_m: Above | None = None
     considered: dict[str, ConsideredPart] = Field(default_factory=dict)
+    many: ManySensorPart = ManySensorPart()
 
     @model_validator(mode="after")
     def _known(self) -> SensorPart:
@@ -106,6 +156,7 @@ class TargetsPart(Strict):
     reach_deg: Annotated[float, Field(gt=0, le=180)] | None = None
     size_m: Above | None = None
     identified: Literal["label", "gate", "one"] | None = None
+    many: ManyTargetsPart | None = None
 
 
 class Settings(Strict):

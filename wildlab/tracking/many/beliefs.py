@@ -133,6 +133,8 @@ class Scan(NamedTuple):
         (2,) north, east in n, m.
     z, R
         (M, 2) and (M, 2, 2): places in n with their covariances, m and m^2.
+    view
+        (C, 2) corners of the ground that a camera shows; None: whatever is within reach is looked at.
     """
 
     time: float
@@ -140,6 +142,7 @@ class Scan(NamedTuple):
     platform: Array
     z: Array
     R: Array
+    view: Array | None = None
 
 
 #: One kind of target, as small as a point.

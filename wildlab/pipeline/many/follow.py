@@ -1,0 +1,193 @@
+"""All targets of a flight followed at once: what `wildlab track --many` does, as one call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from wildlab.errors import WildlabError
+from wildlab.evaluation.identities import Identities, compare_identities
+from wildlab.evaluation.identities import Scan as Compared
+from wildlab.flight.following import Settings
+from wildlab.flight.store import Flight
+from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.follow import order_notes, sensors_with_detections
+from wildlab.pipeline.many.beliefs import of_many
+from wildlab.pipeline.many.places import Places, places_of
+from wildlab.pipeline.scans import scans_of, truths_at
+from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many
+from wildlab.tracking.many.run import in_view
+
+Array = NDArray[np.float64]
+
+#: From this distance a track is on no target, and a target without a track: the cut-off of GOSPA, m.
+CUTOFF_M = 20.0
+
+
+class Followed(NamedTuple):
+    """All targets of a flight.
+
+    Attributes
+    ----------
+    scans, shown
+        Looks of all sensors in order of time, and what is believed after each.
+    places
+        By sensor.
+    sensors, targets
+        What the tracker was told.
+    truth
+        By target's name (N, 2), where it was at each look; NaN where that is not known. Empty without truth.
+    said
+        What the tracker was told, and who says so.
+    notes
+        What was done to the detections, in sentences.
+    """
+
+    scans: list[Scan]
+    shown: list[Shown]
+    places: dict[str, Places]
+    sensors: list[SensorBeliefs]
+    targets: TargetBeliefs
+    truth: dict[str, Array]
+    said: list[Said]
+    notes: list[str]
+
+    @property
+    def minutes(self) -> float:
+        """From the first look to the last."""
+        return (self.scans[-1].time - self.scans[0].time) / 60 if len(self.scans) > 1 else 0.0
+
+
+def follow_all(
+    flight: Flight,
+    *,
+    settings: Settings | None = None,
+    sensors: Sequence[str] = (),
+    source: str | None = None,
+) -> Followed:
+    """Follow all targets by all sensors at once, whatever detections name.
+
+    Parameters
+    ----------
+    settings
+        What is told besides ``flight.toml``.
+    sensors
+        Names; left out: all that detect places.
+    source
+        Name of the ``nav`` table; may be left out where there is only one.
+
+    Raises
+    ------
+    WildlabError
+        Where there is no such sensor, no detection, no time, noise nobody knows, or no detection tells a
+        place.
+    """
+    if flight.manifest.time.kind != "utc":
+        raise WildlabError(
+            "the photos carry no time, and a track is over time",
+            "import the flight with times",
+            file=flight.folder,
+            field="time.kind",
+        )
+    told = of_flight(flight, settings)
+    following, said = of_targets(told.targets)
+    said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
+    notes: list[str] = []
+    places: dict[str, Places] = {}
+    for name in sensors_with_detections(flight, sensors):
+        looks = scans_of(flight, name, 0.0, source)
+        if looks.kind in ("bearing", "velocity") and not sensors:
+            notes.append(f"{name} was left out: what it detects ({looks.kind}) tells no place alone.")
+            continue
+        belief, more = of_sensor(flight, looks, told)
+        if belief.offset_s:
+            looks = scans_of(flight, name, belief.offset_s, source)
+        said += [one for one in more if not one.what.startswith("considered")]
+        notes += order_notes(looks)
+        places[name] = found = places_of(flight, looks, belief, len(places), source)
+        if found.without:
+            notes.append(f"{found.without} detections of {name} have no place on the ground.")
+    if not places:
+        raise WildlabError(
+            "no sensor detects places", "follow one target by its bearings: wildlab track without --many",
+            file=flight.folder, field="detections.kind",
+        )  # fmt: skip
+    beliefs = of_many(told, following, list(places.values()))
+    scans = sorted((scan for one in places.values() for scan in one.scans), key=lambda scan: scan.time)
+    shown = run_many(scans, beliefs.sensors, beliefs.targets)
+    truth = {}
+    if flight.truth is not None and len(flight.truth):
+        times = np.array([scan.time for scan in scans])
+        truth = {one.target: one.position for one in truths_at(flight, times)}
+    return Followed(
+        scans, shown, places, beliefs.sensors, beliefs.targets, truth, [*said, *beliefs.said], notes
+    )
+
+
+def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Identities | None:
+    """Tracks against the true targets at every look; None without truth.
+
+    A target can be seen where it lies in the camera's view, or within reach of any of the sensors. One that
+    cannot costs nothing, with a track or without.
+
+    Parameters
+    ----------
+    reach
+        Metres by target's name, in place of the sensors' own.
+    """
+    if not followed.truth:
+        return None
+    far = max(one.far_m for one in followed.sensors)
+    compared = []
+    for row, (scan, shown) in enumerate(zip(followed.scans, followed.shown, strict=True)):
+        names = [name for name, way in followed.truth.items() if np.isfinite(way[row]).all()]
+        at = np.array([followed.truth[name][row] for name in names]).reshape(-1, 2)
+        distance = np.linalg.norm(at - scan.platform, axis=1)
+        limit = np.array([far if reach is None else reach[name] for name in names])
+        visible = distance <= limit
+        if scan.view is not None:
+            visible &= in_view(scan.view, at)
+        compared.append(
+            Compared(
+                scan.time,
+                shown.x[:, :2],
+                shown.P[:, :2, :2],
+                shown.identity.tolist(),
+                at,
+                names,
+                visible,
+                np.zeros(len(names), bool),
+            )
+        )
+    return compare_identities(compared, CUTOFF_M)
+
+
+def tracks_table(followed: Followed) -> pd.DataFrame:
+    """Every track at every look at which it was shown.
+
+    Returns
+    -------
+    DataFrame
+        ``time_s``, ``sensor`` of the look, ``track``; the state in metres and m/s in n, ``p_ij`` its
+        covariance, the upper triangle; ``existence``; and the probability of each kind of hull.
+    """
+    names = [one.name for one in followed.sensors]
+    rows = []
+    for shown in followed.shown:
+        for i, identity in enumerate(shown.identity):
+            row: dict[str, object] = {
+                "time_s": shown.time, "sensor": names[shown.sensor], "track": int(identity),
+                "north_m": shown.x[i, 0], "east_m": shown.x[i, 1],
+                "v_north_m_s": shown.x[i, 2], "v_east_m_s": shown.x[i, 3],
+            }  # fmt: skip
+            row |= {f"p_{a}{b}": shown.P[i, a, b] for a in range(4) for b in range(a, 4)}
+            row["existence"] = shown.existence[i]
+            kinds = zip(followed.targets.hulls, shown.kinds[i], strict=True)
+            row |= {f"kind_{number}": share for number, (_, share) in enumerate(kinds, start=1)}
+            rows.append(row)
+    columns = ["time_s", "sensor", "track", "north_m", "east_m"]
+    return pd.DataFrame(rows, columns=None if rows else columns)

@@ -1,0 +1,106 @@
+"""Charts of many targets at once: identities on a map and over time, and what is wrong at each look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wildlab.evaluation.identities import Identities
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.many.follow import CUTOFF_M, Followed
+from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
+from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
+
+#: Tracks that have a colour and a name of their own in a map: the longest.
+MOST_NAMED = 6
+#: Looks farther apart than so many usual ones are no line.
+PAUSE = 8.0
+
+
+def ways_of(followed: Followed) -> dict[int, Array]:
+    """(L, 3) times and places of every track, the longest first."""
+    ways: dict[int, list[tuple[float, float, float]]] = {}
+    for look in followed.shown:
+        for identity, x in zip(look.identity, look.x, strict=True):
+            ways.setdefault(int(identity), []).append((look.time, float(x[0]), float(x[1])))
+    longest = sorted(ways, key=lambda name: (-len(ways[name]), name))
+    return {name: np.array(ways[name]) for name in longest}
+
+
+def map_shown(followed: Followed) -> Shown:
+    """Where every track went, in local metres, north up, beside the true ways."""
+    fig, ax = new_figure(5.6, 5.4)
+    for name, way in followed.truth.items():
+        del name
+        ax.plot(way[:, 1], way[:, 0], color="black", lw=1.2, ls=(0, (4, 2)), label="truth")
+    platform = np.array([scan.platform for scan in followed.scans])
+    if len(platform) and np.ptp(platform, axis=0).max() > 0:
+        ax.plot(platform[:, 1], platform[:, 0], color=GREY, lw=1.2, label="platform")
+    elif len(platform):
+        ax.plot(platform[:1, 1], platform[:1, 0], "^", color=GREY, ms=8, label="platform")
+    ways = ways_of(followed)
+    for tint, (identity, way) in zip(SENSOR_COLOURS, list(ways.items())[:MOST_NAMED], strict=False):
+        ax.plot(way[:, 2], way[:, 1], color=tint, lw=1.8, label=f"track {identity}")
+        ax.plot(way[:1, 2], way[:1, 1], "o", color=tint, ms=5)
+    for way in list(ways.values())[MOST_NAMED:]:
+        ax.plot(way[:, 2], way[:, 1], color=INK, lw=1.0, alpha=0.6, label="other tracks")
+    handles, labels = ax.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    fig.legend(once.values(), once.keys(), loc="outside lower center", ncols=3)
+    count = len(ways)
+    ax.set_title("1 track" if count == 1 else f"{count} tracks")
+    map_axes(ax)
+    alt = f"Map in local metres of {count} tracks"
+    alt += f" beside the true ways of {len(followed.truth)} targets." if followed.truth else "."
+    rest = "" if count <= MOST_NAMED else f" The {MOST_NAMED} longest have a colour."
+    return fig, "map", alt, f"A dot is where a track was first believed.{rest}"
+
+
+def identities_shown(followed: Followed, lives: Identities) -> Shown:
+    """Which track is on each target, over time."""
+    names = [name for name, life in lives.targets.items() if life.visible]
+    fig, ax = new_figure(5.8, 1.6 + 0.5 * len(names))
+    start = followed.scans[0].time
+    times = np.array([scan.time for scan in followed.scans]) - start
+    order: dict[object, int] = {}
+    for row, name in enumerate(names):
+        on = [one.get(name) for one in lives.followed]
+        for identity in dict.fromkeys(one for one in on if one is not None):
+            order.setdefault(identity, len(order))
+            mine = np.array([one == identity for one in on])
+            tint = SENSOR_COLOURS[order[identity] % len(SENSOR_COLOURS)]
+            ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tint, ms=11, mew=1.6)
+    ax.set_yticks(range(len(names)), [str(name) for name in names])
+    ax.set_ylim(-0.6, len(names) - 0.4)
+    ax.set_xlabel("time since the first look (s)")
+    changes = lives.swaps + lives.breaks
+    ax.set_title("No target changes its track" if not changes else f"Tracks change {changes} times")
+    alt = f"For each of {len(names)} targets the track that is on it at each look; colours are tracks. "
+    alt += "None changes." if not changes else f"They change {changes} times."
+    return fig, "identities", alt, "A mark is a look with a track on the target; a colour is a track."
+
+
+def wrong_shown(followed: Followed, lives: Identities) -> Shown:
+    """GOSPA at each look, and how many targets are missed and tracks false."""
+    fig, axes = new_figure(5.8, 4.2, rows=2, sharex=True)
+    times = np.array([scan.time for scan in followed.scans]) - followed.scans[0].time
+    distance = np.array([one.distance for one in lives.gospa])
+    axes[0].plot(times, distance, ".", color=SENSOR_COLOURS[0], ms=4)
+    axes[0].axhline(distance.mean(), color=INK, lw=1.2, ls="--")
+    axes[0].set_ylabel("GOSPA (m)")
+    axes[0].set_title(f"{distance.mean():.1f} m in the mean")
+    missed = np.array([one.n_missed for one in lives.gospa])
+    false = np.array([one.n_false for one in lives.gospa])
+    axes[1].step(times, missed, where="mid", color=SENSOR_COLOURS[0], lw=1.4, label="targets missed")
+    axes[1].step(times, -false, where="mid", color=VERMILLION, lw=1.4, label="tracks on nothing")
+    axes[1].set_ylabel("how many")
+    axes[1].set_xlabel("time since the first look (s)")
+    most = max(int(missed.max()), int(false.max()), 1)
+    axes[1].set_ylim(-most - 0.5, most + 0.5)
+    axes[1].set_yticks(range(-most, most + 1), [str(abs(n)) for n in range(-most, most + 1)])
+    fig.legend(loc="outside lower center", ncols=2)
+    mark_gaps(axes[0], times, PAUSE * float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
+    alt = (
+        f"GOSPA with a cut-off of {CUTOFF_M:g} m at {len(times)} looks, {distance.mean():.1f} m in the mean; "
+        f"targets missed at {int((missed > 0).sum())} looks, tracks on nothing at {int((false > 0).sum())}."
+    )
+    return fig, "gospa", alt, "Dashed: the mean. Below: targets missed upwards, tracks on nothing downwards."

@@ -1,0 +1,93 @@
+"""Sections of the report on many targets: what is shown, in which order."""
+
+from __future__ import annotations
+
+from wildlab.evaluation.identities import Identities
+from wildlab.pipeline.many.follow import Followed
+from wildlab.reporting import many_tracks as words
+from wildlab.reporting.charts import many as charts
+from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
+from wildlab.reporting.report import Report
+from wildlab.reporting.tracking import said_table
+
+
+def head_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+    """Title and summary."""
+    by = ", ".join(followed.places)
+    report.head("Who is where, and who is who?", f"All targets at once, by {by}")
+    said, level = words.summary(followed, lives)
+    report.summary(said, level=level, verdict=words.verdict_of(followed, lives, level))
+    report.metric(VERDICT_LEVEL, "tracking-many", VERDICT_LEVELS[level], "1")
+    if followed.notes:
+        report.points(followed.notes)
+
+
+def pictures_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+    """The map, and with truth who is on whom and what is wrong when."""
+    figure, name, alt, caption = charts.map_shown(followed)
+    report.figure(figure, name=name, alt=alt, caption=caption, main=True)
+    if lives is None or not any(life.visible for life in lives.targets.values()):
+        return
+    report.section("Who is who, look by look")
+    report.figures([charts.identities_shown(followed, lives), charts.wrong_shown(followed, lives)])
+
+
+def tables_section(report: Report, followed: Followed, lives: Identities | None) -> None:
+    """Targets, tracks, and what GOSPA is made of."""
+    if lives is not None and lives.targets:
+        report.section("Every target")
+        report.table(
+            words.targets_table(lives),
+            columns=words.TARGETS,
+            digits={"tracked": 0, "confirm": 1, "looks": 0},
+            caption="In reach: in the camera's view, or no farther than any sensor sees. First after: from "
+            "the first look in reach to the first with a track. New tracks: another one than before, which "
+            "was on no target.",
+        )
+        report.table(
+            words.parts_table(lives.gospa),
+            columns={"part": "", "metres": "m", "share": "of the square (%)"},
+            digits={"metres": 2, "share": 0},
+            caption=words.caption_of_gospa(),
+        )
+    table = words.tracks_table(followed, lives)
+    if not len(table):
+        return
+    report.section("Every track")
+    report.table(
+        table,
+        columns={name: heading for name, heading in words.TRACKS.items() if name in table},
+        digits={"from": 1, "to": 1, "looks": 0, "on": 0, "nees": 2},
+        caption="Seconds since the first look."
+        + (
+            " Mean NEES / 2: 1 where errors are as large as the track says, more where they are larger."
+            if lives is not None
+            else ""
+        ),
+    )
+
+
+def told_section(report: Report, followed: Followed) -> None:
+    """What the tracker was told, and by whom."""
+    report.section("What the tracker was told", words.assumed_sentence(followed.said))
+    headings = {"of": "of", "what": "what", "value": "value", "source": "from"}
+    report.table(said_table(followed.said), columns=headings)
+
+
+def end_section(report: Report) -> None:
+    """What is not said, and how it was computed."""
+    report.limits(
+        [
+            "Where the truth has no standard deviation of its own, its error counts as the tracks'.",
+            "Other things that move are tracks on nothing here, unless their true place is known too.",
+            "Errors of the pose are taken for new at every detection, also where all targets of an image "
+            "share them.",
+        ]
+    )
+    report.method(
+        "Joint integrated probabilistic data association with visibility (H 8.2): in every look each "
+        "detection is of each track, of something new, or of nothing, with probabilities over all ways to "
+        "deal them out; a track's estimate is the mean over these ways. Whether a target exists and whether "
+        "it can be seen are estimated apart: one that is hidden is not given up at once. Each track is of "
+        "every kind of hull at once, which differ in where on the hull it is seen."
+    )

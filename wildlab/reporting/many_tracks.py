@@ -1,0 +1,243 @@
+"""What the report on many targets says, from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.identities import Identities
+from wildlab.evaluation.sets import Gospa
+from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.many.beliefs import HERE
+from wildlab.pipeline.many.follow import CUTOFF_M, Followed
+from wildlab.reporting.report import Report
+from wildlab.reporting.tracking import length
+
+#: A target is followed well where it has a track at this share of the looks at which it can be seen.
+FOLLOWED = 0.9
+#: Mean NEES of a position, divided by two: between these a track is as far off as it says, to a factor of
+#: about 1.4 in size.
+SMALLEST, LARGEST = 0.5, 2.0
+NOTHING = "–"
+
+
+def counts_of(shown: Followed) -> tuple[int, float]:
+    """How many tracks there are in all, and at a look in the mean."""
+    names = {int(one) for look in shown.shown for one in look.identity}
+    return len(names), float(np.mean([len(look.identity) for look in shown.shown])) if shown.shown else 0.0
+
+
+def rms_error(lives: Identities) -> float:
+    """Root mean square distance of tracks from the targets they are on, m; NaN where there are none."""
+    squares = sum(one.localisation**2 for one in lives.gospa)
+    return float(np.sqrt(squares / count)) if (count := on_target(lives)) else float("nan")
+
+
+def on_target(lives: Identities) -> int:
+    """How often a target that could be seen had a track, looks and targets counted together."""
+    could = sum(life.visible for life in lives.targets.values())
+    return could - sum(one.n_missed for one in lives.gospa)
+
+
+def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], str]:
+    """The first sentences of the page, and its level."""
+    tracks, at_once = counts_of(followed)
+    looks, minutes = len(followed.scans), followed.minutes
+    many = f"{tracks} {'track' if tracks == 1 else 'tracks'} in {looks} looks over {minutes:.1f} min"
+    if not tracks:
+        return [f"No track was confirmed in {looks} looks over {minutes:.1f} min."], "bad"
+    if lives is None:
+        return [
+            f"{many[0].upper()}{many[1:]}, {at_once:.1f} at a time in the mean.",
+            "Whose they are, and how many are false, cannot be said without the targets' true places.",
+        ], "neutral"
+    seen = {name: life for name, life in lives.targets.items() if life.visible}
+    if not seen:
+        return [f"{many}; no target with a known place was ever in reach."], "neutral"
+    shares = {name: life.tracked for name, life in seen.items()}
+    least = min(shares, key=lambda name: shares[name])
+    several = len(seen) > 1
+    said = [
+        f"{f'Of {len(seen)} targets in reach, each' if several else 'The target in reach'} has a track at "
+        f"{_share(shares[least])}{' or more' if several else ''} of the looks at which it can be seen"
+        + (
+            f"; tracks are off by {length(rms_error(lives))} (root mean square)." if on_target(lives) else "."
+        ),
+        f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to other targets')}, "
+        f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}, "
+        f"and {lives.false_tracks_per_minute:.2f} tracks a minute are on nothing.",
+    ]
+    lost = [name for name, share in shares.items() if share == 0]
+    if lost:
+        said.append(f"Never followed: {', '.join(lost)}.")
+    return said, _level(lives, shares)
+
+
+def _level(lives: Identities, shares: dict[object, float]) -> str:
+    if lives.swaps or min(shares.values()) < 0.5:
+        return "bad"
+    nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
+    doubtful = [one for one in nees if not SMALLEST <= one <= LARGEST]
+    if lives.breaks or lives.false_tracks_per_minute > 0 or min(shares.values()) < FOLLOWED or doubtful:
+        return "warn"
+    return "good"
+
+
+def verdict_of(followed: Followed, lives: Identities | None, level: str) -> tuple[str, str]:
+    """The word that goes with the level, and its reason."""
+    tracks, _ = counts_of(followed)
+    if not tracks:
+        return "no track", "Nothing was seen often enough to be believed."
+    if lives is None or not any(life.visible for life in lives.targets.values()):
+        return "not judged", "There is no target in reach whose true place is known."
+    reasons = []
+    if lives.swaps:
+        reasons.append(f"tracks went over to other targets: {lives.swaps}")
+    if lives.breaks:
+        reasons.append(f"targets got new tracks: {lives.breaks}")
+    if lives.false_tracks_per_minute > 0:
+        false = sum(track.false for track in lives.tracks.values())
+        reasons.append(f"{false} of {len(lives.tracks)} tracks are on nothing")
+    short = [life for life in lives.targets.values() if life.visible and life.tracked < FOLLOWED]
+    if short:
+        reasons.append(f"{len(short)} of {len(lives.targets)} targets without a track for more than a tenth")
+    nees = {name: track.anees / 2 for name, track in lives.tracks.items() if np.isfinite(track.anees)}
+    over, under = [v for v in nees.values() if v > LARGEST], [v for v in nees.values() if v < SMALLEST]
+    if over:
+        reasons.append(f"{len(over)} of {len(nees)} tracks are farther off than they say")
+    if under:
+        reasons.append(f"{len(under)} of {len(nees)} tracks are nearer than they say")
+    words = {"good": "sound", "warn": "look closer", "bad": "mixed up" if lives.swaps else "targets lost"}
+    if not reasons:
+        reasons = ["every target was followed, by one track each, and no track is on nothing"]
+    text = "; ".join(reasons)
+    return words[level], f"{text[0].upper()}{text[1:]}."
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+def _how_often(count: int, once: str, more: str) -> str:
+    return f"No {once}" if not count else f"1 {once}" if count == 1 else f"{count} {more}"
+
+
+def targets_table(lives: Identities) -> pd.DataFrame:
+    """A row for each target."""
+    return pd.DataFrame(
+        [
+            {
+                "target": str(name),
+                "looks": life.visible,
+                "tracked": 100 * life.tracked,
+                "confirm": life.time_to_confirm,
+                "swaps": life.swaps,
+                "breaks": life.breaks,
+            }
+            for name, life in lives.targets.items()
+        ]
+    )
+
+
+TARGETS = {
+    "target": "target", "looks": "looks in reach", "tracked": "with a track (%)",
+    "confirm": "first after (s)", "swaps": "tracks from others", "breaks": "new tracks",
+}  # fmt: skip
+
+
+def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
+    """A row for each track: when it was shown, of which kind it is, and whether it was on a true target."""
+    rows = []
+    hulls = [hull.name for hull in followed.targets.hulls]
+    spans: dict[int, list[tuple[float, int]]] = {}
+    for look in followed.shown:
+        for i, identity in enumerate(look.identity):
+            spans.setdefault(int(identity), []).append((look.time, int(np.argmax(look.kinds[i]))))
+    start = followed.scans[0].time if followed.scans else 0.0
+    for identity, span in spans.items():
+        times = [time for time, _ in span]
+        kinds = np.bincount([kind for _, kind in span], minlength=len(hulls))
+        row: dict[str, object] = {
+            "track": str(identity),
+            "from": times[0] - start,
+            "to": times[-1] - start,
+            "looks": len(span),
+        }
+        if len(hulls) > 1:
+            row["kind"] = hulls[int(np.argmax(kinds))]
+        if lives is not None:
+            life = lives.tracks[identity]
+            row["on"] = 100 * life.on_target / life.scans
+            row["nees"] = life.anees / 2
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+TRACKS = {
+    "track": "track", "from": "from (s)", "to": "to (s)", "looks": "looks", "kind": "mostly a",
+    "on": "on a target (%)", "nees": "mean NEES / 2",
+}  # fmt: skip
+
+
+def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
+    """What GOSPA is made of, means over the looks."""
+    total = np.mean([one.distance for one in found])
+    squares = {
+        "distance of tracks from their targets": np.mean([one.localisation**2 for one in found]),
+        "targets without a track": np.mean([one.missed**2 for one in found]),
+        "tracks on nothing": np.mean([one.false**2 for one in found]),
+    }
+    every = sum(squares.values())
+    rows = [{"part": "GOSPA, mean over looks", "metres": total, "share": np.nan}]
+    for name, square in squares.items():
+        rows.append(
+            {
+                "part": f"from {name}, root of the mean square",
+                "metres": np.sqrt(square),
+                "share": 100 * square / every if every else np.nan,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def assumed_sentence(said: Sequence[Said]) -> str:
+    """How much of what the tracker was told is assumed or estimated from what it then followed."""
+    assumed = sum(one.source.startswith("assumed") for one in said)
+    here = sum(one.source.startswith(HERE) for one in said)
+    if not assumed and not here:
+        return "All that the tracker was told is stated."
+    return (
+        f"Of {len(said)} values that the tracker was told, {assumed} {'is' if assumed == 1 else 'are'} "
+        f"assumed and {here} {'is' if here == 1 else 'are'} estimated from the detections themselves. State "
+        "them in `flight.toml` or with `--settings`."
+    )
+
+
+def record(report: Report, followed: Followed, lives: Identities | None) -> None:
+    """The numbers, for ``metrics.json``."""
+    tracks, at_once = counts_of(followed)
+    report.metric("tracks", "all", tracks, "1", n=len(followed.scans))
+    report.metric("tracks_at_a_look", "all", at_once, "1", n=len(followed.scans))
+    if lives is None:
+        return
+    gospa = lives.gospa
+    report.metric("gospa", "all", float(np.mean([one.distance for one in gospa])), "m", n=len(gospa))
+    report.metric("rmse", "all", rms_error(lives), "m", n=on_target(lives))
+    report.metric("swaps", "all", lives.swaps, "1")
+    report.metric("breaks", "all", lives.breaks, "1")
+    report.metric("false_tracks_per_minute", "all", lives.false_tracks_per_minute, "1/min")
+    for number, life in enumerate(lives.targets.values(), start=1):
+        if life.visible:
+            report.metric("tracked", f"target-{number}", life.tracked, "1", n=life.visible)
+            report.metric("time_to_confirm", f"target-{number}", life.time_to_confirm, "s")
+
+
+def caption_of_gospa() -> str:
+    """What GOSPA counts."""
+    return (
+        f"GOSPA adds the distances of tracks from their targets, and {CUTOFF_M / np.sqrt(2):.1f} m for every "
+        f"target without a track and every track on nothing, as squares; beyond {CUTOFF_M:g} m a track is on "
+        "no target."
+    )

@@ -1,0 +1,107 @@
+"""The report on all targets of a flight at once: checked, and run as a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from wildlab.errors import WildlabError
+from wildlab.flight.following import read_settings
+from wildlab.flight.store import load_flight
+from wildlab.flight.toml import dump_toml
+from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.following.follow import refuse_unusable
+from wildlab.runner.catalogue import StudyEntry, load_studies
+from wildlab.runner.evaluate import refuse_other_flight
+from wildlab.runner.processes.progress import shown
+from wildlab.runner.processes.scheduling import Outcome, run_jobs
+from wildlab.runner.run import make_job, run_all
+
+NOTEBOOK = "tracking-many.ipynb"
+
+
+def refuse_unfit(options: Mapping[str, object]) -> None:
+    """Refuse options that have no meaning where all targets are followed at once.
+
+    Raises
+    ------
+    WildlabError
+        For the first that was given.
+    """
+    for name, value in options.items():
+        if value:
+            raise WildlabError(
+                f"{name} and --many do not go together",
+                f"leave {name} out, or --many: with it all targets are followed by one filter, as told by "
+                "--settings",
+                field=name,
+            )
+
+
+def track_many(
+    folder: Path,
+    *,
+    sensors: Sequence[str] = (),
+    settings: Path | None = None,
+    source: str | None = None,
+    into: Path | None = None,
+    reports: Path = REPORTS,
+    notebooks: Path = NOTEBOOKS,
+    console: Console | None = None,
+) -> Outcome:
+    """Follow all targets of a flight at once, and leave a report with a table of tracks.
+
+    Parameters
+    ----------
+    sensors, source
+        As `wildlab.pipeline.many.follow.follow_all`.
+    settings
+        A settings file.
+    into
+        The folder of the report; ``<reports>/<name of the flight>-many`` if left out.
+
+    Raises
+    ------
+    WildlabError
+        Where the flight cannot be followed as it is asked for, before anything runs.
+    """
+    flight = load_flight(folder)
+    stated = None if settings is None else read_settings(settings)
+    refuse_unusable(flight, stated, (), (), sensors, source)
+    studies = load_studies(notebooks / "studies.toml")
+    place = reports / f"{flight.name}-many" if into is None else into
+    if place.name in studies and into is None:
+        raise WildlabError(
+            f"the flight is named {flight.name!r}, and its report would replace that of a study",
+            "give the flight another name in flight.toml, or the report another folder with --into",
+        )
+    refuse_other_flight(folder, place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    parameters: dict[str, Any] = {
+        "settings": "" if stated is None else dump_toml(stated.model_dump(exclude_none=True)),
+        "sensors": list(sensors),
+        "source": source or "",
+    }
+    options = [f"--sensor {one}" for one in sensors] + ([f"--source {source}"] if source else [])
+    options += ["--settings settings.toml"] if settings is not None else []
+    study = StudyEntry(
+        name="evaluate", title=f"All targets of {flight.name}", notebook=NOTEBOOK, parameters=parameters
+    )
+    job = make_job(
+        study,
+        flight=flight.folder,
+        reports=place.parent,
+        notebooks=notebooks,
+        timeout_s=None,
+        name=place.name,
+        again=" ".join(["wildlab track", flight.name, "--many", *options]),
+    )
+    if into is None:
+        return run_all([[job]], [], studies, place.parent, console)[0]
+    # A folder of one's own gets this report and no list of others.
+    with shown(console) if console is not None else nullcontext() as listen:
+        return run_jobs([job], listen=listen)[0]
