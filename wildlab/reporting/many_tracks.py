@@ -59,19 +59,18 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
     shares = {name: life.tracked for name, life in seen.items()}
     least = min(shares, key=lambda name: shares[name])
     several = len(seen) > 1
+    whose = f"Of {len(seen)} targets in reach, each" if several else "The target in reach"
+    how = " or more" if several else ""
+    off = f"; tracks are off by {length(rms_error(lives))} (RMS)" if on_target(lives) else ""
     said = [
-        f"{f'Of {len(seen)} targets in reach, each' if several else 'The target in reach'} has a track at "
-        f"{_share(shares[least])}{' or more' if several else ''} of the looks at which it can be seen"
-        + (
-            f"; tracks are off by {length(rms_error(lives))} (root mean square)." if on_target(lives) else "."
-        ),
-        f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to other targets')}, "
+        f"{whose} has a track at {_share(shares[least])}{how} of the looks at which it can be seen{off}.",
+        f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to others')}, "
         f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}, "
         f"and {lives.false_tracks_per_minute:.2f} tracks a minute are on nothing.",
     ]
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
-        said.append(f"Never followed: {', '.join(lost)}.")
+        said.append(f"Never followed: {', '.join(map(str, lost))}.")
     return said, _level(lives, shares)
 
 

@@ -51,7 +51,7 @@ def test_one_target_without_clutter_is_the_kalman_filter(seed: int) -> None:
             prior = predict(x, P, *white_acceleration(1.0, targets.density))
             after = update(*prior, scan.z[0], np.eye(2, 4), R)
             x, P = after.x, after.P
-        assert tracks.count == 1
+        assert tracks.number == 1
         assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
 
 

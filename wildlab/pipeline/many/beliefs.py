@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,10 +93,9 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
             STATED if stated.hulls else ASSUMED,
         )
     )
-    told = {name: one(name) for name in _WORDS}
-    targets = TargetBeliefs(
-        hulls, following.density, following.start_speed_m_s, **(told | {"hits": int(told["hits"])})
-    )
+    told: dict[str, Any] = {name: one(name) for name in _WORDS}
+    told["hits"] = int(told["hits"])
+    targets = TargetBeliefs(hulls, following.density, following.start_speed_m_s, **told)
     sensors = []
     for looks in places:
         found, more = _of_sensor(settings, looks, len(hulls))
@@ -135,8 +134,10 @@ def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBel
         near,
         far,
         one("patience_s", "shown unseen for", " s", max(LOOKS_SHOWN * interval, SECONDS_SHOWN), ASSUMED),
-        *(_of_hulls(stated, name, kinds, looks.sensor) for name in ("rough_m", "along_m", "near_side_m")),
-        several=bool(stated is not None and stated.several),
+        _of_hulls(stated, "rough_m", kinds, looks.sensor),
+        _of_hulls(stated, "along_m", kinds, looks.sensor),
+        _of_hulls(stated, "near_side_m", kinds, looks.sensor),
+        bool(stated is not None and stated.several),
     )
     return found, said
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
@@ -123,7 +124,7 @@ def _of_pixels(flight: Flight, scans: Scans, source: str | None) -> tuple[Array,
     points = georeference(flight, observed, np.random.default_rng(0))
     points = points[points["source"] == scans.sensor] if "source" in points else points
     points = points.drop_duplicates("detection_id").set_index("detection_id")
-    row = points.index.get_indexer(scans.ids.ravel())
+    row = points.index.get_indexer(pd.Index(scans.ids.ravel()))
     z = points[["north_m", "east_m"]].to_numpy(float)[row]
     R = covariances_of(points.reset_index())[row]
     z[row < 0], R[row < 0] = np.nan, np.nan

@@ -26,6 +26,13 @@ def ways_of(followed: Followed) -> dict[int, Array]:
     return {name: np.array(ways[name]) for name in longest}
 
 
+def colours_of(followed: Followed) -> dict[object, str]:
+    """By identity: the longest tracks have a colour of their own in every chart, the others that of ink."""
+    names = list(ways_of(followed))
+    own = dict(zip(names, SENSOR_COLOURS[:MOST_NAMED], strict=False))
+    return {name: own.get(name, INK) for name in names}
+
+
 def map_shown(followed: Followed) -> Shown:
     """Where every track went, in local metres, north up, beside the true ways."""
     fig, ax = new_figure(5.6, 5.4)
@@ -38,11 +45,12 @@ def map_shown(followed: Followed) -> Shown:
     elif len(platform):
         ax.plot(platform[:1, 1], platform[:1, 0], "^", color=GREY, ms=8, label="platform")
     ways = ways_of(followed)
-    for tint, (identity, way) in zip(SENSOR_COLOURS, list(ways.items())[:MOST_NAMED], strict=False):
-        ax.plot(way[:, 2], way[:, 1], color=tint, lw=1.8, label=f"track {identity}")
-        ax.plot(way[:1, 2], way[:1, 1], "o", color=tint, ms=5)
-    for way in list(ways.values())[MOST_NAMED:]:
-        ax.plot(way[:, 2], way[:, 1], color=INK, lw=1.0, alpha=0.6, label="other tracks")
+    tints = colours_of(followed)
+    for identity, way in ways.items():
+        named = tints[identity] != INK
+        label = f"track {identity}" if named else "other tracks"
+        ax.plot(way[:, 2], way[:, 1], color=tints[identity], lw=1.8 if named else 1.0, label=label)
+        ax.plot(way[:1, 2], way[:1, 1], "o", color=tints[identity], ms=5)
     handles, labels = ax.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
     fig.legend(once.values(), once.keys(), loc="outside lower center", ncols=3)
@@ -61,14 +69,12 @@ def identities_shown(followed: Followed, lives: Identities) -> Shown:
     fig, ax = new_figure(5.8, 1.6 + 0.5 * len(names))
     start = followed.scans[0].time
     times = np.array([scan.time for scan in followed.scans]) - start
-    order: dict[object, int] = {}
+    tints = colours_of(followed)
     for row, name in enumerate(names):
         on = [one.get(name) for one in lives.followed]
         for identity in dict.fromkeys(one for one in on if one is not None):
-            order.setdefault(identity, len(order))
             mine = np.array([one == identity for one in on])
-            tint = SENSOR_COLOURS[order[identity] % len(SENSOR_COLOURS)]
-            ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tint, ms=11, mew=1.6)
+            ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tints[identity], ms=11, mew=1.6)
     ax.set_yticks(range(len(names)), [str(name) for name in names])
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.set_xlabel("time since the first look (s)")

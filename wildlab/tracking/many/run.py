@@ -120,7 +120,7 @@ def _corrected(
     tracks: Tracks, z: Array, R: Array, scan: Scan, sensor: SensorBeliefs, targets: TargetBeliefs
 ) -> tuple[Tracks, Array, Array, Array]:
     """Tracks after the measurements, these with those of one hull merged, and how much of each is taken."""
-    if not tracks.count:
+    if not tracks.number:
         return tracks, z, R, np.zeros(len(z))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
     compared = compare(tracks.x, tracks.P, offset, noise, z, R, targets.gate)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,14 +63,14 @@ class Tracks(NamedTuple):
     trail: tuple[Array, ...]
 
     @property
-    def count(self) -> int:
+    def number(self) -> int:
         """T."""
         return len(self.existence)
 
     def only(self, rows: NDArray[np.intp]) -> Tracks:
         """These, in this order."""
-        trail = tuple(self.trail[row] for row in rows)
-        return Tracks(*(one[rows] for one in self[:-1]), trail)  # type: ignore[arg-type]
+        parts: list[Any] = [one[rows] for one in self[:-1]]
+        return Tracks._make([*parts, tuple(self.trail[row] for row in rows)])
 
     def estimate(self) -> tuple[Array, Array]:
         """(T, 4) and (T, 4, 4): the kinds merged to one."""
@@ -91,8 +91,8 @@ def no_tracks(kinds: int, sensors: int) -> Tracks:
 
 def both(tracks: Tracks, more: Tracks) -> Tracks:
     """One after the other."""
-    joined = (np.concatenate(pair) for pair in zip(tracks[:-1], more[:-1], strict=True))
-    return Tracks(*joined, tracks.trail + more.trail)  # type: ignore[arg-type]
+    parts: list[Any] = [np.concatenate(pair) for pair in zip(tracks[:-1], more[:-1], strict=True)]
+    return Tracks._make([*parts, tracks.trail + more.trail])
 
 
 def later(tracks: Tracks, dt: float, density: float) -> Tracks:
@@ -162,13 +162,15 @@ def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tr
     several
         Whether the sensor of this scan may see one hull as several things.
     """
-    if tracks.count < 2:
+    if tracks.number < 2:
         return tracks
     mean, P = tracks.estimate()
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     hull = targets.hulls[largest]
     kinds = tracks.kinds.copy()
-    order = sorted(range(tracks.count), key=lambda row: (-int(tracks.confirmed[row]), -int(tracks.hits[row])))
+    order = sorted(
+        range(tracks.number), key=lambda row: (-int(tracks.confirmed[row]), -int(tracks.hits[row]))
+    )
     kept: list[int] = []
     for row in order:
         if not any(_is_of(tracks, mean, P, kinds, row, one, targets, several, largest) for one in kept):
@@ -208,7 +210,8 @@ def _is_of(
         return False
     if not tracks.confirmed[row]:
         return True
-    # Two that are believed are targets that pass each other, unless they move alike and share what is seen.
+    # Two that are believed are targets that pass each other, unless they move alike and share what is
+    # seen.
     share = min(tracks.last[row], tracks.last[one]) < tracks.last.max()
     return bool(apart <= targets.apart_m and share and _as_fast(mean[row], mean[one], P[row] + P[one]))
 

@@ -67,14 +67,14 @@ def update(x: ArrayLike, P: ArrayLike, kinds: ArrayLike, own: ArrayLike, compare
     own
         (T, 1 + M) of `wildlab.tracking.many.existence.after_scan`.
     """
-    x, P, kinds = np.asarray(x, float), np.asarray(P, float), np.asarray(kinds, float)
-    own, (innovation, S, likelihood) = np.asarray(own, float), compared
-    mixed = np.einsum("tk,tkm->tm", kinds, likelihood)[:, None]
+    mean, cov, before = np.asarray(x, float), np.asarray(P, float), np.asarray(kinds, float)
+    whose, (innovation, S, likelihood) = np.asarray(own, float), compared
+    mixed = np.einsum("tk,tkm->tm", before, likelihood)[:, None]
     # Of a measurement that is the target's, the share of each kind: how likely that kind makes it.
-    share = np.divide(likelihood, mixed, out=np.zeros_like(likelihood), where=mixed > 0) * own[:, None, 1:]
-    weight = own[:, None, 0] + share.sum(axis=-1)
+    share = np.divide(likelihood, mixed, out=np.zeros_like(likelihood), where=mixed > 0) * whose[:, None, 1:]
+    weight = whose[:, None, 0] + share.sum(axis=-1)
     beta = np.divide(share, weight[..., None], out=np.zeros_like(share), where=weight[..., None] > 0)
-    PH = P[..., :2]
+    PH = cov[..., :2]
     det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] ** 2
     inverse = np.empty_like(S)
     inverse[..., 0, 0], inverse[..., 1, 1] = S[..., 1, 1] / det, S[..., 0, 0] / det
@@ -84,6 +84,8 @@ def update(x: ArrayLike, P: ArrayLike, kinds: ArrayLike, own: ArrayLike, compare
     moved = np.einsum("tkm,tkmi->tki", beta, step)
     shrunk = np.einsum("tkm,tkmij,tklj->tkil", beta, gain, PH)
     spread = np.einsum("tkm,tkmi,tkmj->tkij", beta, step, step) - moved[..., :, None] * moved[..., None, :]
-    P = P - shrunk + spread
-    kinds = kinds * weight
-    return Updated(x + moved, (P + np.swapaxes(P, -1, -2)) / 2, kinds / kinds.sum(axis=1, keepdims=True))
+    cov = cov - shrunk + spread
+    after = before * weight
+    return Updated(
+        mean + moved, (cov + np.swapaxes(cov, -1, -2)) / 2, after / after.sum(axis=1, keepdims=True)
+    )

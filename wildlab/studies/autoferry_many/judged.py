@@ -1,0 +1,197 @@
+"""How the tracker did on the scenarios, as tables and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.identities import Identities
+from wildlab.flight.store import Flight
+from wildlab.reporting.many_tracks import LARGEST, SMALLEST, caption_of_gospa, rms_error
+from wildlab.reporting.report import Report
+from wildlab.studies.autoferry_many.tuning import MODES, RADAR_REACH_M, Tuned, follow_mode, gospa_of
+
+#: How many of the best draws are used, to show how much the choice among them matters.
+BEST = 5
+MODE_WORDS = {"radar": "radar alone", "lidar": "lidar alone", "both": "both"}
+HEADINGS = {
+    "case": "scenario", "mode": "by", "gospa": "GOSPA (m)", "rmse": "RMS error (m)", "tracked": "tracked (%)",
+    "confirm": "confirmed within (s)", "swaps": "swaps", "breaks": "breaks", "false": "false a minute",
+    "anees": "mean NEES / 2",
+}  # fmt: skip
+
+
+def row_of(lives: Identities | None, case: str, mode: str) -> dict[str, object]:
+    """One scenario by one mode."""
+    if lives is None:
+        return {"case": case, "mode": mode}
+    seen = [life for life in lives.targets.values() if life.visible]
+    on = [track for track in lives.tracks.values() if np.isfinite(track.anees)]
+    return {
+        "case": case,
+        "mode": mode,
+        "gospa": gospa_of(lives),
+        "rmse": rms_error(lives),
+        "tracked": 100 * float(np.mean([life.tracked for life in seen])),
+        "confirm": float(np.median([life.time_to_confirm for life in seen])),
+        "swaps": lives.swaps,
+        "breaks": lives.breaks,
+        "false": lives.false_tracks_per_minute,
+        # Each track in as many looks as it was on a target.
+        "anees": float(np.average([one.anees / 2 for one in on], weights=[one.on_target for one in on]))
+        if on
+        else np.nan,
+    }
+
+
+def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, list[Tuned]]) -> pd.DataFrame:
+    """Every scenario by every mode with each of the best draws; ``rank`` from 1."""
+    rows = []
+    for mode in MODES:
+        for rank, one in enumerate(tuned[mode][:BEST], start=1):
+            for case, flight in flights.items():
+                rows.append(
+                    row_of(follow_mode(flight, mode, one.settings), case, mode)
+                    | {"rank": rank, "draw": one.number, "tuned_gospa": one.gospa}
+                )
+    return pd.DataFrame(rows)
+
+
+def medians(rows: pd.DataFrame, first: str) -> pd.DataFrame:
+    """For each mode the median GOSPA of the scenarios that nothing was tuned on: of the best draw, and the
+    smallest and largest of the best few."""
+    elsewhere = rows[rows["case"] != first]
+    found = []
+    for mode, own in elsewhere.groupby("mode", sort=False):
+        by_rank = own.groupby("rank")["gospa"].median()
+        found.append(
+            {
+                "mode": mode,
+                "best": by_rank.loc[1],
+                "least": by_rank.min(),
+                "most": by_rank.max(),
+                "of": own["case"].nunique(),
+                "draws": len(by_rank),
+            }
+        )
+    return pd.DataFrame(found)
+
+
+def spread_table(rows: pd.DataFrame, first: str) -> pd.DataFrame:
+    """GOSPA of every scenario with each of the best draws, the best first."""
+    found = []
+    for (mode, rank), own in rows.groupby(["mode", "rank"], sort=False):
+        del rank
+        one = own.iloc[0]
+        row = {"by": mode, "draw": int(one["draw"]), f"{first} (tuned here)": one["tuned_gospa"]}
+        found.append(
+            row
+            | {case: value for case, value in zip(own["case"], own["gospa"], strict=True) if case != first}
+        )
+    return pd.DataFrame(found)
+
+
+def record(report: Report, rows: pd.DataFrame, middle: pd.DataFrame) -> None:
+    """The numbers, for ``metrics.json``."""
+    for _, one in rows[rows["rank"] == 1].iterrows():
+        subject = f"{one['case']}/{one['mode']}"
+        for name, column, unit in (
+            ("gospa", "gospa", "m"), ("rmse", "rmse", "m"), ("swaps", "swaps", "1"),
+            ("breaks", "breaks", "1"), ("false_tracks_per_minute", "false", "1/min"),
+            ("mean_nees_by_two", "anees", "1"),
+        ):  # fmt: skip
+            report.metric(name, subject, one[column], unit)
+    for _, one in middle.iterrows():
+        report.metric(
+            "gospa_median", f"elsewhere/{one['mode']}", one["best"], "m", n=int(one["of"]), low=one["least"],
+            high=one["most"],
+        )  # fmt: skip
+
+
+def headline(rows: pd.DataFrame, middle: pd.DataFrame, first: str) -> list[str]:
+    """The answer in sentences."""
+    if not len(middle):
+        return ["There is one scenario only, on which everything was tuned: nothing can be judged."]
+    parts = [
+        f"{MODE_WORDS[one['mode']]} {one['best']:.1f} m ({one['least']:.1f} to {one['most']:.1f} with the "
+        f"{one['draws']:.0f} best draws)"
+        for _, one in middle.iterrows()
+    ]
+    own = rows[(rows["rank"] == 1) & (rows["case"] != first)]
+    said = [
+        f"Tuned on {first} alone, the tracker's GOSPA on {middle['of'].max():.0f} other scenarios is, in the "
+        f"median, {'; '.join(parts)}."
+    ]
+    swaps, breaks = int(own["swaps"].sum()), int(own["breaks"].sum())
+    said.append(
+        f"With the best draws, summed over the ways to look, tracks went over to another boat {swaps} "
+        f"{'time' if swaps == 1 else 'times'}, and a boat got a new track {breaks} "
+        f"{'time' if breaks == 1 else 'times'}."
+    )
+    said.append(fusion(own))
+    return [one for one in said if one]
+
+
+def fusion(own: pd.DataFrame) -> str:
+    """Whether both sensors are better than each alone, scenario by scenario; "" without all modes."""
+    wide = own.pivot_table(index="case", columns="mode", values="gospa", sort=False)
+    if not set(MODES) <= set(wide):
+        return ""
+    better = int((wide["both"] < wide["radar"]).sum())
+    return (
+        f"Both sensors together are nearer than the radar alone, asked for boats as far away, in {better} of "
+        f"{len(wide)} scenarios."
+    )
+
+
+def doubts(own: pd.DataFrame) -> str:
+    """Of how many scenarios and modes errors are as large as tracks say."""
+    fits = own["anees"].between(SMALLEST, LARGEST)
+    return (
+        f"Errors are as large as the tracks say, within a factor of {LARGEST:g} of their squares, in "
+        f"{int(fits.sum())} of {len(own)} scenarios and modes."
+    )
+
+
+def spread(middle: pd.DataFrame, draws: int) -> str:
+    """How far the best draws lie apart where nothing was tuned, in a sentence for each mode."""
+    return " ".join(
+        f"By {MODE_WORDS[one['mode']]}, the best {one['draws']:.0f} of {draws} draws have medians between "
+        f"{one['least']:.2f} and {one['most']:.2f} m."
+        for _, one in middle.iterrows()
+    )
+
+
+def caption() -> str:
+    """What the columns of the table of scenarios mean."""
+    return (
+        f"{caption_of_gospa()} Boats are asked for up to {RADAR_REACH_M:g} m with the radar, and as far as "
+        "the lidar sees one of their size without it. Confirmed within: median over the boats. Mean NEES / 2: "
+        "1 where errors are as large as the tracks say. Swaps: tracks that go over to another boat; breaks: "
+        "boats that get a new track."
+    )
+
+
+def caption_of_spread(first: str) -> str:
+    """What the table of the best draws shows."""
+    return f"Mean GOSPA (m) with each of the draws that are best on {first}."
+
+
+def limits() -> list[str]:
+    """What the study does not say."""
+    return [
+        "Other boats are about whose places nobody published: a track on one of them counts as false.",
+        "The antenna of a boat is not its middle, and nothing says where on the hull it is.",
+        "The cameras take no part: a bearing alone tells no place.",
+    ]
+
+
+METHOD = (
+    "Joint integrated probabilistic data association with visibility and two kinds of hull, see "
+    "`wildlab.tracking.many`. Settings are drawn at random from wide ranges "
+    "(`wildlab.studies.autoferry_many.tuning.draw`), and for each way to look the one is taken that has the "
+    "smallest mean GOSPA on the first scenario. Scales are drawn evenly over their logarithm. Stamps are "
+    "moved by what the study `autoferry` finds on the same scenario."
+)

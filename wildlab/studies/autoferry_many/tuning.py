@@ -1,0 +1,162 @@
+"""What the tracker is told of the harbour: drawn at random, chosen on one scenario, used on the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from wildlab.evaluation.identities import Identities
+from wildlab.flight.following import (
+    HullPart,
+    ManySensorPart,
+    ManyTargetsPart,
+    NoisePart,
+    SensorPart,
+    Settings,
+    TargetsPart,
+)
+from wildlab.flight.store import Flight
+from wildlab.pipeline.many.follow import follow_all, judged
+from wildlab.studies.autoferry.boats import tune_sensor
+
+#: The ways to look: by one sensor, or by both.
+MODES: dict[str, tuple[str, ...]] = {"radar": ("radar",), "lidar": ("lidar",), "both": ("lidar", "radar")}
+#: How far away a boat is asked for, m: as far as the radar sees, or the lidar a boat of its size.
+RADAR_REACH_M = 200.0
+LIDAR_REACH_M = {"havfruen": 105.0, "gunnerus": 125.0, "jet-boat": 70.0}
+#: Of a boat whose size is not known, m.
+USUAL_REACH_M = 105.0
+#: A boat of which nothing is known, and the ship among them.
+BOAT_LENGTH_M, BOAT_BEAM_M, SHIP_LENGTH_M, SHIP_BEAM_M = 6.0, 2.5, 28.0, 8.0
+#: Nothing in a harbour is faster, m/s.
+FASTEST_M_S = 10.0
+
+
+class Tuned(NamedTuple):
+    """One draw, and the mean GOSPA that it has where it was tuned, m."""
+
+    number: int
+    settings: Settings
+    gospa: float
+
+
+def reach_of(flight: Flight, mode: str) -> dict[str, float]:
+    """Metres by target up to which it is asked for."""
+    truth = flight.table("truth")
+    names = [str(name) for name in truth["target_id"].unique()]
+    if "radar" in MODES[mode]:
+        return dict.fromkeys(names, RADAR_REACH_M)
+    return {
+        name: next((reach for key, reach in LIDAR_REACH_M.items() if key in name.lower()), USUAL_REACH_M)
+        for name in names
+    }
+
+
+def clocks_of(flight: Flight) -> dict[str, float]:
+    """To be added to the stamps of each sensor, s, as one scenario tells."""
+    return {sensor: tune_sensor(flight, sensor).offset_s for sensor in MODES["both"]}
+
+
+def draw(rng: np.random.Generator, clocks: Mapping[str, float]) -> Settings:
+    """Everything that the tracker is told, from ranges that are wide and mean something.
+
+    Scales are drawn evenly over their logarithm, shares and distances evenly.
+
+    Parameters
+    ----------
+    clocks
+        From `clocks_of`.
+    """
+
+    def scale(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    def even(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    targets = ManyTargetsPart(
+        hulls=(
+            HullPart(name="boat", length_m=BOAT_LENGTH_M, beam_m=BOAT_BEAM_M, share=0.6),
+            HullPart(name="ship", length_m=SHIP_LENGTH_M, beam_m=SHIP_BEAM_M, share=0.4),
+        ),
+        lifetime_s=scale(20, 200),
+        birth=scale(0.005, 0.3),
+        visible_s=scale(5, 60),
+        hidden_s=scale(3, 40),
+        gate=even(2.5, 4.5),
+        confirmed=float(rng.choice([0.9, 0.95, 0.98, 0.99])),
+        hits=int(rng.choice([3, 4, 5])),
+        shown=even(0.2, 0.9),
+        forgotten=0.02,
+        lost_m=SHIP_LENGTH_M,
+        fastest_m_s=FASTEST_M_S,
+        moves_m=even(4, 12),
+        over_s=even(8, 20),
+        apart_m=5.0,
+    )
+    lidar = ManySensorPart(
+        detection=even(0.6, 0.9),
+        clutter_per_m2=scale(5e-7, 2e-5),
+        near_m=even(5, 20),
+        far_m=even(105, 140),
+        patience_s=even(3, 9),
+        several=True,
+        rough_m=(0.0, scale(0.7, 4)),
+        along_m=(0.0, scale(3, 9)),
+        near_side_m=(scale(0.3, 2.5), scale(2, 7)),
+    )
+    radar = ManySensorPart(
+        detection=even(0.75, 0.95),
+        clutter_per_m2=scale(2e-6, 5e-5),
+        near_m=even(5, 20),
+        far_m=RADAR_REACH_M,
+        patience_s=even(4, 10),
+        rough_m=(0.0, scale(0.7, 4)),
+        along_m=(0.0, scale(1, 6)),
+        near_side_m=(0.0, 0.0),
+    )
+    noise = {"lidar": scale(0.7, 2.5), "radar": scale(1.5, 4)}
+    return Settings(
+        targets=TargetsPart(
+            acceleration_m_s_sqrt_s=float(np.sqrt(scale(0.01, 0.3))),
+            start_speed_m_s=even(2, 5),
+            many=targets,
+        ),
+        sensors={
+            name: SensorPart(clock_offset_s=clocks[name], noise=NoisePart(position_m=noise[name]), many=part)
+            for name, part in (("lidar", lidar), ("radar", radar))
+        },
+    )
+
+
+def gospa_of(lives: Identities | None) -> float:
+    """Mean over the looks, m; infinite where there is nothing to compare."""
+    return float(np.mean([one.distance for one in lives.gospa])) if lives is not None else np.inf
+
+
+def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | None:
+    """A scenario by the sensors of a mode, beside its true boats."""
+    return judged(follow_all(flight, settings=settings, sensors=MODES[mode]), reach_of(flight, mode))
+
+
+def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
+    """Draw settings, and order them for each mode by how the tracker does with them on one scenario.
+
+    Parameters
+    ----------
+    draws
+        How many.
+
+    Returns
+    -------
+    By mode, the best first.
+    """
+    clocks = clocks_of(flight)
+    found: dict[str, list[Tuned]] = {mode: [] for mode in MODES}
+    for number, rng in enumerate(np.random.default_rng(seed).spawn(draws), start=1):
+        settings = draw(rng, clocks)
+        for mode, tuned in found.items():
+            tuned.append(Tuned(number, settings, gospa_of(follow_mode(flight, mode, settings))))
+    return {mode: sorted(tuned, key=lambda one: (one.gospa, one.number)) for mode, tuned in found.items()}
