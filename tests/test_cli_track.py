@@ -104,3 +104,25 @@ def test_a_flight_without_detections_is_refused(tmp_path: Path) -> None:
 def test_help_has_an_example() -> None:
     text = typed("--help").output
     assert "wildlab track flights/tuesday" in text and "--tune" in text and "schmidt" in text
+
+
+@pytest.mark.slow
+def test_all_targets_at_once_without_a_name(tmp_path: Path) -> None:
+    flight = kept(tmp_path, kind="position", clutter=2, labelled=False)
+    result = typed(flight, "--many", "--into", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    text = words((tmp_path / "out" / "report.html").read_text())
+    assert "The target in reach has a track at" in text and "tracks a minute are on nothing" in text
+    assert numbers(tmp_path / "out")["tracked", "target-1"] > 0.9
+    assert (pd.read_parquet(tmp_path / "out" / "estimates.parquet")["track"] >= 0).all()
+
+
+@pytest.mark.parametrize(
+    "option", [("--tune", "other"), ("--filter", "ekf"), ("--target", "boat"), ("--smooth",)]
+)
+def test_options_that_do_not_go_with_many(tmp_path: Path, option: tuple[str, ...]) -> None:
+    flight = kept(tmp_path, kind="position")
+    (tmp_path / "other").mkdir()
+    given = [tmp_path / one if one == "other" else one for one in option]
+    said = refused(flight, "--many", *given)
+    assert f"{option[0]} and --many do not go together" in said

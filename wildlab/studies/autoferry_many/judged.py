@@ -168,9 +168,9 @@ def caption() -> str:
     """What the columns of the table of scenarios mean."""
     return (
         f"{caption_of_gospa()} Boats are asked for up to {RADAR_REACH_M:g} m with the radar, and as far as "
-        "the lidar sees one of their size without it. Confirmed within: median over the boats. Mean NEES / 2: "
-        "1 where errors are as large as the tracks say. Swaps: tracks that go over to another boat; breaks: "
-        "boats that get a new track."
+        "the lidar sees one of their size without it. Confirmed within: median over the boats. Mean NEES / 2 "
+        "is 1 where errors are as large as the tracks say. Swaps: tracks that go over to another boat. "
+        "Breaks: boats that get a new track."
     )
 
 

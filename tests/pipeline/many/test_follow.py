@@ -1,0 +1,78 @@
+"""All targets of a flight at once: found without names, beside the truth, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.pipeline.robots import boat, robot_flight
+from wildlab.errors import WildlabError
+from wildlab.flight.following import parse_settings
+from wildlab.pipeline.many.follow import follow_all, judged, tracks_table
+
+
+def test_a_boat_among_clutter_is_found_without_its_name() -> None:
+    flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3)
+    followed = follow_all(flight)
+    lives = judged(followed)
+    assert lives is not None
+    assert lives.targets["boat"].tracked > 0.9 and lives.swaps == lives.breaks == 0
+    assert lives.false_tracks_per_minute <= 1
+    table = tracks_table(followed)
+    longest = table[table["track"] == table["track"].mode()[0]]
+    off = longest[["north_m", "east_m"]].to_numpy() - boat(longest["time_s"].to_numpy())
+    assert np.sqrt((off**2).sum(axis=1).mean()) < 1.5
+    assert (longest["existence"] > 0.5).all() and {"p_00", "p_33", "kind_1"} <= set(longest)
+
+
+def test_what_was_told_says_where_it_is_from() -> None:
+    text = "[targets.many]\nbirth = 0.2\n[sensors.radar.many]\ndetection = 0.7\n"
+    said = follow_all(robot_flight(kind="position"), settings=parse_settings(text)).said
+    by_words = {one.what: one for one in said}
+    assert by_words["a detection of nothing known is a new target, probability"].source == "stated"
+    assert by_words["detects what is in view, probability"].value == "0.7"
+    assert by_words["or farther than"].source == "estimated here"
+    assert by_words["how long a target is about"].source == "assumed"
+
+
+def test_without_truth_there_is_nothing_to_compare() -> None:
+    followed = follow_all(robot_flight(kind="position", truth=False))
+    assert judged(followed) is None and followed.truth == {} and followed.minutes > 1
+
+
+def test_a_target_out_of_reach_costs_nothing() -> None:
+    followed = follow_all(robot_flight(kind="position"))
+    lives = judged(followed, {"boat": 1.0})
+    assert lives is not None and lives.targets["boat"].visible == 0
+    assert max(one.distance for one in lives.gospa) == 0
+
+
+def test_bearings_are_left_out_with_a_word() -> None:
+    places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
+    both = pd.concat([places.table("detections"), bearings.table("detections")], ignore_index=True)
+    frames = pd.concat([places.table("frames"), bearings.table("frames")], ignore_index=True)
+    joined = replace(places, tables={**places.tables, "detections": both, "frames": frames})
+    followed = follow_all(joined)
+    assert list(followed.places) == ["radar"]
+    assert followed.notes == ["eye was left out: what it detects (bearing) tells no place alone."]
+    with pytest.raises(WildlabError, match="no sensor detects places"):
+        follow_all(bearings)
+    with pytest.raises(WildlabError, match="tells no place alone"):
+        follow_all(bearings, sensors=["eye"])
+
+
+def test_numbers_for_hulls_that_there_are_not() -> None:
+    text = "[sensors.radar.many]\nrough_m = [1.0, 2.0]\n"
+    with pytest.raises(
+        WildlabError, match="rough_m of the sensor 'radar' has 2 values, and there are 1 kinds"
+    ):
+        follow_all(robot_flight(kind="position"), settings=parse_settings(text))
+
+
+def test_no_track_leaves_an_empty_table() -> None:
+    text = "[targets.many]\nhits = 1000\n"
+    followed = follow_all(robot_flight(kind="position"), settings=parse_settings(text))
+    assert list(tracks_table(followed)) == ["time_s", "sensor", "track", "north_m", "east_m"]

@@ -1,0 +1,110 @@
+"""What the page on many targets says turns with its numbers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wildlab.evaluation.identities import Identities, TargetLife, TrackLife
+from wildlab.evaluation.sets import gospa
+from wildlab.reporting import many_tracks as words
+from wildlab.tracking.many import POINT, Shown
+
+
+def followed(tracks: int = 2, looks: int = 61) -> Any:
+    shown = [
+        Shown(
+            float(t), 0, np.arange(tracks), np.zeros((tracks, 4)), np.tile(np.eye(4), (tracks, 1, 1)),
+            np.ones(tracks), np.ones((tracks, 1)),
+        )
+        for t in range(looks)
+    ]  # fmt: skip
+    scans = [SimpleNamespace(time=float(t)) for t in range(looks)]
+    return SimpleNamespace(
+        shown=shown, scans=scans, minutes=(looks - 1) / 60, targets=SimpleNamespace(hulls=(POINT,))
+    )
+
+
+def lives(**changes: Any) -> Identities:
+    """Two targets at 61 looks, tracks 3 m off."""
+    each = gospa([[0.0, 0.0], [50.0, 0.0]], [[3.0, 0.0], [50.0, 3.0]], 20.0)
+    base: dict[str, Any] = {
+        "gospa": [each] * 61,
+        "followed": [{"a": 0, "b": 1}] * 61,
+        "swaps": 0,
+        "breaks": 0,
+        "false_tracks_per_minute": 0.0,
+        "targets": {"a": TargetLife(61, 1.0, 0.0, 0, 0), "b": TargetLife(61, 0.95, 2.0, 0, 0)},
+        "tracks": {0: TrackLife(61, 61, 2.0, False), 1: TrackLife(61, 61, 2.2, False)},
+    }
+    return Identities(**(base | changes))
+
+
+def said(one: Any, two: Any) -> tuple[str, str, tuple[str, str]]:
+    sentences, level = words.summary(one, two)
+    return " ".join(sentences), level, words.verdict_of(one, two, level)
+
+
+def test_all_followed_by_one_track_each_is_sound() -> None:
+    text, level, verdict = said(followed(), lives())
+    assert level == "good" and verdict[0] == "sound"
+    assert "Of 2 targets in reach, each has a track at 95 % or more" in text and "off by 3.0 m (RMS)" in text
+    assert "No track went over to another target, no target got a new track, and 0.00 tracks" in text
+
+
+FALSE = {0: TrackLife(9, 9, 2.0, False), 1: TrackLife(9, 0, np.nan, True)}
+SHORT, NEVER = TargetLife(61, 0.7, 0.0, 0, 0), TargetLife(61, 0.0, np.nan, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "word", "reason"),
+    [
+        ({"swaps": 2}, "bad", "mixed up", "Tracks went over to other targets: 2"),
+        ({"breaks": 1}, "warn", "look closer", "Targets got new tracks: 1"),
+        (
+            {"false_tracks_per_minute": 1.0, "tracks": FALSE},
+            "warn",
+            "look closer",
+            "1 of 2 tracks are on nothing",
+        ),
+        ({"tracks": {0: TrackLife(9, 9, 9.0, False)}}, "warn", "look closer", "1 of 1 tracks are farther"),
+        ({"tracks": {0: TrackLife(9, 9, 0.5, False)}}, "warn", "look closer", "1 of 1 tracks are nearer"),
+        ({"targets": {"a": SHORT}}, "warn", "look closer", "1 of 1 targets without a track for more than a"),
+        ({"targets": {"a": NEVER}}, "bad", "targets lost", "1 of 1 targets without a track for more than a"),
+    ],
+)
+def test_what_is_amiss_is_the_reason(changes: dict[str, Any], level: str, word: str, reason: str) -> None:
+    _, found, verdict = said(followed(), lives(**changes))
+    assert found == level and verdict[0] == word and verdict[1].startswith(reason)
+
+
+def test_one_target_that_was_never_followed() -> None:
+    none = gospa([[0.0, 0.0]], np.empty((0, 2)), 20.0)
+    text, *_ = said(
+        followed(),
+        lives(gospa=[none] * 61, targets={"a": TargetLife(61, 0.0, np.nan, 0, 0)}, breaks=3, swaps=1),
+    )
+    assert text.startswith("The target in reach has a track at 0 % of the looks at which it can be seen.")
+    assert "1 track went over to another target, 3 times a target got a new track" in text
+    assert text.endswith("Never followed: a.")
+
+
+def test_without_truth_nothing_is_judged() -> None:
+    text, level, verdict = said(followed(), None)
+    assert level == "neutral" and verdict[0] == "not judged"
+    assert text.startswith("2 tracks in 61 looks over 1.0 min, 2.0 at a time in the mean.")
+    out = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
+    assert said(followed(), lives(targets=out))[2][0] == "not judged"
+    assert said(followed(0), lives())[1:] == (
+        "bad", ("no track", "Nothing was seen often enough to be believed.")
+    )  # fmt: skip
+
+
+def test_parts_of_gospa_add_up() -> None:
+    far = gospa([[0.0, 0.0], [50.0, 0.0]], [[3.0, 0.0], [99.0, 3.0]], 20.0)
+    table = words.parts_table([far])
+    assert table["metres"].iloc[1:].pow(2).sum() == pytest.approx(table["metres"].iloc[0] ** 2)
+    assert table["share"].iloc[1:].sum() == pytest.approx(100)
