@@ -204,6 +204,13 @@ def test_nothing_of_where_when_and_who_is_in_the_copy(tmp_path: Path) -> None:
     assert terrain is not None and terrain.cell_m == (40.0, 40.0)
 
 
+def test_kinds_of_hulls_have_no_names_in_the_copy() -> None:
+    hulls = [{"name": "Thandi's dinghy", "length_m": 4.0}, {"name": "patrol", "length_m": 9.0}]
+    many = made(canary(targets={"many": {"hulls": hulls}})).flight.manifest.targets.many
+    assert many is not None
+    assert [(hull.name, hull.length_m) for hull in many.hulls] == [("kind 1", 4.0), ("kind 2", 9.0)]
+
+
 def test_columns_that_the_schema_does_not_know_are_dropped() -> None:
     found = made(canary())
     assert all("lat_raw" not in nav for nav in found.flight.nav.values())

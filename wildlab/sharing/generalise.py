@@ -233,6 +233,8 @@ def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: 
         key: getattr(manifest, key).model_dump(exclude_none=True)
         for key in ("mount", "imu", "gnss", "uncertainty", "scoring", "targets")
     }
+    for number, hull in enumerate((parts["targets"].get("many") or {}).get("hulls", ()), start=1):
+        hull["name"] = f"kind {number}"
     for part in ("imu", "gnss"):
         parts[part] |= {"name": "", "note": ""}
     parts["uncertainty"]["note"] = ""
