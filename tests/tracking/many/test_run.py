@@ -94,14 +94,15 @@ def test_order_of_scans_does_not_matter() -> None:
 
 
 def test_many_at_once_and_none() -> None:
-    """A scan of thousands, an empty one, and places that are no numbers."""
+    """A scan of thousands, twice, an empty one, and places that are no numbers."""
     rng = np.random.default_rng(5)
     crowd = rng.uniform(-3000, 3000, (3000, 2))
     crowd[7] = np.nan
     scans = [
         Scan(0.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
         Scan(1.0, 0, np.zeros(2), crowd, np.tile(R, (len(crowd), 1, 1))),
-        Scan(2.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
+        Scan(2.0, 0, np.zeros(2), crowd + 0.3, np.tile(R, (len(crowd), 1, 1))),
+        Scan(3.0, 0, np.zeros(2), np.zeros((0, 2)), np.zeros((0, 2, 2))),
     ]
     *_, (tracks, shown) = follow_many(scans, [EYE], POINTS)
     assert not len(shown.identity) and np.isfinite(tracks.x).all()

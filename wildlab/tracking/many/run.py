@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from wildlab.errors import WildlabError
 from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
@@ -23,7 +24,7 @@ from wildlab.tracking.many.tracks import (
     no_tracks,
     without_doubles,
 )
-from wildlab.tracking.many.update import compare, update
+from wildlab.tracking.many.update import Compared, compare, update
 
 Array = NDArray[np.float64]
 
@@ -123,25 +124,26 @@ def _corrected(
     if not tracks.number:
         return tracks, z, R, np.zeros(len(z))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
-    compared = compare(tracks.x, tracks.P, offset, noise, z, R, targets.gate)
+    compared, near, likely = _compared(tracks, offset, noise, z, R, targets.gate)
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
     gathered = gather(
-        z, R, tracks.x[:, largest, :2], tracks.kinds, established, compared.likelihood, sensor, targets.hulls
+        z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
     )
     if len(gathered.z) != len(z):
         z, R = gathered.z, gathered.R
-        compared = compare(tracks.x, tracks.P, offset, noise, z, R, targets.gate)
+        compared, near, likely = _compared(tracks, offset, noise, z, R, targets.gate)
     kinds = gathered.kinds
     which = scan.sensor
     visible = visible_later(
         tracks.visible[:, which], scan.time - tracks.looked[:, which], targets.visible_s, targets.hidden_s
     )
-    likelihood = np.einsum("tk,tkm->tm", kinds, compared.likelihood)
+    likelihood = np.einsum("tk,tkm->tm", kinds, likely)
     pairs, none = weights(tracks.existence, visible, sensor.detection, likelihood, sensor.clutter)
     p = association_probabilities(pairs, none)
     existence, visible, own = after_scan(tracks.existence, visible, sensor.detection, p)
-    x, P, kinds = update(tracks.x, tracks.P, kinds, own, compared)
+    mine = np.where(near >= 0, np.take_along_axis(own, near + 1, axis=1), 0.0)
+    x, P, kinds = update(tracks.x, tracks.P, kinds, np.concatenate([own[:, :1], mine], axis=1), compared)
     kinds = np.maximum(kinds, LEAST_KIND if kinds.shape[1] > 1 else 0.0)
     seen = own[:, 1:].sum(axis=1) > 0.5
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
@@ -165,6 +167,36 @@ def _corrected(
         trail=trail,
     )
     return tracks, z, R, p[:, 1:].sum(axis=0)
+
+
+def _compared(
+    tracks: Tracks, offset: Array, noise: Array, z: Array, R: Array, gate: float
+) -> tuple[Compared, NDArray[np.intp], Array]:
+    """Every track beside the G measurements that may lie in its gate: of thousands in a scan it is few.
+
+    Returns
+    -------
+    What is compared, (T, G) which measurements these are, -1 none, and (T, K, M) likelihoods of all.
+    """
+    T, K, M = tracks.number, tracks.x.shape[1], len(z)
+    if not M:
+        nothing = compare(tracks.x, tracks.P, offset, noise, z, R, gate)
+        return nothing, np.zeros((T, 0), np.intp), np.zeros((T, K, 0))
+    spread = np.trace(tracks.P[..., :2, :2] + noise, axis1=-2, axis2=-1).max(axis=1)
+    widest = gate * np.sqrt(spread + np.trace(R, axis1=-2, axis2=-1).max())
+    seen = tracks.x[..., :2] + offset
+    middle = seen.mean(axis=1)
+    widest += np.linalg.norm(seen - middle[:, None], axis=2).max(axis=1)
+    found = cKDTree(z).query_ball_point(middle, widest, return_sorted=True)
+    near = np.full((T, max(map(len, found))), -1, np.intp)
+    for row, rows in enumerate(found):
+        near[row, : len(rows)] = rows
+    compared = compare(tracks.x, tracks.P, offset, noise, z[near], R[near], gate)
+    likelihood = np.where((near >= 0)[:, None], compared.likelihood, 0.0)
+    dense = np.zeros((T, K, M))
+    track, place = np.nonzero(near >= 0)
+    dense[track, :, near[track, place]] = likelihood[track, :, place]
+    return compared._replace(likelihood=likelihood), near, dense
 
 
 def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:

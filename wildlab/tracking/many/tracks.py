@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.hulls import near_side, on_one_hull
@@ -171,12 +172,17 @@ def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tr
     order = sorted(
         range(tracks.number), key=lambda row: (-int(tracks.confirmed[row]), -int(tracks.hits[row]))
     )
-    kept: list[int] = []
+    # On one hull they are nowhere farther apart than this.
+    widest = max(targets.apart_m, hull.length_m + hull.beam_m + 2.0)
+    close = cKDTree(mean[:, :2]).query_ball_point(mean[:, :2], widest)
+    place = {row: number for number, row in enumerate(order)}
+    kept: set[int] = set()
     for row in order:
-        if not any(_is_of(tracks, mean, P, kinds, row, one, targets, several, largest) for one in kept):
-            kept.append(row)
+        beside = sorted((one for one in close[row] if one in kept), key=place.__getitem__)
+        if not any(_is_of(tracks, mean, P, kinds, row, one, targets, several, largest) for one in beside):
+            kept.add(row)
             continue
-        for one in kept:
+        for one in beside:
             apart = float(np.linalg.norm(mean[row, :2] - mean[one, :2]))
             if several and apart > targets.apart_m and on_one_hull(mean[one], mean[row], hull):
                 # Two that go along one line at one speed are the ends of something long.

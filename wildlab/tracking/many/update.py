@@ -34,14 +34,16 @@ def compare(
     offset, noise
         (T, K, 2) from the middle of a target to what is seen, and (T, K, 2, 2) how much that varies.
     z, R
-        (M, 2) and (M, 2, 2).
+        (M, 2) and (M, 2, 2); or (T, M, 2) and (T, M, 2, 2), where each track has measurements of its own.
     gate
         How many standard deviations it may be.
     """
     x, P = np.asarray(x, float), np.asarray(P, float)
-    z, R = np.asarray(z, float).reshape(-1, 2), np.asarray(R, float).reshape(-1, 2, 2)
-    innovation = z - (x[..., :2] + np.asarray(offset, float))[:, :, None]
-    S = (P[..., :2, :2] + np.asarray(noise, float))[:, :, None] + R
+    places, noises = np.asarray(z, float), np.asarray(R, float)
+    if places.ndim == 2:
+        places, noises = places[None], noises[None]
+    innovation = places[:, None] - (x[..., :2] + np.asarray(offset, float))[:, :, None]
+    S = (P[..., :2, :2] + np.asarray(noise, float))[:, :, None] + noises[:, None]
     det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] ** 2
     a, b = innovation[..., 0], innovation[..., 1]
     square = (S[..., 1, 1] * a**2 - 2 * S[..., 0, 1] * a * b + S[..., 0, 0] * b**2) / det

@@ -1,0 +1,90 @@
+"""What the tracker is told of the harbour is drawn, ordered by one scenario and judged on the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.following import parse_settings
+from wildlab.flight.toml import dump_toml
+from wildlab.studies.autoferry_many import judged as words
+from wildlab.studies.autoferry_many.tuning import draw
+
+CLOCKS = {"lidar": -1.0, "radar": -2.0}
+
+
+def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
+    one, other = (draw(np.random.default_rng(3), CLOCKS) for _ in range(2))
+    assert one == other != draw(np.random.default_rng(4), CLOCKS)
+    for seed in range(50):
+        settings = draw(np.random.default_rng(seed), CLOCKS)
+        many, lidar = settings.targets.many, settings.sensors["lidar"].many
+        assert many is not None and 0.005 <= (many.birth or 0) <= 0.3 and many.hits in (3, 4, 5)
+        assert lidar.several and 105 <= (lidar.far_m or 0) <= 140
+        assert settings.sensors["radar"].clock_offset_s == -2.0
+    # As a file they say the same: kinds of hulls too.
+    assert parse_settings(dump_toml(one.model_dump(exclude_none=True))) == one
+
+
+def rows() -> pd.DataFrame:
+    """Three scenarios, two draws by each way to look; the first scenario is what it was tuned on."""
+    base = {"rmse": 1.0, "tracked": 90.0, "confirm": 2.0, "swaps": 0, "breaks": 1, "false": 0.0, "anees": 1.0}
+    found = []
+    for mode, values in (("radar", (5, 9, 7)), ("lidar", (3, 4, 6)), ("both", (4, 8, 8))):
+        for rank in (1, 2):
+            for case, value in zip(("s1", "s2", "s3"), values, strict=True):
+                found.append(
+                    base | {"case": case, "mode": mode, "rank": rank, "draw": 7 * rank,
+                            "gospa": float(value * rank), "tuned_gospa": float(values[0])}
+                )  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def test_what_it_was_tuned_on_is_in_no_median() -> None:
+    middle = words.medians(rows(), "s1").set_index("mode")
+    assert middle["best"].to_dict() == {"radar": 8.0, "lidar": 5.0, "both": 8.0}
+    assert middle["most"].to_dict() == {"radar": 16.0, "lidar": 10.0, "both": 16.0}
+    assert (middle["of"] == 2).all()
+
+
+def test_sentences_turn_with_the_numbers() -> None:
+    table = rows()
+    said = words.headline(table, words.medians(table, "s1"), "s1")
+    assert said[0].startswith(
+        "Tuned on s1 alone, the tracker's GOSPA on 2 other scenarios is, in the median, "
+    )
+    assert "radar alone 8.0 m (8.0 to 16.0 with the 2 best draws)" in said[0]
+    assert "another boat 0 times, and a boat got a new track 6 times" in said[1]
+    assert "in 1 of 2 scenarios" in said[2]
+    better = table.assign(gospa=table["gospa"].where(table["mode"] != "both", 1.0))
+    assert "in 2 of 2 scenarios" in words.fusion(better[(better["rank"] == 1) & (better["case"] != "s1")])
+    own = table[(table["rank"] == 1) & (table["case"] != "s1")]
+    assert "in 6 of 6 scenarios" in words.doubts(own)
+    assert "in 0 of 6 scenarios" in words.doubts(own.assign(anees=9.0))
+    alone = table[table["case"] == "s1"]
+    assert "nothing can be judged" in words.headline(alone, words.medians(alone, "s1"), "s1")[0]
+
+
+def test_the_table_of_draws_has_each_scenario_once() -> None:
+    table = words.spread_table(rows(), "s1")
+    assert list(table) == ["by", "draw", "s1 (tuned here)", "s2", "s3"] and len(table) == 6
+    assert table["s2"].tolist() == [9.0, 18.0, 4.0, 8.0, 8.0, 16.0]
+
+
+@pytest.mark.slow
+def test_scenarios_are_followed_by_what_one_teaches(shared_data, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    from wildlab.flight.recipe.importing import import_flight
+    from wildlab.paths import DATA
+    from wildlab.studies.autoferry_many.tuning import clocks_of, follow_mode, tune
+
+    raw = shared_data("tracking", "autoferry")
+    first, second = (
+        import_flight(DATA / "recipes" / f"autoferry-{n}.toml", raw, tmp_path / str(n)) for n in (2, 3)
+    )
+    clocks = clocks_of(first)
+    assert -2.5 < clocks["radar"] < -1.5 and -1.5 < clocks["lidar"] < -0.5
+    tuned = tune(first, draws=3, seed=1)
+    for mode, ordered in tuned.items():
+        assert [one.gospa for one in ordered] == sorted(one.gospa for one in ordered) and len(ordered) == 3
+        assert follow_mode(second, mode, ordered[0].settings) is not None
