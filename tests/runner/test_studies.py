@@ -219,6 +219,19 @@ def test_a_large_ship_is_tracked_on_two_flights(reports: Path, faults: Faults) -
     assert faults(folder / "report.html") == []
 
 
+def test_crossing_vessels_are_told_apart_on_two_flights(reports: Path, faults: Faults) -> None:
+    folder = run("crossing-vessels", reports, seeds=2)
+    found = values(folder)
+    assert found["wrong_rate_boat_1", "with-features"]["published"] == 0.0033
+    assert found["wrong", "with-features"]["value"] < found["wrong", "without-features"]["value"]
+    assert found["wrong", "separation-6"]["value"] < found["wrong", "separation-0"]["value"]
+    content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    assert (content["kind"], content["seeds"], len(content["claims"])) == ("twin", 2, 10)
+    for figure in ("fig-6-21", "fig-6-23", "separation"):
+        assert (folder / "figures" / f"{figure}.png").is_file()
+    assert faults(folder / "report.html") == []
+
+
 def test_both_kinds_of_detections_are_tracked_on_two_flights(reports: Path, faults: Faults) -> None:
     folder = run("end-to-end-fast", reports, seeds=2)
     found = values(folder)

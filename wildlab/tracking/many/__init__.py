@@ -6,10 +6,12 @@ A matrix of distances has a row for each measurement and a column for each track
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
 - `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
+- `follow_all`: a bank of filters on positions, with any of these.
 - `pair_scans`, `judge_start`, `outlived`: the life of a track.
 """
 
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
+from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, follow_all
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
@@ -21,15 +23,20 @@ __all__ = [
     "DROPPED",
     "POINT",
     "UNDECIDED",
+    "Appearance",
     "Assignment",
+    "Bank",
     "Hull",
+    "Looks",
     "Scan",
     "SensorBeliefs",
     "Shown",
     "TargetBeliefs",
+    "Tuning",
     "association_probabilities",
     "belief_propagation",
     "feature_distances",
+    "follow_all",
     "follow_many",
     "global_nearest",
     "image_features",

@@ -1,0 +1,328 @@
+"""The study of crossing vessels: known mistakes, and words that turn with numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.geometry.validation import gate_threshold
+from wildlab.pipeline.georeference import observe
+from wildlab.reporting.published import load_claims, load_published
+from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.crossing_vessels import STUDY, charts, text
+from wildlab.studies.crossing_vessels import trial as study
+from wildlab.studies.crossing_vessels.claims import check_claims
+from wildlab.studies.crossing_vessels.trial import (
+    DISTANCE,
+    FEATURES,
+    LOOKS,
+    SEPARATIONS,
+    SUBJECTS,
+    TUNING,
+    VETO,
+    Crossing,
+    all_numbers,
+    curve_subject,
+    distances_of,
+    dressed,
+    follow_by,
+    gather,
+    looks_of,
+    photograph,
+    swapped,
+    wrong_of,
+)
+from wildlab.tracking.many.bank import Appearance, Looks
+
+INTERVAL = 0.5
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate_twin("crossing-vessels", 6, ("imu", "gnss"))
+
+
+@pytest.fixture(scope="module")
+def flown(flight):
+    crossing = gather(flight)
+    looks = photograph("crossing-vessels", 6, flight, 2)
+    appearance = dressed(crossing, looks, 6)
+    banks = {rule: follow_by(crossing, rule, appearance) for rule in SUBJECTS}
+    return study.Flown(crossing, looks, banks)
+
+
+@pytest.fixture(scope="module")
+def numbers(flown):
+    return all_numbers(flown, 6)
+
+
+def passing(images=600, closest=0.0, noise=0.0, seed=0):
+    """Two that run past each other, east and west, seen in every image; the first is south by ``closest``."""
+    when = np.arange(images)
+    east = (when - images / 2) * 1.0
+    truth = np.array(
+        [np.column_stack([np.zeros(images), east]), np.column_stack([np.full(images, closest), -east])]
+    )
+    rng = np.random.default_rng(seed)
+    z = truth.transpose(1, 0, 2).reshape(-1, 2) + rng.normal(0, noise, (2 * images, 2))
+    looks = Looks(np.repeat(when, 2), z, INTERVAL)
+    return Crossing(looks, np.tile([0, 1], images), when * INTERVAL, truth)
+
+
+def looking(crossing, separation):
+    return Appearance(separation * crossing.boat[:, None].astype(float), np.ones(1), np.ones(1))
+
+
+def test_two_far_apart_are_two_tracks_without_a_mistake():
+    crossing = passing(closest=400, noise=5)
+    bank = follow_by(crossing, DISTANCE)
+    assert len(bank.started) == 2
+    assert not wrong_of(crossing, bank).any()
+    own, nearest = distances_of(crossing, bank)
+    assert np.nanmax(own) < 30
+    assert np.array_equal(own, nearest, equal_nan=True)
+    assert np.isnan(own[:, 0]).all()
+    assert swapped(crossing, bank) == (False, False)
+
+
+def reversing():
+    """Two that come near and turn back, which by distance alone looks as if they had passed."""
+    crossing = passing()
+    half = len(crossing.times) // 2
+    z = crossing.looks.positions.reshape(-1, 2, 2).copy()
+    truth = crossing.truth.copy()
+    z[half:], truth[:, half:] = z[half:, ::-1], truth[::-1, half:]
+    return crossing._replace(looks=crossing.looks._replace(positions=z.reshape(-1, 2)), truth=truth)
+
+
+def test_who_turns_back_is_swapped_by_distance_and_not_by_looks():
+    crossing = reversing()
+    alone = follow_by(crossing, DISTANCE)
+    assert swapped(crossing, alone) == (True, True)
+    told = study.identities_of(crossing, alone)
+    assert told.swaps == 2
+    wrong = wrong_of(crossing, alone)
+    assert 0.4 < wrong.mean() < 0.6
+    assert not wrong[: len(wrong) // 2 - 20].any()
+    told_apart = follow_by(crossing, FEATURES, looking(crossing, 20.0))
+    assert not wrong_of(crossing, told_apart).any()
+    assert study.identities_of(crossing, told_apart).swaps == 0
+
+
+def test_a_veto_leaves_detections_rather_than_taking_the_wrong_ones():
+    crossing = reversing()
+    vetoed = follow_by(crossing, VETO, looking(crossing, 20.0))
+    assert not wrong_of(crossing, vetoed)[: len(crossing.boat) * 3 // 4].any()
+    assert (vetoed.track < 0).any()
+    alone = follow_by(crossing, DISTANCE)
+    same = follow_by(crossing, VETO, looking(crossing, 0.0))
+    assert np.array_equal(same.track, alone.track), "what looks alike is never undone"
+
+
+def test_a_track_keeps_the_looks_that_it_started_with():
+    """What it is measured against does not follow what it was given since."""
+    crossing = passing(closest=400)
+    drifting = np.linspace(0, 40, len(crossing.boat))[:, None]
+    bank = follow_by(crossing, VETO, Appearance(drifting, np.ones(1), np.ones(1)))
+    refused = np.flatnonzero(bank.track < 0)
+    limit = np.sqrt(1.5 * gate_threshold(TUNING.veto_probability, 1))
+    assert drifting[refused[0], 0] == pytest.approx(limit, abs=0.3)
+
+
+def test_detections_are_those_of_the_flight_in_order(flight, flown):
+    crossing, seen = flown.crossing, observe(flight, "autopilot")
+    assert np.bincount(crossing.boat).tolist() == [1535, 865]
+    numbers, counts = np.unique(crossing.looks.image, return_counts=True)
+    assert (counts == 2).sum() == 349
+    assert (np.diff(crossing.looks.image) >= 0).all()
+    assert len(crossing.times) == len(numbers)
+    assert crossing.looks.interval == pytest.approx(1 / 7.5, rel=0.01)
+    at = np.searchsorted(numbers, crossing.looks.image)
+    off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
+    assert np.median(off) < 25
+    assert len(seen.uv) == len(crossing.boat)
+
+
+def test_rendered_looks_are_of_the_vessels(flown):
+    long, short = flown.looks
+    assert long.shape[1] == short.shape[1] == 3
+    assert 1 <= len(long) <= 2
+    # Of 11 m by a third of it, and of 7 m: hulls fill most of their boxes.
+    for pool, length in ((long, 11.0), (short, 7.0)):
+        assert np.all(np.exp(pool[:, 0]) > 0.5 * length**2 / 3)
+        assert np.all(np.exp(pool[:, 0]) < 2.5 * length**2 / 3)
+
+
+def test_detections_are_dressed_from_their_own_vessel():
+    crossing = passing(images=50)
+    looks = [np.array([[1.0, 1, 1], [2, 2, 2]]), np.empty((0, 3))]
+    found = dressed(crossing, looks, 3)
+    own = found.features[crossing.boat == 0]
+    assert set(own[:, 0]) == {1.0, 2.0}
+    assert (own == own[:, :1]).all(), "the features of one image stay together"
+    assert np.isnan(found.features[crossing.boat == 1]).all()
+
+
+def test_a_made_up_feature_is_as_far_apart_as_it_says():
+    crossing = passing(images=4000)
+    none, four = (study.made_up(crossing, separation, 1).features[:, 0] for separation in (0, 4))
+    assert np.allclose(four - none, 4 * crossing.boat)
+    assert none.std() == pytest.approx(1, abs=0.05)
+
+
+def test_how_far_apart_the_two_look():
+    looks = [np.array([[0.0, 0, 5], [2, 0, 5]]), np.array([[10.0, np.nan, 5], [12, 1, 5]])]
+    found = looks_of(looks)
+    assert found[LOOKS, "separation_size"] == pytest.approx(10 / np.sqrt(2))
+    assert np.isnan(found[LOOKS, "separation_intensity"]), "one known value has no spread"
+    assert np.isnan(found[LOOKS, "separation_hu"]), "no spread, no measure"
+
+
+def test_numbers_are_those_of_the_tracks(flown, numbers):
+    assert {name for _, name in numbers} == set(study.UNITS)
+    assert all(STUDY.metric_of(*key) is not None for key in numbers)
+    for rule, bank in flown.banks.items():
+        wrong = wrong_of(flown.crossing, bank)
+        assert numbers[rule, "wrong"] == wrong.sum()
+        assert numbers[rule, "wrong_rate_boat_1"] == wrong[flown.crossing.boat == 0].sum() / 1535
+        assert numbers[rule, "wrong_rate_boat_2"] == wrong[flown.crossing.boat == 1].sum() / 865
+        assert numbers[rule, "tracks"] == bank.track.max() + 1
+        own, nearest = distances_of(flown.crossing, bank)
+        assert numbers[rule, "near_share"] == min(np.mean(one[np.isfinite(one)] < 20) for one in own)
+        assert numbers[rule, "any_near_share"] >= numbers[rule, "near_share"]
+        assert (nearest[np.isfinite(own)] <= own[np.isfinite(own)]).all()
+
+
+def spread_of(numbers, changes, flights=40):
+    """So many flights alike, with some numbers changed."""
+    return pd.DataFrame([dict(numbers) | changes] * flights)
+
+
+GOOD = {
+    (DISTANCE, "swapped"): 1.0, (DISTANCE, "swapped_at_end"): 1.0, (FEATURES, "swapped"): 0.0,
+    (DISTANCE, "any_near_share"): 0.8, (FEATURES, "near_share"): 0.8,
+    (DISTANCE, "wrong"): 1800.0, (FEATURES, "wrong"): 5.0,
+    (DISTANCE, "wrong_rate_boat_1"): 0.8, (DISTANCE, "wrong_rate_boat_2"): 0.6,
+    (FEATURES, "wrong_rate_boat_1"): 0.0, (FEATURES, "wrong_rate_boat_2"): 0.0,
+    (LOOKS, "separation_size"): 9.0, (LOOKS, "separation_intensity"): 3.0, (LOOKS, "separation_hu"): 1.0,
+    (LOOKS, "closest"): 3.0,
+}  # fmt: skip
+BAD = {
+    (DISTANCE, "swapped"): 0.0, (DISTANCE, "swapped_at_end"): 0.0, (FEATURES, "swapped"): 1.0,
+    (DISTANCE, "any_near_share"): 0.2, (FEATURES, "near_share"): 0.2,
+    (DISTANCE, "wrong"): 5.0, (FEATURES, "wrong"): 1800.0,
+    (DISTANCE, "wrong_rate_boat_1"): 0.0, (DISTANCE, "wrong_rate_boat_2"): 0.0,
+    (FEATURES, "wrong_rate_boat_1"): 0.0, (FEATURES, "wrong_rate_boat_2"): 0.9,
+    (LOOKS, "separation_size"): 2.5, (LOOKS, "separation_intensity"): 1.0, (LOOKS, "separation_hu"): 3.0,
+}  # fmt: skip
+
+
+def test_claims_turn_with_the_numbers(numbers):
+    thresholds = {claim["id"]: claim.get("threshold") for claim in load_claims("crossing-vessels")}
+
+    def held(changes):
+        checks = check_claims(spread_of(numbers, changes))
+        assert set(checks) == set(thresholds)
+        return {
+            key: bool(check.holds(None if thresholds[key] is None else float(thresholds[key])).all())
+            for key, check in checks.items()
+        }
+
+    assert all(held(GOOD).values())
+    assert not any(held(GOOD | BAD).values())
+
+
+def test_premises_turn_with_the_numbers(numbers):
+    def met(changes):
+        checks = check_claims(spread_of(numbers, GOOD | changes))
+        return {key for key, check in checks.items() if check.premise is not None and check.premise.all()}
+
+    crossed = {"swap-without-features", "no-swap-with-features", "most-correct-in-contrast"}
+    after_swap = {"never-recovers", "accurate-though-swapped"}
+    assert met({}) == crossed | after_swap
+    assert met({(LOOKS, "closest"): 18.0}) == after_swap
+    assert met({(DISTANCE, "swapped"): 0.0}) == crossed
+
+
+def test_published_numbers_are_those_of_the_text():
+    printed = load_published("crossing-vessels").set_index(["name", "subject"])["value"]
+    assert printed["wrong_rate_boat_1", FEATURES] == pytest.approx(5 / 1535, abs=5e-5)
+    assert printed["wrong_rate_boat_2", FEATURES] == 0
+    assert text.PUBLISHED_WRONG == 5
+
+
+def curve(wrong, swaps):
+    """Numbers over the separation."""
+    pairs = zip(SEPARATIONS, wrong, swaps, strict=True)
+    return {
+        (curve_subject(at), name): value
+        for at, count, swap in pairs
+        for name, value in (("wrong", count), ("swapped", swap))
+    }
+
+
+def test_words_turn_with_the_numbers(numbers):
+    good = spread_of(numbers, GOOD | curve((1500, 90, 40, 20, 6, 0), (1, 0, 0, 0, 0, 0)), 20)
+    bad = spread_of(numbers, GOOD | BAD | curve((1500,) * 6, (1,) * 6), 20)
+    first = text.summary(good)
+    assert "swapped on 20 of 20 flights" in first[0]
+    assert "look like, on 0 of 20 flights" in first[0]
+    assert "1800 go to the wrong track" in first[1] and "features 5" in first[1]
+    assert "80.0 %" in first[2] and "20.0 %" in text.summary(bad)[2]
+    assert "20. Of these 20 end" in text.end_words(good)
+    assert "nothing to recover" in text.end_words(bad)
+    assert "Size tells them apart best" in text.looks_words(good)
+    assert "Hu's first moment tells them apart best" in text.looks_words(bad)
+    words = text.curve_words(good)
+    assert "At a difference of 1 and more no flight of 20 is swapped" in words
+    assert "does no harm" in words
+    assert "between 4 and 6" in words
+    worse = text.curve_words(bad)
+    assert "At 6 spreads 20 of 20 flights are still swapped" in worse
+    assert "does harm: 20 flights swapped in place of 0" in worse
+    assert "at none of these" in worse
+    assert "there at any" in text.as_published_words(spread_of(numbers, curve((3,) * 6, (0,) * 6)))
+    gap = text.curve_words(spread_of(numbers, GOOD | curve((9,) * 6, (1, 0, 1, 0, 0, 0)), 20))
+    assert "At a difference of 3 and more" in gap
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"), [(2.0, "fewer wrong, 2"), (9.0, "more wrong, 9"), (5.0, "as many wrong, 5")]
+)
+def test_words_on_the_veto(numbers, wrong, said):
+    spread = spread_of(
+        numbers, {(VETO, "wrong"): wrong, (FEATURES, "wrong"): 5.0, (VETO, "unassigned"): 70.0}
+    )
+    assert said in text.veto_words(spread)
+    assert "70 detections go to no track" in text.veto_words(spread)
+
+
+def test_the_table_has_a_row_for_each_rule(numbers):
+    table = text.outcome_table(spread_of(numbers, GOOD, 20))
+    assert list(table.columns) == list(text.OUTCOME_COLUMNS)
+    assert table["wrong"].tolist()[:2] == [1800.0, 5.0]
+    assert text.swap_words(spread_of(numbers, GOOD, 1), DISTANCE) == "the one flight"
+    assert text.swap_words(spread_of(numbers, GOOD, 1), FEATURES) == "no flight of one"
+
+
+def test_figures_say_what_they_show(flown, numbers):
+    spread = spread_of(numbers, curve((1500, 90, 40, 20, 6, 0), (1, 0, 0, 0, 0, 0)), 20)
+    for shown, words in (
+        (charts.tracks_shown(flown), f"{numbers[DISTANCE, 'wrong']:.0f} wrong"),
+        (charts.looks_shown(flown.looks), f"size {numbers[LOOKS, 'separation_size']:.1f}"),
+        (charts.curve_shown(spread), "0: 1500 wrong, 100 % swapped"),
+    ):
+        assert words in shown[2]
+        assert words.split()[0] in shown[3]
+
+
+def test_outcomes_are_named(flown, monkeypatch):
+    for pair, words in (
+        ((True, True), "swapped for good"),
+        ((True, False), "swapped, and not at the end"),
+        ((False, True), "swapped at the end"),
+        ((False, False), "no swap"),
+    ):
+        monkeypatch.setattr(charts, "swapped", lambda *_, pair=pair: pair)
+        assert charts.outcome_words(flown.crossing, FEATURES, flown).startswith(words + ",")
