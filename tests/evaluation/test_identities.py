@@ -98,6 +98,14 @@ def test_false_tracks_by_the_minute():
     assert np.isnan(compare_identities([scan(0, {}, target)], CUTOFF).false_tracks_per_minute)
 
 
+def test_a_track_on_a_target_for_half_of_its_scans_is_not_false():
+    target, off = {"A": (0, 0)}, (90, 0)
+    tracks = [{1: (0, 0), 2: off}, {1: off, 2: (0, 0)}, {2: off}]
+    found = compare_identities([scan(t, one, target) for t, one in enumerate(tracks)], CUTOFF)
+    assert found.tracks[1][:2] == (2, 1) and not found.tracks[1].false
+    assert found.tracks[2][:2] == (3, 1) and found.tracks[2].false
+
+
 def test_time_to_confirm_counts_from_when_it_is_visible():
     near, far = {"A": (0, 0)}, {"A": (500, 0)}
     found = compare_identities(

@@ -33,7 +33,7 @@ from wildlab.studies.crossing_vessels.trial import (
     swapped,
     wrong_of,
 )
-from wildlab.tracking.many.bank import Appearance, Looks
+from wildlab.tracking.many.bank import Appearance, Bank, Looks
 
 INTERVAL = 0.5
 
@@ -108,6 +108,29 @@ def test_who_turns_back_is_swapped_by_distance_and_not_by_looks():
     told_apart = follow_by(crossing, FEATURES, looking(crossing, 20.0))
     assert not wrong_of(crossing, told_apart).any()
     assert study.identities_of(crossing, told_apart).swaps == 0
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "found"),
+    [
+        (300, 420, (True, False)),  # and then each is on its own again
+        (470, 600, (False, True)),
+        (300, 600, (True, True)),
+        (300, 350, (False, False)),  # less than half of the two minutes
+        (0, 290, (False, False)),
+    ],
+)
+def test_a_swap_is_looked_for_just_after_the_crossing_and_at_the_end(from_s, to_s, found):
+    """They meet in the middle of ten minutes; a crossed bank between two times."""
+    crossing = passing(images=1200)
+    when = np.repeat(crossing.times, 2)
+    crossed = (when >= from_s) & (when < to_s)
+    track = np.where(crossed, 1 - crossing.boat, crossing.boat)
+    empty = np.empty((1200, 2, 4))
+    bank = Bank(track, np.array([0, 1]), np.arange(1200), empty, np.empty((1200, 2, 4, 4)))
+    assert swapped(crossing, bank) == found
+    one_side = bank._replace(track=np.where(crossing.boat == 0, track, crossing.boat))
+    assert swapped(crossing, one_side) == (False, False), "one of the two is no exchange"
 
 
 def test_a_veto_leaves_detections_rather_than_taking_the_wrong_ones():
