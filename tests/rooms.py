@@ -24,6 +24,7 @@ DOCUMENTED = (
     *(
         "wildlab.tracking",
         "wildlab.tracking.many",
+        "wildlab.tracking.particles",
         "wildlab.evaluation",
         "wildlab.detection",
         "wildlab.planning",

@@ -16,6 +16,7 @@ Using a UAV and Thermal Imagery, master's thesis, Linköping University 2016.
   errors.
 - `start_from_measurement`, `start_from_rays`: where it begins. `merge`: several sensors into one track.
 - `kalman`, `schmidt`, `association`: the single steps.
+- `wildlab.tracking.particles`: particle filters of many animals, with what an image did not show.
 """
 
 from wildlab.tracking.association import distances, nearest_within

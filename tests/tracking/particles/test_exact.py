@@ -1,0 +1,214 @@
+"""Particles against the exact answer: the Kalman filter on a linear world, the grid in a small one."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from wildlab.errors import WildlabError
+from wildlab.tracking import kalman
+from wildlab.tracking.motion import constant_velocity
+from wildlab.tracking.particles import (
+    SCHEMES,
+    Cloud,
+    Grid,
+    draw,
+    grid_moments,
+    grid_over,
+    grid_weigh,
+    log_likelihood,
+    moments,
+    move,
+    resample,
+    sight_of,
+    start_gaussian,
+    start_inside,
+    stay_inside,
+    walk_matrix,
+    walk_of,
+    weigh,
+    weigh_unseen,
+)
+
+MOTION = partial(constant_velocity, sd_acceleration=0.4)
+START, P0 = np.array([0.0, 0.0, 1.0, 0.5]), np.diag([16.0, 16.0, 0.5, 0.5])
+R = np.diag([9.0, 4.0])
+
+
+def measurements():
+    rng = np.random.default_rng(11)
+    F, Q = MOTION(1.0)
+    x, found = rng.multivariate_normal(START, P0), []
+    for _ in range(8):
+        x = rng.multivariate_normal(F @ x, Q + 1e-12 * np.eye(4))
+        found.append(x[:2] + rng.multivariate_normal([0, 0], R))
+    return np.array(found)
+
+
+def exact(z):
+    x, P, log_evidence = START, P0, 0.0
+    for one in z:
+        step = kalman.update(*kalman.predict(x, P, *MOTION(1.0)), one, np.eye(2, 4), R)
+        x, P = step.x, step.P
+        nis = step.innovation @ np.linalg.solve(step.S, step.innovation)
+        log_evidence += -0.5 * (nis + np.log(np.linalg.det(2 * np.pi * step.S)))
+    return x, P, log_evidence
+
+
+def by_particles(z, particles, runs, scheme, threshold, seed):
+    """Many filters at once, one in each row, that differ in their random numbers alone."""
+    rng = np.random.default_rng(seed)
+    cloud = start_gaussian(np.tile(START, (runs, 1)), P0, particles, rng)
+    log_evidence = np.zeros(runs)
+    for one in z:
+        cloud = move(cloud, MOTION, 1.0, rng)
+        cloud, gained = weigh(cloud, log_likelihood(cloud.x[..., :2], one, R))
+        log_evidence += gained
+        estimate = moments(cloud)
+        cloud, _ = resample(cloud, rng, scheme, threshold)
+    return *estimate, log_evidence
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("threshold", [1.0, 2 / 3])
+def test_particles_become_the_kalman_filter_at_the_rate_of_monte_carlo(scheme, threshold):
+    z = measurements()
+    x, P, log_evidence = exact(z)
+    sizes, off, spread = [250, 1000, 4000], [], []
+    for N in sizes:
+        mean, covariance, gained = by_particles(z, N, 100, scheme, threshold, N)
+        off.append(np.sqrt(((mean - x) ** 2 / np.diag(P)).mean()))
+        spread.append(np.sqrt(((covariance - P) ** 2).mean() / (P**2).mean()))
+        # The product of (4.10)'s sums estimates the measurements' likelihood without bias, for any N.
+        ratio = np.exp(gained - log_evidence)
+        assert abs(ratio.mean() - 1) < 4 * ratio.std(ddof=1) / np.sqrt(len(ratio))
+    # In units of the Kalman filter's own standard deviation: c / sqrt(N).
+    for errors in (off, spread):
+        rate = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+        assert -0.6 < rate < -0.4
+    assert off[-1] < 0.1
+
+
+def test_the_mean_over_runs_is_that_of_the_kalman_filter():
+    z = measurements()
+    x, P, _ = exact(z)
+    mean, covariance, _ = by_particles(z, 4000, 200, "systematic", 2 / 3, 5)
+    assert np.abs((mean.mean(axis=0) - x) / (mean.std(axis=0, ddof=1) / np.sqrt(200))).max() < 4.5
+    assert np.abs(covariance.mean(axis=0) - P).max() < 0.02 * P.max()
+
+
+# A small world: a fence with a corner cut off, images that look at parts of it, something that hides a part.
+STEP = 4.0
+
+
+def cut_corner(places):
+    inside = (places[..., 0] > 0) & (places[..., 0] < 40) & (places[..., 1] > 0) & (places[..., 1] < 48)
+    return inside & (places.sum(axis=-1) < 72)
+
+
+GRID = grid_over(cut_corner, [0, 0], [40, 48], STEP)
+
+
+def looks():
+    """Six images: a half of the world each, a hidden block in it, a detector that misses some."""
+    rng = np.random.default_rng(9)
+    for k in range(6):
+        mask = np.zeros((10, 12))
+        mask[:, 6:] = k % 2
+        mask[:, :6] = 1 - k % 2
+        mask[3:6, 2:9] = 0.0
+        yield sight_of(mask, STEP / 2, STEP / 2, STEP, probability=rng.uniform(0.5, 0.95))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_seeing_nothing_is_the_grid_filter_within_the_error_of_the_draws(scheme):
+    """Particles that sit on the cells and move as the matrix says live in the grid filter's very world."""
+    runs, N, rng = 400, 500, np.random.default_rng(12)
+    C = len(GRID.places)
+    T = walk_matrix(GRID, 1.5, 6.0)
+    ways = np.cumsum(T, axis=0)
+    p, total = np.full(C, 1 / C), 0.0
+    cells, cloud_w = rng.integers(0, C, (runs, N)), np.full((runs, N), 1 / N)
+    gained = np.zeros(runs)
+    for k, sight in enumerate(looks()):
+        p = T @ p
+        u = rng.random((runs, N))
+        cells = np.array([(v[:, None] >= ways[:, c].T).sum(axis=1) for c, v in zip(cells, u, strict=True)])
+        cloud = Cloud(GRID.places[np.minimum(cells, C - 1)], cloud_w)
+        if k == 4:  # one detection among the images without
+            z, noise = np.array([14.0, 30.0]), 36.0 * np.eye(2)
+            p, c = grid_weigh(p, np.exp(log_likelihood(GRID.places, z, noise)))
+            cloud, log_c = weigh(cloud, log_likelihood(cloud.x, z, noise))
+        else:
+            p, c = grid_weigh(p, 1 - sight(GRID.places))
+            cloud, log_c = weigh_unseen(cloud, sight(cloud.x))
+        total, gained = total + np.log(c), gained + log_c
+        share = np.stack([np.bincount(a, b, C) for a, b in zip(cells, cloud.w, strict=True)])
+        # The estimate is a ratio; weighing the runs by their evidence makes it one of unbiased sums.
+        weight = np.exp(gained - total)
+        often = runs * N * p > 50  # the others together: an error cannot be read off a handful of visits
+        mine = weight[:, None] * np.column_stack(
+            [share[:, often], share[:, ~often].sum(axis=1), np.ones(runs)]
+        )
+        wanted = np.append(p[often], [p[~often].sum(), 1.0])
+        error = mine.std(axis=0, ddof=1) / np.sqrt(runs)
+        # Six images of some hundred cells: one in a million by chance, each.
+        assert (np.abs(mine.mean(axis=0) - wanted) <= norm.isf(5e-7) * error + 1e-12).all()
+        chosen = draw(cloud.w, rng, scheme)
+        cells, cloud_w = np.take_along_axis(cells, chosen, axis=1), np.full((runs, N), 1 / N)
+
+
+def test_between_the_cells_particles_come_to_the_same():
+    """The whole filter as it is used, in continuous space: what is left is the size of the grid's cells."""
+
+    def off(step):
+        grid = grid_over(cut_corner, [0, 0], [40, 48], step)
+        p = np.full(len(grid.places), 1 / len(grid.places))
+        T = walk_matrix(grid, 1.5, 6.0)
+        rng = np.random.default_rng(3)
+        cloud = start_inside(cut_corner, [0, 0], [40, 48], 20, 4000, rng)
+        for sight in looks():
+            p, _ = grid_weigh(T @ p, 1 - sight(grid.places))
+            cloud = stay_inside(cloud, move(cloud, walk_of(1.5, 1.0), 6.0, rng), cut_corner)
+            cloud, _ = weigh_unseen(cloud, sight(cloud.x))
+            estimate = moments(cloud)
+            cloud, _ = resample(cloud, rng)
+        mean, covariance = grid_moments(grid, p)
+        return np.abs(estimate[0].mean(axis=0) - mean).max(), np.abs(
+            estimate[1].mean(axis=0) / covariance - 1
+        )[[0, 1], [0, 1]].max()
+
+    position, variance = off(1.0)
+    assert position < 0.35 and variance < 0.03
+
+
+def test_looking_and_not_finding_tells_where_it_is_not():
+    """Closed form: a detector that never misses, a fence, and nobody moves."""
+    rng = np.random.default_rng(4)
+    cloud = start_inside(cut_corner, [0, 0], [40, 48], 1, 5000, rng)
+    half = sight_of(np.tile(np.arange(12) < 6, (10, 1)), 2.0, 2.0, 4.0)
+    after, log_evidence = weigh_unseen(cloud, half(cloud.x))
+    assert moments(after)[0][0, 1] > 24 and (after.w[cloud.x[..., 1] < 23.9] == 0).all()
+    share = (40 * 24 - 0) / (40 * 48 - 16 * 16 / 2)  # the part looked at, of the whole without its corner
+    assert abs(np.exp(log_evidence[0]) - (1 - share)) < 5 * np.sqrt(share * (1 - share) / 5000)
+
+
+def test_a_walk_in_a_grid_keeps_all_and_spreads_as_the_walk():
+    T = walk_matrix(GRID, 1.5, 6.0)
+    np.testing.assert_allclose(T.sum(axis=0), 1, atol=1e-12)
+    assert (T >= 0).all() and np.allclose(T, T.T)  # symmetric: even in the long run
+    wide = Grid(np.stack(np.meshgrid(*[np.arange(-24.0, 25.0)] * 2, indexing="ij"), -1).reshape(-1, 2), 1.0)
+    from_middle = walk_matrix(wide, 1.5, 6.0)[:, len(wide.places) // 2]
+    np.testing.assert_allclose(grid_moments(wide, from_middle)[1], 13.5 * np.eye(2), atol=1e-6)
+
+
+def test_what_is_no_small_world_is_refused():
+    with pytest.raises(WildlabError, match="Choose a step"):
+        grid_over(cut_corner, [0, 0], [40, 48], 0.2)
+    with pytest.raises(WildlabError, match="0 cells"):
+        grid_over(lambda p: np.zeros(p.shape[:-1], bool), [0, 0], [40, 48], 4.0)
+    with pytest.raises(WildlabError, match="no cell"):
+        grid_weigh([0.5, 0.5, 0.0], [0.0, 0.0, 1.0])
