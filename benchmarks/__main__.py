@@ -7,6 +7,7 @@ from benchmarks import (
     floating,
     long_flight,
     navigation,
+    particles,
     pixel_to_plane,
     simulation,
     terrain,
@@ -18,7 +19,18 @@ from benchmarks import (
 
 def main() -> None:
     console = Console()
-    every = (pixel_to_plane, turns, terrain, navigation, tracking, simulation, warm, floating, long_flight)
+    every = (
+        pixel_to_plane,
+        turns,
+        terrain,
+        navigation,
+        tracking,
+        particles,
+        simulation,
+        warm,
+        floating,
+        long_flight,
+    )
     for benchmark in every:
         title, rows = benchmark.run()
         table = Table("what", "time (ms)", "ratio", "wanted", title=title)

@@ -8,6 +8,8 @@ size alone SIS.
 - `start_gaussian`, `start_inside`: where it begins, the second knowing only the enclosure.
 - `walk_of`: F (4.5) with the step that its noise depends on; `drift`: to water holes, F 8.4.
 - `sight_of`: a footprint from a mask.
+- `step_nearest`, `step_counting`: many animals image after image, by F's rule and by one that counts, with
+  `nearest_animal` and `one_to_one` behind them; `count_interval`: how many there are.
 - `wildlab.tracking.particles.grid`: the exact answer in small worlds.
 
 >>> import numpy as np
@@ -22,6 +24,7 @@ size alone SIS.
 (True, array([ True]))
 """
 
+from wildlab.tracking.particles.association import mahalanobis_squared, nearest_animal, one_to_one
 from wildlab.tracking.particles.clouds import (
     Cloud,
     Weighed,
@@ -32,31 +35,53 @@ from wildlab.tracking.particles.clouds import (
     weigh,
     weigh_unseen,
 )
+from wildlab.tracking.particles.counting import (
+    Count,
+    count_interval,
+    count_probabilities,
+    existence_after,
+)
 from wildlab.tracking.particles.grid import Grid, grid_moments, grid_over, grid_weigh, walk_matrix
+from wildlab.tracking.particles.herd import Herd, Look, Rules, expect, no_herd
 from wildlab.tracking.particles.likelihoods import log_likelihood, sight_of
 from wildlab.tracking.particles.moves import drift, move, move_by_sight, stay_inside, walk_of
 from wildlab.tracking.particles.resampling import SCHEMES, draw, resample
+from wildlab.tracking.particles.steps import step_counting, step_nearest
 
 __all__ = [
     "SCHEMES",
     "Cloud",
+    "Count",
     "Grid",
+    "Herd",
+    "Look",
+    "Rules",
     "Weighed",
+    "count_interval",
+    "count_probabilities",
     "draw",
     "drift",
     "effective_size",
+    "existence_after",
+    "expect",
     "grid_moments",
     "grid_over",
     "grid_weigh",
     "log_likelihood",
+    "mahalanobis_squared",
     "moments",
     "move",
     "move_by_sight",
+    "nearest_animal",
+    "no_herd",
+    "one_to_one",
     "resample",
     "sight_of",
     "start_gaussian",
     "start_inside",
     "stay_inside",
+    "step_counting",
+    "step_nearest",
     "walk_matrix",
     "walk_of",
     "weigh",

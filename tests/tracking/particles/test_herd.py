@@ -1,0 +1,226 @@
+"""Many animals image after image: F's rule, the one that counts, what is lost, and what is found again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.tracking.particles.worlds import NOISE, RULES, SIZE, WALK, followed, inside, world
+from wildlab.errors import WildlabError
+from wildlab.tracking import kalman
+from wildlab.tracking.particles import (
+    Look,
+    count_interval,
+    count_probabilities,
+    existence_after,
+    expect,
+    grid_over,
+    moments,
+    move,
+    no_herd,
+    step_counting,
+    step_nearest,
+    walk_matrix,
+)
+
+R = NOISE**2 * np.eye(2)
+
+
+def free(cloud, seen, dt, rng):
+    return move(cloud, WALK, dt, rng)
+
+
+def look(time, *z, sight=lambda p: np.zeros(p.shape[:-1]), clutter=0.0):
+    return Look(time, np.reshape(z, (-1, 2)).astype(float), np.tile(R, (len(z), 1, 1)), sight, clutter)
+
+
+@pytest.mark.parametrize("step", [step_nearest, step_counting])
+def test_one_animal_and_nothing_else_is_the_single_filter(step):
+    """A detection in each image, none false: the Kalman filter's, within the error of the particles."""
+    rng = np.random.default_rng(2)
+    rules = RULES._replace(moves=free, particles=20_000)
+    everywhere = lambda p: np.full(p.shape[:-1], 0.9)  # noqa: E731
+    at, x, P = np.array([60.0, 45.0]), None, None
+    herd = no_herd(rules) if step is step_nearest else expect(rules, 1.0, inside, np.zeros(2), SIZE, rng)
+    for k in range(8):
+        at = at + rng.standard_normal(2) * np.sqrt(WALK(4.0)[1][0, 0])
+        z = at + NOISE * rng.standard_normal(2)
+        herd, taken = step(herd, look(4.0 * k, z, sight=everywhere), rules, rng)
+        if x is None:
+            x, P = z, R
+        else:
+            x, P, *_ = kalman.update(*kalman.predict(x, P, *WALK(4.0)), z, np.eye(2), R)
+        assert taken.tolist() == [1] and herd.identity.tolist() == [1]
+        mean, covariance = moments(herd.cloud)
+        assert np.abs(mean[0] - x).max() < 6 * np.sqrt(P[0, 0] / 5000)
+        np.testing.assert_allclose(covariance[0], P, atol=0.1)
+    assert herd.existence[0] > 0.99999 if step is step_counting else herd.existence[0] == 1
+
+
+def test_two_detections_of_one_track_are_multiplied():
+    """(4.11): as one detection half way, with half the variance."""
+    rng = np.random.default_rng(3)
+    rules = RULES._replace(particles=40_000)
+    herd, _ = step_nearest(no_herd(rules), look(0.0, [50.0, 40.0]), rules, rng)
+    herd, taken = step_nearest(herd, look(0.0, [51.0, 40.0], [53.0, 41.0]), rules, rng)
+    assert taken.tolist() == [1, 1]
+    x, P, *_ = kalman.update(np.array([50.0, 40.0]), R, np.array([52.0, 40.5]), np.eye(2), R / 2)
+    mean, covariance = moments(herd.cloud)
+    assert np.abs(mean[0] - x).max() < 0.05
+    np.testing.assert_allclose(covariance[0], P, atol=0.06)
+
+
+def test_a_group_has_one_track_by_f_and_two_where_they_are_counted():
+    rng = np.random.default_rng(4)
+    near = lambda p: np.full(p.shape[:-1], 0.9)  # noqa: E731
+    one, two = no_herd(RULES), expect(RULES, 4.0, inside, np.zeros(2), SIZE, rng)
+    for k in range(6):
+        pair = look(2.0 * k, [50.0, 40.0], [52.0, 41.0], sight=near, clutter=1e-6)
+        # F's first image has no track yet that both could take.
+        first = look(0.0, [50.0, 40.0], sight=near)
+        one, _ = step_nearest(one, pair if k else first, RULES, rng)
+        two, _ = step_counting(two, pair, RULES, rng)
+    assert len(one.identity) == 1
+    assert count_interval(count_probabilities(two.existence)).low == 2
+
+
+def test_who_is_not_where_it_should_be_is_less_and_less_there():
+    """An animal at rest that images cannot miss but by the detector: the rule of Bayes, image by image."""
+    rng = np.random.default_rng(5)
+    rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud)
+    sight = lambda p: np.full(p.shape[:-1], 0.6)  # noqa: E731
+    herd = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng)
+    clutter = 1e-4
+    herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=sight, clutter=clutter), rules, rng)
+    # Three animals in the enclosure's area, those seen of a detector that sees 0.6.
+    new = 0.6 * 3 / np.prod(SIZE)
+    r = new / (new + clutter)
+    assert np.isclose(herd.existence[0], r, rtol=0.05)
+    assert np.isclose(herd.expected_unseen, 3 * 0.4)
+    r = herd.existence[0]
+    for k in range(1, 4):
+        herd, _ = step_counting(herd, look(float(k), sight=sight, clutter=clutter), rules, rng)
+        r = existence_after(r, 0.4)
+        assert np.isclose(herd.existence[0], r) and np.isclose(herd.missed[0], 0.4**k)
+        assert np.isclose(herd.expected_unseen, 3 * 0.4 ** (k + 1))
+    for k in range(4, 20):
+        herd, _ = step_counting(herd, look(float(k), sight=sight, clutter=clutter), rules, rng)
+    assert not len(herd.identity)
+
+
+def test_those_never_seen_are_the_exact_grid():
+    """No detection at all: where animals may still be, and how many, by the matrix of moves."""
+    rng = np.random.default_rng(6)
+    herd = expect(RULES, 8.0, inside, np.zeros(2), SIZE, rng, particles=30_000)
+    grid = grid_over(inside, [0, 0], SIZE, 2.0)
+    T, intensity = walk_matrix(grid, 0.5, 4.0), np.full(len(grid.places), 8.0 / len(grid.places))
+    for k, one in enumerate(world(rng, 0, images=12, clutter=0.0).looks):
+        herd, _ = step_counting(herd, one, RULES, rng)
+        intensity = (T @ intensity if k else intensity) * (1 - one.sight(grid.places))
+    # The error of a share of 30 000 particles, and that of cells of 2 m at the edges of the images.
+    assert abs(herd.expected_unseen / intensity.sum() - 1) < 0.03
+    mean, _ = moments(herd.unseen)
+    assert np.abs(mean[0] - intensity @ grid.places / intensity.sum()).max() < 1.0
+
+
+def test_both_lost_rules_and_found_again_under_the_same_name():
+    rng = np.random.default_rng(7)
+    by_spread = RULES._replace(lost_trace=40.0)
+    herd, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), by_spread, rng)
+    herd, _ = step_nearest(herd, look(20.0), by_spread, rng)  # 2 (4 + 0.25 * 20) = 18
+    assert not herd.lost.any()
+    herd, _ = step_nearest(herd, look(80.0), by_spread, rng)  # 48
+    assert herd.lost.tolist() == [True]
+    other, taken = step_nearest(herd, look(80.0, [110.0, 80.0]), by_spread, rng)
+    assert taken.tolist() == [2] and other.lost.tolist() == [True, False]
+    found, taken = step_nearest(herd, look(80.0, [55.0, 44.0]), by_spread, rng)
+    assert taken.tolist() == [1] and not found.lost.any() and found.seen_at.tolist() == [80.0]
+
+    by_search = RULES._replace(lost_doubt=0.05)
+    herd, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), by_search, rng)
+    wide = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
+    for k in range(1, 5):
+        herd, _ = step_nearest(herd, look(float(k), sight=wide), by_search, rng)
+        assert np.isclose(herd.missed[0], 0.5**k) and not herd.lost.any()
+    herd, _ = step_nearest(herd, look(5.0, sight=wide), by_search, rng)
+    assert herd.lost.tolist() == [True]
+    herd, _ = step_nearest(herd, look(6.0, [50.0, 41.0], sight=wide), by_search, rng)
+    assert herd.missed.tolist() == [1.0] and not herd.lost.any()
+
+
+def test_two_lost_ones_are_not_one_detection_each_twice():
+    """A lap later two detections near two lost tracks go to one each, the pairs that are nearest together."""
+    rng = np.random.default_rng(8)
+    rules = RULES._replace(lost_trace=30.0)
+    herd, _ = step_nearest(no_herd(rules), look(0.0, [40.0, 40.0], [52.0, 40.0]), rules, rng)
+    herd, _ = step_nearest(herd, look(60.0), rules, rng)
+    assert herd.lost.all()
+    herd, taken = step_nearest(herd, look(60.0, [42.0, 40.0], [45.0, 40.0]), rules, rng)
+    assert taken.tolist() == [1, 2]
+
+
+def test_without_negative_information_an_empty_image_says_nothing():
+    rng = np.random.default_rng(9)
+    half = lambda p: np.where(p[..., 0] > 50, 1.0, 0.0)  # noqa: E731
+    start, _ = step_nearest(no_herd(RULES), look(0.0, [50.0, 40.0]), RULES, rng)
+    quiet = RULES._replace(negative=False)
+    told, _ = step_nearest(start, look(0.0, sight=half), RULES, np.random.default_rng(1))
+    untold, _ = step_nearest(start, look(0.0, sight=half), quiet, np.random.default_rng(1))
+    assert (told.cloud.x[0, :, 0][told.cloud.w[0] > 0] <= 50).all()
+    np.testing.assert_allclose(untold.cloud.w, start.cloud.w, rtol=1e-12)
+    np.testing.assert_allclose(told.missed, untold.missed)
+
+
+@pytest.mark.parametrize("step", [step_nearest, step_counting])
+def test_nothing_at_all_and_very_much(step):
+    rng = np.random.default_rng(10)
+    rules = RULES._replace(particles=50)
+    start = expect(rules, 3.0, inside, np.zeros(2), SIZE, rng, particles=400)
+    start = no_herd(rules) if step is step_nearest else start
+    herd, taken = step(start, look(0.0), rules, rng)
+    assert not len(taken) and not len(herd.identity)
+    crowd = rng.uniform(0, SIZE, (1000, 2))
+    everywhere = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
+    for k in range(2):
+        herd, taken = step(herd, look(float(k), *crowd, sight=everywhere, clutter=0.05), rules, rng)
+        assert len(taken) == 1000 and len(set(herd.identity.tolist())) == len(herd.identity)
+        assert (herd.existence <= 1).all()
+        np.testing.assert_allclose(herd.cloud.w.sum(axis=1), 1)
+
+
+@pytest.mark.parametrize("step", [step_nearest, step_counting])
+def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step):
+    rng = np.random.default_rng(11)
+    begun = no_herd(RULES) if step is step_nearest else expect(RULES, 3.0, inside, np.zeros(2), SIZE, rng)
+    herd, _ = step(begun, look(5.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
+    kept = herd.cloud.x.copy(), herd.cloud.w.copy()
+    step(herd, look(5.0, [50.0, 41.0], clutter=1e-5), RULES, rng)
+    step(herd, look(5.0, [90.0, 41.0], clutter=1e-5), RULES, rng)
+    np.testing.assert_array_equal(kept[0], herd.cloud.x)
+    np.testing.assert_array_equal(kept[1], herd.cloud.w)
+    with pytest.raises(WildlabError, match="Sort the images"):
+        step(herd, look(4.0), RULES, rng)
+
+
+def test_a_number_below_zero_is_not_expected():
+    with pytest.raises(WildlabError, match="zero or more"):
+        expect(RULES, -1.0, inside, np.zeros(2), SIZE, np.random.default_rng())
+
+
+def test_states_with_velocities_start_with_their_spread():
+    rng = np.random.default_rng(12)
+    rules = RULES._replace(start_sd=(0.5, 2.0), particles=20_000)
+    herd, _ = step_nearest(no_herd(rules), look(0.0, [50.0, 40.0]), rules, rng)
+    np.testing.assert_allclose(np.diag(moments(herd.cloud)[1][0]), [4.0, 4.0, 0.25, 4.0], rtol=0.06)
+
+
+def test_same_seed_same_herd():
+    def end():
+        rng = np.random.default_rng(13)
+        w = world(rng, 6, images=8)
+        *_, (herd, _) = followed(w.looks, no_herd(RULES), step_nearest, RULES, rng)
+        return herd
+
+    one, two = end(), end()
+    np.testing.assert_array_equal(one.cloud.x, two.cloud.x)
+    np.testing.assert_array_equal(one.identity, two.identity)

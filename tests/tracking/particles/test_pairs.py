@@ -1,0 +1,80 @@
+"""Which detection is of which animal: F's rule by its letter, the gate by its share, pairs by trying all."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import chi2
+
+from wildlab.errors import WildlabError
+from wildlab.tracking.particles import mahalanobis_squared, nearest_animal, one_to_one
+
+
+def covariances(rng, count, n):
+    A = rng.normal(size=(count, n, n + 1))
+    return A @ np.swapaxes(A, 1, 2)
+
+
+@given(seed=st.integers(0, 999), animals=st.integers(0, 5), detections=st.integers(0, 6))
+def test_each_detection_takes_its_closest_track(seed, animals, detections):
+    rng = np.random.default_rng(seed)
+    mean, P = rng.normal(0, 3, (animals, 4)), covariances(rng, animals, 4)
+    z, R = rng.normal(0, 3, (detections, 2)), covariances(rng, detections, 2)
+    squared = mahalanobis_squared(mean, P, z, R)
+    assert squared.shape == (animals, detections)
+    taken = nearest_animal(squared, 0.9)
+    for j in range(detections):
+        roots = []
+        for a in range(animals):
+            off = z[j] - mean[a, :2]
+            roots.append(np.sqrt(off @ np.linalg.inv(P[a, :2, :2] + R[j]) @ off))
+            assert np.isclose(roots[a], np.sqrt(squared[a, j]))
+        best = int(np.argmin(roots)) if roots else -1
+        inside = animals and roots[best] ** 2 <= chi2.ppf(0.9, 2)
+        assert taken[j] == (best if inside else -1)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.9, 0.99])
+def test_the_gate_holds_its_share_of_an_animals_own_detections(probability):
+    """The square of D_M has the chi-square distribution; the root under the same limit is no gate."""
+    rng, N = np.random.default_rng(1), 40_000
+    P, R = np.diag([9.0, 4.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
+    z = rng.multivariate_normal([0, 0], P + R, N)
+    taken = nearest_animal(mahalanobis_squared([[0.0, 0.0]], [P], z, R), probability)
+    error = np.sqrt(probability * (1 - probability) / N)
+    assert abs((taken == 0).mean() - probability) < 4.5 * error
+    printed = nearest_animal(np.sqrt(mahalanobis_squared([[0.0, 0.0]], [P], z, R)), probability)
+    assert abs((printed == 0).mean() - chi2.cdf(chi2.ppf(probability, 2) ** 2, 2)) < 4.5 * error
+    assert (printed == 0).mean() > probability or probability == 0.5
+
+
+@given(seed=st.integers(0, 999), animals=st.integers(0, 4), detections=st.integers(0, 4))
+def test_pairs_gain_as_much_as_the_best_of_all_ways(seed, animals, detections):
+    rng = np.random.default_rng(seed)
+    gain = rng.normal(0.5, 2, (animals, detections))
+    gain[rng.random(gain.shape) < 0.3] = -np.inf
+    taken = one_to_one(gain)
+    pairs = [(a, j) for j, a in enumerate(taken) if a >= 0]
+    assert len({a for a, _ in pairs}) == len(pairs) and all(gain[p] > 0 for p in pairs)
+    # Every way: each track takes one of the detections, or one of as many that stand for none.
+    ways = permutations(range(detections + animals), animals)
+    best = max(
+        sum(gain[a, j] for a, j in enumerate(way) if j < detections and gain[a, j] > 0) for way in ways
+    )
+    assert np.isclose(sum(gain[p] for p in pairs), best)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_gain_that_is_no_number_is_refused(wrong):
+    with pytest.raises(WildlabError, match="not a number"):
+        one_to_one([[wrong, 0.0]])
+
+
+def test_a_group_takes_one_track_by_f_and_each_its_own_when_counted():
+    squared = mahalanobis_squared([[0.0, 0.0]], [4 * np.eye(2)], [[0.5, 0.0], [-0.5, 0.0]], np.eye(2))
+    assert nearest_animal(squared, 0.99).tolist() == [0, 0]
+    assert sorted(one_to_one(9.21 - squared).tolist()) == [-1, 0]
