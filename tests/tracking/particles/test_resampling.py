@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.tracking.particles import SCHEMES, Cloud, draw, effective_size, resample
-from wildlab.tracking.particles.kernels import pick
+from wildlab.tracking.particles.kernels import pick, take
 
 
 def uneven(rng, animals, particles):
@@ -28,6 +28,13 @@ def test_the_compiled_walk_finds_what_a_search_finds(seed, animals, particles):
     points[:, 0] = 0.0
     wanted = [np.searchsorted(c, p, side="right") for c, p in zip(cumulative, points, strict=True)]
     np.testing.assert_array_equal(pick(cumulative, points), wanted)
+
+
+@given(seed=st.integers(0, 999), n=st.integers(1, 5))
+def test_the_compiled_choice_takes_what_numpy_takes(seed, n):
+    rng = np.random.default_rng(seed)
+    x, chosen = rng.normal(size=(3, 20, n)), rng.integers(0, 20, (3, 9))
+    np.testing.assert_array_equal(take(x, chosen), np.take_along_axis(x, chosen[..., None], axis=1))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.validation import check_covariance
+from wildlab.tracking.particles.kernels import weighted_moments
 
 #: Places (..., 2) m -> whether each lies in an enclosure.
 Inside = Callable[[Array], NDArray[np.bool_]]
@@ -147,9 +148,8 @@ def moments(cloud: Cloud) -> tuple[Array, Array]:
     >>> print(mean, covariance[0, 0, 0])
     [[1. 0.]] 3.0
     """
-    mean = np.einsum("an,ani->ai", cloud.w, cloud.x)
-    off = cloud.x - mean[:, None]
-    return mean, np.asarray(np.swapaxes(off * cloud.w[..., None], 1, 2) @ off)
+    x, w = (np.ascontiguousarray(one, float) for one in cloud)
+    return weighted_moments(x, w)
 
 
 def effective_size(w: ArrayLike) -> Array:

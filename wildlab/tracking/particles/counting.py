@@ -78,7 +78,7 @@ def count_probabilities(existence: ArrayLike, unseen: float = 0.0) -> Array:
         logarithm = numbers * np.log(unseen) - unseen - np.cumsum(np.log(np.maximum(numbers, 1)))
         poisson = np.exp(logarithm)
         p = np.convolve(p, poisson[: np.searchsorted(np.cumsum(poisson), 1 - TAIL) + 1])
-    return p / p.sum()
+    return np.asarray(p / p.sum())
 
 
 def count_interval(probabilities: ArrayLike, probability: float = 0.9) -> Count:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.tracking.particles.clouds import Cloud, effective_size
-from wildlab.tracking.particles.kernels import pick
+from wildlab.tracking.particles.kernels import pick, take
 
 #: ``multinomial`` draws with replacement, as F has it; ``systematic`` takes points at equal distances.
 SCHEMES = ("multinomial", "systematic")
@@ -56,10 +56,9 @@ def resample(
         return cloud, due
     chosen = draw(cloud.w[due], rng, scheme)
     if due.all():
-        x = np.take_along_axis(cloud.x, chosen[..., None], axis=1)
-        return Cloud(x, np.full_like(cloud.w, 1 / N)), due
+        return Cloud(take(np.ascontiguousarray(cloud.x), chosen), np.full_like(cloud.w, 1 / N)), due
     x, w = cloud.x.copy(), cloud.w.copy()
-    x[due] = np.take_along_axis(cloud.x[due], chosen[..., None], axis=1)
+    x[due] = take(cloud.x[due], chosen)
     w[due] = 1 / N
     return Cloud(x, w), due
 

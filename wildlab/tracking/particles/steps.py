@@ -67,20 +67,11 @@ def step_nearest(
         a = taken[j]
         given[a] += log_likelihood(herd.cloud.x[a, :, :2], look.z[j], look.R[j])
         seen[a] = True
-    found, log_evidence = weigh(herd.cloud, given)
-    # Within the gate and yet of no likelihood at any particle: the track begins anew where it was seen.
-    adrift = seen & ~np.isfinite(log_evidence)
+    found, _ = weigh(herd.cloud, given)
     unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
     missed = np.where(seen, 1.0, herd.missed * np.exp(log_nothing))
-    x, w = herd.cloud.x, found.w
-    if rules.negative:
-        w = np.where(seen[:, None], w, unseen.w)
-    for a in np.flatnonzero(adrift):
-        j = int(np.flatnonzero(taken == a)[0])
-        fresh = start_tracks(look.z[j : j + 1], look.R[j : j + 1], rules, rng)
-        x, w = x.copy(), w.copy()
-        x[a], w[a] = fresh.x[0], fresh.w[0]
-    cloud = Cloud(x, w)
+    w = np.where(seen[:, None], found.w, unseen.w) if rules.negative else found.w
+    cloud = Cloud(herd.cloud.x, w)
     herd = herd._replace(
         cloud=cloud, missed=missed, lost=herd.lost & ~seen, seen_at=np.where(seen, look.time, herd.seen_at)
     )
