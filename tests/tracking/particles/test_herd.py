@@ -189,6 +189,33 @@ def test_nothing_at_all_and_very_much(step):
 
 
 @pytest.mark.parametrize("step", [step_nearest, step_counting])
+def test_a_ray_that_met_no_ground_keeps_its_place_and_nothing_else(step):
+    rng = np.random.default_rng(14)
+    everywhere = lambda p: np.full(p.shape[:-1], 0.5)  # noqa: E731
+    start = no_herd(RULES) if step is step_nearest else expect(RULES, 3.0, inside, np.zeros(2), SIZE, rng)
+    gaps = look(0.0, [np.nan, np.nan], [50.0, 40.0], [90.0, 70.0], sight=everywhere, clutter=1e-6)
+    gaps.R[2] = np.nan
+    herd, taken = step(start, gaps, RULES, np.random.default_rng(1))
+    alone = look(0.0, [50.0, 40.0], sight=everywhere, clutter=1e-6)
+    wanted, _ = step(start, alone, RULES, np.random.default_rng(1))
+    assert taken.tolist() == [0, 1, 0]
+    np.testing.assert_array_equal(herd.cloud.x, wanted.cloud.x)
+    np.testing.assert_array_equal(herd.existence, wanted.existence)
+
+
+def test_a_detection_that_can_only_be_false_starts_nothing():
+    """Nobody is left to be found, or nobody can be seen there."""
+    rng = np.random.default_rng(15)
+    everywhere = lambda p: np.full(p.shape[:-1], 0.9)  # noqa: E731
+    none = expect(RULES, 0.0, inside, np.zeros(2), SIZE, rng)
+    herd, taken = step_counting(none, look(0.0, [50.0, 40.0], sight=everywhere, clutter=1e-5), RULES, rng)
+    assert taken.tolist() == [0] and not len(herd.identity)
+    blind = expect(RULES, 5.0, inside, np.zeros(2), SIZE, rng)
+    herd, taken = step_counting(blind, look(0.0, [50.0, 40.0], clutter=1e-5), RULES, rng)
+    assert taken.tolist() == [0] and np.isclose(herd.expected_unseen, 5.0)
+
+
+@pytest.mark.parametrize("step", [step_nearest, step_counting])
 def test_time_does_not_go_back_and_a_step_leaves_what_was_known_alone(step):
     rng = np.random.default_rng(11)
     begun = no_herd(RULES) if step is step_nearest else expect(RULES, 3.0, inside, np.zeros(2), SIZE, rng)

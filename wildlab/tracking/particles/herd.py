@@ -26,7 +26,7 @@ class Look(NamedTuple):
     time
         s.
     z
-        (M, 2) detections on the ground, north and east, m.
+        (M, 2) detections on the ground, north and east, m; NaN where a ray met none.
     R
         (M, 2, 2) their covariances, m^2.
     sight

@@ -8,6 +8,8 @@ once for an image, so that whoever plans the flight can look at the tracks in be
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,16 +22,19 @@ from wildlab.tracking.particles.herd import Herd, Look, Rules, kept, moved, star
 from wildlab.tracking.particles.likelihoods import log_likelihood
 from wildlab.tracking.particles.resampling import resample
 
+Integers = NDArray[np.int64]
+
 #: A track that is less probable than this is given up where animals are counted.
 LEAST_EXISTENCE = 1e-3
 #: What stands for a density of zero, 1/m^2, so that ratios stay finite.
 LEAST_DENSITY = 1e-100
 
 
-def step_nearest(
-    herd: Herd, look: Look, rules: Rules, rng: np.random.Generator
-) -> tuple[Herd, NDArray[np.int64]]:
+def step_nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     """F's tracking, one image on: modified nearest neighbour, (4.11), negative update, both lost rules.
+
+    Detections that no track takes start one each: F does not say whether the second one of a group takes the
+    track that the first one has just started.
 
     Parameters
     ----------
@@ -45,13 +50,17 @@ def step_nearest(
     Returns
     -------
     herd, taken
-        What is known now; (M,) the identity that each detection was given.
+        What is known now; (M,) the identity that each detection was given, 0 where it is NaN.
 
     Raises
     ------
     WildlabError
         For an image that is earlier than the one before.
     """
+    return _of_usable(_nearest, herd, look, rules, rng)
+
+
+def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     herd = moved(herd, look, rules, rng)
     mean, covariance = moments(herd.cloud)
     squared = mahalanobis_squared(mean, covariance, look.z, look.R)
@@ -82,9 +91,7 @@ def step_nearest(
     return _resampled(_lost(herd, rules), rules, rng), names
 
 
-def step_counting(
-    herd: Herd, look: Look, rules: Rules, rng: np.random.Generator
-) -> tuple[Herd, NDArray[np.int64]]:
+def step_counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     """Tracking that counts, one image on: one detection at most for a track, and each with its probability.
 
     A detection is of a track, of an animal that was never seen, or false: each pair gains the logarithm of
@@ -107,13 +114,18 @@ def step_counting(
     Returns
     -------
     herd, taken
-        What is known now; (M,) the identity that each detection was given.
+        What is known now; (M,) the identity that each detection was given, 0 where it was not used: NaN, or
+        no track's and false without much doubt.
 
     Raises
     ------
     WildlabError
         For an image that is earlier than the one before.
     """
+    return _of_usable(_counting, herd, look, rules, rng)
+
+
+def _counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
     herd = moved(herd, look, rules, rng)
     A, M = len(herd.identity), len(look.z)
     sight, of_unseen = look.sight(herd.cloud.x[..., :2]), look.sight(herd.unseen.x[0, :, :2])
@@ -162,7 +174,23 @@ def step_counting(
     return _resampled(herd, rules, rng), names
 
 
-def _doubt(gain: Array, taken: NDArray[np.int64], new: Array) -> Array:
+def _of_usable(
+    step: Callable[[Herd, Look, Rules, np.random.Generator], tuple[Herd, Integers]],
+    herd: Herd,
+    look: Look,
+    rules: Rules,
+    rng: np.random.Generator,
+) -> tuple[Herd, Integers]:
+    """One of the steps with the detections that met the ground; the others keep their place, with 0."""
+    z, R = np.asarray(look.z, float).reshape(-1, 2), np.asarray(look.R, float).reshape(-1, 2, 2)
+    usable = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
+    herd, names = step(herd, look._replace(z=z[usable], R=R[usable]), rules, rng)
+    aligned = np.zeros(len(z), np.int64)
+    aligned[usable] = names
+    return herd, aligned
+
+
+def _doubt(gain: Array, taken: Integers, new: Array) -> Array:
     """(M,) how probable it is that a detection that a track took is of an animal never seen."""
     mine = np.where(taken >= 0, gain[taken, np.arange(len(taken))] if len(gain) else 0.0, np.inf)
     return np.where(taken >= 0, new / (1 + np.exp(np.minimum(mine, 700))), 0.0)
