@@ -108,6 +108,26 @@ def test_who_is_not_where_it_should_be_is_less_and_less_there():
     assert not len(herd.identity)
 
 
+def test_one_detection_is_shared_out_among_all_it_may_be_of():
+    """A track's, an animal's that was never seen, or false: by hand, with normal densities."""
+    rng = np.random.default_rng(16)
+    rules = RULES._replace(moves=lambda cloud, seen, dt, rng: cloud, particles=40_000)
+    everywhere, p, clutter = (lambda x: np.full(x.shape[:-1], 0.6)), 0.6, 2e-4
+    herd = expect(rules, 5.0, inside, np.zeros(2), SIZE, rng, particles=200_000)
+    herd, _ = step_counting(herd, look(0.0, [60.0, 45.0], sight=everywhere, clutter=clutter), rules, rng)
+    r, u = herd.existence[0], herd.expected_unseen
+    after, taken = step_counting(herd, look(1.0, [63.0, 45.0], sight=everywhere, clutter=clutter), rules, rng)
+    g = np.exp(-0.5 * 9 / (2 * NOISE**2)) / (2 * np.pi * 2 * NOISE**2)  # track and detection both unsure
+    new = p * u / np.prod(SIZE)
+    assert taken.tolist() == [1]
+    mine, others = r * p * g, (1 - r * p) * (new + clutter)
+    assert np.isclose(
+        after.expected_unseen, 0.4 * u + others / (mine + others) * new / (new + clutter), rtol=2e-3
+    )
+    seen = 1 - p + p * g / (new + clutter)
+    assert np.isclose(after.existence[0], r * seen / (1 - r + r * seen), rtol=0.01)
+
+
 def test_those_never_seen_are_the_exact_grid():
     """No detection at all: where animals may still be, and how many, by the matrix of moves."""
     rng = np.random.default_rng(6)
