@@ -95,7 +95,9 @@ def test_one_target_that_was_never_followed() -> None:
 def test_without_truth_nothing_is_judged() -> None:
     text, level, verdict = said(followed(), None)
     assert level == "neutral" and verdict[0] == "not judged"
-    assert text.startswith("2 tracks in 61 looks over 1.0 min, 2.0 at a time in the mean.")
+    assert text.startswith(
+        "2 tracks in 61 looks over 1.0 min, 2.0 at a time in the mean; when there are most, 2 targets (90 %"
+    )
     out = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
     assert said(followed(), lives(targets=out))[2][0] == "not judged"
     assert said(followed(0), lives())[1:] == (

@@ -14,6 +14,7 @@ from wildlab.pipeline.many.beliefs import HERE
 from wildlab.pipeline.many.follow import CUTOFF_M, Followed
 from wildlab.reporting.report import Report
 from wildlab.reporting.tracking import length
+from wildlab.tracking.particles import Count, count_interval, count_probabilities
 
 #: A target is followed well where it has a track at this share of the looks at which it can be seen.
 FOLLOWED = 0.9
@@ -27,6 +28,25 @@ def counts_of(shown: Followed) -> tuple[int, float]:
     """How many tracks there are in all, and at a look in the mean."""
     names = {int(one) for look in shown.shown for one in look.identity}
     return len(names), float(np.mean([len(look.identity) for look in shown.shown])) if shown.shown else 0.0
+
+
+def most_at_once(followed: Followed) -> Count:
+    """How many targets there are at the look that has most, with a 90 % interval, as tracks may be false."""
+    expected = [float(look.existence.sum()) for look in followed.shown]
+    if not expected:
+        return count_interval(count_probabilities([]))
+    return count_interval(count_probabilities(followed.shown[int(np.argmax(expected))].existence))
+
+
+def count_words(count: Count) -> str:
+    """An interval of a number of targets.
+
+    Examples
+    --------
+    >>> count_words(count_interval(count_probabilities([0.99, 0.5])))
+    '1 to 2'
+    """
+    return f"{count.low}" if count.low == count.high else f"{count.low} to {count.high}"
 
 
 def rms_error(lives: Identities) -> float:
@@ -50,7 +70,8 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         return [f"No track was confirmed in {looks} looks over {minutes:.1f} min."], "bad"
     if lives is None:
         return [
-            f"{many[0].upper()}{many[1:]}, {at_once:.1f} at a time in the mean.",
+            f"{many}, {at_once:.1f} at a time in the mean; when there are most, "
+            f"{count_words(most_at_once(followed))} targets (90 % interval).",
             "Whose they are, and how many are false, cannot be said without the targets' true places.",
         ], "neutral"
     seen = {name: life for name, life in lives.targets.items() if life.visible}
@@ -219,6 +240,8 @@ def record(report: Report, followed: Followed, lives: Identities | None) -> None
     tracks, at_once = counts_of(followed)
     report.metric("tracks", "all", tracks, "1", n=len(followed.scans))
     report.metric("tracks_at_a_look", "all", at_once, "1", n=len(followed.scans))
+    most = most_at_once(followed)
+    report.metric("targets_at_once", "most", most.mean, "1", low=most.low, high=most.high)
     if lives is None:
         return
     gospa = lives.gospa

@@ -196,8 +196,10 @@ def belief_propagation(weights: ArrayLike, missed: ArrayLike) -> Array:
 
     Parameters
     ----------
-    weights, missed
-        (T, M) and (T,) as there; those missed above zero.
+    weights
+        (T, M) as there.
+    missed
+        (T,) as there, above zero.
 
     Returns
     -------

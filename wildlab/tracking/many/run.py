@@ -58,6 +58,8 @@ def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: T
         In any order; those of one time are taken as they come.
     sensors
         S of them; `Scan.sensor` is a place among them.
+    targets
+        What is known of the targets.
 
     Returns
     -------
@@ -75,7 +77,23 @@ def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: T
 def follow_many(
     scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: TargetBeliefs
 ) -> Iterator[tuple[Tracks, Shown]]:
-    """The same scan by scan, with all tracks: also those that are not believed yet."""
+    """The same scan by scan, with all tracks: also those that are not believed yet.
+
+    Parameters
+    ----------
+    scans, sensors, targets
+        As in `run_many`.
+
+    Returns
+    -------
+    Iterator of Tracks, Shown
+        After each scan, in order of time.
+
+    Raises
+    ------
+    WildlabError
+        As `run_many`.
+    """
     eyes = tuple(sensors)
     for scan in scans:
         if not np.isfinite(scan.time):

@@ -174,7 +174,8 @@ def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tr
     )
     # On one hull they are nowhere farther apart than this.
     widest = max(targets.apart_m, hull.length_m + hull.beam_m + 2.0)
-    close = cKDTree(mean[:, :2]).query_ball_point(mean[:, :2], widest)
+    found: Any = cKDTree(mean[:, :2]).query_ball_point(mean[:, :2], widest)
+    close: list[list[int]] = list(found)
     place = {row: number for number, row in enumerate(order)}
     kept: set[int] = set()
     for row in order:
