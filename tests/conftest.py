@@ -82,10 +82,18 @@ def launch() -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture(scope="session")
-def browser(launch: Callable[..., Any]) -> Iterator[Any]:
-    chromium = launch()
+def chromium(launch: Callable[..., Any]) -> Iterator[Any]:
+    started = launch()
+    yield started
+    started.close()
+
+
+@pytest.fixture
+def browser(chromium: Any) -> Iterator[Any]:
+    """Its pages are closed with the test: one that moves would go on moving, and slow all others."""
     yield chromium
-    chromium.close()
+    for context in chromium.contexts:
+        context.close()
 
 
 #: The views that are held against the rules of axe, which take it longest.
