@@ -292,6 +292,9 @@ def test_words_turn_with_the_numbers(numbers):
     assert "swapped on 20 of 20 flights" in first[0]
     assert "look like, on 0 of 20 flights" in first[0]
     assert "1800 go to the wrong track" in first[1] and "features 5" in first[1]
+    worst = pd.concat([good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
+    assert "at most 455. Published" in text.summary(worst)[1]
+    assert "at most" not in text.summary(good[:1])[1]
     assert "80.0 %" in first[2] and "20.0 %" in text.summary(bad)[2]
     assert "20. Of these 20 end" in text.end_words(good)
     assert "nothing to recover" in text.end_words(bad)
