@@ -80,6 +80,7 @@ OF_FLIGHTS = {
     "repeat-sightings.ipynb": "gating",
     "overview.ipynb": "large-ship",
     "tracking.ipynb": "large-ship",
+    "tracking-many.ipynb": "large-ship",
 }
 
 

@@ -1,6 +1,6 @@
 """Wrong meanings made of good flights: found, and named with their cause; `pytest -s` prints the table.
 
-Every fifth of them is tried, for each takes seconds; WILDLAB_ALL_SABOTAGE=1 tries all.
+Every tenth of them is tried, for each takes seconds; WILDLAB_ALL_SABOTAGE=1 tries all.
 
 A wrong meaning whose effect is below 10 % is harmless. The effect of the others is the relative change of
 what the flight's report states: the mean error of ground points; with an inertial sensor the attitude and
@@ -38,7 +38,7 @@ from wildlab.simulation.twins import simulate_twin
 HARMLESS, GRAVE, NAMED = 0.1, 0.5, 2 / 3
 #: Distinct wrong meanings of a flight.
 ENOUGH = 60
-EVERY = 1 if os.environ.get("WILDLAB_ALL_SABOTAGE") else 5
+EVERY = 1 if os.environ.get("WILDLAB_ALL_SABOTAGE") else 10
 
 PUBLIC = {
     "openathena-f1": ("georeferencing", "openathena-f1"),
@@ -172,17 +172,17 @@ def test_a_few_on_a_twin() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "fast-vessel",
-        # A negated roll, and a yaw read as radians, pass unseen on it, and move its points by more than half.
-        pytest.param("uav-search", marks=pytest.mark.xfail(strict=True, raises=AssertionError)),
-    ],
-)
-def test_all_on_twins(name: str) -> None:
-    flight = simulate_twin(name, 2)
-    sabotage(flight, lambda f: ground_error(f, "autopilot"))
+def test_all_on_a_twin() -> None:
+    sabotage(simulate_twin("fast-vessel", 2), lambda f: ground_error(f, "autopilot"))
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, raises=AssertionError)
+@pytest.mark.parametrize("unseen", ["attitude: roll negated", "attitude: yaw in degrees read as radians"])
+def test_what_passes_unseen_over_hilly_land(unseen: str) -> None:
+    """Known gaps: these move the points of this twin by more than half."""
+    flight = simulate_twin("uav-search", 2)
+    sabotage(flight, lambda f: ground_error(f, "autopilot"), few=re.compile(f"^{unseen}$"))
 
 
 @pytest.mark.slow
