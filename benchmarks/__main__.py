@@ -6,6 +6,7 @@ from rich.table import Table
 from benchmarks import (
     floating,
     long_flight,
+    many,
     navigation,
     particles,
     pixel_to_plane,
@@ -25,6 +26,7 @@ def main() -> None:
         terrain,
         navigation,
         tracking,
+        many,
         particles,
         simulation,
         warm,

@@ -435,6 +435,8 @@ def first_of(gains: Sequence[Gain], possible: Gain | None = None) -> str:
         if possible:
             return f"No gain is certain. Possible: {_possible_words(possible)}."
         return "Nothing was measured that would gain metres for certain, or bring back data."
+    if len(gains) == 1:
+        return "One thing. Only what was measured is listed."
     of = f" of {len(gains)}" if len(gains) > shown else ""
     order = "by the share of the error or of the data that each would gain"
-    return f"{shown}{of}, {order}. Only what was measured is listed."
+    return f"{shown}{of} things, {order}. Only what was measured is listed."
