@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
@@ -102,7 +103,8 @@ def wrong_shown(followed: Followed, lives: Identities) -> Shown:
     axes[1].set_xlabel("time since the first look (s)")
     most = max(int(missed.max()), int(false.max()), 1)
     axes[1].set_ylim(-most - 0.5, most + 0.5)
-    axes[1].set_yticks(range(-most, most + 1), [str(abs(n)) for n in range(-most, most + 1)])
+    axes[1].yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    axes[1].yaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")
     fig.legend(loc="outside lower center", ncols=2)
     mark_gaps(axes[0], times, PAUSE * float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
     alt = (

@@ -1,0 +1,87 @@
+"""Charts of many targets: what they show, whose colour it is, and letters that do not lie on each other."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.figure_text import overlapping
+from wildlab.evaluation.identities import Scan, compare_identities
+from wildlab.reporting import figures
+from wildlab.reporting.charts import many as charts
+from wildlab.reporting.figure_text import least_size
+from wildlab.reporting.pictures import PHONE_WIDTH
+from wildlab.tracking.many import POINT, Shown
+
+
+def made(seed: int, tracks: int = 9, targets: int = 3, looks: int = 80) -> tuple[Any, Any]:
+    """Tracks that come and go beside targets that walk about; the first three are on them."""
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(1, 300)
+    ways = rng.normal(0, size, (targets, 1, 2)) + rng.normal(0, size / 20, (targets, looks, 2)).cumsum(axis=1)
+    begin = np.sort(rng.integers(0, looks // 2, tracks))
+    shown, compared = [], []
+    for t in range(looks):
+        there = np.flatnonzero(begin <= t)
+        at = np.array([ways[i, t] if i < targets else rng.normal(0, size, 2) for i in there]).reshape(-1, 2)
+        x = np.concatenate([at, np.zeros((len(at), 2))], axis=1)
+        P = np.tile(np.eye(4), (len(at), 1, 1))
+        shown.append(Shown(float(t), 0, there, x, P, np.ones(len(at)), np.ones((len(at), 1))))
+        flags = np.ones(targets, bool)
+        compared.append(
+            Scan(float(t), at, P[:, :2, :2], there.tolist(), ways[:, t],
+                 [f"boat {i}" for i in range(targets)], flags, ~flags)
+        )  # fmt: skip
+    platform = rng.normal(0, size / 50, (looks, 2)).cumsum(axis=0)
+    followed = SimpleNamespace(
+        shown=shown,
+        scans=[SimpleNamespace(time=float(t), platform=platform[t]) for t in range(looks)],
+        truth={f"boat {i}": ways[i] for i in range(targets)},
+        targets=SimpleNamespace(hulls=(POINT,)),
+    )
+    return followed, compare_identities(compared, 20.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ["map", "identities", "wrong"])
+def test_letters_can_be_read_and_lie_on_no_others(name: str, seed: int) -> None:
+    followed, lives = made(seed)
+    figure = {
+        "map": lambda: charts.map_shown(followed),
+        "identities": lambda: charts.identities_shown(followed, lives),
+        "wrong": lambda: charts.wrong_shown(followed, lives),
+    }[name]()[0]
+    figures.png_bytes(figure)
+    assert overlapping(figure) == []
+    assert figure.get_size_inches()[0] * least_size(figure) <= PHONE_WIDTH
+
+
+def test_a_track_has_one_colour_in_every_chart() -> None:
+    followed, _ = made(1)
+    tints = charts.colours_of(followed)
+    longest = list(charts.ways_of(followed))
+    assert len({tints[one] for one in longest[: charts.MOST_NAMED]}) == charts.MOST_NAMED
+    assert {tints[one] for one in longest[charts.MOST_NAMED :]} == {figures.INK}
+    drawn = {line.get_label(): line.get_color() for line in charts.map_shown(followed)[0].axes[0].get_lines()}
+    for identity in longest[: charts.MOST_NAMED]:
+        assert drawn[f"track {identity}"] == tints[identity]
+
+
+def test_titles_and_alternatives_count() -> None:
+    followed, lives = made(2)
+    figure, _, alt, _ = charts.map_shown(followed)
+    assert (
+        figure.axes[0].get_title(loc="left") == "9 tracks"
+        and "9 tracks beside the true ways of 3 targets" in alt
+    )
+    changes = lives.swaps + lives.breaks
+    figure, _, alt, _ = charts.identities_shown(followed, lives)
+    assert ("None changes." in alt) == (changes == 0)
+    _, _, alt, _ = charts.wrong_shown(followed, lives)
+    missed = sum(one.n_missed > 0 for one in lives.gospa)
+    assert f"targets missed at {missed} looks" in alt and "at 80 looks" in alt
+    alone, _ = made(2, tracks=1)
+    assert charts.map_shown(alone)[0].axes[0].get_title(loc="left") == "1 track"
