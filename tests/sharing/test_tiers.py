@@ -91,8 +91,17 @@ def test_no_place_is_farther_from_the_named_point_than_is_said(
     assert away + reach <= cell.uncertainty_m * 1.0001
     # No digit more than the cell has, and the same for all in the cell.
     assert round(cell.latitude_deg, 3) == cell.latitude_deg
-    assert abs(cell.latitude_deg - latitude) <= size / 2 + 1e-9
+    assert abs(cell.latitude_deg - latitude) <= 1.11 * size / 2 + 1e-9
     assert cell_of(cell.latitude_deg, cell.longitude_deg, size, reach) == cell
+
+
+@given(st.floats(-90, 90), st.floats(-180, 180))
+def test_a_coarse_copy_beside_a_finer_one_tells_nothing_more(latitude: float, longitude: float) -> None:
+    """The coarse cell follows from the middle of the finer one."""
+    for fine, coarse in ((0.001, 0.01), (0.01, 0.1), (0.001, 0.1)):
+        inner, outer = cell_of(latitude, longitude, fine), cell_of(latitude, longitude, coarse)
+        again = cell_of(inner.latitude_deg, inner.longitude_deg, coarse)
+        assert (again.latitude_deg, again.longitude_deg) == (outer.latitude_deg, outer.longitude_deg)
 
 
 @given(st.floats(1e-3, 1e6))

@@ -148,7 +148,7 @@ def test_a_receiver_that_is_not_where_or_when_it_is_said_to_be_gets_advice() -> 
     said = words.words_on_placement(as_stated, [0.22, 0.0, 0.0, 0.0])
     assert "0.223 s late" in said and "as stated, within 3 SD" in said and "write" not in said
     late = words.words_on_placement(as_stated._replace(latency=0.25), [0.22, 0.0, 0.0, 0.0])
-    assert "write latency_s = 0.25 in [gnss]" in late and "lever_arm_m" not in late
+    assert "write latency_s = 0.250 in [gnss]" in late and "lever_arm_m" not in late
     moved = words.words_on_placement(
         as_stated._replace(lever=np.array([0.1, 0.5, 0.0])), [0.22, 0.0, 0.0, 0.0]
     )

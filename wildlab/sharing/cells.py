@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import pymap3d.vincenty
 
+#: Sides of cells, degrees, by GBIF's guide.
+SIDES = (0.001, 0.01, 0.1)
 #: Digits after the point of a cell's middle are its own, so that no rounding error prints more of them.
 _DIGITS = 6
 
@@ -34,8 +36,10 @@ class Cell:
 def cell_of(latitude_deg: float, longitude_deg: float, size_deg: float, reach_m: float = 0.0) -> Cell:
     """The cell that a place is in.
 
-    Coordinates are rounded to multiples of the cell's side, as GBIF's guide has it. Two flights in one cell
-    give the same one, so that no mean of many copies is nearer to the truth.
+    Coordinates are rounded to multiples of the cell's side, as GBIF's guide has it, and before that to those
+    of the finer ones: so every cell lies whole in one of the next size, and a copy for the public beside one
+    for a partner tells nothing that the finer one does not. Two flights in one cell give the same one, so
+    that no mean of many copies is nearer to the truth.
 
     Parameters
     ----------
@@ -54,12 +58,15 @@ def cell_of(latitude_deg: float, longitude_deg: float, size_deg: float, reach_m:
     --------
     >>> cell = cell_of(58.662064, 16.433337, 0.1)
     >>> cell.latitude_deg, cell.longitude_deg, cell.uncertainty_m
-    (58.7, 16.4, 6300.0)
+    (58.7, 16.4, 7000.0)
     """
-    lat = max(-90.0, min(90.0, rounded(latitude_deg, size_deg)))
-    lon = rounded((longitude_deg + 180) % 360 - 180, size_deg)
-    lon = -180.0 if lon >= 180.0 else lon
-    return Cell(lat, lon, size_deg, round_up(half_diagonal(lat, size_deg) + reach_m))
+    sides = [*(side for side in SIDES if side < size_deg), size_deg]
+    lat, lon = latitude_deg, (longitude_deg + 180) % 360 - 180
+    for side in sides:
+        lat, lon = rounded(lat, side), rounded(lon, side)
+    lat, lon = max(-90.0, min(90.0, lat)), -180.0 if lon >= 180.0 else lon
+    # What was rounded more than once may be farther off by half of each of the finer sides.
+    return Cell(lat, lon, size_deg, round_up(half_diagonal(lat, sum(sides)) + reach_m))
 
 
 def rounded(value: float, step: float) -> float:

@@ -52,11 +52,12 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
 
     Examples
     --------
-    Two targets that both want the first measurement; one of them has another choice:
+    Two targets that both want the first measurement; one of them has another choice. Of the five ways, whose
+    weights are 1, 8, 8, 8 and 64, two give the first measurement to the first target, 72 of 89:
 
     >>> np.round(association_probabilities([[8.0, 0.0], [8.0, 8.0]], [1.0, 1.0]), 2)
-    array([[0.2 , 0.8 , 0.  ],
-           [0.11, 0.09, 0.8 ]])
+    array([[0.19, 0.81, 0.  ],
+           [0.1 , 0.09, 0.81]])
     """
     w, w0 = np.asarray(weights, float), np.asarray(missed, float)
     if w.ndim != 2 or w0.shape != w.shape[:1]:
