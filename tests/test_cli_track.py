@@ -112,7 +112,7 @@ def test_all_targets_at_once_without_a_name(tmp_path: Path) -> None:
     result = typed(flight, "--many", "--into", tmp_path / "out")
     assert result.exit_code == 0, result.output
     text = words((tmp_path / "out" / "report.html").read_text())
-    assert "The target in reach has a track at" in text and "tracks a minute are on nothing" in text
+    assert "The target in reach has a track at" in text and "mostly on nothing" in text
     assert numbers(tmp_path / "out")["tracked", "target-1"] > 0.9
     assert (pd.read_parquet(tmp_path / "out" / "estimates.parquet")["track"] >= 0).all()
 

@@ -17,7 +17,9 @@ from wildlab.reporting.pictures import PHONE_WIDTH
 from wildlab.tracking.many import POINT, Shown
 
 
-def made(seed: int, tracks: int = 9, targets: int = 3, looks: int = 80) -> tuple[Any, Any]:
+def made(
+    seed: int, tracks: int = 9, targets: int = 3, looks: int = 80, name: str = "boat {}"
+) -> tuple[Any, Any]:
     """Tracks that come and go beside targets that walk about; the first three are on them."""
     rng = np.random.default_rng(seed)
     size = rng.uniform(1, 300)
@@ -33,13 +35,13 @@ def made(seed: int, tracks: int = 9, targets: int = 3, looks: int = 80) -> tuple
         flags = np.ones(targets, bool)
         compared.append(
             Scan(float(t), at, P[:, :2, :2], there.tolist(), ways[:, t],
-                 [f"boat {i}" for i in range(targets)], flags, ~flags)
+                 [name.format(i) for i in range(targets)], flags, ~flags)
         )  # fmt: skip
     platform = rng.normal(0, size / 50, (looks, 2)).cumsum(axis=0)
     followed = SimpleNamespace(
         shown=shown,
         scans=[SimpleNamespace(time=float(t), platform=platform[t]) for t in range(looks)],
-        truth={f"boat {i}": ways[i] for i in range(targets)},
+        truth={name.format(i): ways[i] for i in range(targets)},
         targets=SimpleNamespace(hulls=(POINT,)),
     )
     return followed, compare_identities(compared, 20.0)
@@ -85,3 +87,11 @@ def test_titles_and_alternatives_count() -> None:
     assert f"targets missed at {missed} looks" in alt and "at 80 looks" in alt
     alone, _ = made(2, tracks=1)
     assert charts.map_shown(alone)[0].axes[0].get_title(loc="left") == "1 track"
+
+
+def test_names_are_only_text_and_leave_room_for_the_picture() -> None:
+    followed, lives = made(1, name="<b>a$b_{{$^</b>" + "L" * 60 + "{}")
+    figure = charts.identities_shown(followed, lives)[0]
+    figures.png_bytes(figure)
+    shown = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert shown[0].startswith("<b>a$b_{$^") and all(len(one) <= charts.LONGEST_NAME for one in shown)

@@ -51,8 +51,12 @@ def said(one: Any, two: Any) -> tuple[str, str, tuple[str, str]]:
 def test_all_followed_by_one_track_each_is_sound() -> None:
     text, level, verdict = said(followed(), lives())
     assert level == "good" and verdict[0] == "sound"
-    assert "Of 2 targets in reach, each has a track at 95 % or more" in text and "off by 3.0 m (RMS)" in text
-    assert "No track went over to another target, no target got a new track, and 0.00 tracks" in text
+    assert (
+        "Of 2 targets in reach, b has a track at the fewest looks, at 95 % of those" in text
+        and "off by 3.0 m (RMS of those within 20 m)" in text
+    )
+    assert "no target got a new track, and 0 of 2 tracks (0.00 a minute) are mostly on nothing" in text
+    assert "a track is on nothing at 0 % of the looks" in text
 
 
 FALSE = {0: TrackLife(9, 9, 2.0, False), 1: TrackLife(9, 0, np.nan, True)}
@@ -68,12 +72,22 @@ SHORT, NEVER = TargetLife(61, 0.7, 0.0, 0, 0), TargetLife(61, 0.0, np.nan, 0, 0)
             {"false_tracks_per_minute": 1.0, "tracks": FALSE},
             "warn",
             "look closer",
-            "1 of 2 tracks are on nothing",
+            "Tracks mostly on nothing: 1 of 2",
         ),
-        ({"tracks": {0: TrackLife(9, 9, 9.0, False)}}, "warn", "look closer", "1 of 1 tracks are farther"),
-        ({"tracks": {0: TrackLife(9, 9, 0.5, False)}}, "warn", "look closer", "1 of 1 tracks are nearer"),
-        ({"targets": {"a": SHORT}}, "warn", "look closer", "1 of 1 targets without a track for more than a"),
-        ({"targets": {"a": NEVER}}, "bad", "targets lost", "1 of 1 targets without a track for more than a"),
+        (
+            {"tracks": {0: TrackLife(9, 9, 9.0, False)}},
+            "warn",
+            "look closer",
+            "Tracks farther off than they say: 1 of 1",
+        ),
+        (
+            {"tracks": {0: TrackLife(9, 9, 0.5, False)}},
+            "warn",
+            "look closer",
+            "Tracks nearer than they say: 1 of 1",
+        ),
+        ({"targets": {"a": SHORT}}, "warn", "look closer", "Targets without a track at more than a tenth"),
+        ({"targets": {"a": NEVER}}, "bad", "targets lost", "Targets never followed: 1 of 1"),
     ],
 )
 def test_what_is_amiss_is_the_reason(changes: dict[str, Any], level: str, word: str, reason: str) -> None:
@@ -87,7 +101,7 @@ def test_one_target_that_was_never_followed() -> None:
         followed(),
         lives(gospa=[none] * 61, targets={"a": TargetLife(61, 0.0, np.nan, 0, 0)}, breaks=3, swaps=1),
     )
-    assert text.startswith("The target in reach has a track at 0 % of the looks at which it can be seen.")
+    assert text.startswith("The target in reach has a track at 0 % of those at which it can be seen.")
     assert "1 track went over to another target, 3 times a target got a new track" in text
     assert text.endswith("Never followed: a.")
 
@@ -96,12 +110,12 @@ def test_without_truth_nothing_is_judged() -> None:
     text, level, verdict = said(followed(), None)
     assert level == "neutral" and verdict[0] == "not judged"
     assert text.startswith(
-        "2 tracks in 61 looks over 1.0 min, 2.0 at a time in the mean; when there are most, 2 targets (90 %"
+        "2 tracks in 61 looks over 1.0 min, 2.0 at a time in the mean; when there are most, 2 at once (90 %"
     )
     out = {"a": TargetLife(0, np.nan, np.nan, 0, 0)}
     assert said(followed(), lives(targets=out))[2][0] == "not judged"
     assert said(followed(0), lives())[1:] == (
-        "bad", ("no track", "Nothing was seen often enough to be believed.")
+        "bad", ("no track", "Nothing met all that the tracker was told a target is.")
     )  # fmt: skip
 
 
@@ -110,3 +124,24 @@ def test_parts_of_gospa_add_up() -> None:
     table = words.parts_table([far])
     assert table["metres"].iloc[1:].pow(2).sum() == pytest.approx(table["metres"].iloc[0] ** 2)
     assert table["share"].iloc[1:].sum() == pytest.approx(100)
+
+
+def test_a_track_that_goes_on_without_its_target_is_seen() -> None:
+    """On a target for most of its looks, and on nothing at 40 of 100: no sound page."""
+    on = gospa([[0.0, 0.0]], [[1.0, 0.0]], 20.0)
+    off = gospa(np.empty((0, 2)), [[1.0, 0.0]], 20.0)
+    gone = lives(
+        gospa=[on] * 60 + [off] * 40,
+        targets={"a": TargetLife(60, 1.0, 0.0, 0, 0)},
+        tracks={0: TrackLife(100, 60, 2.0, False)},
+    )
+    text, level, verdict = said(followed(looks=100), gone)
+    assert level == "warn" and verdict[1] == "A track is on nothing at 40 % of the looks."
+    assert "a track is on nothing at 40 % of the looks" in text
+
+
+def test_looks_without_truth_and_no_time_at_all_are_told() -> None:
+    text, *_ = said(followed(looks=99), lives())
+    assert "Judged are 61 of 99 looks: every true place is known there." in text
+    text, *_ = said(followed(), lives(false_tracks_per_minute=float("nan")))
+    assert "nan" not in text and "0 of 2 tracks are mostly on nothing" in text

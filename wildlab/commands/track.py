@@ -63,7 +63,7 @@ def track(
       wildlab track flights/tuesday
       wildlab track flights/wednesday --tune flights/tuesday --filter schmidt --filter coloured
       wildlab track flights/harbour --settings settings.toml --target boat --sensor radar
-      wildlab track flights/harbour --many --settings data/settings/autoferry-many.toml
+      wildlab track flights/harbour --many --settings settings.toml
     """
     from wildlab.runner.track import track_flight
     from wildlab.runner.track_many import refuse_unfit, track_many

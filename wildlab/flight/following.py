@@ -72,6 +72,12 @@ class ManySensorPart(Strict):
     along_m: Lengths = ()
     near_side_m: Lengths = ()
 
+    @model_validator(mode="after")
+    def _near_before_far(self) -> ManySensorPart:
+        if self.near_m is not None and self.far_m is not None and self.near_m >= self.far_m:
+            raise ValueError(f"near_m = {self.near_m:g} is not below far_m = {self.far_m:g}")
+        return self
+
 
 class ConsideredPart(Strict):
     """One error that lasts: its standard deviation, and for how long it is the same.
@@ -190,5 +196,8 @@ def parse_settings(text: str) -> Settings:
 
 def settings_over(stated: Settings, own: Settings) -> Settings:
     """``stated`` where it says something, else what a flight says of ``own``; a sensor counts as a whole."""
-    targets = own.targets.model_dump(exclude_none=True) | stated.targets.model_dump(exclude_none=True)
+    before, after = (one.targets.model_dump(exclude_none=True, exclude_unset=True) for one in (own, stated))
+    targets = before | after
+    if "many" in before and "many" in after:
+        targets["many"] = before["many"] | after["many"]
     return Settings(sensors={**own.sensors, **stated.sensors}, targets=TargetsPart(**targets))

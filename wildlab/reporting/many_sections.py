@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wildlab.evaluation.identities import Identities
-from wildlab.pipeline.many.follow import Followed
+from wildlab.pipeline.many.follow import CUTOFF_M, Followed
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
@@ -29,7 +29,8 @@ def pictures_section(report: Report, followed: Followed, lives: Identities | Non
     if lives is None or not any(life.visible for life in lives.targets.values()):
         return
     report.section("Who is who, look by look")
-    report.figures([charts.identities_shown(followed, lives), charts.wrong_shown(followed, lives)])
+    shown = [charts.identities_shown(followed, lives)] if any(lives.followed) else []
+    report.figures([*shown, charts.wrong_shown(followed, lives)])
 
 
 def tables_section(report: Report, followed: Followed, lives: Identities | None) -> None:
@@ -74,20 +75,31 @@ def told_section(report: Report, followed: Followed) -> None:
     report.table(said_table(followed.said), columns=headings)
 
 
-def end_section(report: Report) -> None:
+def end_section(report: Report, followed: Followed) -> None:
     """What is not said, and how it was computed."""
+    kinds = {one.kind for one in followed.places.values()}
+    poses = []
+    if "pixel" in kinds:
+        poses.append(
+            "Errors of the pose are taken for new at every detection, also where all targets of an image "
+            "share them; and what an image shows is told by the same poses."
+        )
+    if kinds - {"pixel"}:
+        poses.append("Errors of the platform's position and heading that last are in no covariance here.")
+    hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
     report.limits(
         [
+            f"A track farther than {CUTOFF_M:g} m from every target is on nothing here, also where it "
+            "follows one whose places are that far off.",
             "Where the truth has no standard deviation of its own, its error counts as the tracks'.",
             "Other things that move are tracks on nothing here, unless their true place is known too.",
-            "Errors of the pose are taken for new at every detection, also where all targets of an image "
-            "share them.",
+            *poses,
         ]
     )
     report.method(
         "Joint integrated probabilistic data association with visibility (H 8.2): in every look each "
         "detection is of each track, of something new, or of nothing, with probabilities over all ways to "
         "deal them out; a track's estimate is the mean over these ways. Whether a target exists and whether "
-        "it can be seen are estimated apart: one that is hidden is not given up at once. Each track is of "
-        "every kind of hull at once, which differ in where on the hull it is seen."
+        "it can be seen are estimated apart: one that is hidden is not given up at once."
+        + (hulls if len(followed.targets.hulls) > 1 else "")
     )

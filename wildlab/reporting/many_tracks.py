@@ -71,7 +71,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
     if lives is None:
         return [
             f"{many}, {at_once:.1f} at a time in the mean; when there are most, "
-            f"{count_words(most_at_once(followed))} targets (90 % interval).",
+            f"{count_words(most_at_once(followed))} at once (90 % interval).",
             "Whose they are, and how many are false, cannot be said without the targets' true places.",
         ], "neutral"
     seen = {name: life for name, life in lives.targets.items() if life.visible}
@@ -79,20 +79,36 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         return [f"{many}; no target with a known place was ever in reach."], "neutral"
     shares = {name: life.tracked for name, life in seen.items()}
     least = min(shares, key=lambda name: shares[name])
-    several = len(seen) > 1
-    whose = f"Of {len(seen)} targets in reach, each" if several else "The target in reach"
-    how = " or more" if several else ""
-    off = f"; tracks are off by {length(rms_error(lives))} (RMS)" if on_target(lives) else ""
+    if len(seen) > 1:
+        first = f"Of {len(seen)} targets in reach, {least} has a track at the fewest looks, at "
+    else:
+        first = "The target in reach has a track at "
+    off = f"; tracks are off by {length(rms_error(lives))} (RMS of those within {CUTOFF_M:g} m)"
     said = [
-        f"{whose} has a track at {_share(shares[least])}{how} of the looks at which it can be seen{off}.",
+        f"{first}{_share(shares[least])} of those at which it can be seen{off if on_target(lives) else ''}.",
         f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to others')}, "
         f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}, "
-        f"and {lives.false_tracks_per_minute:.2f} tracks a minute are on nothing.",
+        f"and {_false_words(lives)}.",
     ]
+    if len(lives.gospa) < looks:
+        said.append(f"Judged are {len(lives.gospa)} of {looks} looks: every true place is known there.")
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
         said.append(f"Never followed: {', '.join(map(str, lost))}.")
     return said, _level(lives, shares)
+
+
+def false_share(lives: Identities) -> float:
+    """Of how many looks a track is on nothing."""
+    return float(np.mean([one.n_false > 0 for one in lives.gospa]))
+
+
+def _false_words(lives: Identities) -> str:
+    false = sum(track.false for track in lives.tracks.values())
+    rate = lives.false_tracks_per_minute
+    each = f" ({rate:.2f} a minute)" if np.isfinite(rate) else ""
+    of = f"{false} of {len(lives.tracks)} tracks{each} {'is' if false == 1 else 'are'} mostly on nothing"
+    return f"{of}; a track is on nothing at {_share(false_share(lives))} of the looks"
 
 
 def _level(lives: Identities, shares: dict[object, float]) -> str:
@@ -100,7 +116,8 @@ def _level(lives: Identities, shares: dict[object, float]) -> str:
         return "bad"
     nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
     doubtful = [one for one in nees if not SMALLEST <= one <= LARGEST]
-    if lives.breaks or lives.false_tracks_per_minute > 0 or min(shares.values()) < FOLLOWED or doubtful:
+    false = any(track.false for track in lives.tracks.values()) or false_share(lives) > 1 - FOLLOWED
+    if lives.breaks or false or min(shares.values()) < FOLLOWED or doubtful:
         return "warn"
     return "good"
 
@@ -109,29 +126,33 @@ def verdict_of(followed: Followed, lives: Identities | None, level: str) -> tupl
     """The word that goes with the level, and its reason."""
     tracks, _ = counts_of(followed)
     if not tracks:
-        return "no track", "Nothing was seen often enough to be believed."
-    if lives is None or not any(life.visible for life in lives.targets.values()):
-        return "not judged", "There is no target in reach whose true place is known."
+        return "no track", "Nothing met all that the tracker was told a target is."
+    if lives is None:
+        return "not judged", "No target's true place is known at any look."
+    seen = [life for life in lives.targets.values() if life.visible]
+    if not seen:
+        return "not judged", "No target whose true place is known is in reach."
     reasons = []
     if lives.swaps:
         reasons.append(f"tracks went over to other targets: {lives.swaps}")
     if lives.breaks:
         reasons.append(f"targets got new tracks: {lives.breaks}")
-    if lives.false_tracks_per_minute > 0:
-        false = sum(track.false for track in lives.tracks.values())
-        reasons.append(f"{false} of {len(lives.tracks)} tracks are on nothing")
-    short = [life for life in lives.targets.values() if life.visible and life.tracked < FOLLOWED]
-    if short:
-        reasons.append(f"{len(short)} of {len(lives.targets)} targets without a track for more than a tenth")
-    nees = {name: track.anees / 2 for name, track in lives.tracks.items() if np.isfinite(track.anees)}
-    over, under = [v for v in nees.values() if v > LARGEST], [v for v in nees.values() if v < SMALLEST]
-    if over:
-        reasons.append(f"{len(over)} of {len(nees)} tracks are farther off than they say")
-    if under:
-        reasons.append(f"{len(under)} of {len(nees)} tracks are nearer than they say")
+    if false := sum(track.false for track in lives.tracks.values()):
+        reasons.append(f"tracks mostly on nothing: {false} of {len(lives.tracks)}")
+    elif false_share(lives) > 1 - FOLLOWED:
+        reasons.append(f"a track is on nothing at {_share(false_share(lives))} of the looks")
+    if never := sum(life.tracked == 0 for life in seen):
+        reasons.append(f"targets never followed: {never} of {len(seen)}")
+    if short := sum(0 < life.tracked < FOLLOWED for life in seen):
+        reasons.append(f"targets without a track at more than a tenth of the looks: {short} of {len(seen)}")
+    nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
+    if over := sum(value > LARGEST for value in nees):
+        reasons.append(f"tracks farther off than they say: {over} of {len(nees)}")
+    if under := sum(value < SMALLEST for value in nees):
+        reasons.append(f"tracks nearer than they say: {under} of {len(nees)}")
     words = {"good": "sound", "warn": "look closer", "bad": "mixed up" if lives.swaps else "targets lost"}
     if not reasons:
-        reasons = ["every target was followed, by one track each, and no track is on nothing"]
+        reasons = ["every target was followed by one track, and hardly ever was a track on nothing"]
     text = "; ".join(reasons)
     return words[level], f"{text[0].upper()}{text[1:]}."
 
@@ -188,9 +209,10 @@ def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
         if len(hulls) > 1:
             row["kind"] = hulls[int(np.argmax(kinds))]
         if lives is not None:
-            life = lives.tracks[identity]
-            row["on"] = 100 * life.on_target / life.scans
-            row["nees"] = life.anees / 2
+            # One that was there only while a true place was not known is not judged.
+            life = lives.tracks.get(identity)
+            row["on"] = 100 * life.on_target / life.scans if life else np.nan
+            row["nees"] = life.anees / 2 if life else np.nan
         rows.append(row)
     return pd.DataFrame(rows)
 

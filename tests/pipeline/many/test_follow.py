@@ -10,8 +10,8 @@ import pytest
 
 from tests.pipeline.robots import boat, robot_flight
 from wildlab.errors import WildlabError
-from wildlab.flight.following import parse_settings
-from wildlab.pipeline.many.follow import follow_all, judged, tracks_table
+from wildlab.flight.following import parse_settings, settings_over
+from wildlab.pipeline.many.follow import follow_all, judged, known_looks, tracks_table
 
 
 def test_a_boat_among_clutter_is_found_without_its_name() -> None:
@@ -76,3 +76,32 @@ def test_no_track_leaves_an_empty_table() -> None:
     text = "[targets.many]\nhits = 1000\n"
     followed = follow_all(robot_flight(kind="position"), settings=parse_settings(text))
     assert list(tracks_table(followed)) == ["time_s", "sensor", "track", "north_m", "east_m"]
+
+
+def test_where_a_true_place_is_not_known_nothing_is_judged() -> None:
+    """The truth ends half-way: a track on a boat that is still there is not false."""
+    flight = robot_flight(kind="position", seconds=100.0)
+    truth = flight.table("truth")
+    early = truth[truth["time_s"] < truth["time_s"].min() + 50]
+    followed = follow_all(replace(flight, tables={**flight.tables, "truth": early}))
+    lives, known = judged(followed), known_looks(followed)
+    assert lives is not None and 0.3 < known.mean() < 0.7 and len(lives.gospa) == known.sum()
+    assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
+
+
+def test_what_settings_say_in_vain_is_said() -> None:
+    text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
+    notes = follow_all(robot_flight(), settings=parse_settings(text)).notes
+    assert "The settings speak of a sensor 'rader', which this flight does not have." in notes
+    assert "Errors of radar that last are not considered where many targets are followed." in notes
+
+
+def test_a_sensor_that_sees_nothing_is_refused() -> None:
+    with pytest.raises(WildlabError, match="near_m = 300 is not below far_m = 20"):
+        parse_settings("[sensors.radar.many]\nnear_m = 300\nfar_m = 20\n")
+
+
+def test_settings_for_many_are_merged_key_by_key() -> None:
+    own = parse_settings('[targets.many]\nhits = 4\n[[targets.many.hulls]]\nname = "ship"\n')
+    many = settings_over(parse_settings("[targets.many]\ngate = 3.0\n"), own).targets.many
+    assert many is not None and (many.gate, many.hits, many.hulls[0].name) == (3.0, 4, "ship")

@@ -116,6 +116,16 @@ def test_what_stays_is_not_shown_where_targets_move() -> None:
     assert len(shown[-1].identity) == 1 and shown[-1].x[0, 0] > 90
 
 
+def test_two_sensors_that_look_at_one_time() -> None:
+    rng = np.random.default_rng(8)
+    scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.5, 0.0]]), 20), rng)
+    twice = [one for scan in scans for one in (scan, scan._replace(sensor=1))]
+    shown = run_many(twice, [EYE, EYE], POINTS._replace(moves_m=0.5))
+    assert len(shown) == 40 and len(shown[-1].identity) == 1
+    still = [scan._replace(time=5.0) for scan in scans]
+    assert len(run_many(still, [EYE], POINTS)) == 20
+
+
 SHIP = Hull("ship", 30.0, 8.0, 0.4)
 BOTH = POINTS._replace(hulls=(POINT._replace(share=0.6), SHIP), apart_m=4.0)
 LONG = SensorBeliefs("long", 0.9, 1e-5, 0.0, 1e6, 3.0, (0.0, 1.0), (0.0, 6.0), (0.0, 3.0), several=True)

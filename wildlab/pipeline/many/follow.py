@@ -18,7 +18,7 @@ from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_ta
 from wildlab.pipeline.following.follow import order_notes, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
 from wildlab.pipeline.many.places import Places, places_of
-from wildlab.pipeline.scans import scans_of, truths_at
+from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many
 from wildlab.tracking.many.run import in_view
 
@@ -96,7 +96,12 @@ def follow_all(
     told = of_flight(flight, settings)
     following, said = of_targets(told.targets)
     said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
-    notes: list[str] = []
+    there = sensors_of(flight)
+    notes = [
+        f"The settings speak of a sensor {name!r}, which this flight does not have."
+        for name in told.sensors
+        if name not in there
+    ]
     places: dict[str, Places] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
@@ -106,7 +111,9 @@ def follow_all(
         belief, more = of_sensor(flight, looks, told)
         if belief.offset_s:
             looks = scans_of(flight, name, belief.offset_s, source)
-        said += [one for one in more if not one.what.startswith("considered")]
+        said += [one for one in dict.fromkeys(more) if not one.what.startswith("considered")]
+        if any(one.what.startswith("considered") for one in more):
+            notes.append(f"Errors of {name} that last are not considered where many targets are followed.")
         notes += order_notes(looks)
         places[name] = found = places_of(flight, looks, belief, len(places), source)
         if found.without:
@@ -128,8 +135,16 @@ def follow_all(
     )
 
 
+def known_looks(followed: Followed) -> NDArray[np.bool_]:
+    """(N,) looks at which every target's true place is known: elsewhere no track is false."""
+    known = np.ones(len(followed.scans), bool)
+    for way in followed.truth.values():
+        known &= np.isfinite(way).all(axis=1)
+    return known
+
+
 def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Identities | None:
-    """Tracks against the true targets at every look; None without truth.
+    """Tracks against the true targets at the looks of `known_looks`; None where there are none, or no truth.
 
     A target can be seen where it lies in the camera's view, or within reach of any of the sensors. One that
     cannot costs nothing, with a track or without.
@@ -139,12 +154,15 @@ def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Iden
     reach
         Metres by target's name, in place of the sensors' own.
     """
-    if not followed.truth:
+    known = known_looks(followed)
+    if not followed.truth or not known.any():
         return None
     far = max(one.far_m for one in followed.sensors)
     compared = []
     for row, (scan, shown) in enumerate(zip(followed.scans, followed.shown, strict=True)):
-        names = [name for name, way in followed.truth.items() if np.isfinite(way[row]).all()]
+        if not known[row]:
+            continue
+        names = list(followed.truth)
         at = np.array([followed.truth[name][row] for name in names]).reshape(-1, 2)
         distance = np.linalg.norm(at - scan.platform, axis=1)
         limit = np.array([far if reach is None else reach[name] for name in names])

@@ -7,12 +7,14 @@ from matplotlib.ticker import MaxNLocator
 
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.many.follow import CUTOFF_M, Followed
+from wildlab.pipeline.many.follow import CUTOFF_M, Followed, known_looks
 from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
 from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
 
 #: Tracks that have a colour and a name of their own in a map: the longest.
 MOST_NAMED = 6
+#: Letters of a target's name in a chart.
+LONGEST_NAME = 14
 #: Looks farther apart than so many usual ones are no line.
 PAUSE = 8.0
 
@@ -25,6 +27,20 @@ def ways_of(followed: Followed) -> dict[int, Array]:
             ways.setdefault(int(identity), []).append((look.time, float(x[0]), float(x[1])))
     longest = sorted(ways, key=lambda name: (-len(ways[name]), name))
     return {name: np.array(ways[name]) for name in longest}
+
+
+def short(name: object) -> str:
+    """A target's name as far as there is room for it."""
+    text = str(name)
+    return text if len(text) <= LONGEST_NAME else f"{text[: LONGEST_NAME - 1]}…"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def colours_of(followed: Followed) -> dict[object, str]:
@@ -58,8 +74,8 @@ def map_shown(followed: Followed) -> Shown:
     count = len(ways)
     ax.set_title("1 track" if count == 1 else f"{count} tracks")
     map_axes(ax)
-    alt = f"Map in local metres of {count} tracks"
-    alt += f" beside the true ways of {len(followed.truth)} targets." if followed.truth else "."
+    alt = f"Map in local metres of {_many(count, 'track')}"
+    alt += f" beside the true ways of {_many(len(followed.truth), 'target')}." if followed.truth else "."
     rest = "" if count <= MOST_NAMED else f" The {MOST_NAMED} longest have a colour."
     return fig, "map", alt, f"A dot is where a track was first believed.{rest}"
 
@@ -69,27 +85,27 @@ def identities_shown(followed: Followed, lives: Identities) -> Shown:
     names = [name for name, life in lives.targets.items() if life.visible]
     fig, ax = new_figure(5.8, 1.6 + 0.5 * len(names))
     start = followed.scans[0].time
-    times = np.array([scan.time for scan in followed.scans]) - start
+    times = (np.array([scan.time for scan in followed.scans]) - start)[known_looks(followed)]
     tints = colours_of(followed)
     for row, name in enumerate(names):
         on = [one.get(name) for one in lives.followed]
         for identity in dict.fromkeys(one for one in on if one is not None):
             mine = np.array([one == identity for one in on])
             ax.plot(times[mine], np.full(int(mine.sum()), row), "|", color=tints[identity], ms=11, mew=1.6)
-    ax.set_yticks(range(len(names)), [str(name) for name in names])
+    ax.set_yticks(range(len(names)), [short(name) for name in names], parse_math=False)
     ax.set_ylim(-0.6, len(names) - 0.4)
     ax.set_xlabel("time since the first look (s)")
     changes = lives.swaps + lives.breaks
-    ax.set_title("No target changes its track" if not changes else f"Tracks change {changes} times")
-    alt = f"For each of {len(names)} targets the track that is on it at each look; colours are tracks. "
-    alt += "None changes." if not changes else f"They change {changes} times."
+    ax.set_title("No target changes its track" if not changes else f"Tracks change {_times(changes)}")
+    alt = f"For {_many(len(names), 'target')} the track that is on it at each look; colours are tracks. "
+    alt += "None changes." if not changes else f"They change {_times(changes)}."
     return fig, "identities", alt, "A mark is a look with a track on the target; a colour is a track."
 
 
 def wrong_shown(followed: Followed, lives: Identities) -> Shown:
     """GOSPA at each look, and how many targets are missed and tracks false."""
     fig, axes = new_figure(5.8, 4.2, rows=2, sharex=True)
-    times = np.array([scan.time for scan in followed.scans]) - followed.scans[0].time
+    times = (np.array([scan.time for scan in followed.scans]) - followed.scans[0].time)[known_looks(followed)]
     distance = np.array([one.distance for one in lives.gospa])
     axes[0].plot(times, distance, ".", color=SENSOR_COLOURS[0], ms=4)
     axes[0].axhline(distance.mean(), color=INK, lw=1.2, ls="--")

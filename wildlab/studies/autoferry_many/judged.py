@@ -34,8 +34,8 @@ def row_of(lives: Identities | None, case: str, mode: str) -> dict[str, object]:
         "mode": mode,
         "gospa": gospa_of(lives),
         "rmse": rms_error(lives),
-        "tracked": 100 * float(np.mean([life.tracked for life in seen])),
-        "confirm": float(np.median([life.time_to_confirm for life in seen])),
+        "tracked": 100 * float(np.mean([life.tracked for life in seen])) if seen else np.nan,
+        "confirm": _middle([life.time_to_confirm for life in seen]),
         "swaps": lives.swaps,
         "breaks": lives.breaks,
         "false": lives.false_tracks_per_minute,
@@ -44,6 +44,12 @@ def row_of(lives: Identities | None, case: str, mode: str) -> dict[str, object]:
         if on
         else np.nan,
     }
+
+
+def _middle(times: list[float]) -> float:
+    """Median of the boats that were followed; NaN where none was."""
+    known = [one for one in times if np.isfinite(one)]
+    return float(np.median(known)) if known else float("nan")
 
 
 def judge_all(flights: Mapping[str, Flight], tuned: Mapping[str, list[Tuned]]) -> pd.DataFrame:
@@ -141,8 +147,8 @@ def fusion(own: pd.DataFrame) -> str:
         return ""
     better = int((wide["both"] < wide["radar"]).sum())
     return (
-        f"Both sensors together are nearer than the radar alone, asked for boats as far away, in {better} of "
-        f"{len(wide)} scenarios."
+        f"Both sensors together have a smaller GOSPA than the radar alone, asked for boats as far away, in "
+        f"{better} of {len(wide)} scenarios."
     )
 
 
@@ -168,9 +174,9 @@ def caption() -> str:
     """What the columns of the table of scenarios mean."""
     return (
         f"{caption_of_gospa()} Boats are asked for up to {RADAR_REACH_M:g} m with the radar, and as far as "
-        "the lidar sees one of their size without it. Confirmed within: median over the boats. Mean NEES / 2 "
-        "is 1 where errors are as large as the tracks say. Swaps: tracks that go over to another boat. "
-        "Breaks: boats that get a new track."
+        "the lidar sees one of their size without it. Confirmed within: median over the boats that were. "
+        "Mean NEES / 2 is 1 where errors are as large as the tracks say. Swaps: tracks that go over to "
+        "another boat. Breaks: boats that get a new track."
     )
 
 

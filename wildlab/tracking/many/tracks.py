@@ -238,7 +238,7 @@ def judged_by_motion(tracks: Tracks, time: float, targets: TargetBeliefs) -> Tra
             continue
         gone = float(np.linalg.norm(recent[-1, 1:] - recent[0, 1:]))
         lasted = float(recent[-1, 0] - recent[0, 0])
-        if gone > targets.moves_m and gone / lasted > STAYS_M_S:
+        if gone > targets.moves_m and gone > STAYS_M_S * lasted:
             moving[row] = True
         elif lasted > 0.8 * targets.over_s and gone < 0.6 * targets.moves_m:
             moving[row] = False
