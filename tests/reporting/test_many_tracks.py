@@ -10,6 +10,7 @@ import pytest
 
 from wildlab.evaluation.identities import Identities, TargetLife, TrackLife
 from wildlab.evaluation.sets import gospa
+from wildlab.pipeline.following.beliefs import Said
 from wildlab.reporting import many_tracks as words
 from wildlab.tracking.many import POINT, Shown
 
@@ -145,3 +146,15 @@ def test_looks_without_truth_and_no_time_at_all_are_told() -> None:
     assert "Judged are 61 of 99 looks: every true place is known there." in text
     text, *_ = said(followed(), lives(false_tracks_per_minute=float("nan")))
     assert "nan" not in text and "0 of 2 tracks are mostly on nothing" in text
+
+
+def test_names_are_only_text() -> None:
+    said_of = [
+        Said("targets", "kinds by size", "**bold** `code`", "stated"),
+        Said("radar", "x", "1", "stated"),
+    ]
+    table = words.told_table([said_of[1], said_of[0], said_of[1]])
+    assert table["of"].tolist() == ["radar", "radar", "targets"]
+    assert not set("*`") & set(table["value"].iloc[2])
+    text, *_ = said(followed(), lives(targets={"**x**": TargetLife(61, 0.0, np.nan, 0, 0)}))
+    assert "**" not in text

@@ -95,6 +95,13 @@ def test_no_place_is_farther_from_the_named_point_than_is_said(
     assert cell_of(cell.latitude_deg, cell.longitude_deg, size, reach) == cell
 
 
+def test_what_is_rounded_up_again_and_again_is_within_what_is_said() -> None:
+    """0.04455 goes to 0.045, to 0.05 and to 0.1: more than half a cell."""
+    cell = cell_of(0.04455, 0.04455, 0.1)
+    assert (cell.latitude_deg, cell.longitude_deg) == (0.1, 0.1)
+    assert half_diagonal(0.1, 0.1) < GEOD.inv(0.04455, 0.04455, 0.1, 0.1)[2] <= cell.uncertainty_m
+
+
 @given(st.floats(-90, 90), st.floats(-180, 180))
 def test_a_coarse_copy_beside_a_finer_one_tells_nothing_more(latitude: float, longitude: float) -> None:
     """The coarse cell follows from the middle of the finer one."""

@@ -8,7 +8,6 @@ from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
-from wildlab.reporting.tracking import said_table
 
 
 def head_section(report: Report, followed: Followed, lives: Identities | None) -> None:
@@ -41,9 +40,9 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
             words.targets_table(lives),
             columns=words.TARGETS,
             digits={"tracked": 0, "confirm": 1, "looks": 0},
-            caption="In reach: in the camera's view, or no farther than any sensor sees. First after: from "
-            "the first look in reach to the first with a track. New tracks: another one than before, which "
-            "was on no target.",
+            caption="In reach: named by a detection, in the camera's view, or no farther than any sensor "
+            "sees. First after: from the first look in reach to the first with a track. New tracks: another "
+            "one than before, which was on no target.",
         )
         report.table(
             words.parts_table(lives.gospa),
@@ -72,7 +71,7 @@ def told_section(report: Report, followed: Followed) -> None:
     """What the tracker was told, and by whom."""
     report.section("What the tracker was told", words.assumed_sentence(followed.said))
     headings = {"of": "of", "what": "what", "value": "value", "source": "from"}
-    report.table(said_table(followed.said), columns=headings)
+    report.table(words.told_table(followed.said), columns=headings)
 
 
 def end_section(report: Report, followed: Followed) -> None:

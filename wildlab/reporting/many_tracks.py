@@ -80,7 +80,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
     shares = {name: life.tracked for name, life in seen.items()}
     least = min(shares, key=lambda name: shares[name])
     if len(seen) > 1:
-        first = f"Of {len(seen)} targets in reach, {least} has a track at the fewest looks, at "
+        first = f"Of {len(seen)} targets in reach, {plain(str(least))} has a track at the fewest looks, at "
     else:
         first = "The target in reach has a track at "
     off = f"; tracks are off by {length(rms_error(lives))} (RMS of those within {CUTOFF_M:g} m)"
@@ -94,7 +94,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         said.append(f"Judged are {len(lives.gospa)} of {looks} looks: every true place is known there.")
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
-        said.append(f"Never followed: {', '.join(map(str, lost))}.")
+        said.append(f"Never followed: {', '.join(plain(str(name)) for name in lost)}.")
     return said, _level(lives, shares)
 
 
@@ -170,7 +170,7 @@ def targets_table(lives: Identities) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
-                "target": str(name),
+                "target": plain(str(name)),
                 "looks": life.visible,
                 "tracked": 100 * life.tracked,
                 "confirm": life.time_to_confirm,
@@ -207,7 +207,7 @@ def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
             "looks": len(span),
         }
         if len(hulls) > 1:
-            row["kind"] = hulls[int(np.argmax(kinds))]
+            row["kind"] = plain(hulls[int(np.argmax(kinds))])
         if lives is not None:
             # One that was there only while a true place was not known is not judged.
             life = lives.tracks.get(identity)
@@ -242,6 +242,22 @@ def parts_table(found: Sequence[Gospa]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def told_table(said: Sequence[Said]) -> pd.DataFrame:
+    """Every value, subject by subject; a name in it is only text."""
+    subjects = list(dict.fromkeys(one.subject for one in said))
+    return pd.DataFrame(
+        [
+            {"of": plain(one.subject), "what": one.what, "value": plain(one.value), "source": one.source}
+            for one in sorted(said, key=lambda one: subjects.index(one.subject))
+        ]
+    )
+
+
+def plain(text: str) -> str:
+    """A name without the signs by which a page sets words bold or as code."""
+    return text.replace("*", "∗").replace("`", "ˋ")
 
 
 def assumed_sentence(said: Sequence[Said]) -> str:

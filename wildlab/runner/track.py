@@ -91,14 +91,7 @@ def track_flight(
         its_source = source if source in other.nav else None
         tuned = tune_flight(other, wanted, stated, cast(Against | None, against), its_source)
     studies = load_studies(notebooks / "studies.toml")
-    place = reports / f"{flight.name}-tracking" if into is None else into
-    if place.name in studies and into is None:
-        raise WildlabError(
-            f"the flight is named {flight.name!r} like a study, whose report it would replace",
-            "give the flight another name in flight.toml, or the report another folder with --into",
-        )
-    refuse_other_flight(folder, place)
-    place.parent.mkdir(parents=True, exist_ok=True)
+    place = place_of(flight, folder, "tracking", into, reports, studies)
     job = tracking_job(
         flight,
         place.parent,
@@ -112,9 +105,41 @@ def track_flight(
         source=source,
         smooth=smooth,
     )
-    if into is None:
-        return run_all([[job]], [], studies, place.parent, console)[0]
-    # A folder of one's own gets this report and no list of others.
+    return run_alone(job, studies, place.parent, console, listed=into is None)
+
+
+def place_of(
+    flight: Flight,
+    folder: Path,
+    kind: str,
+    into: Path | None,
+    reports: Path,
+    studies: dict[str, StudyEntry],
+) -> Path:
+    """The folder of a report on a flight: ``into``, else ``<reports>/<name>-<kind>``; its parent is made.
+
+    Raises
+    ------
+    WildlabError
+        Where a study or another flight has its report there.
+    """
+    place = reports / f"{flight.name}-{kind}" if into is None else into
+    if place.name in studies and into is None:
+        raise WildlabError(
+            f"the flight is named {flight.name!r} like a study, whose report it would replace",
+            "give the flight another name in flight.toml, or the report another folder with --into",
+        )
+    refuse_other_flight(folder, place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    return place
+
+
+def run_alone(
+    job: Job, studies: dict[str, StudyEntry], reports: Path, console: Console | None, *, listed: bool
+) -> Outcome:
+    """Run one report; where it is not ``listed``, its folder is one's own and gets no list of others."""
+    if listed:
+        return run_all([[job]], [], studies, reports, console)[0]
     with shown(console) if console is not None else nullcontext() as listen:
         return run_jobs([job], listen=listen)[0]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,13 @@ from wildlab.flight.following import read_settings
 from wildlab.flight.store import load_flight
 from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS, REPORTS
+from wildlab.pipeline.following.beliefs import of_flight
 from wildlab.pipeline.following.follow import refuse_unusable
+from wildlab.pipeline.many.beliefs import refuse_unfit_hulls
 from wildlab.runner.catalogue import StudyEntry, load_studies
-from wildlab.runner.evaluate import refuse_other_flight
-from wildlab.runner.processes.progress import shown
-from wildlab.runner.processes.scheduling import Outcome, run_jobs
-from wildlab.runner.run import make_job, run_all
+from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.run import make_job
+from wildlab.runner.track import place_of, run_alone
 
 NOTEBOOK = "tracking-many.ipynb"
 
@@ -72,15 +72,9 @@ def track_many(
     flight = load_flight(folder)
     stated = None if settings is None else read_settings(settings)
     refuse_unusable(flight, stated, (), (), sensors, source)
+    refuse_unfit_hulls(of_flight(flight, stated))
     studies = load_studies(notebooks / "studies.toml")
-    place = reports / f"{flight.name}-many" if into is None else into
-    if place.name in studies and into is None:
-        raise WildlabError(
-            f"the flight is named {flight.name!r}, and its report would replace that of a study",
-            "give the flight another name in flight.toml, or the report another folder with --into",
-        )
-    refuse_other_flight(folder, place)
-    place.parent.mkdir(parents=True, exist_ok=True)
+    place = place_of(flight, folder, "many", into, reports, studies)
     parameters: dict[str, Any] = {
         "settings": "" if stated is None else dump_toml(stated.model_dump(exclude_none=True)),
         "sensors": list(sensors),
@@ -100,8 +94,4 @@ def track_many(
         name=place.name,
         again=" ".join(["wildlab track", flight.name, "--many", *options]),
     )
-    if into is None:
-        return run_all([[job]], [], studies, place.parent, console)[0]
-    # A folder of one's own gets this report and no list of others.
-    with shown(console) if console is not None else nullcontext() as listen:
-        return run_jobs([job], listen=listen)[0]
+    return run_alone(job, studies, place.parent, console, listed=into is None)

@@ -32,9 +32,9 @@ def test_what_was_told_says_where_it_is_from() -> None:
     text = "[targets.many]\nbirth = 0.2\n[sensors.radar.many]\ndetection = 0.7\n"
     said = follow_all(robot_flight(kind="position"), settings=parse_settings(text)).said
     by_words = {one.what: one for one in said}
-    assert by_words["a detection of nothing known is a new target, probability"].source == "stated"
-    assert by_words["detects what is in view, probability"].value == "0.7"
-    assert by_words["or farther than"].source == "estimated here"
+    assert by_words["probability that a detection of nothing known is a new target"].source == "stated"
+    assert by_words["probability that what is in view is detected"].value == "0.7"
+    assert by_words["distance above which it sees nothing"].source == "estimated here"
     assert by_words["how long a target is about"].source == "assumed"
 
 
@@ -44,7 +44,7 @@ def test_without_truth_there_is_nothing_to_compare() -> None:
 
 
 def test_a_target_out_of_reach_costs_nothing() -> None:
-    followed = follow_all(robot_flight(kind="position"))
+    followed = follow_all(robot_flight(kind="position", labelled=False))
     lives = judged(followed, {"boat": 1.0})
     assert lives is not None and lives.targets["boat"].visible == 0
     assert max(one.distance for one in lives.gospa) == 0
@@ -65,11 +65,26 @@ def test_bearings_are_left_out_with_a_word() -> None:
 
 
 def test_numbers_for_hulls_that_there_are_not() -> None:
-    text = "[sensors.radar.many]\nrough_m = [1.0, 2.0]\n"
-    with pytest.raises(
-        WildlabError, match="rough_m of the sensor 'radar' has 2 values, and there are 1 kinds"
-    ):
-        follow_all(robot_flight(kind="position"), settings=parse_settings(text))
+    words = "rough_m of the sensor 'radar' has 2 values, and kinds of hulls there are 1"
+    settings = parse_settings("[sensors.radar.many]\nrough_m = [1.0, 2.0]\n")
+    with pytest.raises(WildlabError, match=words):
+        follow_all(robot_flight(kind="position"), settings=settings)
+
+
+def test_a_sensor_that_reaches_less_far_than_it_is_blind() -> None:
+    settings = parse_settings("[sensors.radar.many]\nnear_m = 5000.0\n")
+    with pytest.raises(WildlabError, match="sees nothing nearer than 5000 m or farther than"):
+        follow_all(robot_flight(kind="position"), settings=settings)
+
+
+def test_only_what_an_image_shows_or_a_detection_names_could_be_seen() -> None:
+    followed = follow_all(robot_flight(kind="position", labelled=False))
+    away = [scan._replace(sees=lambda at: np.zeros(len(at), bool)) for scan in followed.scans]
+    lives = judged(followed._replace(scans=away))
+    assert lives is not None and lives.targets["boat"].visible == 0
+    named = [frozenset({"boat"}) if row < 30 else frozenset() for row in range(len(away))]
+    lives = judged(followed._replace(scans=away, named=named))
+    assert lives is not None and lives.targets["boat"].visible == 30
 
 
 def test_no_track_leaves_an_empty_table() -> None:

@@ -8,10 +8,16 @@ import pytest
 from tests.pipeline.robots import boat, robot, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.mount import Mount
 from wildlab.pipeline.following.beliefs import of_flight, of_sensor
-from wildlab.pipeline.many.places import Places, places_of
-from wildlab.pipeline.scans import scans_of
+from wildlab.pipeline.georeference import georeference, observe
+from wildlab.pipeline.many.places import Places, places_of, sees_of
+from wildlab.pipeline.scans import Scans, scans_of
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.many import Scan
 
 
 def places(flight: Flight, sensor: str = "radar", source: str | None = None) -> Places:
@@ -26,7 +32,7 @@ def test_ranges_and_bearings_lie_where_the_boat_is() -> None:
     for scan in found.scans[::40]:
         assert np.allclose(scan.platform, robot(np.array([scan.time]))[0], atol=0.01)
         assert np.allclose(scan.z, boat(np.array([scan.time])), atol=0.02)
-        assert scan.view is None
+        assert scan.sees is None
 
 
 def test_covariances_are_those_of_errors_drawn_at_random() -> None:
@@ -46,24 +52,56 @@ def test_positions_are_taken_as_they_are() -> None:
     found = places(robot_flight(kind="position", clutter=2, labelled=False, manifest=noise))
     assert np.allclose(found.scans[0].R, 1.5**2 * np.eye(2))
     assert {len(one.z) for one in found.scans} == {3}
-    assert [len(ids) for ids in found.ids] == [3] * len(found.scans)
+    assert found.area(100.0) == pytest.approx(np.pi * 100.0**2)
+    assert set(found.named) == {frozenset()}
+    assert set(places(robot_flight(kind="position", manifest=noise)).named) == {frozenset({"boat"})}
 
 
 @pytest.mark.slow
-def test_pixels_are_where_georeferencing_puts_them_and_images_show_a_part_of_the_ground() -> None:
+def test_pixels_are_where_georeferencing_puts_them() -> None:
     flight = simulate_twin("large-ship", 1)
-    name = str(flight.table("detections")["source"].iloc[0])
-    found = places(flight, name, "autopilot")
-    from wildlab.pipeline.georeference import georeference, observe
-
+    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
+    found = places(flight, scans.sensor, "autopilot")
     points = georeference(flight, observe(flight, "autopilot"), np.random.default_rng(0))
     points = points.set_index("detection_id")
-    for scan, ids in list(zip(found.scans, found.ids, strict=True))[::50]:
-        if ids:
-            assert np.allclose(scan.z, points.loc[ids, ["north_m", "east_m"]].to_numpy(float))
-            assert np.allclose(scan.R[:, 0, 1], points.loc[ids, "cov_ne"].to_numpy(float))
-    views = [one.view for one in found.scans if one.view is not None]
-    assert views and 100 < found.area(1e9) < 1e6
+    rows = np.flatnonzero(np.isfinite(scans.platform).all(axis=1))
+    for scan, row in list(zip(found.scans, rows, strict=True))[::50]:
+        ids = [one for one in scans.ids[row] if one]
+        assert np.allclose(scan.z, points.loc[ids, ["north_m", "east_m"]].to_numpy(float))
+        assert np.allclose(scan.R[:, 0, 1], points.loc[ids, "cov_ne"].to_numpy(float))
+
+
+@pytest.mark.parametrize("tilt_deg", [10.0, 60.0, 85.0])
+def test_an_image_shows_what_lies_under_its_pixels(tilt_deg: float) -> None:
+    """Also where its upper edge looks past the horizon: rays of pixels are the truth."""
+    camera = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
+    tilt = np.radians(tilt_deg)
+    R_nb = np.array([[[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]]])
+    poses = CameraPoses(camera, Mount("down"), np.array([[5.0, -8.0, -60.0]]), R_nb)
+    empty = np.zeros((1, 0, 2))
+    scans = Scans("eye", "pixel", np.zeros(1), empty, np.array([[5.0, -8.0]]), np.zeros((1, 2)), poses=poses,
+                  plane_down=np.array([3.0]))  # fmt: skip
+    sees = sees_of(scans, 0)
+    assert sees is not None
+    rng = np.random.default_rng(0)
+    uv = rng.uniform((-300, -300), (940, 812), (2000, 2))
+    ground = georeference_pixels(poses.take(np.zeros(len(uv), int)), uv, np.full(len(uv), 3.0))
+    met = np.isfinite(ground).all(axis=1)
+    inside = (uv >= 0).all(axis=1) & (uv <= (640, 512)).all(axis=1)
+    assert met.sum() > 200 and np.array_equal(sees(ground[met, :2]), inside[met])
+    assert not sees(np.array([[-5000.0, -8.0]])).any(), "behind the camera"
+
+
+def test_how_much_ground_an_image_covers() -> None:
+    """Straight down from 60 m: 640 x 512 pixels of 60 / 700 m."""
+    camera = Camera(640, 512, 700.0, 700.0, 320.0, 256.0)
+    poses = CameraPoses(camera, Mount("down"), np.array([[0.0, 0.0, -60.0]]), np.eye(3)[None])
+    scans = Scans("eye", "pixel", np.zeros(1), np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 2)),
+                  poses=poses, plane_down=np.zeros(1))  # fmt: skip
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
+    look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(scans, 0))
+    found = Places("eye", "pixel", [look], [frozenset()], 1.0, 0)
+    assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", ["bearing", "velocity"])

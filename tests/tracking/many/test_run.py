@@ -55,12 +55,15 @@ def test_one_target_without_clutter_is_the_kalman_filter(seed: int) -> None:
         assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
 
 
-def test_two_that_cross_keep_their_names() -> None:
+@pytest.mark.parametrize("density", [0.1, 0.3])
+def test_two_that_cross_keep_their_names(density: float) -> None:
+    """Also where velocities are known badly: then both are still seen, each by its own measurement."""
+    targets = POINTS._replace(density=density)
     starts, velocities = np.array([[-30.0, -5.0], [-30.0, 5.0]]), np.array([[2.0, 0.4], [2.0, -0.4]])
     kept = []
     for seed in range(30):
         truth = lines(starts, velocities, 40)
-        shown = run_many(looks(truth, np.random.default_rng(seed), clutter=1, seen=0.95), [EYE], POINTS)
+        shown = run_many(looks(truth, np.random.default_rng(seed), clutter=1, seen=0.95), [EYE], targets)
         begin, end = shown[8], shown[-1]
         names = []
         for at, one in ((8, begin), (-1, end)):
@@ -83,6 +86,40 @@ def test_what_hides_for_a_while_keeps_its_name() -> None:
     shown = run_many(scans, [EYE], POINTS)
     assert [len(one.identity) for one in shown[34:38]] == [0] * 4, "not shown while nobody sees it"
     assert shown[29].identity.tolist() == shown[45].identity.tolist() != []
+
+
+def test_what_comes_to_rest_is_not_shown_any_more() -> None:
+    rng = np.random.default_rng(9)
+    way = np.concatenate([np.arange(0, 40, 2.0), np.full(40, 40.0)])
+    scans = looks(np.stack([way, np.zeros(60)], axis=1)[:, None], rng)
+    shown = run_many(scans, [EYE], POINTS._replace(moves_m=10.0))
+    assert len(shown[18].identity) == 1 and len(shown[-1].identity) == 0
+
+
+def test_what_is_not_in_view_is_not_missed() -> None:
+    """The camera turns away for ten looks: a target that was sure stays as sure."""
+    scans = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 30), np.random.default_rng(7))
+    away = [
+        one
+        if one.time < 15
+        else one._replace(z=one.z[:0], R=one.R[:0], sees=lambda at: np.zeros(len(at), bool))
+        for one in scans
+    ]
+    blind = [one if one.time < 15 else one._replace(z=one.z[:0], R=one.R[:0]) for one in scans]
+    existence = [
+        [tracks.existence.max() for tracks, _ in follow_many(these, [EYE], POINTS)] for these in (away, blind)
+    ]
+    assert existence[0][-1] == pytest.approx(existence[0][14]) and existence[1][-1] < 0.9
+
+
+def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> None:
+    """A slow sensor saw it; a fast one with little patience, which cannot, does not make it flicker."""
+    slow = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 12), np.random.default_rng(7))
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
+    fast = [Scan(t, 1, np.array([0.0, -500.0]), *nothing) for t in np.arange(0.25, 12, 0.25)]
+    eyes = [EYE._replace(patience_s=3.0), EYE._replace(patience_s=0.1, far_m=10.0)]
+    shown = [one for one in run_many([*slow, *fast], eyes, POINTS) if one.time > 6]
+    assert {len(one.identity) for one in shown} == {1}
 
 
 def test_order_of_scans_does_not_matter() -> None:

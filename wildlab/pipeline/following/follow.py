@@ -90,13 +90,7 @@ def follow_targets(
     WildlabError
         Where there is no such sensor, target or filter, no detection, no time, or noise nobody knows.
     """
-    if flight.manifest.time.kind != "utc":
-        raise WildlabError(
-            "the photos carry no time, and a track is over time",
-            "import the flight with times",
-            file=flight.folder,
-            field="time.kind",
-        )
+    refuse_without_times(flight)
     told = of_flight(flight, settings)
     believed, said = of_targets(told.targets)
     if tuned is not None and tuned.density is not None and told.targets.acceleration_m_s_sqrt_s is None:
@@ -148,6 +142,23 @@ def follow_targets(
             parts = {name: (scans[name], beliefs[name], looked[name]) for name in wanted}
             tracks += follow_together(flight, parts, target, believed, list(dict.fromkeys([WHITE, *names])))
     return Followed(tracks, scans, beliefs, believed, said, notes, any_truth)
+
+
+def refuse_without_times(flight: Flight) -> None:
+    """Refuse a flight whose photos carry no time.
+
+    Raises
+    ------
+    WildlabError
+        Of such a flight.
+    """
+    if flight.manifest.time.kind != "utc":
+        raise WildlabError(
+            "the photos carry no time, and a track is over time",
+            "import the flight with times",
+            file=flight.folder,
+            field="time.kind",
+        )
 
 
 def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[str]:
@@ -285,13 +296,7 @@ def refuse_unusable(
     WildlabError
         As `follow_targets`.
     """
-    if flight.manifest.time.kind != "utc":
-        raise WildlabError(
-            "the photos carry no time, and a track is over time",
-            "import the flight with times",
-            file=flight.folder,
-            field="time.kind",
-        )
+    refuse_without_times(flight)
     believed, _ = of_targets(of_flight(flight, settings).targets)
     _refuse_unknown_filters(filters)
     known: set[str] = set()

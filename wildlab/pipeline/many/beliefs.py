@@ -30,19 +30,24 @@ HERE = "estimated here"
 
 _WORDS = {
     "lifetime_s": ("how long a target is about", " s"),
-    "birth": ("a detection of nothing known is a new target, probability", ""),
-    "visible_s": ("in sight at a time", " s"),
-    "hidden_s": ("out of sight at a time", " s"),
-    "gate": ("gate, standard deviations", ""),
-    "confirmed": ("a track is believed from a probability of existence of", ""),
-    "hits": ("and from so many scans with a detection", ""),
-    "shown": ("and shown while that is above", ""),
-    "forgotten": ("a track ends below", ""),
-    "lost_m": ("or where its place is known no better than", " m"),
-    "fastest_m_s": ("nothing is faster than", " m/s"),
-    "moves_m": ("a track is shown once it has moved by", " m"),
-    "over_s": ("within", " s"),
-    "apart_m": ("two tracks nearer to each other that move alike are one", " m"),
+    "birth": ("probability that a detection of nothing known is a new target", ""),
+    "visible_s": ("how long a target is in sight at a time", " s"),
+    "hidden_s": ("how long it is out of sight", " s"),
+    "gate": ("gate, in standard deviations", ""),
+    "confirmed": ("probability of existence from which a track is believed", ""),
+    "hits": ("looks with a detection from which a track is believed", ""),
+    "shown": ("probability of existence above which it is shown", ""),
+    "forgotten": ("probability of existence below which a track ends", ""),
+    "lost_m": ("standard deviation of its place above which a track ends", " m"),
+    "fastest_m_s": ("speed that no target has", " m/s"),
+    "moves_m": ("way after which a track is shown", " m"),
+    "over_s": ("time within which it has to go that way", " s"),
+    "apart_m": ("distance within which two tracks that move alike are one", " m"),
+}
+_HULLS = {
+    "rough_m": "which part of a hull is seen, SD of each axis, by kind",
+    "along_m": "the same along its heading",
+    "near_side_m": "how far on this side of its middle a hull is seen, by kind",
 }
 
 
@@ -69,8 +74,9 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     Raises
     ------
     WildlabError
-        Where a sensor has another number of values for the hulls than there are hulls.
+        Where a sensor has another number of values for the hulls than there are hulls, or sees nothing.
     """
+    refuse_unfit_hulls(settings)
     stated = settings.targets.many or ManyTargetsPart()
     usual = read_settings(DATA / "settings" / "many.toml").targets.many
     if usual is None:
@@ -120,34 +126,72 @@ def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBel
         return value
 
     distance = looks.distances()
-    near = one("near_m", "sees nothing nearer than", " m", 0.0, ASSUMED)
-    far = one("far_m", "or farther than", " m", BEYOND * float(distance.max(initial=1.0)), HERE)
+    near = one("near_m", "distance below which it sees nothing", " m", 0.0, ASSUMED)
+    far = one(
+        "far_m", "distance above which it sees nothing", " m", BEYOND * float(distance.max(initial=1.0)), HERE
+    )
     # What is left over if every scan had one target: a guess that is too high where there are many.
     each = len(distance) / max(len(looks.scans), 1)
     area = looks.area(far)
     clutter = max(each - 1.0, LEAST_FALSE) / area
+    if near >= far:
+        raise WildlabError(
+            f"the sensor {looks.sensor!r} sees nothing nearer than {near:g} m or farther than {far:g} m",
+            "state near_m and far_m so that something lies between them",
+            field=f"sensors.{looks.sensor}.many",
+        )
     interval = looks.interval_s
+    hull_values = {name: getattr(stated, name, ()) or (0.0,) * kinds for name in _HULLS}
     found = SensorBeliefs(
         looks.sensor,
-        one("detection", "detects what is in view, probability", "", DETECTION, ASSUMED),
-        one("clutter_per_m2", "false detections a look on a square metre", "", clutter, HERE),
+        one("detection", "probability that what is in view is detected", "", DETECTION, ASSUMED),
+        one("clutter_per_m2", "false detections in a look on a square metre", "", clutter, HERE),
         near,
         far,
-        one("patience_s", "shown unseen for", " s", max(LOOKS_SHOWN * interval, SECONDS_SHOWN), ASSUMED),
-        _of_hulls(stated, "rough_m", kinds, looks.sensor),
-        _of_hulls(stated, "along_m", kinds, looks.sensor),
-        _of_hulls(stated, "near_side_m", kinds, looks.sensor),
+        one(
+            "patience_s",
+            "how long a target is shown after it saw it last",
+            " s",
+            max(LOOKS_SHOWN * interval, SECONDS_SHOWN),
+            ASSUMED,
+        ),
+        hull_values["rough_m"],
+        hull_values["along_m"],
+        hull_values["near_side_m"],
         bool(stated is not None and stated.several),
+    )
+    for name, what in _HULLS.items():
+        own = stated is not None and bool(getattr(stated, name))
+        values = ", ".join(f"{value:.3g}" for value in hull_values[name])
+        said.append(Said(looks.sensor, what, f"{values} m", STATED if own else ASSUMED))
+    said.append(
+        Said(
+            looks.sensor,
+            "whether one hull may give several detections",
+            "yes" if found.several else "no",
+            STATED if stated is not None and stated.several is not None else ASSUMED,
+        )
     )
     return found, said
 
 
-def _of_hulls(stated: object, name: str, kinds: int, sensor: str) -> tuple[float, ...]:
-    own: tuple[float, ...] = getattr(stated, name, ())
-    if own and len(own) != kinds:
-        raise WildlabError(
-            f"{name} of the sensor {sensor!r} has {len(own)} values, and there are {kinds} kinds of hulls",
-            "give one for each of [[targets.many.hulls]]",
-            field=f"sensors.{sensor}.many.{name}",
-        )
-    return own or (0.0,) * kinds
+def refuse_unfit_hulls(settings: Settings) -> None:
+    """Refuse numbers for kinds of hulls that there are not.
+
+    Raises
+    ------
+    WildlabError
+        Where a sensor has another number of values for the hulls than there are hulls.
+    """
+    many = settings.targets.many
+    kinds = max(len(many.hulls), 1) if many is not None else 1
+    for sensor, part in settings.sensors.items():
+        for name in _HULLS:
+            own = getattr(part.many, name)
+            if own and len(own) != kinds:
+                values = "1 value" if len(own) == 1 else f"{len(own)} values"
+                raise WildlabError(
+                    f"{name} of the sensor {sensor!r} has {values}, and kinds of hulls there are {kinds}",
+                    "give one for each of [[targets.many.hulls]]",
+                    field=f"sensors.{sensor}.many.{name}",
+                )

@@ -15,12 +15,11 @@ from wildlab.evaluation.identities import Scan as Compared
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
-from wildlab.pipeline.following.follow import order_notes, sensors_with_detections
+from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
 from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many
-from wildlab.tracking.many.run import in_view
 
 Array = NDArray[np.float64]
 
@@ -33,8 +32,9 @@ class Followed(NamedTuple):
 
     Attributes
     ----------
-    scans, shown
-        Looks of all sensors in order of time, and what is believed after each.
+    scans, named, shown
+        Looks of all sensors in order of time, the targets that detections of each name, and what is believed
+        after it.
     places
         By sensor.
     sensors, targets
@@ -48,6 +48,7 @@ class Followed(NamedTuple):
     """
 
     scans: list[Scan]
+    named: list[frozenset[str]]
     shown: list[Shown]
     places: dict[str, Places]
     sensors: list[SensorBeliefs]
@@ -86,13 +87,7 @@ def follow_all(
         Where there is no such sensor, no detection, no time, noise nobody knows, or no detection tells a
         place.
     """
-    if flight.manifest.time.kind != "utc":
-        raise WildlabError(
-            "the photos carry no time, and a track is over time",
-            "import the flight with times",
-            file=flight.folder,
-            field="time.kind",
-        )
+    refuse_without_times(flight)
     told = of_flight(flight, settings)
     following, said = of_targets(told.targets)
     said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
@@ -124,14 +119,24 @@ def follow_all(
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
     beliefs = of_many(told, following, list(places.values()))
-    scans = sorted((scan for one in places.values() for scan in one.scans), key=lambda scan: scan.time)
+    pairs = [pair for one in places.values() for pair in zip(one.scans, one.named, strict=True)]
+    pairs.sort(key=lambda pair: pair[0].time)
+    scans = [scan for scan, _ in pairs]
     shown = run_many(scans, beliefs.sensors, beliefs.targets)
     truth = {}
     if flight.truth is not None and len(flight.truth):
         times = np.array([scan.time for scan in scans])
         truth = {one.target: one.position for one in truths_at(flight, times)}
     return Followed(
-        scans, shown, places, beliefs.sensors, beliefs.targets, truth, [*said, *beliefs.said], notes
+        scans,
+        [names for _, names in pairs],
+        shown,
+        places,
+        beliefs.sensors,
+        beliefs.targets,
+        truth,
+        [*said, *beliefs.said],
+        notes,
     )
 
 
@@ -146,8 +151,8 @@ def known_looks(followed: Followed) -> NDArray[np.bool_]:
 def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Identities | None:
     """Tracks against the true targets at the looks of `known_looks`; None where there are none, or no truth.
 
-    A target can be seen where it lies in the camera's view, or within reach of any of the sensors. One that
-    cannot costs nothing, with a track or without.
+    A target can be seen where a detection names it, and where it lies in the camera's view, or within reach
+    of any of the sensors. One that cannot costs nothing, with a track or without.
 
     Parameters
     ----------
@@ -167,8 +172,9 @@ def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Iden
         distance = np.linalg.norm(at - scan.platform, axis=1)
         limit = np.array([far if reach is None else reach[name] for name in names])
         visible = distance <= limit
-        if scan.view is not None:
-            visible &= in_view(scan.view, at)
+        if scan.sees is not None:
+            visible &= scan.sees(at)
+        visible |= np.array([name in followed.named[row] for name in names])
         compared.append(
             Compared(
                 scan.time,

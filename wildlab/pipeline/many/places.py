@@ -10,16 +10,29 @@ from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.flight.store import Flight
-from wildlab.geometry.georeference import georeference_pixels
+from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.many import Scan
+from wildlab.tracking.many.beliefs import Sees
 
 Array = NDArray[np.float64]
 
 #: Kinds of detections that tell a place.
 ABLE = ("position", "range-bearing", "pixel")
+#: Looks, and places about the platform, by which it is found how much of the ground an image shows.
+MOST_LOOKS, PLACES = 50, 4000
+
+
+def _disc(count: int) -> Array:
+    """(count, 2) places of a disc of radius one, evenly spread: a spiral whose turns never fall in line."""
+    number = np.arange(count) + 0.5
+    angle = np.pi * (3 - np.sqrt(5)) * number
+    return np.asarray(np.sqrt(number / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+_DISC = _disc(PLACES)
 
 
 class Places(NamedTuple):
@@ -31,8 +44,8 @@ class Places(NamedTuple):
         Its name, and what it detects.
     scans
         N looks; ``sensor`` of each is ``order``.
-    ids
-        For each look the names of its detections, in their order.
+    named
+        For each look the targets that its detections name: never told to the tracker.
     interval_s
         The usual time between two.
     without
@@ -42,7 +55,7 @@ class Places(NamedTuple):
     sensor: str
     kind: str
     scans: list[Scan]
-    ids: list[list[str]]
+    named: list[frozenset[str]]
     interval_s: float
     without: int
 
@@ -53,9 +66,15 @@ class Places(NamedTuple):
         )
 
     def area(self, far: float) -> float:
-        """Square metres that one look covers: of the camera's view, else all around as far as it sees."""
-        views = [_area(one.view) for one in self.scans if one.view is not None]
-        return float(np.median(views)) if views else float(np.pi * far**2)
+        """Square metres that one look covers: of all around as far as it sees, what its camera shows."""
+        disc = float(np.pi * far**2)
+        looked = [one for one in self.scans if one.sees is not None]
+        shares = [
+            float(one.sees(one.platform + far * _DISC).mean())
+            for one in looked[:: max(len(looked) // MOST_LOOKS, 1)]
+            if one.sees is not None
+        ]
+        return disc * max(float(np.median(shares)), 1 / len(_DISC)) if shares else disc
 
 
 def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source: str | None) -> Places:
@@ -90,17 +109,16 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
     else:
         z, R = _of_ranges(scans, beliefs)
     usable = np.isfinite(scans.platform).all(axis=1)
-    views = _views(scans)
-    looks, ids, without = [], [], 0
+    looks, named, without = [], [], 0
     for row in np.flatnonzero(usable):
         there = np.isfinite(scans.detections[row]).all(axis=-1)
         good = there & np.isfinite(z[row]).all(axis=-1) & np.isfinite(R[row]).all(axis=(-2, -1))
         without += int((there & ~good).sum())
         time, platform = float(scans.times[row]), scans.platform[row]
-        looks.append(Scan(time, order, platform, z[row][good], R[row][good], views[row]))
-        ids.append([str(one) for one in scans.ids[row][good]])
+        looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees_of(scans, int(row))))
+        named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
-    return Places(scans.sensor, scans.kind, looks, ids, scans.interval_s, without)
+    return Places(scans.sensor, scans.kind, looks, named, scans.interval_s, without)
 
 
 def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
@@ -131,19 +149,15 @@ def _of_pixels(flight: Flight, scans: Scans, source: str | None) -> tuple[Array,
     return z.reshape(*scans.ids.shape, 2), R.reshape(*scans.ids.shape, 2, 2)
 
 
-def _views(scans: Scans) -> list[Array | None]:
-    """The ground that each image shows; None where that is not known, or a corner looks past it."""
-    if scans.poses is None:
-        return [None] * len(scans.times)
-    width, height = scans.poses.camera.width, scans.poses.camera.height
-    corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    n = len(scans.times)
-    each = scans.poses.take(np.repeat(np.arange(n), 4))
-    ground = georeference_pixels(each, np.tile(corners, (n, 1)), np.repeat(scans.plane_down, 4))
-    outline = ground[:, :2].reshape(n, 4, 2)
-    return [one if np.isfinite(one).all() else None for one in outline]
+def sees_of(scans: Scans, row: int) -> Sees | None:
+    """What the image of a look shows of the plane that targets move on; None where it is of no camera."""
+    poses = scans.poses
+    if poses is None:
+        return None
+    down, origin, R_nc = scans.plane_down[row], poses.p_nc[row], poses.R_nc[row]
 
+    def sees(places: Array) -> NDArray[np.bool_]:
+        at = np.concatenate([places, np.full((len(places), 1), down)], axis=1)
+        return in_image(poses.camera, project(poses.camera, (at - origin) @ R_nc))
 
-def _area(corners: Array) -> float:
-    x, y = corners.T
-    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+    return sees

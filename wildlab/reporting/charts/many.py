@@ -53,9 +53,8 @@ def colours_of(followed: Followed) -> dict[object, str]:
 def map_shown(followed: Followed) -> Shown:
     """Where every track went, in local metres, north up, beside the true ways."""
     fig, ax = new_figure(5.6, 5.4)
-    for name, way in followed.truth.items():
-        del name
-        ax.plot(way[:, 1], way[:, 0], color="black", lw=1.2, ls=(0, (4, 2)), label="truth")
+    for way in followed.truth.values():
+        ax.plot(way[:, 1], way[:, 0], color="black", lw=1.2, ls=(0, (4, 2)), label="truth", zorder=3)
     platform = np.array([scan.platform for scan in followed.scans])
     if len(platform) and np.ptp(platform, axis=0).max() > 0:
         ax.plot(platform[:, 1], platform[:, 0], color=GREY, lw=1.2, label="platform")

@@ -186,15 +186,13 @@ def _harm_words(useless: NDArray[np.bool_], alone: NDArray[np.bool_]) -> str:
 
 
 def as_published_words(spread: pd.DataFrame) -> str:
-    """Between which separations the median of the wrong detections is the published one."""
+    """At which separations the median of the wrong detections is no more than the published one."""
     middle = [float(spread[curve_subject(at), "wrong"].median()) for at in SEPARATIONS]
     few = [at for at, count in zip(SEPARATIONS, middle, strict=True) if count <= PUBLISHED_WRONG]
     if not few:
         return f"As few wrong as published, {PUBLISHED_WRONG}, are reached at none of these."
-    if few[0] == SEPARATIONS[0]:
-        return f"No more wrong than published, {PUBLISHED_WRONG}, are there at any."
-    last = SEPARATIONS[SEPARATIONS.index(few[0]) - 1]
-    return f"As few wrong as published, {PUBLISHED_WRONG}, are reached between {last} and {few[0]} (median)."
+    where = "all of these" if len(few) == len(SEPARATIONS) else ", ".join(map(str, few))
+    return f"As few wrong as published, {PUBLISHED_WRONG}, are reached at {where} (median of the flights)."
 
 
 def end_words(spread: pd.DataFrame) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +45,7 @@ class SensorBeliefs(NamedTuple):
         Between which distances it sees; measurements from elsewhere are not used, and targets there are not
         missed.
     patience_s
-        For how long a target is shown that it could have seen and did not.
+        For how long a target is shown after it saw it last.
     rough_m
         (K,) standard deviation of each axis that a hull adds to the noise of a measurement: which part of it
         is seen.
@@ -120,6 +121,10 @@ class TargetBeliefs(NamedTuple):
     apart_m: float
 
 
+#: Places (N, 2) in n to whether they are in view, (N,).
+Sees = Callable[[Array], NDArray[np.bool_]]
+
+
 class Scan(NamedTuple):
     """One look of one sensor.
 
@@ -133,8 +138,8 @@ class Scan(NamedTuple):
         (2,) north, east in n, m.
     z, R
         (M, 2) and (M, 2, 2): places in n with their covariances, m and m^2.
-    view
-        (C, 2) corners of the ground that a camera shows; None: whatever is within reach is looked at.
+    sees
+        Which of (N, 2) places a camera shows, (N,) bool; None: whatever is within reach is looked at.
     """
 
     time: float
@@ -142,7 +147,7 @@ class Scan(NamedTuple):
     platform: Array
     z: Array
     R: Array
-    view: Array | None = None
+    sees: Sees | None = None
 
 
 #: One kind of target, as small as a point.

@@ -78,16 +78,14 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
         part, none = part / scale[:, None], none / scale
         if min(part.shape) <= most:
             with announced("whose a measurement is"):
-                own = _exact(part, none) if part.shape[1] <= part.shape[0] else _exact_by_targets(part, none)
+                own = _exact(part, none)
         else:
             own = belief_propagation(part, none)
-        total = own.sum(axis=1)
-        if not (total > 0).all():
+        if not np.isfinite(own).all():
             raise WildlabError(
                 "targets that cannot be missed share too few measurements: there is no way to deal them out",
                 "give every target a weight above zero of being missed",
             )
-        own /= total[:, None]
         found[targets, 0] = own[:, 0]
         found[np.ix_(targets, 1 + measurements)] = own[:, 1:]
     return found
@@ -106,9 +104,16 @@ def _clusters(linked: NDArray[np.bool_]) -> list[tuple[NDArray[np.intp], NDArray
     return groups
 
 
-@compiled
 def _exact(w: Array, w0: Array) -> Array:
-    """(T, 1 + M) sums over all ways: target after target, over the sets of measurements that are taken."""
+    """(T, 1 + M) of a cluster. The sets are of whatever there is less of, targets or measurements."""
+    free = np.ones(w.shape[1])
+    pairs = _pairs(w, w0, free) if w.shape[1] <= w.shape[0] else _pairs(w.T.copy(), free, w0).T
+    return np.concatenate([np.maximum(1 - pairs.sum(axis=1, keepdims=True), 0.0), pairs], axis=1)
+
+
+@compiled
+def _pairs(w: Array, item_none: Array, slot_none: Array) -> Array:
+    """(I, S) probabilities of pairs over all ways: item after item, over the sets of slots that are taken."""
     n, m = w.shape
     size = 1 << m
     ahead = np.zeros((n + 1, size))
@@ -118,73 +123,30 @@ def _exact(w: Array, w0: Array) -> Array:
             value = ahead[i, taken]
             if value == 0.0:
                 continue
-            ahead[i + 1, taken] += value * w0[i]
+            ahead[i + 1, taken] += value * item_none[i]
             for j in range(m):
                 if w[i, j] > 0.0 and not taken >> j & 1:
                     ahead[i + 1, taken | 1 << j] += value * w[i, j]
         ahead[i + 1] /= max(ahead[i + 1].max(), 1e-300)
-    found = np.zeros((n, 1 + m))
     behind = np.ones(size)
+    for taken in range(size):
+        for j in range(m):
+            if not taken >> j & 1:
+                behind[taken] *= slot_none[j]
+    found = np.zeros((n, m))
     for i in range(n - 1, -1, -1):
         before = np.zeros(size)
+        total = 0.0
         for taken in range(size):
             value = ahead[i, taken]
-            none = w0[i] * behind[taken]
-            found[i, 0] += value * none
-            before[taken] = none
+            before[taken] = item_none[i] * behind[taken]
             for j in range(m):
                 if w[i, j] > 0.0 and not taken >> j & 1:
                     one = w[i, j] * behind[taken | 1 << j]
-                    found[i, 1 + j] += value * one
+                    found[i, j] += value * one
                     before[taken] += one
-        behind = before / max(before.max(), 1e-300)
-    return found
-
-
-@compiled
-def _exact_by_targets(w: Array, w0: Array) -> Array:
-    """The same, measurement after measurement, over the sets of targets that have one."""
-    n, m = w.shape
-    size = 1 << n
-    ahead = np.zeros((m + 1, size))
-    ahead[0, 0] = 1.0
-    for j in range(m):
-        for served in range(size):
-            value = ahead[j, served]
-            if value == 0.0:
-                continue
-            ahead[j + 1, served] += value
-            for i in range(n):
-                if w[i, j] > 0.0 and not served >> i & 1:
-                    ahead[j + 1, served | 1 << i] += value * w[i, j]
-        ahead[j + 1] /= max(ahead[j + 1].max(), 1e-300)
-    behind = np.ones(size)
-    for served in range(size):
-        for i in range(n):
-            if not served >> i & 1:
-                behind[served] *= w0[i]
-    found = np.zeros((n, 1 + m))
-    total = 0.0
-    for served in range(size):
-        total += ahead[m, served] * behind[served]
-    for i in range(n):
-        for served in range(size):
-            if not served >> i & 1:
-                found[i, 0] += ahead[m, served] * behind[served] / total
-    for j in range(m - 1, -1, -1):
-        here = np.zeros(n)
-        total = 0.0
-        before = np.zeros(size)
-        for served in range(size):
-            value = ahead[j, served]
-            before[served] = behind[served]
-            for i in range(n):
-                if w[i, j] > 0.0 and not served >> i & 1:
-                    one = w[i, j] * behind[served | 1 << i]
-                    here[i] += value * one
-                    before[served] += one
-            total += value * before[served]
-        found[:, 1 + j] = here / total
+            total += value * before[taken]
+        found[i] /= total
         behind = before / max(before.max(), 1e-300)
     return found
 

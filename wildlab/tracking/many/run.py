@@ -181,6 +181,7 @@ def _corrected(
         looked=looked,
         hits=hits,
         last=np.where(seen, scan.time, tracks.last),
+        by=np.where(seen, which, tracks.by),
         confirmed=tracks.confirmed | ((existence > targets.confirmed) & (hits >= targets.hits)),
         trail=trail,
     )
@@ -227,24 +228,7 @@ def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:
 def _sees(places: Array, scan: Scan, sensor: SensorBeliefs) -> NDArray[np.bool_]:
     """(N,) places that are looked at: others are not missed."""
     near = np.asarray(np.linalg.norm(places - scan.platform, axis=1) < sensor.far_m)
-    return near if scan.view is None else near & in_view(scan.view, places)
-
-
-def in_view(corners: Array, places: Array) -> NDArray[np.bool_]:
-    """(N,) which places (N, 2) lie in a polygon (C, 2): a line to the north crosses its edges an odd number
-    of times.
-
-    Examples
-    --------
-    >>> in_view(np.array([[0, 0], [0, 10], [20, 10], [20, 0]]), np.array([[5, 5], [25, 5]]))
-    array([ True, False])
-    """
-    a, b = corners, np.roll(corners, -1, axis=0)
-    p, q = places[:, None, 0], places[:, None, 1]
-    spans = (a[:, 1] > q) != (b[:, 1] > q)
-    run = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-    north = a[:, 0] + (q - a[:, 1]) * (b[:, 0] - a[:, 0]) / run
-    return np.asarray((spans & (north > p)).sum(axis=1) % 2 == 1)
+    return near if scan.sees is None else near & scan.sees(places)
 
 
 def _on_a_known_one(z: Array, tracks: Tracks, targets: TargetBeliefs) -> NDArray[np.bool_]:
@@ -265,7 +249,7 @@ def _shown(tracks: Tracks, scan: Scan, sensors: tuple[SensorBeliefs, ...], targe
         tracks.confirmed
         & (tracks.existence > targets.shown)
         & (tracks.moving | (targets.moves_m <= 0))
-        & (scan.time - tracks.last < sensors[scan.sensor].patience_s)
+        & (scan.time - tracks.last < np.array([one.patience_s for one in sensors])[tracks.by])
         & (np.linalg.norm(mean[:, :2] - scan.platform, axis=1) < reach)
     )
     mine = tracks.only(rows)

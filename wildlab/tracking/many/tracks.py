@@ -41,8 +41,8 @@ class Tracks(NamedTuple):
         (T, S) probability that a sensor can see it, and when that was so, s.
     identity, hits
         (T,) its number, and how many scans had a measurement of it.
-    born, last
-        (T,) s, of its first and last measurement.
+    last, by
+        (T,) s, of its last measurement, and which sensor that was of.
     confirmed, moving
         (T,) whether it is believed, and whether it was seen to move.
     trail
@@ -57,8 +57,8 @@ class Tracks(NamedTuple):
     looked: Array
     identity: NDArray[np.int64]
     hits: NDArray[np.int64]
-    born: Array
     last: Array
+    by: NDArray[np.int64]
     confirmed: Flags
     moving: Flags
     trail: tuple[Array, ...]
@@ -87,7 +87,7 @@ def no_tracks(kinds: int, sensors: int) -> Tracks:
     one = np.zeros(0)
     of_kinds, of_sensors = np.zeros((0, kinds)), np.zeros((0, sensors))
     x, P = np.zeros((0, kinds, 4)), np.zeros((0, kinds, 4, 4))
-    return Tracks(x, P, of_kinds, one, of_sensors, of_sensors, whole, whole, one, one, flag, flag, ())
+    return Tracks(x, P, of_kinds, one, of_sensors, of_sensors, whole, whole, one, whole, flag, flag, ())
 
 
 def both(tracks: Tracks, more: Tracks) -> Tracks:
@@ -138,7 +138,7 @@ def begin(
         np.arange(first, first + count),
         np.ones(count, np.int64),
         np.full(count, time),
-        np.full(count, time),
+        np.full(count, sensor),
         np.zeros(count, bool),
         np.zeros(count, bool),
         tuple(np.array([[time, *place]]) for place in z),

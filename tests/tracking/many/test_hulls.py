@@ -1,0 +1,65 @@
+"""Which part of a hull is seen: from its near side, longer along its heading, the same wherever north is."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.tracking.many.test_run import BOTH, LONG, SHIP
+from wildlab.tracking.many.hulls import STEERS_M_S, hull_noise, near_side, on_one_hull
+from wildlab.tracking.many.tracks import begin
+
+
+def turned(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def test_a_hull_is_longer_along_its_heading() -> None:
+    sensor = LONG._replace(rough_m=(0.0, 1.5), along_m=(0.0, 6.0))
+    fast = np.array([[[0.0, 0.0, 50.0, 0.0]] * 2])
+    assert np.allclose(hull_noise(fast, sensor)[0, 1], np.diag([1.5**2 + 6.0**2, 1.5**2]), rtol=1e-3)
+    assert np.allclose(hull_noise(fast, sensor)[0, 0], 0)
+    # At rest it may lie either way: half of it along each axis. At the limit, half of that is its course's.
+    assert np.allclose(hull_noise(0 * fast, sensor)[0, 1], (1.5**2 + 18.0) * np.eye(2))
+    slow = np.array([[[0.0, 0.0, STEERS_M_S, 0.0]] * 2])
+    assert np.allclose(hull_noise(slow, sensor)[0, 1], np.diag([1.5**2 + 27.0, 1.5**2 + 9.0]))
+
+
+@given(st.floats(-np.pi, np.pi), st.integers(0, 1000))
+def test_it_is_the_same_wherever_north_is(angle: float, seed: int) -> None:
+    rng, T = np.random.default_rng(seed), turned(angle)
+    x, platform = rng.normal(0, 5, (3, 2, 4)), rng.normal(0, 50, 2)
+    rotated = np.concatenate([x[..., :2] @ T.T, x[..., 2:] @ T.T], axis=-1)
+    assert np.allclose(hull_noise(rotated, LONG), T @ hull_noise(x, LONG) @ T.T)
+    assert np.allclose(near_side(rotated, T @ platform, LONG), near_side(x, platform, LONG) @ T.T)
+
+
+def test_what_is_seen_lies_towards_the_platform_and_not_beyond_its_half() -> None:
+    x = np.array([[[10.0, 0.0, 1.0, 0.0]] * 2, [[0.0, -4.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 1.0, 0.0]] * 2])
+    found = near_side(x, np.zeros(2), LONG)
+    assert np.allclose(found[0], [[0, 0], [-3, 0]]) and np.allclose(found[1], [[0, 0], [0, 2]])
+    assert np.allclose(found[2], 0)
+
+
+def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
+    z, R, platform = (
+        np.array([[60.0, 5.0], [-20.0, 80.0]]),
+        np.tile(np.eye(2), (2, 1, 1)),
+        np.array([3.0, -9.0]),
+    )
+    tracks = begin(z, R, 2.0, platform, (LONG,), 0, BOTH, 7)
+    seen = tracks.x[..., :2] + near_side(tracks.x, platform, LONG)
+    assert np.allclose(seen, z[:, None], atol=0.05) and not np.allclose(tracks.x[:, 1, :2], z, atol=1.0)
+    assert tracks.identity.tolist() == [7, 8] and np.allclose(tracks.kinds, [0.6, 0.4])
+    assert np.allclose(tracks.P[:, 1, :2, :2], (1 + 1.0**2 + 6.0**2 / 2) * np.eye(2))
+
+
+def test_two_ends_of_one_hull_and_two_ships() -> None:
+    end = np.array([0.0, 0.0, 3.0, 0.0])
+    assert on_one_hull(end, [20.0, 2.0, 3.0, 0.2], SHIP)
+    assert not on_one_hull(end, [35.0, 0.0, 3.0, 0.0], SHIP), "too far ahead"
+    assert not on_one_hull(end, [10.0, 7.0, 3.0, 0.0], SHIP), "abreast"
+    assert not on_one_hull(end, [20.0, 0.0, 1.0, 0.0], SHIP), "slower"
+    assert not on_one_hull([0.0, 0.0, 0.1, 0.0], [5.0, 0.0, 0.1, 0.0], SHIP), "at rest nobody knows the line"
