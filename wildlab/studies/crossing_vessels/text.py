@@ -77,13 +77,14 @@ def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what `trial.trial` gives, one row for each flight."""
     near = spread[FEATURES, "near_share"]
     wrong = {subject: spread[subject, "wrong"] for subject in (DISTANCE, FEATURES)}
+    of = spread[LOOKS, "detections"].median()
     # A range of nine in ten may hide the one flight on which it all went wrong.
     most = f", at most {wrong[FEATURES].max():.0f}" if len(spread) > 1 else ""
     return [
         f"By distance alone the tracks of two vessels that cross are swapped on "
         f"{swap_words(spread, DISTANCE)}; with what the vessels look like, on "
         f"{swap_words(spread, FEATURES)}.",
-        f"Of 2400 detections {wrong[DISTANCE].median():.0f} go to the wrong track by distance alone"
+        f"Of {of:.0f} detections {wrong[DISTANCE].median():.0f} go to the wrong track by distance alone"
         f"{range_clause(wrong[DISTANCE], 0)}; with features {wrong[FEATURES].median():.0f}"
         f"{range_clause(wrong[FEATURES], 0)}{most}. Published are {PUBLISHED_WRONG}, on one flight.",
         f"With features the vessel that is followed worse is within {NEAR_M:.0f} m of its track for "

@@ -66,6 +66,7 @@ UNITS = {
     **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1", "unassigned": "1", "tracks": "1",
     "swapped": "1", "swapped_at_end": "1", "swaps": "1", "breaks": "1",
     "near_share": "1", "any_near_share": "1", "mae": "m", "gospa": "m", "anees": "1", "closest": "m",
+    "detections": "1",
     **{f"separation_{name}": "1" for name in NAMES}, **{f"spread_{name}": "1" for name in NAMES},
 }  # fmt: skip
 
@@ -162,7 +163,7 @@ def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
 def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     """Whether the two have each other's track just after the crossing, and at the end.
 
-    That is, of either more than half of its detections in `WINDOW_S` went to a track of the other; a vessel
+    That is, of each more than half of its detections in `WINDOW_S` went to a track of the other; a vessel
     without detections then has no track of the other.
     """
     at = np.searchsorted(bank.images, crossing.looks.image)
@@ -307,6 +308,7 @@ def all_numbers(flown: Flown, seed: int) -> Numbers:
         **numbers_of(flown.crossing, flown.banks),
         **looks_of(flown.looks),
         **curve_of(flown.crossing, seed),
+        (LOOKS, "detections"): float(len(flown.crossing.boat)),
         (LOOKS, "closest"): float(np.nanmin(flown.crossing.apart)),
     }
 
