@@ -18,7 +18,7 @@ from wildlab.tracking.many.bank import (
     Looks,
     Tuning,
     associate,
-    follow_all,
+    run_bank,
 )
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import constant_velocity, in_steps
@@ -33,7 +33,7 @@ def test_of_one_target_it_is_the_single_filter():
     rng = np.random.default_rng(4)
     image = np.array([3, 4, 5, 6, 7, 9, 10, 40, 41, 90])
     z = np.column_stack([0.1 * image, -0.2 * image]) + rng.normal(0, 10, (len(image), 2))
-    bank = follow_all(Looks(image, z, INTERVAL), TUNING)
+    bank = run_bank(Looks(image, z, INTERVAL), TUNING)
     assert bank.track.tolist() == [0] * len(image)
     assert np.isnan(bank.x[0]).all()
     motion = partial(
@@ -54,7 +54,7 @@ def test_of_one_target_it_is_the_single_filter():
 
 def test_a_single_detection_starts_nothing_and_neither_do_two_far_apart():
     for image, z in (([1], [[0, 0]]), ([1, 3], [[0, 0], [0, 0]]), ([1, 2], [[0, 0], [500, 0]])):
-        bank = follow_all(Looks(np.array(image), np.array(z, float), INTERVAL), TUNING)
+        bank = run_bank(Looks(np.array(image), np.array(z, float), INTERVAL), TUNING)
         assert (bank.track == -1).all()
         assert len(bank.started) == 0
 
@@ -63,7 +63,7 @@ def test_two_in_one_image_do_not_go_to_one_track():
     """The second finds the only gate taken: with its like in the next image it starts a track of its own."""
     image = np.array([1, 2, 3, 3, 4, 4])
     z = np.array([[0, 0], [0, 0], [0, 0], [20, 0], [0, 0], [20, 0]], float)
-    bank = follow_all(Looks(image, z, INTERVAL), TUNING)
+    bank = run_bank(Looks(image, z, INTERVAL), TUNING)
     assert bank.track.tolist() == [0, 0, 0, 1, 0, 1]
     assert bank.started.tolist() == [0, 3]
     assert np.isnan(bank.x[:3, 1]).all() and np.isfinite(bank.x[3, 1]).all()
@@ -74,9 +74,9 @@ def test_what_a_veto_has_left_starts_nothing():
     image, z = np.arange(6), np.zeros((6, 2))
     strange = np.array([0, 0, 0, 90, 90, 90], float)[:, None]
     looks = Appearance(strange, np.ones(1), np.ones(1))
-    bank = follow_all(Looks(image, z, INTERVAL), TUNING, VETO, looks)
+    bank = run_bank(Looks(image, z, INTERVAL), TUNING, VETO, looks)
     assert bank.track.tolist() == [0, 0, 0, -1, -1, -1]
-    assert follow_all(Looks(image, z, INTERVAL), TUNING, FEATURES, looks).track.tolist() == [0] * 6
+    assert run_bank(Looks(image, z, INTERVAL), TUNING, FEATURES, looks).track.tolist() == [0] * 6
 
 
 def test_each_rule_by_hand():
@@ -92,7 +92,7 @@ def test_each_rule_by_hand():
 
 
 def test_no_detections_are_no_tracks():
-    bank = follow_all(Looks(np.empty(0, int), np.empty((0, 2)), INTERVAL), TUNING)
+    bank = run_bank(Looks(np.empty(0, int), np.empty((0, 2)), INTERVAL), TUNING)
     assert bank.x.shape == (0, 0, 4)
     assert len(bank.started) == 0
 
@@ -108,4 +108,4 @@ def test_no_detections_are_no_tracks():
 )
 def test_what_is_refused(looks, rule, words):
     with pytest.raises(WildlabError, match=words):
-        follow_all(looks, TUNING, rule)
+        run_bank(looks, TUNING, rule)

@@ -22,7 +22,7 @@ from wildlab.pipeline.track import truth_states
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import bank as rules
-from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, follow_all
+from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]
@@ -299,7 +299,7 @@ def fly(seed: int, twin: str, images: int, flight: Flight | None = None) -> Flow
 
 def follow_by(crossing: Crossing, subject: str, appearance: Appearance | None = None) -> Bank:
     """All detections, tracked with the printed tuning by one of `RULES`."""
-    return follow_all(crossing.looks, TUNING, RULES[subject], appearance)
+    return run_bank(crossing.looks, TUNING, RULES[subject], appearance)
 
 
 def all_numbers(flown: Flown, seed: int) -> Numbers:

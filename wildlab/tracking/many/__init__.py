@@ -6,12 +6,12 @@ A matrix of distances has a row for each measurement and a column for each track
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
 - `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
-- `follow_all`: a bank of filters on positions, with any of these.
+- `run_bank`: a bank of filters on positions, with any of these.
 - `pair_scans`, `judge_start`, `outlived`: the life of a track.
 """
 
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
-from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, follow_all
+from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
@@ -36,7 +36,6 @@ __all__ = [
     "association_probabilities",
     "belief_propagation",
     "feature_distances",
-    "follow_all",
     "follow_many",
     "global_nearest",
     "image_features",
@@ -44,6 +43,7 @@ __all__ = [
     "nearest",
     "outlived",
     "pair_scans",
+    "run_bank",
     "run_many",
     "veto",
     "with_features",

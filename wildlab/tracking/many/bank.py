@@ -107,7 +107,7 @@ class Bank(NamedTuple):
     P: Array
 
 
-def follow_all(
+def run_bank(
     looks: Looks, tuning: Tuning, rule: str = DISTANCE, appearance: Appearance | None = None
 ) -> Bank:
     """Track everything that was detected.
