@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -156,6 +157,36 @@ def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
             at = a[0] + (asked[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
             inside ^= spans & (asked[:, 0] < at)
     return inside
+
+
+def tester(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
+    """Whether points (..., 2) lie in an area, for areas that are asked often.
+
+    A convex one is asked by its sides, which is many times faster than `contains`.
+
+    Parameters
+    ----------
+    corners
+        (K, 2) metres, from `check_area`.
+
+    Returns
+    -------
+    Callable
+        Points (..., 2) m -> (...) bool. On the border either answer may come out.
+
+    Examples
+    --------
+    >>> inside = tester(check_area([[0, 0], [0, 10], [20, 10], [20, 0]], "area"))
+    >>> inside(np.array([[[5.0, 5.0], [25.0, 5.0]]]))
+    array([[ True, False]])
+    """
+    fence = np.asarray(corners, float)
+    if not is_convex(fence):
+        return lambda points: contains(fence, points.reshape(-1, 2)).reshape(points.shape[:-1])
+    edges = np.roll(fence, -1, axis=0) - fence
+    inward = np.stack([-edges[:, 1], edges[:, 0]])
+    least = np.einsum("ki,ik->k", fence, inward)
+    return lambda points: np.asarray((points @ inward > least).all(axis=-1))
 
 
 def rectangle(north: float, east: float, length: float, width: float, course: float) -> Array:

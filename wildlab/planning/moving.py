@@ -6,15 +6,13 @@ one plan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import check_area, contains, is_convex
+from wildlab.planning.areas import check_area, contains, tester
 from wildlab.planning.sightings import Sightings
 
 
@@ -64,7 +62,7 @@ def walks(
     steps = int(np.ceil(float(t.max(initial=0.0)) / step)) + 1
     way = np.empty((steps + 1, count, 2))
     way[0] = here
-    within = _within(corners)
+    within = tester(corners)
     for k in range(steps):
         there = here + step * speed_sd * rng.standard_normal((count, 2))
         here = np.where(within(there)[:, None], there, here)
@@ -109,16 +107,6 @@ def first_seen(
     place = np.minimum(np.searchsorted(shown, asked), max(len(shown) - 1, 0))
     hit = (shown[place] == asked) & sharp if len(shown) else np.zeros(asked.shape, bool)
     return np.where(hit.any(axis=1), t[hit.argmax(axis=1)], np.nan)
-
-
-def _within(corners: Array) -> Callable[[Array], NDArray[np.bool_]]:
-    """Whether points (N, 2) lie in an area; of a convex one by its sides, which is many times faster."""
-    if not is_convex(corners):
-        return lambda points: contains(corners, points)
-    edges = np.roll(corners, -1, axis=0) - corners
-    inward = np.stack([-edges[:, 1], edges[:, 0]])
-    least = np.einsum("ki,ik->k", corners, inward)
-    return lambda points: np.asarray((points @ inward > least).all(axis=1))
 
 
 def _anywhere(corners: Array, count: int, rng: np.random.Generator) -> Array:

@@ -144,10 +144,27 @@ def with_errors(
     -------
     CameraPoses
     """
-    count = poses.rows[0]
+    off, turn = drawn_errors(poses.rows[0], errors, step, rng)
+    return displaced(poses, headings, off, turn)
+
+
+def drawn_errors(
+    count: int, errors: ExecutionErrors, step: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Errors of ``count`` poses, ``step`` s apart.
+
+    Returns
+    -------
+    off, turn
+        (count, 3) m in n, and (count, 3) rad about the axes of a level platform.
+    """
     position_sd = [errors.horizontal, errors.horizontal, errors.vertical]
     off = gauss_markov(count, step, position_sd, errors.position_time, rng)
-    turn = gauss_markov(count, step, [errors.roll, errors.pitch, errors.yaw], errors.attitude_time, rng)
+    return off, gauss_markov(count, step, [errors.roll, errors.pitch, errors.yaw], errors.attitude_time, rng)
+
+
+def displaced(poses: CameraPoses, headings: ArrayLike, off: Array, turn: Array) -> CameraPoses:
+    """The same poses with errors as `drawn_errors` gives them, for platforms with these headings, rad."""
     h = np.asarray(headings, float)
     # About the platform's axes, given in n.
     cos, sin = np.cos(h), np.sin(h)

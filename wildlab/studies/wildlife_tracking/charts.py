@@ -1,0 +1,236 @@
+"""Figures of the study of tracking animals: counterparts of F figures 5.4, 7.13, 7.14 and 7.19."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wildlab.evaluation.runs import mean_interval
+from wildlab.geometry.frames import Array
+from wildlab.pipeline.animals.follow import Followed, Known
+from wildlab.pipeline.animals.revisit import Patrolled
+from wildlab.planning.high_level import SEARCH
+from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, ellipse, map_axes, new_figure
+from wildlab.studies.wildlife_tracking.text import PLATFORMS
+from wildlab.studies.wildlife_tracking.trial import NEGATIVE, POSITIVE, UAV, Runs, World
+
+#: What `Report.figures` takes: figure, name, alternative text, caption.
+Shown = tuple[Figure, str, str, str]
+#: Probability that the drawn ellipses hold, as in F figure 4.1.
+HELD = 0.95
+KEY = (
+    f"Dots: animals, hollow where none was detected yet. Ellipses: the tracks, {100 * HELD:.0f} % of each "
+    "covariance."
+)
+
+
+def map_shown(
+    world: World, followed: Followed, share: float, name: str, what: str, counterpart: str
+) -> Shown:
+    """Animals, tracks and the way up to a share of the first lap.
+
+    Parameters
+    ----------
+    world
+        What was flown over.
+    followed
+        Its tracks.
+    share
+        Of the first lap.
+    name
+        Of the figure.
+    what
+        When that is, in words, for the title.
+    counterpart
+        Of which figure.
+    """
+    fig, ax = new_figure(5.9, 4.2)
+    times = world.images.times
+    known = _at(followed.known, times, share * world.lap)
+    seen = {one.animal for one in followed.found if one.image <= known.image}
+    way = world.images.poses.p_nc[: known.image + 1, :2]
+    _ground(ax, world, way)
+    _animals(ax, world.images.truth[known.image], seen)
+    _tracks(ax, known)
+    _fit(ax, world, way)
+    said = f"{len(seen)} of {world.images.truth.shape[1]} animals found, {len(known.identity)} tracks"
+    ax.set_title(f"{what}: {said}")
+    return (
+        fig, name, f"Map of five enclosures {what.lower()}: {said}.",
+        f"{KEY} Counterpart of F figure {counterpart}.",
+    )  # fmt: skip
+
+
+def _at(known: list[Known], times: Array, time: float) -> Known:
+    return known[int(np.argmin([abs(times[one.image] - time) for one in known]))]
+
+
+def _ground(ax: Axes, world: World, way: Array) -> None:
+    for fence in world.fences:
+        ring = np.concatenate([fence, fence[:1]])
+        ax.plot(ring[:, 1], ring[:, 0], color=INK, lw=1.2)
+    ax.plot(way[:, 1], way[:, 0], color=GREY, lw=1.0)
+    ax.plot(way[-1, 1], way[-1, 0], "^", color=INK, ms=7)
+    ax.grid(False)
+
+
+def _animals(ax: Axes, places: Array, seen: set[int]) -> None:
+    for animal, (north, east) in enumerate(places):
+        ax.plot(east, north, "o", ms=4.5, mec=INK, mew=0.9, mfc=VERMILLION if animal in seen else "none")
+
+
+def _tracks(ax: Axes, known: Known, color: str = BLUE) -> None:
+    for mean, covariance in zip(known.mean, known.covariance, strict=True):
+        ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=color, lw=1.3)
+
+
+def _fit(ax: Axes, world: World, way: Array) -> None:
+    """The view to the enclosures and the way, whatever an ellipse reaches to."""
+    points = np.concatenate([*world.fences, way])
+    low, high = points.min(axis=0) - 25, points.max(axis=0) + 25
+    ax.set(xlim=(low[1], high[1]), ylim=(low[0], high[0]))
+    map_axes(ax)
+
+
+def visit_rows(flown: Patrolled) -> tuple[int, int] | None:
+    """Of the visit after which the covariance fell furthest: its first image, and that which found it.
+
+    None where no visit found its animal.
+    """
+    best: tuple[float, int, int] | None = None
+    for one in flown.found:
+        if flown.goal[one.image] != one.track or not np.isfinite(one.before):
+            continue
+        first = one.image
+        while first > 0 and flown.goal[first - 1] == one.track:
+            first -= 1
+        if best is None or one.before - one.after > best[0]:
+            best = (one.before - one.after, first, one.image)
+    return None if best is None else best[1:]
+
+
+def visit_shown(world: World, flown: Patrolled) -> Shown | None:
+    """Before a visit, as it finds its animal, and when the search goes on (F figures 5.4 and 7.14)."""
+    rows = visit_rows(flown)
+    if rows is None:
+        return None
+    first, found = rows
+    track = int(flown.goal[found])
+    later = min(found + 60, len(flown.times) - 1)
+    fig, axes = new_figure(5.9, 8.2, rows=3)
+    said, sizes = [], []
+    middle = flown.known[found].mean[flown.known[found].identity == track][0]
+    for ax, row, what in zip(
+        axes, (max(first - 1, 0), found, later), ("Before the visit", "Found", "A minute later"), strict=True
+    ):
+        known = flown.known[row]
+        mine = known.identity == track
+        _ground(ax, world, flown.p_nc[: row + 1, :2])
+        for mean, covariance in zip(known.mean[~mine], known.covariance[~mine], strict=True):
+            ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=BLUE, lw=1.2)
+        sd = np.nan
+        for mean, covariance in zip(known.mean[mine], known.covariance[mine], strict=True):
+            ellipse(ax, mean[::-1], covariance[::-1, ::-1], HELD, color=VERMILLION, lw=2.0)
+            sd = float(np.sqrt(np.trace(covariance) / 2))
+        sizes.append(sd)
+        ax.set(xlim=(middle[1] - 160, middle[1] + 160), ylim=(middle[0] - 95, middle[0] + 95))
+        map_axes(ax, scale_bar=ax is axes[-1])
+        ax.set_xlabel("east (m)" if ax is axes[-1] else "")
+        ax.set_title(f"{what}: known to {sd:.1f} m each way")
+        said.append(f"{what.lower()} {sd:.1f} m")
+    return (
+        fig, "fig-7-14", f"Three maps of a visit; the animal is known each way to: {', '.join(said)}.",
+        f"Of all visits the one after which the covariance fell furthest. Red: the animal visited, "
+        f"{', '.join(said)}. Blue: other tracks; grey: the way. Counterpart of F figures 5.4 and 7.14.",
+    )  # fmt: skip
+
+
+def most_seen(followed: Followed, out: float) -> int | None:
+    """The animal that came back into sight most often, after being out of it for so long, s."""
+    back = [one.animal for one in followed.found if np.isfinite(one.away) and one.away > out]
+    return int(np.bincount(back).argmax()) if back else None
+
+
+def covariance_shown(runs: Runs) -> Shown | None:
+    """What one animal's track says of itself over time, with and without images that show nothing."""
+    world = runs.worlds[UAV]
+    animal = most_seen(runs.followed[UAV, NEGATIVE], 60.0)
+    if animal is None:
+        return None
+    fig, ax = new_figure(5.9, 3.6)
+    tops = {}
+    for name, color, label, style in (
+        (POSITIVE, ORANGE, "detections alone", "--"), (NEGATIVE, BLUE, "and images without", "-")
+    ):  # fmt: skip
+        times, sd = sd_of(world, runs.followed[UAV, name], animal)
+        ax.plot(times / 60, sd, style, color=color, label=label)
+        tops[name] = float(np.nanmax(sd))
+    ax.axvline(world.lap / 60, color=GREY, lw=1.0, ls=":", label="a lap")
+    ax.set(xlabel="time (min)", ylabel="known to, each way (m)", ylim=(0, None))
+    ax.set_title(f"At most {tops[NEGATIVE]:.0f} m, and {tops[POSITIVE]:.0f} m by detections alone")
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return (
+        fig, "covariance",
+        f"Stated standard deviation of one animal's track over two laps: at most {tops[NEGATIVE]:.0f} m, by "
+        f"detections alone {tops[POSITIVE]:.0f} m.",
+        "Of the multicopter's world, the animal that came back into sight most often: each fall is a "
+        "sighting. The track is that which its latest detection was given to.",
+    )  # fmt: skip
+
+
+def sd_of(world: World, followed: Followed, animal: int) -> tuple[Array, Array]:
+    """Times (K,) s and the stated standard deviation (K,) m of an animal's track at the stations."""
+    own, row, times, sd = 0, 0, list[float](), list[float]()
+    for known in followed.known:
+        while row < len(followed.found) and followed.found[row].image <= known.image:
+            if followed.found[row].animal == animal:
+                own = followed.found[row].track
+            row += 1
+        at = np.flatnonzero(known.identity == own)
+        times.append(float(world.images.times[known.image]))
+        sd.append(float(np.sqrt(np.trace(known.covariance[at[0]]) / 2)) if len(at) else np.nan)
+    return np.array(times), np.array(sd)
+
+
+def differences_shown(spread: pd.DataFrame) -> Shown:
+    """What images without a detection change, world by world."""
+    fig, axes = new_figure(5.9, 3.8, columns=2, sharey=True)
+    rng = np.random.default_rng(0)  # to tell points apart, across
+    said = []
+    for ax, name, label in zip(axes, ("sd", "rmse"), ("stated", "off"), strict=True):
+        ends = []
+        for number, (platform, words) in enumerate(PLATFORMS.items()):
+            one, other = f"{platform}-{NEGATIVE}", f"{platform}-{POSITIVE}"
+            values = (spread[one, name] - spread[other, name]).dropna().to_numpy(float)
+            across = number + rng.uniform(-0.16, 0.16, len(values))
+            ax.plot(across, values, "o", ms=4, color=(BLUE, ORANGE)[number], alpha=0.55, mew=0)
+            if len(values) > 1:
+                found = mean_interval(values)
+                bar = [[found.estimate - found.low], [found.high - found.estimate]]
+                ax.errorbar(number + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
+            if len(values):
+                ends.append(f"{words} {_plain(values.mean())} m")
+        ax.axhline(0, color=GREY, lw=1.0)
+        ax.set(xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=list(PLATFORMS.values()))
+        ax.set_title(label.capitalize())
+        said.append(f"{label}: {', '.join(ends)}")
+    axes[0].set_ylabel("with less without (m)")
+    return (
+        fig, "negative",
+        f"Difference that images without a detection make, mean over worlds: {'; '.join(said)}.",
+        f"Each dot is a world; black: the mean with its 95 % interval. Means: {'; '.join(said)}. Stated: the "
+        "standard deviation that tracks state each way; off: their RMS distance from animals out of sight. "
+        "Below zero the images help.",
+    )  # fmt: skip
+
+
+def _plain(value: float) -> str:
+    text = f"{value:.2f}"
+    return "0.00" if float(text) == 0 else text.replace("-", "−")
+
+
+def visited_share(flown: Patrolled) -> float:
+    """Share of the images of a search that were taken on the way to an animal, or over it."""
+    return float((flown.goal != SEARCH).mean())

@@ -1,0 +1,423 @@
+"""Animals that walk in five enclosures, followed from a gondola and from a multicopter: F 4, 5.3, 7.5, 8.3.
+
+F shows maps of single simulations (figures 5.4, 7.13, 7.14, 7.19) and says in words what came of them. Here
+worlds are drawn: land, animals, errors of the pose and of the detections; each is followed by F's particle
+filter with and without its negative update, and by a Kalman filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.animals.follow import Followed, Follower, Found, Kalman, Known, Particles, follow
+from wildlab.pipeline.animals.images import Detector, Images, take_images
+from wildlab.pipeline.animals.revisit import Aircraft, Patrolled, Visits, patrol
+from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
+from wildlab.planning.areas import check_area, tester
+from wildlab.planning.courses import fly
+from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
+from wildlab.planning.heights import follow_terrain
+from wildlab.planning.high_level import SEARCH
+from wildlab.planning.moving import walks
+from wildlab.planning.patterns import Pattern, lawn_mowers
+from wildlab.simulation.error_models import stream
+from wildlab.simulation.parameters import TwinParameters, load_twin
+from wildlab.studies.gondola_coverage import trial as gondola
+from wildlab.studies.uav_coverage import trial as uav
+from wildlab.tracking.motion import Motion
+from wildlab.tracking.particles import Rules, walk_of
+from wildlab.tracking.particles.clouds import Inside
+from wildlab.tracking.particles.herd import Moves
+
+#: The platforms; and by what animals are followed.
+GONDOLA, UAV = "gondola", "uav"
+NEGATIVE, POSITIVE, KALMAN = "negative", "without-negative", "kalman"
+FILTERS = (NEGATIVE, POSITIVE, KALMAN)
+#: The same enclosures with the high-level planner, and rows alone flown by the same means.
+REVISITS, ROWS = "uav-revisits", "uav-rows"
+#: Numbers of images are those of a platform, the same for all filters.
+SUBJECTS = (
+    *(f"{platform}-{one}" for platform in (GONDOLA, UAV) for one in FILTERS), GONDOLA, UAV, REVISITS, ROWS,
+)  # fmt: skip
+RECORDED = {
+    "rmse": "m", "sd": "m", "anees": "1", "right_share": "1", "sd_later": "m", "tracks": "1", "fell": "1",
+    "grew": "1", "seen_share": "1", "in_view": "s", "minutes": "min", "visits": "1", "given_up": "1",
+    "done": "1", "animals_share": "1", "rmse_own": "m", "anees_own": "1",
+}  # fmt: skip
+#: F 4.2.1, figure 4.1.
+PARTICLES = 500
+#: F 4.3.1 has a design parameter alpha and prints none.
+GATE = 0.99
+#: The gondola's gimbal (F 7.5.2: the adaptive roll rotation; the limit is that of F 7.5.1).
+STRATEGY = "adaptive-60"
+LAPS = 2
+#: Images that are looked at, Hz: so many that what two of them show still touches while the camera swings.
+RATES = {GONDOLA: 2.0, UAV: 1.0}
+#: An animal is out of sight once it has not been detected for so long, s; and a lap later once it is so share
+#: of a lap. Both chosen.
+OUT_OF_SIGHT, LATER = 30.0, 0.5
+#: Of F (5.2), not printed: an animal not known to 5 m each way is worth as much as the search, and none that
+#: is known better is worth a visit; two swings of the camera are patience enough.
+VISITS = Visits(alpha=1.0, c=50.0, worth_m2=50.0, patience=16.0)
+ROWS_ALONE = VISITS._replace(worth_m2=float("inf"))
+
+
+#: Between two images of a flight that its tracks steer, s; and how many of these lie between two at which the
+#: tracks are held against the animals. Chosen.
+PATROL_S, EVERY = 1.0, 10
+
+
+class World(NamedTuple):
+    """Land, animals and a platform over it.
+
+    Attributes
+    ----------
+    twin
+        Whose platform, camera and enclosures.
+    land
+        The ground.
+    fences
+        (E) each (K, 2) m.
+    lives
+        (E,) animals in each.
+    images
+        Of `LAPS` laps.
+    lap
+        How long one takes, s.
+    detector, errors
+        Of the camera and of its pose.
+    motion
+        How animals walk, as the filters take it.
+    """
+
+    twin: TwinParameters
+    land: Terrain
+    fences: list[Array]
+    lives: NDArray[np.intp]
+    images: Images
+    lap: float
+    detector: Detector
+    errors: ExecutionErrors
+    motion: Motion
+
+
+def detector_of(twin: TwinParameters) -> Detector:
+    """What becomes of an animal in an image of the twin."""
+    a = uav.required(twin.animals, "animals")
+    return Detector(a.detected.number, twin.camera.marking_sd.si, a.border.si, a.height.si)
+
+
+def insides(fences: Iterable[Array]) -> list[Inside]:
+    """Each fence as the particle filter takes it."""
+    return [tester(check_area(one, "fence")) for one in fences]
+
+
+def herds(twin: TwinParameters, fences: list[Array], times: Array, seed: int) -> Array:
+    """(T, A, 2) m: the animals of all enclosures, one after the other, on their walks (F (4.5))."""
+    a = uav.required(twin.animals, "animals")
+    each = [
+        walks(fence, times, int(one.animals.number), a.speed_sd.si, a.step.si, stream(seed, f"walk {k}"))
+        for k, (fence, one) in enumerate(zip(fences, twin.enclosures.values(), strict=True))
+    ]
+    return np.swapaxes(np.concatenate(each), 0, 1)
+
+
+class Way(NamedTuple):
+    """One lap: times (T,) s, headings (T,) rad, poses as told, and how long it takes, s."""
+
+    times: Array
+    headings: Array
+    poses: CameraPoses
+    lap: float
+
+
+def gondola_way(twin: TwinParameters, land: Terrain, fences: list[Array], seed: int, rate: float) -> Way:
+    """Once round with the adaptive roll rotation (F 7.5.2)."""
+    there = gondola.ride(twin, land, rate, 1.0)
+    poses = gondola.poses_of(STRATEGY, twin, land, fences, there, seed)
+    return Way(there.times, there.headings, poses, there.duration)
+
+
+def rolling(twin: TwinParameters) -> Callable[[Array], GimbalAngles]:
+    """The multicopter's gimbal: from side to side about roll (F 7.5.1)."""
+    g = uav.required(twin.gimbal, "gimbal")
+    return lambda times: swing_roll(times, g.limit.si, 4 * g.limit.si / g.period.si)
+
+
+def uav_way(twin: TwinParameters, land: Terrain, fences: list[Array], rate: float) -> Way:
+    """Rows over all enclosures, and back, 50 m above the ground (F 7.5.1)."""
+    pattern = rows_of(twin, fences)
+    s = uav.required(twin.survey, "survey")
+    course = fly(pattern, twin.flight.airspeed.si, turn_time=s.turn_time.si)
+    times = np.arange(0.0, course.duration, 1 / rate)
+    places, headings = course.at(times)
+    way = follow_terrain(land, pattern.waypoints, twin.flight.altitude.si, climb=uav.CLIMB, descent=uav.CLIMB)
+    p = np.column_stack([places, -way.at(course.distances(times))])
+    poses = camera_on_course(uav.camera_of(twin), p, headings, rolling(twin)(times))
+    return Way(times, headings, poses, course.duration)
+
+
+def rows_of(twin: TwinParameters, fences: list[Array]) -> Pattern:
+    """The lawn mower pattern over all enclosures."""
+    s, speed = uav.required(twin.survey, "survey"), twin.flight.airspeed.si
+    along = [one.course.si for one in twin.enclosures.values()]
+    return lawn_mowers(
+        fences, s.row_distance.si, directions=along, turn=speed * s.turn_time.si, back=True
+    )  # fmt: skip
+
+
+def draw_world(platform: str, twin_name: str, seed: int) -> World:
+    """Land, animals and images of one seed, from `GONDOLA` or `UAV`.
+
+    Parameters
+    ----------
+    platform
+        Which way is flown.
+    twin_name
+        Of the platform.
+    seed
+        Of all that is drawn.
+    """
+    twin, rate = load_twin(twin_name), RATES[platform]
+    land = uav.land_of(seed)
+    fences = uav.fences_of(twin, len(twin.enclosures))
+    if platform == GONDOLA:
+        way, errors = gondola_way(twin, land, fences, seed, rate), gondola.errors_of_execution(twin)
+    else:
+        way, errors = uav_way(twin, land, fences, rate), uav.errors_of_execution(twin)
+    rows = np.tile(np.arange(len(way.times)), LAPS)
+    times = (way.times + way.lap * np.arange(LAPS)[:, None]).ravel()
+    told = way.poses.take(rows)
+    true = with_errors(told, way.headings[rows], errors, 1 / rate, stream(seed, f"execution, {platform}"))
+    detector = detector_of(twin)
+    truth = herds(twin, fences, times, seed)
+    images = take_images(
+        land, told, true, times, truth, errors, detector, stream(seed, f"detections, {platform}")
+    )
+    a = uav.required(twin.animals, "animals")
+    lives = np.array([int(one.animals.number) for one in twin.enclosures.values()])
+    return World(
+        twin, land, fences, lives, images, way.lap, detector, errors, walk_of(a.speed_sd.si, a.step.si)
+    )
+
+
+def particles_of(world: World, seed: int, negative: bool) -> Particles:
+    """F's particle filter, which knows how animals walk, their fences, and what the camera shows."""
+
+    def rules(moves: Moves) -> Rules:
+        return Rules(moves, particles=PARTICLES, gate_probability=GATE, negative=negative)
+
+    return Particles(world.motion, insides(world.fences), stream(seed, "particles"), rules)
+
+
+def follower_of(name: str, world: World, seed: int) -> Follower:
+    """One of `FILTERS`."""
+    if name == KALMAN:
+        return Kalman(world.motion, GATE)
+    return particles_of(world, seed, name == NEGATIVE)
+
+
+def run_filter(name: str, world: World, seed: int) -> Followed:
+    """A world followed by one of `FILTERS`."""
+    return follow(world.images, world.land, world.detector, follower_of(name, world, seed), world.motion)
+
+
+def run_patrol(world: World, seed: int, visits: Visits) -> Patrolled:
+    """One search of all enclosures in rows, with visits to animals that are known (F 5.3)."""
+    twin = world.twin
+    pattern = rows_of(twin, world.fences)
+    times = np.arange(0.0, LAPS * world.lap, PATROL_S)
+    aircraft = Aircraft(
+        uav.camera_of(twin), rolling(twin), twin.flight.altitude.si, twin.flight.airspeed.si, world.errors,
+        world.detector,
+    )  # fmt: skip
+    return patrol(
+        world.land, aircraft, pattern.rows.reshape(-1, 2), np.repeat(pattern.area, 2), world.lives, times,
+        herds(twin, world.fences, times, seed), particles_of(world, seed, True), visits,
+        stream(seed, "patrol"),
+    )  # fmt: skip
+
+
+class OutOfSight(NamedTuple):
+    """Animals with a track at a time when they were not detected for a while; N of them, at all stations.
+
+    Attributes
+    ----------
+    off
+        (N, 2) m, the track's mean from the animal.
+    covariance
+        (N, 2, 2) m^2, the track's.
+    own
+        (N,) bool: whether the track was never given another animal's detection.
+    """
+
+    off: Array
+    covariance: Array
+    own: NDArray[np.bool_]
+
+    @property
+    def nees(self) -> Array:
+        """(N,) squared distances in units of the covariance; 2 on average where it is right."""
+        solved = np.linalg.solve(self.covariance, self.off[..., None])[..., 0]
+        return np.asarray(np.einsum("ni,ni->n", self.off, solved))
+
+
+def out_of_sight(known: list[Known], found: list[Found], times: Array, truth: Array) -> OutOfSight:
+    """Where tracks are and animals are, once these were not detected for `OUT_OF_SIGHT`.
+
+    An animal's track is the one that its latest detection was given to.
+    """
+    animals = truth.shape[1]
+    own, seen_at = np.zeros(animals, np.int64), np.full(animals, np.inf)
+    off, covariance, pure, row = list[Array](), list[Array](), list[bool](), 0
+    first, mixed = dict[int, int](), set[int]()
+    for one in known:
+        while row < len(found) and found[row].image <= one.image:
+            if first.setdefault(found[row].track, found[row].animal) != found[row].animal:
+                mixed.add(found[row].track)
+            own[found[row].animal], seen_at[found[row].animal] = found[row].track, times[found[row].image]
+            row += 1
+        at = {int(name): k for k, name in enumerate(one.identity)}
+        for animal in np.flatnonzero(times[one.image] - seen_at > OUT_OF_SIGHT):
+            k = at.get(int(own[animal]))
+            if k is not None:
+                off.append(one.mean[k] - truth[one.image, animal])
+                covariance.append(one.covariance[k])
+                pure.append(int(own[animal]) not in mixed)
+    return OutOfSight(
+        np.array(off).reshape(-1, 2), np.array(covariance).reshape(-1, 2, 2), np.array(pure, bool)
+    )  # fmt: skip
+
+
+def sight_numbers(known: list[Known], found: list[Found], times: Array, truth: Array) -> dict[str, float]:
+    """How well animals out of sight are known, and what the covariance does between two sightings."""
+    away = out_of_sight(known, found, times, truth)
+    back = [one for one in found if OUT_OF_SIGHT < one.away < np.inf and one.track == one.own]
+    names = ("rmse", "sd", "anees", "rmse_own", "anees_own", "own_share", "fell", "fall", "grew")
+    if not len(away.off):
+        return dict.fromkeys(names, np.nan)
+    squares, mine = (away.off**2).sum(axis=1), away.own
+    trace = np.trace(away.covariance, axis1=1, axis2=2)
+    return {
+        "rmse": float(np.sqrt(squares.mean())),
+        "sd": float(np.sqrt(trace.mean() / 2)),
+        "anees": float(away.nees.mean()),
+        "rmse_own": float(np.sqrt(squares[mine].mean())) if mine.any() else np.nan,
+        "anees_own": float(away.nees[mine].mean()) if mine.any() else np.nan,
+        "own_share": float(mine.mean()),
+        "fell": float(np.mean([one.after < one.before for one in back])) if back else np.nan,
+        "fall": float(np.median([one.after / one.before for one in back])) if back else np.nan,
+        "grew": float(np.mean([one.before > one.after_last for one in back])) if back else np.nan,
+    }
+
+
+def filter_numbers(world: World, followed: Followed) -> dict[str, float]:
+    """What is compared of a filter, by name."""
+    images = world.images
+    later = [one for one in followed.found if LATER * world.lap < one.away < np.inf]
+    own = [np.sqrt(one.own_before / 2) for one in later if np.isfinite(one.own_before)]
+    right = sum(one.track == one.own for one in later)
+    return {
+        **sight_numbers(followed.known, followed.found, images.times, images.truth),
+        "later": float(len(later)),
+        "right": float(right),
+        "right_share": right / len(later) if later else np.nan,
+        "sd_later": float(np.median(own)) if own else np.nan,
+        "tracks": float(followed.tracks),
+        "looks": float(followed.steps),
+    }
+
+
+def platform_numbers(world: World) -> dict[str, float]:
+    """What the images of a platform's first lap show of the animals."""
+    images = world.images
+    first = images.in_view[images.times < world.lap]
+    seconds = first.sum(axis=0) * float(np.median(np.diff(images.times)))
+    seen = seconds > 0
+    return {
+        "seen_share": float(seen.mean()),
+        "in_view": float(np.median(seconds[seen])) if seen.any() else np.nan,
+        "minutes": world.lap / 60,
+        "by_fence_alone": float(np.sqrt(np.mean([_uniform_trace(one) / 2 for one in world.fences]))),
+    }
+
+
+def _uniform_trace(fence: Array) -> float:
+    """Trace of the covariance of a place anywhere in a rectangle, m^2."""
+    sides = np.linalg.norm(np.diff(fence[:3], axis=0), axis=1)
+    return float((sides**2).sum() / 12)
+
+
+def patrol_numbers(world: World, flown: Patrolled, seed: int) -> dict[str, float]:
+    """What is compared of a search with visits and of one without, by name."""
+    truth = herds(world.twin, world.fences, np.arange(0.0, LAPS * world.lap, PATROL_S), seed)
+    goal = np.append(SEARCH, flown.goal)
+    began = (goal[1:] != goal[:-1]) & (goal[1:] != SEARCH)
+    return {
+        **sight_numbers(flown.known[::EVERY], flown.found, flown.times, truth),
+        "minutes": float(flown.times[-1]) / 60,
+        "visits": float(began.sum()),
+        "given_up": float(len(flown.given_up)),
+        "done": float(np.isfinite(flown.done).mean()),
+        "tracks": float(max((one.track for one in flown.found), default=0)),
+        "animals_share": len({one.animal for one in flown.found}) / truth.shape[1],
+    }
+
+
+class Runs(NamedTuple):
+    """All that is computed of one seed.
+
+    Attributes
+    ----------
+    worlds
+        By platform.
+    followed
+        By platform and filter.
+    patrolled
+        By `REVISITS` and `ROWS`.
+    """
+
+    worlds: dict[str, World]
+    followed: dict[tuple[str, str], Followed]
+    patrolled: dict[str, Patrolled]
+
+
+def all_runs(seed: int, twin: str, second: str) -> tuple[Runs, dict[tuple[str, str], float]]:
+    """Everything of one seed, and the numbers of `trial`."""
+    worlds = {name: draw_world(name, source, seed) for name, source in ((GONDOLA, twin), (UAV, second))}
+    followed = {
+        (name, one): run_filter(one, world, seed) for name, world in worlds.items() for one in FILTERS
+    }
+    patrolled = {
+        REVISITS: run_patrol(worlds[UAV], seed, VISITS), ROWS: run_patrol(worlds[UAV], seed, ROWS_ALONE)
+    }  # fmt: skip
+    numbers: dict[tuple[str, str], float] = {}
+    for name, world in worlds.items():
+        numbers |= {(name, key): value for key, value in platform_numbers(world).items()}
+    for (name, one), run in followed.items():
+        found = filter_numbers(worlds[name], run)
+        numbers |= {(f"{name}-{one}", key): value for key, value in found.items()}
+    for name, flown in patrolled.items():
+        found = patrol_numbers(worlds[UAV], flown, seed)
+        numbers |= {(name, key): value for key, value in found.items()}
+    return Runs(worlds, followed, patrolled), numbers
+
+
+def trial(seed: int, *, twin: str, second: str) -> dict[tuple[str, str], float]:
+    """All platforms and filters over the world of one seed.
+
+    Parameters
+    ----------
+    seed
+        Of land, animals, errors and detections.
+    twin, second
+        Of the gondola and of the multicopter.
+    """
+    return all_runs(seed, twin, second)[1]
