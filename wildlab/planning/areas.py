@@ -159,7 +159,7 @@ def contains(corners: ArrayLike, points: ArrayLike) -> NDArray[np.bool_]:
     return inside
 
 
-def tester(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
+def inside_of(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
     """Whether points (..., 2) lie in an area, for areas that are asked often.
 
     A convex one is asked by its sides, which is many times faster than `contains`.
@@ -176,7 +176,7 @@ def tester(corners: ArrayLike) -> Callable[[Array], NDArray[np.bool_]]:
 
     Examples
     --------
-    >>> inside = tester(check_area([[0, 0], [0, 10], [20, 10], [20, 0]], "area"))
+    >>> inside = inside_of(check_area([[0, 0], [0, 10], [20, 10], [20, 0]], "area"))
     >>> inside(np.array([[[5.0, 5.0], [25.0, 5.0]]]))
     array([[ True, False]])
     """

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.planning.areas import check_area, contains, tester
+from wildlab.planning.areas import check_area, contains, inside_of
 from wildlab.planning.sightings import Sightings
 
 
@@ -62,7 +62,7 @@ def walks(
     steps = int(np.ceil(float(t.max(initial=0.0)) / step)) + 1
     way = np.empty((steps + 1, count, 2))
     way[0] = here
-    within = tester(corners)
+    within = inside_of(corners)
     for k in range(steps):
         there = here + step * speed_sd * rng.standard_normal((count, 2))
         here = np.where(within(there)[:, None], there, here)

@@ -82,14 +82,32 @@ class Images(NamedTuple):
         return self.z[rows], self.R[rows], self.animal[rows]
 
 
-def pose_errors(errors: ExecutionErrors, sd: float) -> PoseErrors:
-    """The errors of a way as `ground_covariance` takes them, with detections of ``sd`` px."""
-    sizes = [
-        errors.horizontal, errors.horizontal, errors.vertical, errors.roll, errors.pitch, errors.yaw,
-    ]  # fmt: skip
-    return PoseErrors(
-        pixel=sd**2 * np.eye(2), pose=np.diag(np.square(sizes)), mount=np.zeros((3, 3)), plane=0.0
-    )
+def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array) -> PoseErrors:
+    """The errors of a way as `ground_covariance` takes them of poses at the lens.
+
+    Parameters
+    ----------
+    errors
+        Of the way; its angles are about the axes of a level platform.
+    sd
+        Of detections, px.
+    R_nc
+        (N, 3, 3) attitudes of the camera, in whose own axes errors of the attitude are told.
+    headings
+        (N,) of the platform, rad.
+
+    Returns
+    -------
+    PoseErrors
+    """
+    cos, sin, zero = np.cos(headings), np.sin(headings), np.zeros(len(headings))
+    # Columns: the platform's axes in n, ahead, to the right and down.
+    axes = np.stack([cos, -sin, zero, sin, cos, zero, zero, zero, zero + 1], axis=-1).reshape(-1, 3, 3)
+    turned = np.swapaxes(R_nc, -1, -2) @ axes * [errors.roll, errors.pitch, errors.yaw]
+    pose = np.zeros((len(headings), 6, 6))
+    pose[:, range(3), range(3)] = np.square([errors.horizontal, errors.horizontal, errors.vertical])
+    pose[:, 3:, 3:] = turned @ np.swapaxes(turned, -1, -2)
+    return PoseErrors(pixel=sd**2 * np.eye(2), pose=pose, mount=np.zeros((3, 3)), plane=0.0)
 
 
 def raised(terrain: Terrain, height: float) -> Terrain:
@@ -139,6 +157,7 @@ def take_images(
     terrain: Terrain,
     told: CameraPoses,
     true: CameraPoses,
+    headings: Array,
     times: ArrayLike,
     truth: Array,
     errors: ExecutionErrors,
@@ -153,6 +172,8 @@ def take_images(
         The ground.
     told, true
         Poses as they are known, and as they are; T rows.
+    headings
+        (T,) of the platform, rad.
     times
         (T,) s.
     truth
@@ -179,7 +200,14 @@ def take_images(
     z, R = np.zeros((0, 2)), np.zeros((0, 2, 2))
     if len(image):
         z, R = put_on_ground(
-            terrain, told.take(image), true.take(image), places[image, animal], errors, detector, rng
+            terrain,
+            told.take(image),
+            true.take(image),
+            headings[image],
+            places[image, animal],
+            errors,
+            detector,
+            rng,
         )
     return Images(np.asarray(times, float), told, z, R, image, animal, places, in_view)
 
@@ -188,20 +216,23 @@ def put_on_ground(
     terrain: Terrain,
     told: CameraPoses,
     true: CameraPoses,
+    headings: Array,
     places: Array,
     errors: ExecutionErrors,
     detector: Detector,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Detections (D, 2) m of animals at places (D, 2), and their covariances (D, 2, 2); a pose for each.
+    """Detections (D, 2) m of animals at places (D, 2), and their covariances (D, 2, 2).
 
-    The covariance takes the ground about a detection as level.
+    There is a pose and a heading for each. The covariance takes the ground about a detection as level.
     """
     points = np.column_stack([places, -terrain.heights_at(places) - detector.height])
     uv = ground_to_pixel(true.camera, points, true.p_nc, true.R_nc)
     uv = uv + detector.sd * rng.standard_normal(uv.shape)
     met = pixels_to_terrain(told, uv, raised(terrain, detector.height)).points
-    R = ground_covariance(told, uv, met[:, 2], pose_errors(errors, detector.sd), rng).covariance
+    R = ground_covariance(
+        told, uv, met[:, 2], pose_errors(errors, detector.sd, told.R_nc, headings), rng
+    ).covariance
     return met[:, :2], R
 
 

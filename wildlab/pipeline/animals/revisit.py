@@ -170,7 +170,7 @@ def patrol(
         scanned = scanned + step if goal != SEARCH and away <= reach else 0.0
         told = _pose(terrain, aircraft, here, heading, times[k : k + 1])
         true = displaced(told, [heading], off[k : k + 1], turn[k : k + 1])
-        animals = _see(terrain, aircraft, told, true, truth[k], time, follower, ledger, k, rng)
+        animals = _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
         if scanned > visits.patience:
             follower.give_up(goal)
             given_up.append(goal)
@@ -193,8 +193,8 @@ def _pose(terrain: Terrain, aircraft: Aircraft, here: Array, heading: float, tim
 
 
 def _see(
-    terrain: Terrain, aircraft: Aircraft, told: CameraPoses, true: CameraPoses, truth: Array, time: float,
-    follower: Particles, ledger: Ledger, k: int, rng: np.random.Generator,
+    terrain: Terrain, aircraft: Aircraft, told: CameraPoses, true: CameraPoses, heading: float,
+    truth: Array, time: float, follower: Particles, ledger: Ledger, k: int, rng: np.random.Generator,
 ) -> int:  # fmt: skip
     """One image for the tracks; how many animals are detected in it."""
     detector = aircraft.detector
@@ -204,7 +204,14 @@ def _see(
     if len(seen):
         rows = np.zeros(len(seen), np.intp)
         z, R = put_on_ground(
-            terrain, told.take(rows), true.take(rows), truth[seen], aircraft.errors, detector, rng
+            terrain,
+            told.take(rows),
+            true.take(rows),
+            np.full(len(seen), heading),
+            truth[seen],
+            aircraft.errors,
+            detector,
+            rng,
         )
     follower.step(blind(time))
     before = traces_of(follower)

@@ -20,7 +20,7 @@ from wildlab.pipeline.animals.follow import Followed, Follower, Found, Kalman, K
 from wildlab.pipeline.animals.images import Detector, Images, take_images
 from wildlab.pipeline.animals.revisit import Aircraft, Patrolled, Visits, patrol
 from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
-from wildlab.planning.areas import check_area, tester
+from wildlab.planning.areas import check_area, inside_of
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
 from wildlab.planning.heights import follow_terrain
@@ -116,7 +116,7 @@ def detector_of(twin: TwinParameters) -> Detector:
 
 def insides(fences: Iterable[Array]) -> list[Inside]:
     """Each fence as the particle filter takes it."""
-    return [tester(check_area(one, "fence")) for one in fences]
+    return [inside_of(check_area(one, "fence")) for one in fences]
 
 
 def herds(twin: TwinParameters, fences: list[Array], times: Array, seed: int) -> Array:
@@ -199,7 +199,15 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
     detector = detector_of(twin)
     truth = herds(twin, fences, times, seed)
     images = take_images(
-        land, told, true, times, truth, errors, detector, stream(seed, f"detections, {platform}")
+        land,
+        told,
+        true,
+        way.headings[rows],
+        times,
+        truth,
+        errors,
+        detector,
+        stream(seed, f"detections, {platform}"),
     )
     a = uav.required(twin.animals, "animals")
     lives = np.array([int(one.animals.number) for one in twin.enclosures.values()])

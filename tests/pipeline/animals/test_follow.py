@@ -1,0 +1,195 @@
+"""Animals followed through images: what is left out changes nothing, and what is written down is so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import Array, euler_to_matrix
+from wildlab.geometry.mount import R_MC_DOWN
+from wildlab.geometry.terrain import Terrain
+from wildlab.pipeline.animals.follow import (
+    STATION_S,
+    Kalman,
+    Ledger,
+    Particles,
+    blind,
+    follow,
+    traces_of,
+)
+from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from, take_images
+from wildlab.pipeline.plans.flown import ExecutionErrors
+from wildlab.planning.areas import inside_of, rectangle
+from wildlab.planning.moving import walks
+from wildlab.tracking.particles import Look, Rules, walk_of
+from wildlab.tracking.particles.clouds import Inside
+from wildlab.tracking.particles.herd import Moves
+
+CAMERA = Camera(640, 480, 1267.0, 1117.0, 356.0, 216.6)
+FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
+DETECTOR = Detector(detected=0.9, sd=1.0, border=0.0, height=0.7)
+ERRORS = ExecutionErrors(0.2, 0.2, 300.0, 0.002, 0.002, 0.005, 60.0)
+FENCE = rectangle(0.0, 0.0, 200.0, 160.0, 0.0)
+
+
+def over_and_over(seed: int, speed_sd: float, seconds: float = 300.0) -> Images:
+    """A camera 50 m up that goes back and forth over a field with eight animals."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, seconds, 0.5)
+    p = np.column_stack([90 * np.sin(times / 15), 60 * np.sin(times / 47), np.full(len(times), -50.0)])
+    R = np.tile(euler_to_matrix(0.0, 0.0, 0.0) @ R_MC_DOWN, (len(times), 1, 1))
+    told = CameraPoses.at_lens(CAMERA, p, R, np.eye(3))
+    truth = np.swapaxes(walks(FENCE, times, 8, speed_sd, 1.0, rng), 0, 1)
+    return take_images(FLAT, told, told, np.zeros(len(times)), times, truth, ERRORS, DETECTOR, rng)
+
+
+def particles(seed: int, speed_sd: float, *, negative: bool = True) -> Particles:
+    def rules(moves: Moves) -> Rules:
+        return Rules(moves, particles=300, negative=negative, scheme="systematic")
+
+    fences: list[Inside] = [inside_of(FENCE)]
+    return Particles(walk_of(speed_sd, 1.0), fences, np.random.default_rng(seed), rules)
+
+
+class Spied(Particles):
+    """Keeps where its particles were when it was asked for nothing."""
+
+    seen_at: float = np.nan
+
+    def step(self, look: Look) -> np.ndarray:
+        names = super().step(look)
+        self.seen_at = look.time
+        self.looked.append(look.time)  # type: ignore[attr-defined]
+        return names
+
+
+def test_images_that_are_left_out_show_no_particle() -> None:
+    images = over_and_over(1, 0.0)
+    spied = particles(1, 0.0)
+    spied.__class__ = Spied
+    spied.looked = []  # type: ignore[attr-defined]
+    follow(images, FLAT, DETECTOR, spied, walk_of(0.0, 1.0))
+    looked = set(spied.looked)  # type: ignore[attr-defined]
+    skipped = [k for k, time in enumerate(images.times.tolist()) if time not in looked]
+    assert len(skipped) > 50
+    # Nothing moves: where the particles end, they were since the last detection of their animal.
+    last = int(images.image.max())
+    middle, radius = footprint_circles(FLAT, images.poses)
+    after = [k for k in skipped if k > last]
+    for k in after or skipped[-1:]:
+        p, R = images.poses.p_nc[k], images.poses.R_nc[k]
+        sight = sight_from(FLAT, CAMERA, p, R, (middle[k], float(radius[k])), DETECTOR)
+        weight = (spied.herd.cloud.w * (sight(spied.herd.cloud.x[..., :2]) > 0)).sum()
+        if k > last:
+            assert weight == 0
+
+
+def test_every_image_with_a_detection_is_looked_at_and_every_station() -> None:
+    images = over_and_over(2, 0.5)
+    done = follow(images, FLAT, DETECTOR, particles(2, 0.5), walk_of(0.5, 1.0))
+    assert len(done.found) == len(images.z)
+    times = images.times[[one.image for one in done.known]]
+    assert np.diff(times).max() <= STATION_S + 0.5 and times[-1] == images.times[-1]
+    assert done.tracks == max(one.track for one in done.found)
+    assert done.steps < len(images.times)
+
+
+def every_image(images: Images, kalman: Kalman) -> Kalman:
+    for k, time in enumerate(images.times.tolist()):
+        z, R, _ = images.taken(k)
+        kalman.step(Look(time, z, R, lambda places: np.zeros(places.shape[:-1])))
+    return kalman
+
+
+def test_a_kalman_filter_that_leaves_images_out_is_the_one_that_does_not() -> None:
+    images = over_and_over(3, 0.5)
+    motion = walk_of(0.5, 1.0)
+    few = Kalman(motion, 0.99)
+    follow(images, FLAT, DETECTOR, few, motion)
+    for one, other in zip(few.known(), every_image(images, Kalman(motion, 0.99)).known(), strict=True):
+        assert np.allclose(one, other, rtol=1e-9)
+
+
+def test_a_kalman_track_is_the_textbooks() -> None:
+    kalman, motion = Kalman(walk_of(0.5, 1.0), 0.99), walk_of(0.5, 1.0)
+    first, second = np.array([[3.0, 4.0]]), np.array([[5.0, 4.5]])
+    R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
+    nowhere: Inside = lambda places: np.zeros(places.shape[:-1], bool)  # noqa: E731
+    kalman.step(Look(0.0, first, R, nowhere))
+    assert kalman.step(Look(10.0, second, R, nowhere)).tolist() == [1]
+    P = R[0] + motion(10.0)[1]
+    # In the form of information: precisions add.
+    after = np.linalg.inv(np.linalg.inv(P) + np.linalg.inv(R[0]))
+    mean = after @ (np.linalg.solve(P, first[0]) + np.linalg.solve(R[0], second[0]))
+    _, got, covariance = kalman.known()
+    assert got[0] == pytest.approx(mean) and covariance[0] == pytest.approx(after)
+    assert kalman.step(
+        Look(11.0, np.array([[90.0, 0.0], [np.nan, 0.0]]), np.tile(R, (2, 1, 1)), nowhere)
+    ).tolist() == [2, 0]
+
+
+def test_particles_without_negative_information_agree_with_kalman_far_from_the_fence() -> None:
+    motion = walk_of(0.5, 1.0)
+    R = np.array([[[4.0, 1.0], [1.0, 2.0]]])
+    kalman = Kalman(motion, 0.99)
+    means, covariances = [], []
+    for seed in range(30):
+        cloud = particles(seed, 0.5, negative=False)
+        for one in (cloud, kalman := Kalman(motion, 0.99)):
+            one.step(Look(0.0, np.array([[3.0, 4.0]]), R, lambda places: np.zeros(places.shape[:-1])))
+            one.step(blind(40.0))
+            one.step(Look(60.0, np.array([[6.0, 1.0]]), R, lambda places: np.zeros(places.shape[:-1])))
+        means.append(cloud.known()[1][0])
+        covariances.append(cloud.known()[2][0])
+    _, mean, covariance = kalman.known()
+    assert np.mean(means, axis=0) == pytest.approx(mean[0], abs=0.2)
+    assert np.mean(covariances, axis=0) == pytest.approx(covariance[0], rel=0.12, abs=0.15)
+
+
+def test_no_particle_leaves_the_fence_it_began_in() -> None:
+    cloud = particles(7, 2.0)
+    look = Look(0.0, np.array([[70.0, 60.0]]), np.eye(2)[None], lambda places: np.zeros(places.shape[:-1]))
+    cloud.step(look)
+    cloud.step(blind(900.0))
+    assert cloud.home.tolist() == [0]
+    assert inside_of(FENCE)(cloud.herd.cloud.x[..., :2]).all()
+    assert np.ptp(cloud.herd.cloud.x[..., 0]) > 100
+    cloud.give_up(1)
+    assert cloud.herd.lost.tolist() == [True]
+
+
+def test_negative_information_moves_a_track_out_of_what_was_seen() -> None:
+    cloud = particles(8, 0.5)
+    whole = Look(
+        0.0, np.array([[0.0, 0.0]]), 25 * np.eye(2)[None], lambda places: np.zeros(places.shape[:-1])
+    )
+    cloud.step(whole)
+
+    def west(places: Array) -> Array:
+        return 0.9 * (places[..., 1] < 0)
+
+    cloud.step(Look(1.0, np.zeros((0, 2)), np.zeros((0, 2, 2)), west))
+    _, mean, _ = cloud.known()
+    # Half a normal distribution at 10 % of its weight: the mean is 0.8 sd times 9/11.
+    assert mean[0, 1] == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(25.25) * 9 / 11, rel=0.2)
+
+
+def test_a_ledger_knows_who_got_which_track() -> None:
+    ledger = Ledger(3)
+    ledger.enter(0, 0.0, np.array([0, 1]), np.array([1, 2]), {}, {1: 4.0, 2: 6.0})
+    ledger.enter(9, 90.0, np.array([1, 2]), np.array([1, 0]), {1: 50.0, 2: 60.0}, {1: 5.0, 2: 60.0})
+    first, _, third = ledger.found
+    assert first.started and first.away == np.inf and first.own == 0 and np.isnan(first.before)
+    assert (third.animal, third.track, third.own, third.away) == (1, 1, 2, 90.0)
+    assert (third.before, third.after, third.after_last, third.own_before) == (50.0, 5.0, 4.0, 60.0)
+    assert not third.started
+
+
+def test_traces_go_by_the_number_of_the_track() -> None:
+    kalman = Kalman(walk_of(0.5, 1.0), 0.99)
+    kalman.step(
+        Look(0.0, np.array([[0.0, 0.0], [90.0, 0.0]]), np.array([np.eye(2), 3 * np.eye(2)]), blind(0).sight)
+    )
+    assert traces_of(kalman) == {1: 2.0, 2: 6.0}
