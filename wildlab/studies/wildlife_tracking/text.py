@@ -301,8 +301,8 @@ def search_words(spread: pd.DataFrame) -> str:
         )
     missed = 1 - spread[REVISITS, "animals_share"].mean()
     early = (
-        f" Enclosures are called done by their number of tracks: {percent(missed)} of the animals were not "
-        "found by then, for two tracks of one animal count twice."
+        " Enclosures are called done by their number of tracks, where two of one animal count twice: when "
+        f"the search ended, {percent(missed)} of the animals had not been found."
         if missed > 0
         else ""
     )

@@ -1,0 +1,220 @@
+"""The study of animals that are followed: its sentences turn with its numbers, which are counted by hand."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.evaluation.shares import FAILS, HOLDS, decide_check
+from wildlab.pipeline.animals.follow import Found, Known
+from wildlab.pipeline.animals.revisit import Patrolled
+from wildlab.planning.high_level import SEARCH
+from wildlab.studies.wildlife_tracking import charts, text
+from wildlab.studies.wildlife_tracking.claims import check_claims
+from wildlab.studies.wildlife_tracking.trial import (
+    FILTERS,
+    GONDOLA,
+    KALMAN,
+    NEGATIVE,
+    POSITIVE,
+    REVISITS,
+    ROWS,
+    UAV,
+    Runs,
+    all_runs,
+    out_of_sight,
+    sight_numbers,
+)
+
+N = 80
+
+
+def spread_of(**changed: float) -> pd.DataFrame:
+    """Worlds in which everything is as F has it; ``subject__name`` changes a number."""
+    rng = np.random.default_rng(1)
+    values: dict[tuple[str, str], np.ndarray] = {}
+
+    def put(subject: str, name: str, value: float, noise: float = 0.0) -> None:
+        values[subject, name] = value + noise * rng.standard_normal(N)
+
+    for platform in (GONDOLA, UAV):
+        put(platform, "seen_share", 0.5, 0.01)
+        put(platform, "in_view", 1.5)
+        put(platform, "by_fence_alone", 60.0)
+        for number, one in enumerate(FILTERS):
+            subject = f"{platform}-{one}"
+            for name, value in (
+                ("rmse", 20.0 + number), ("sd", 14.0 + number), ("anees", 4.0), ("rmse_own", 19.0),
+                ("anees_own", 2.0), ("later", 10.0), ("right", 4.0), ("sd_later", 40.0), ("tracks", 30.0),
+                ("looks", 600.0 - 100 * number),
+            ):  # fmt: skip
+                put(subject, name, value, 0.05 if name not in ("later", "right") else 0.0)
+    for number, subject in enumerate((REVISITS, ROWS)):
+        for name, value in (
+            ("rmse", 12.0 + number), ("sd", 8.0 + number), ("minutes", 12.0 - number),
+            ("visits", 6.0 - 6 * number),
+            ("given_up", 0.0), ("done", 1.0), ("animals_share", 0.96), ("fall", 0.2), ("grew", 1.0),
+        ):  # fmt: skip
+            put(subject, name, value)
+    for key, number in changed.items():
+        subject, name = key.split("__")
+        values[subject.replace("_", "-"), name] = np.full(N, number)
+    return pd.DataFrame(values)
+
+
+def verdict(claim: str, threshold: float | None = None, **changed: float) -> str:
+    return decide_check(check_claims(spread_of(**changed), np.full(N, 9.0))[claim], threshold).verdict
+
+
+@pytest.mark.parametrize(
+    ("claim", "threshold", "changed"),
+    [
+        ("falls-on-revisit", 0.5, {f"{REVISITS}__fall": 0.8}),
+        ("grows-between", 0.9, {f"{REVISITS}__grew": 0.5}),
+        ("couple-of-seconds", 4.0, {f"{GONDOLA}__in_view": 9.0}),
+        ("very-large-a-lap-later", 0.5, {f"{GONDOLA}-{NEGATIVE}__sd_later": 20.0}),
+        ("hard-to-associate", 0.1, {f"{GONDOLA}-{NEGATIVE}__right": 10.0}),
+        ("same-problem-uav", 0.1, {f"{UAV}-{NEGATIVE}__right": 10.0}),
+        ("visits-keep-known", None, {f"{REVISITS}__sd": 10.0}),
+        ("negative-lowers-uncertainty-gondola", None, {f"{GONDOLA}-{NEGATIVE}__sd": 20.0}),
+        ("negative-lowers-uncertainty-uav", None, {f"{UAV}-{NEGATIVE}__sd": 20.0}),
+        ("negative-lowers-error-gondola", None, {f"{GONDOLA}-{NEGATIVE}__rmse": 30.0}),
+        ("negative-lowers-error-uav", None, {f"{UAV}-{NEGATIVE}__rmse": 30.0}),
+        ("closer-than-kalman-gondola", None, {f"{GONDOLA}-{KALMAN}__rmse": 10.0}),
+        ("closer-than-kalman-uav", None, {f"{UAV}-{KALMAN}__rmse": 10.0}),
+    ],
+)
+def test_each_claim_turns_with_its_number(
+    claim: str, threshold: float | None, changed: dict[str, float]
+) -> None:
+    assert verdict(claim, threshold) == HOLDS
+    assert verdict(claim, threshold, **changed) == FAILS
+
+
+def test_the_cost_decides_its_claim() -> None:
+    spread = spread_of()
+    assert decide_check(check_claims(spread, np.full(N, 9.0))["dearer-than-ekf"], 1.0).verdict == HOLDS
+    assert decide_check(check_claims(spread, np.full(N, 0.5))["dearer-than-ekf"], 1.0).verdict == FAILS
+    assert "dearer-than-ekf" not in check_claims(spread)
+    said = text.cost_words(pd.DataFrame({"ratio": [9.0, 11.0, 8.0]}), spread)
+    assert (
+        "9.0 times" in said and "dearer" in said and "no dearer" not in said and "1.2 times as many" in said
+    )
+    assert "no dearer" in text.cost_words(pd.DataFrame({"ratio": [0.5]}), spread)
+
+
+def test_words_turn_with_the_numbers() -> None:
+    ours = spread_of()
+    assert "is lower by 1.0" in text.negative_words(ours)
+    other = spread_of(**{f"{UAV}-{NEGATIVE}__rmse": 25.0, f"{UAV}-{POSITIVE}__rmse": 24.0})
+    assert "RMS distance is higher by 1.00 m" in text.negative_words(other)
+    same = spread_of(**{f"{UAV}-{NEGATIVE}__sd": 14.0, f"{UAV}-{POSITIVE}__sd": 14.0})
+    assert "not different for certain (0.00 m, 0.00 to 0.00)" in text.negative_words(same)
+    assert "too sure of itself" in text.consistency_words(ours)
+    timid = spread_of(
+        **{f"{one}-{NEGATIVE}__{name}": 1.2 for one in (GONDOLA, UAV) for name in ("anees", "anees_own")}
+    )
+    assert "too cautious" in text.consistency_words(timid) and "too sure" not in text.consistency_words(timid)
+    said = text.search_words(ours)
+    assert "1.0 min longer" in said and "4.0 % of the animals had not been found" in said
+    whole = spread_of(**{f"{REVISITS}__animals_share": 1.0, f"{REVISITS}__minutes": 10.0})
+    assert "1.0 min less" in text.search_words(whole) and "been found" not in text.search_words(whole)
+
+
+def test_none_seen_again_is_said_and_one_world_has_no_interval() -> None:
+    none = spread_of(
+        **{
+            f"{GONDOLA}-{NEGATIVE}__later": 0.0,
+            f"{GONDOLA}-{NEGATIVE}__right": 0.0,
+            f"{GONDOLA}-{NEGATIVE}__sd_later": np.nan,
+        }
+    )
+    assert "no animal is seen again" in text.later_words(none)
+    assert text.right_words(none, f"{GONDOLA}-{NEGATIVE}") == "none seen again"
+    one = spread_of().iloc[:1]
+    assert " to " not in text.table(one)["rmse"].iloc[0]
+    assert "in the one world" in text.negative_words(one)
+    assert "One world says nothing" in text.consistency_words(one)
+    assert len(text.summary(one)) == 3 and len(text.search_table(one)) == 2
+
+
+def found(image: int, animal: int, track: int, **other: float) -> Found:
+    base = {
+        "before": np.nan,
+        "after": 1.0,
+        "after_last": np.nan,
+        "own_before": np.nan,
+        "own": 0,
+        "away": np.inf,
+    }
+    return Found(image, animal, track, other == {}, **(base | other))  # type: ignore[arg-type]
+
+
+def test_out_of_sight_counts_by_hand() -> None:
+    times = np.arange(0.0, 100.0, 10.0)
+    truth = np.zeros((10, 2, 2))
+    truth[:, 1] = [100.0, 0.0]
+    # Animal 0 is seen at 0 s, animal 1 at 20 s; then animal 1 takes the track of animal 0 at 70 s.
+    log = [found(0, 0, 1), found(2, 1, 2), found(7, 1, 1, before=9.0, after=2.0, own=2, away=50.0)]
+    names, P = np.array([1, 2]), np.array([np.diag([4.0, 1.0]), 9 * np.eye(2)])
+    known = [Known(k, names, np.array([[2.0, 1.0], [103.0, 0.0]]), P) for k in (3, 5, 6, 8)]
+    away = out_of_sight(known, log, times, truth)
+    # At 30 s none is out of sight for more than 30 s; at 50 s animal 0 is, at 60 s both, at 80 s animal 0.
+    assert away.off.tolist() == [[2, 1], [2, 1], [3, 0], [2, 1]]
+    assert away.nees == pytest.approx([2.0, 2.0, 1.0, 2.0])
+    assert away.own.tolist() == [True, True, True, False]
+    numbers = sight_numbers(known, log, times, truth)
+    assert numbers["rmse"] == pytest.approx(np.sqrt((5 + 5 + 9 + 5) / 4))
+    assert numbers["sd"] == pytest.approx(np.sqrt((5 + 5 + 18 + 5) / 8))
+    assert numbers["own_share"] == 0.75 and np.isnan(numbers["fell"])
+    again = [*log, found(9, 0, 1, before=9.0, after=3.0, after_last=10.0, own=1, away=90.0)]
+    numbers = sight_numbers(known, again, times, truth)
+    assert (numbers["fell"], numbers["fall"], numbers["grew"]) == (1.0, pytest.approx(1 / 3), 0.0)
+
+
+def test_the_visit_of_the_figure_is_the_one_with_the_largest_fall() -> None:
+    goal = np.array([SEARCH, 4, 4, SEARCH, 7, 7, 7])
+    log = [
+        found(2, 0, 4, before=60.0, after=5.0), found(6, 1, 7, before=90.0, after=5.0),
+        found(3, 2, 9, before=900.0, after=5.0),
+    ]  # fmt: skip
+    flown = Patrolled(np.arange(7.0), np.zeros((7, 3)), goal, [], log, [], np.array([np.inf]))
+    assert charts.visit_rows(flown) == (4, 6)
+    assert charts.visit_rows(flown._replace(found=log[2:])) is None
+
+
+@lru_cache(maxsize=1)
+def runs() -> tuple[Runs, dict[tuple[str, str], float]]:
+    return all_runs(5, "gondola", "uav-tracking")
+
+
+@pytest.mark.slow
+def test_a_world_follows_as_it_should() -> None:
+    done, numbers = runs()
+    assert numbers[UAV, "seen_share"] > numbers[GONDOLA, "seen_share"] > 0.1
+    # The Kalman filter of animals that are never mixed up: its covariance is that of their walk.
+    assert numbers[f"{UAV}-{KALMAN}", "anees_own"] == pytest.approx(2.0, abs=0.7)
+    for (platform, _), one in done.followed.items():
+        images = done.worlds[platform].images
+        assert len(one.found) == np.isfinite(images.z).all(axis=1).sum()
+        assert {f.animal for f in one.found} <= set(range(images.truth.shape[1]))
+    looks = {one: numbers[f"{UAV}-{one}", "looks"] for one in FILTERS}
+    assert looks[POSITIVE] == looks[KALMAN] < looks[NEGATIVE]
+    assert numbers[REVISITS, "visits"] > 0 == numbers[ROWS, "visits"]
+
+
+@pytest.mark.slow
+def test_charts_say_what_they_draw() -> None:
+    done, _ = runs()
+    world, followed = done.worlds[GONDOLA], done.followed[GONDOLA, NEGATIVE]
+    _, _, alt, caption = charts.map_shown(world, followed, 1.0, "x", "After a lap", "7.19 (b)")
+    seen = {one.animal for one in followed.found if world.images.times[one.image] <= world.lap}
+    assert f"{len(seen)} of 25 animals found" in alt and "7.19 (b)" in caption
+    times, sd = charts.sd_of(done.worlds[UAV], done.followed[UAV, NEGATIVE], 3)
+    assert len(times) == len(sd) and np.nanmax(sd) > 5
+    shown = charts.visit_shown(done.worlds[UAV], done.patrolled[REVISITS])
+    assert shown is not None and "before the visit" in shown[2]
+    assert charts.covariance_shown(done) is not None
