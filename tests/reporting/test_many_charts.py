@@ -95,3 +95,11 @@ def test_names_are_only_text_and_leave_room_for_the_picture() -> None:
     figures.png_bytes(figure)
     shown = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert shown[0].startswith("<b>a$b_{$^") and all(len(one) <= charts.LONGEST_NAME for one in shown)
+
+
+def test_a_line_is_parted_where_its_track_was_absent() -> None:
+    way = np.array([[0.0, 1, 1], [0.0, 1, 2], [1.0, 2, 2], [4.0, 9, 9]])
+    times = [0.0, 0.0, 1.0, 2.0, 3.0, 4.0]
+    got = charts.parted(way, times)
+    assert np.isnan(got[3]).all() and got[[0, 1, 2, 4]].tolist() == way.tolist()
+    assert charts.parted(way[:3], times).tolist() == way[:3].tolist()

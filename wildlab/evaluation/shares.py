@@ -63,7 +63,8 @@ class Check:
     calculated
         Whether ``measured`` follows from the parameters alone, so that flights add nothing to it.
     first, second
-        (N,), what a comparison compares, in ``unit``: the paired difference is shown.
+        (N,), what a comparison compares, in ``unit``: the paired difference is shown. Where something is
+        pooled, ``unit`` is what is counted; images where it is empty.
     by_threshold
         Of which flights it is true, (N,) bool by the threshold, where that says what is counted: a share of
         what lies within a limit has no single measure to hold against the limit.

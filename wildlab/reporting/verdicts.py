@@ -140,4 +140,5 @@ def comparison_words(compared: Comparison) -> str:
     if compared.ratio is not None:
         return f"{compared.ratio:.2f}"
     off = compared.difference
-    return f"{'+' if off > 0 else MINUS if off < 0 else ''}{abs(off):.2f}"
+    size = f"{abs(off):.2f}" if abs(off) >= 0.005 or not off else f"{abs(off):.1g}"
+    return f"{'+' if off > 0 else MINUS if off < 0 else ''}{size}"

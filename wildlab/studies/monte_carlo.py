@@ -206,7 +206,7 @@ def beside_published(
                     "published": abs(row["value"]) if by_size else row["value"],
                     "here": found.get("value", np.nan),
                     "ratio": "" if compared is None else comparison_words(compared),
-                    "range": range_words(values, 2 if np.nanmax(values, initial=0.0) < 2 else 1),
+                    "range": range_words(values, _decimals(np.nanmax(values, initial=0.0))),
                     "below": "" if below is None else f"{100 * below:.0f} %",
                     "verdict": ""
                     if compared is None
@@ -217,6 +217,11 @@ def beside_published(
                 }
             )
     return pd.DataFrame(rows)
+
+
+def _decimals(largest: float) -> int:
+    """How many decimals a range is shown with: one of metres, four of shares of a few thousandths."""
+    return 1 if largest >= 2 else 2 if largest >= 0.02 else 4
 
 
 def decide_claims(report: Report, study: str, checks: Mapping[str, Check | ArrayLike]) -> pd.DataFrame:
@@ -299,7 +304,7 @@ def _share_words(found: Any, check: Check) -> str:
     if check.pooled is not None and check.pooled.of:
         count, of = check.pooled
         ends = share_interval(count, of)[1:]
-        return f"{count} of {of} images ({percent(ends[0])} to {percent(ends[1])})"
+        return f"{count} of {of} {check.unit or 'images'} ({percent(ends[0])} to {percent(ends[1])})"
     if found.share is None:
         return f"{found.met} of {found.flights} flights meet the premise"
     low, high = (100 * end for end in found.share[1:])

@@ -29,6 +29,13 @@ def ways_of(followed: Followed) -> dict[int, Array]:
     return {name: np.array(ways[name]) for name in longest}
 
 
+def parted(way: Array, times: list[float]) -> Array:
+    """A way (L, 3) of times and places, with a row of NaN wherever it misses some of the times."""
+    # Several sensors may look at one time.
+    order = np.searchsorted(np.unique(times), way[:, 0])
+    return np.asarray(np.insert(way, np.flatnonzero(np.diff(order) > 1) + 1, np.nan, axis=0))
+
+
 def short(name: object) -> str:
     """A target's name as far as there is room for it."""
     text = str(name)
@@ -63,6 +70,8 @@ def map_shown(followed: Followed) -> Shown:
     ways = ways_of(followed)
     tints = colours_of(followed)
     for identity, way in ways.items():
+        # Where a track is absent for a while no line says where it was.
+        way = parted(way, [look.time for look in followed.shown])
         named = tints[identity] != INK
         label = f"track {identity}" if named else "other tracks"
         ax.plot(way[:, 2], way[:, 1], color=tints[identity], lw=1.8 if named else 1.0, label=label)

@@ -36,7 +36,7 @@ def tracks_shown(flown: Flown) -> Shown:
     """Tracks without features and with them, beside the truth (H figures 6.23 and 6.24)."""
     fig, axes = new_figure(5.9, 6.6, rows=2)
     said = []
-    for ax, rule, name in zip(axes, (DISTANCE, FEATURES), ("Distance", "And features"), strict=True):
+    for ax, rule, name in zip(axes, (DISTANCE, FEATURES), ("Distance alone", "And features"), strict=True):
         bank, crossing = flown.banks[rule], flown.crossing
         for number, boat in enumerate(BOATS):
             north, east = crossing.truth[number].T

@@ -38,7 +38,7 @@ def check_claims(spread: pd.DataFrame, cost: Array | None = None) -> dict[str, C
         with np.errstate(invalid="ignore"):
             each = (later - right) / later
         pooled = Pooled(int((later - right).sum()), int(later.sum()))
-        return Check(measured=each, above=True, pooled=pooled, reach=(0, 1))
+        return Check(measured=each, above=True, pooled=pooled, reach=(0, 1), unit="animals seen again")
 
     def lower(name: str, first: str, second: str) -> Check:
         one, other = of(first, name), of(second, name)
