@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -352,3 +354,40 @@ def test_outcomes_are_named(flown, monkeypatch):
     ):
         monkeypatch.setattr(charts, "swapped", lambda *_, pair=pair: pair)
         assert charts.outcome_words(flown.crossing, FEATURES, flown).startswith(words + ",")
+
+
+def test_joint_association_of_two_far_apart_is_two_tracks():
+    crossing = passing(closest=400, noise=5)
+    numbers = study.joint_numbers(crossing)
+    assert numbers[study.JOINT, "tracks"] == 2
+    assert numbers[study.JOINT, "swaps"] == numbers[study.JOINT, "swapped"] == 0
+    assert numbers[study.JOINT, "gospa"] < 10
+
+
+def test_the_density_spreads_velocities_as_the_tuning_does():
+    # An acceleration of 0.2 m/s^2 held over each of two images a second, for 50 s.
+    assert study.density_of(0.5) ** 2 * 50 == pytest.approx(100 * (0.2 * 0.5) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("after", "end", "expected"),
+    [((1, 2), (1, 2), (False, False)), ((2, 1), (2, 1), (True, True)), ((2, 1), (1, 2), (True, False)),
+     ((2, 2), (2, 2), (False, False)), ((None, 1), (None, 1), (False, False))],
+)  # fmt: skip
+def test_shared_tracks_are_swapped_where_each_has_the_others(after, end, expected):
+    crossing = passing(images=1200)
+    times = crossing.times[:: study.EVERY]
+    told = []
+    for time in times:
+        pair = (1, 2) if time < 300 else after if time < 460 else end
+        told.append({boat: name for boat, name in zip(study.BOATS, pair, strict=True) if name is not None})
+    assert study.joint_swapped(crossing, SimpleNamespace(followed=told)) == expected
+
+
+def test_joint_words_turn_with_the_flights():
+    table = {(study.JOINT, "swapped"): [1.0] * 12 + [0.0] * 8, (DISTANCE, "swapped"): [0.0] * 20}
+    assert "on more of them, beyond chance" in text.joint_words(pd.DataFrame(table))
+    table = {(study.JOINT, "swapped"): [0.0] * 20, (DISTANCE, "swapped"): [1.0] * 12 + [0.0] * 8}
+    assert "on fewer of them, beyond chance" in text.joint_words(pd.DataFrame(table))
+    table = {(study.JOINT, "swapped"): [1.0, 0.0], (DISTANCE, "swapped"): [0.0, 0.0]}
+    assert "cannot be told" in text.joint_words(pd.DataFrame(table))

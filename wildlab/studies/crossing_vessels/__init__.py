@@ -14,7 +14,7 @@ def _metric(subject: str, name: str) -> Metric | None:
 
 STUDY = Study(
     "crossing-vessels",
-    (*trial.SUBJECTS, trial.LOOKS, *map(trial.curve_subject, trial.SEPARATIONS)),
+    (*trial.SUBJECTS, trial.JOINT, trial.LOOKS, *map(trial.curve_subject, trial.SEPARATIONS)),
     trial.trial,
     check_claims,
     _metric,

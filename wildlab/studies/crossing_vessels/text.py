@@ -13,6 +13,7 @@ from wildlab.reporting.text import percent
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
+    JOINT,
     LOOKS,
     NEAR_M,
     SEPARATIONS,
@@ -26,6 +27,7 @@ NAMES = {
     DISTANCE: "distance alone",
     FEATURES: "distance and features",
     VETO: "distance, features as a veto",
+    JOINT: "distance, shared by probability (JIPDA)",
 }
 
 METHOD = r"""Where and when each vessel is detected comes from the twin, with the printed numbers of
@@ -44,7 +46,12 @@ rendered images of other flights had.
 What a detection looks like is drawn from images of the same flight, rendered and searched with the seven
 steps of H 4.3, of the same vessel. An association is wrong where a detection goes to a track that the other
 vessel's detection started. Tracks are swapped where more than half of each vessel's detections go wrong,
-in the two minutes from when the two are 35 m apart again; at the end, in the last two minutes."""
+in the two minutes from when the two are 35 m apart again; at the end, in the last two minutes.
+
+Beside these rules stands joint integrated probabilistic data association with visibility (H 8.2), by distance
+alone and with the same noises: each track is updated with both detections, weighed by how probable each is.
+There a vessel's track is the one that is on it most often, and tracks are swapped where each vessel has the
+other's from before the crossing."""
 
 LIMITS = [
     "How the vessels looked is not printed: their lengths of 11 m and 7 m, warmth and wakes are chosen, and "
@@ -102,7 +109,10 @@ def outcome_table(spread: pd.DataFrame) -> pd.DataFrame:
     columns = ("wrong", "unassigned", "tracks", "swaps", "breaks", "mae", "gospa", "anees")
     rows = []
     for subject, words in NAMES.items():
-        middle = {name: float(spread[subject, name].median()) for name in columns}
+        middle = {
+            name: float(spread[subject, name].median()) if (subject, name) in spread else np.nan
+            for name in columns
+        }
         rows.append({"rule": words, "swapped": swap_words(spread, subject), **middle})
     return pd.DataFrame(rows)
 
@@ -175,6 +185,19 @@ def curve_words(spread: pd.DataFrame) -> str:
         "One feature, made up, normal and new in each image, with a known difference between the two vessels "
         f"in units of its spread. Flights swapped: {parts}. {first} {harm} {as_published_words(spread)}"
     )
+
+
+def joint_words(spread: pd.DataFrame) -> str:
+    """Whether sharing detections by probability swaps more or fewer tracks, on the same flights."""
+    joint, alone = (spread[one, "swapped"].to_numpy(bool) for one in (JOINT, DISTANCE))
+    more, fewer = int((joint & ~alone).sum()), int((alone & ~joint).sum())
+    counts = (
+        f"Shared by probability, detections leave the tracks swapped on {swap_words(spread, JOINT)}, given "
+        f"to one track each on {swap_words(spread, DISTANCE)}"
+    )
+    if more + fewer and binomtest(more, more + fewer).pvalue < 0.05:
+        return f"{counts}: on {'more' if more > fewer else 'fewer'} of them, beyond chance."
+    return f"{counts}; that one is better than the other cannot be told."
 
 
 def _harm_words(useless: NDArray[np.bool_], alone: NDArray[np.bool_]) -> str:
