@@ -19,7 +19,7 @@ from wildlab.pipeline.following.follow import order_notes, refuse_without_times,
 from wildlab.pipeline.many.beliefs import of_many
 from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
-from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many
+from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
 
 Array = NDArray[np.float64]
 
@@ -197,11 +197,13 @@ def tracks_table(followed: Followed) -> pd.DataFrame:
     -------
     DataFrame
         ``time_s``, ``sensor`` of the look, ``track``; the state in metres and m/s in n, ``p_ij`` its
-        covariance, the upper triangle; ``existence``; and the probability of each kind of hull.
+        covariance, the upper triangle; ``existence``; the probability of each kind of hull; and the place
+        with its covariance once the flight is over (`smooth_many`), ``smoothed_``.
     """
     names = [one.name for one in followed.sensors]
     rows = []
-    for shown in followed.shown:
+    after = smooth_many(followed.shown, followed.targets.density)
+    for shown, (later_x, later_P) in zip(followed.shown, after, strict=True):
         for i, identity in enumerate(shown.identity):
             row: dict[str, object] = {
                 "time_s": shown.time, "sensor": names[shown.sensor], "track": int(identity),
@@ -212,6 +214,8 @@ def tracks_table(followed: Followed) -> pd.DataFrame:
             row["existence"] = shown.existence[i]
             kinds = zip(followed.targets.hulls, shown.kinds[i], strict=True)
             row |= {f"kind_{number}": share for number, (_, share) in enumerate(kinds, start=1)}
+            row |= {"smoothed_north_m": later_x[i, 0], "smoothed_east_m": later_x[i, 1]}
+            row |= {f"smoothed_p_{a}{b}": later_P[i, a, b] for a in range(2) for b in range(a, 2)}
             rows.append(row)
     columns = ["time_s", "sensor", "track", "north_m", "east_m"]
     return pd.DataFrame(rows, columns=None if rows else columns)

@@ -3,6 +3,7 @@
 A matrix of distances has a row for each measurement and a column for each track, H (3.10).
 
 - `run_many`: all targets of all sensors, by joint probabilities with existence, visibility and hulls (H 8.2).
+- `smooth_many`: back over all tracks once the flight is over.
 - `association_probabilities`, `belief_propagation`: which measurement is probably whose.
 - `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
@@ -17,6 +18,7 @@ from wildlab.tracking.many.features import feature_distances, image_features, ve
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
 from wildlab.tracking.many.probabilities import association_probabilities, belief_propagation
 from wildlab.tracking.many.run import Shown, follow_many, run_many
+from wildlab.tracking.many.smoothing import smooth_many
 
 __all__ = [
     "CONFIRMED",
@@ -45,6 +47,7 @@ __all__ = [
     "pair_scans",
     "run_bank",
     "run_many",
+    "smooth_many",
     "veto",
     "with_features",
 ]
