@@ -17,6 +17,7 @@ from wildlab.pipeline.animals.follow import (
     Particles,
     blind,
     follow,
+    next_look,
     traces_of,
 )
 from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from, take_images
@@ -193,3 +194,47 @@ def test_traces_go_by_the_number_of_the_track() -> None:
         Look(0.0, np.array([[0.0, 0.0], [90.0, 0.0]]), np.array([np.eye(2), 3 * np.eye(2)]), blind(0).sight)
     )
     assert traces_of(kalman) == {1: 2.0, 2: 6.0}
+
+
+class Told:
+    """A follower with one track at the origin, whose animal is within 5 m of it."""
+
+    def step(self, look: Look) -> np.ndarray:
+        return np.zeros(0, np.int64)
+
+    def known(self) -> tuple[np.ndarray, Array, Array]:
+        return np.array([1]), np.zeros((1, 2)), np.eye(2)[None]
+
+    def reach(self) -> Array:
+        return np.array([5.0])
+
+
+@pytest.mark.parametrize(
+    ("away", "motion", "told"),
+    [(14.0, 0.0, True), (16.0, 0.0, False), (18.0, 0.5, True), (22.0, 0.5, False)],
+)
+def test_an_image_is_looked_at_where_an_animal_may_be_in_it(away: float, motion: float, told: bool) -> None:
+    # A footprint of 10 m; an animal within 5 m of its track, which strays by 0.5 m in a second, four of it in
+    # the four seconds up to the station.
+    times = np.arange(6.0)
+    middle = np.full((6, 2), 500.0)
+    middle[3] = [away, 0.0]
+    wanted = np.zeros(6, bool)
+    wanted[4] = True
+    found = next_look(Told(), 0, times, middle, np.full(6, 10.0), wanted, walk_of(motion, 1.0))
+    assert found == ((3, True) if told else (4, False))
+
+
+def test_a_trace_before_an_image_is_one_at_its_time() -> None:
+    images = over_and_over(4, 0.5)
+    motion = walk_of(0.5, 1.0)
+    done = follow(images, FLAT, DETECTOR, Kalman(motion, 0.99), motion)
+    last: dict[int, float] = {}
+    checked = 0
+    for one in done.found:
+        if one.track in last and last[one.track] < one.image:
+            waited = images.times[one.image] - images.times[int(last[one.track])]
+            assert one.before == pytest.approx(one.after_last + 2 * 0.25 * waited)
+            checked += 1
+        last[one.track] = one.image
+    assert checked > 10

@@ -30,6 +30,8 @@ LAND = synthetic_landscape(3, north=300, east=300)
 EXACT = Detector(detected=1.0, sd=0.0, border=0.0, height=0.7)
 NONE = ExecutionErrors(0.0, 0.0, 300.0, 0.0, 0.0, 0.0, 60.0)
 SOME = ExecutionErrors(1.0, 1.5, 300.0, 0.01, 0.02, 0.04, 60.0)
+ROLLS = SOME._replace(roll=0.04, pitch=0.004, yaw=0.004, horizontal=0.1, vertical=0.1)
+PITCHES = ROLLS._replace(roll=0.004, pitch=0.04)
 FLAT = Terrain(np.zeros((101, 101), np.float32), north=-500.0, east=-500.0, step=10.0)
 
 
@@ -95,23 +97,28 @@ def test_without_errors_detections_are_where_the_animals_are() -> None:
     assert pytest.approx(0.0, abs=1e-9) == R
 
 
-def test_covariances_are_those_of_many_flights() -> None:
+@pytest.mark.parametrize("heading", [0.6, 2.5])
+@pytest.mark.parametrize("errors", [SOME, ROLLS, PITCHES])
+def test_covariances_are_those_of_many_flights(heading: float, errors: ExecutionErrors) -> None:
     rng = np.random.default_rng(2)
-    count = 3000
-    R = euler_to_matrix(0.5, 0.1, 0.6) @ R_MC_DOWN
+    count = 6000
+    R = euler_to_matrix(0.5, 0.1, heading) @ R_MC_DOWN
     told = CameraPoses.at_lens(
         CAMERA, np.tile([0.0, 0.0, -40.0], (count, 1)), np.tile(R, (count, 1, 1)), np.eye(3)
     )
-    sizes = [SOME.horizontal, SOME.horizontal, SOME.vertical], [SOME.roll, SOME.pitch, SOME.yaw]
+    sizes = (
+        [errors.horizontal, errors.horizontal, errors.vertical], [errors.roll, errors.pitch, errors.yaw],
+    )  # fmt: skip
     off, turn = (rng.standard_normal((count, 3)) * one for one in sizes)
-    headings = np.full(count, 0.6)
+    headings = np.full(count, heading)
     true = displaced(told, headings, off, turn)
-    at = np.tile([2.0, 22.0], (count, 1))
+    # Where the optical axis meets the ground.
+    at = np.tile(40 * R[:2, 2] / R[2, 2], (count, 1))
     detector = EXACT._replace(sd=2.0, height=0.0)
-    z, covariance = put_on_ground(FLAT, told, true, headings, at, SOME, detector, rng)
-    solved = np.linalg.solve(covariance, (z - at)[..., None])[..., 0]
-    nees = np.einsum("ni,ni->n", z - at, solved)
-    assert nees.mean() == pytest.approx(2.0, rel=0.1)
+    z, covariance = put_on_ground(FLAT, told, true, headings, at, errors, detector, rng)
+    drawn, said = np.cov((z - at).T), covariance.mean(axis=0)
+    scale = np.sqrt(np.outer(np.diag(said), np.diag(said)))
+    assert drawn / scale == pytest.approx(said / scale, abs=0.08)
 
 
 def test_errors_of_a_way_are_the_drawn_ones() -> None:

@@ -242,15 +242,14 @@ class Ledger:
         after: dict[int, float],
     ) -> None:
         """The detections of one image; traces of all tracks before and after it, by their number."""
-        own = self._own.copy()
         for animal, name in zip(animals.tolist(), names.tolist(), strict=True):
             if not name:
                 continue
             self.found.append(
                 Found(
                     image, animal, name, name not in before, before.get(name, np.nan), after[name],
-                    self._after_last.get(name, np.nan), before.get(int(own[animal]), np.nan),
-                    int(own[animal]), time - float(self._seen_at[animal]),
+                    self._after_last.get(name, np.nan), before.get(int(self._own[animal]), np.nan),
+                    int(self._own[animal]), time - float(self._seen_at[animal]),
                 )
             )  # fmt: skip
             self._own[animal], self._seen_at[animal] = name, time
@@ -317,7 +316,7 @@ def follow(
             follower.step(look(k) if tells else blind(time))
         if stations[k]:
             known.append(Known(k, *follower.known()))
-        k, tells = _next(follower, k, times, middle, radius, detected | stations, motion)
+        k, tells = next_look(follower, k, times, middle, radius, detected | stations, motion)
     tracks = max((one.track for one in ledger.found), default=0)
     return Followed(known, ledger.found, steps, tracks)
 
@@ -327,7 +326,7 @@ def blind(time: float) -> Look:
     return Look(time, np.zeros((0, 2)), np.zeros((0, 2, 2)), lambda places: np.zeros(places.shape[:-1]))
 
 
-def _next(
+def next_look(
     follower: Follower, k: int, times: Array, middle: Array, radius: Array, wanted: NDArray[np.bool_],
     motion: Motion,
 ) -> tuple[int, bool]:  # fmt: skip

@@ -170,7 +170,7 @@ def patrol(
         scanned = scanned + step if goal != SEARCH and away <= reach else 0.0
         told = _pose(terrain, aircraft, here, heading, times[k : k + 1])
         true = displaced(told, [heading], off[k : k + 1], turn[k : k + 1])
-        animals = _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
+        _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
         if scanned > visits.patience:
             follower.give_up(goal)
             given_up.append(goal)
@@ -178,7 +178,6 @@ def patrol(
         known.append(Known(k, *follower.known()))
         goals.append(goal)
         path.append(told.p_nc[0])
-        scanned = 0.0 if animals else scanned
     flown = len(goals)
     return Patrolled(
         times[:flown], np.array(path).reshape(-1, 3), np.array(goals, np.int64), known, ledger.found,
@@ -195,8 +194,8 @@ def _pose(terrain: Terrain, aircraft: Aircraft, here: Array, heading: float, tim
 def _see(
     terrain: Terrain, aircraft: Aircraft, told: CameraPoses, true: CameraPoses, heading: float,
     truth: Array, time: float, follower: Particles, ledger: Ledger, k: int, rng: np.random.Generator,
-) -> int:  # fmt: skip
-    """One image for the tracks; how many animals are detected in it."""
+) -> None:  # fmt: skip
+    """One image for the tracks."""
     detector = aircraft.detector
     in_view = shown(terrain, true.camera, true.p_nc[0], true.R_nc[0], truth, detector)
     seen = np.flatnonzero(in_view & (rng.random(len(truth)) < detector.detected))
@@ -221,4 +220,3 @@ def _see(
     )
     names = follower.step(Look(time, z, R, sight))
     ledger.enter(k, time, seen, names, before, traces_of(follower))
-    return len(seen)
