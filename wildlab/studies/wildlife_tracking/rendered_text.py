@@ -1,0 +1,168 @@
+"""What the report says on tracks from rendered frames, as the computed numbers have it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from wildlab.evaluation.runs import share_interval
+from wildlab.studies.wildlife_tracking.rendered import CLOUDS, DAWN, Counted, Renderings, counted
+
+#: What weathers are called, at the beginning of a sentence and in a table.
+WHEN = {DAWN: "At dawn", CLOUDS: "Under clouds at noon"}
+#: Row of the drawn detections.
+DRAWN = "drawn detections"
+
+COLUMNS = {
+    "from": "from",
+    "found": "animals in view that are detected",
+    "false": "false detections",
+    "with_false": "frames with one",
+    "tracks": "tracks",
+    "by_false": "begun by a false one",
+    "rmse": "off (m)",
+    "sd": "said (m)",
+}
+CAPTION = (
+    "The same images three times. Shares have 95 % intervals, as if images were independent: neighbours are "
+    "not, so these are too narrow. Off: RMS distance of tracks from animals out of sight; said: the standard "
+    "deviation that they state, each way."
+)
+
+
+def counts_of(runs: Renderings) -> tuple[Counted, dict[str, Counted]]:
+    """What came of the drawn detections, and of the frames in each weather."""
+    return counted(runs.world, runs.world.images, runs.drawn), {
+        name: counted(runs.world, one.framed.images, one.followed, one.framed)
+        for name, one in runs.by_weather.items()
+    }
+
+
+def share_words(count: int, of: int) -> str:
+    """A count of so many, with the interval of its share.
+
+    Examples
+    --------
+    >>> share_words(8, 10), share_words(0, 0)
+    ('8 of 10 (49 to 94 %)', 'none of 0')
+    """
+    if not of:
+        return "none of 0"
+    found = share_interval(count, of)
+    return f"{count} of {of} ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
+
+
+def _metres(value: float) -> str:
+    return f"{value:.1f}" if np.isfinite(value) else "–"
+
+
+def frames_table(drawn: Counted, by_weather: Mapping[str, Counted], frames: int) -> pd.DataFrame:
+    """One row for the drawn detections, and one for each weather."""
+    rows = []
+    for name, one in {DRAWN: drawn, **by_weather}.items():
+        rows.append(
+            {
+                "from": "frames " + WHEN[name][0].lower() + WHEN[name][1:] if name in WHEN else name,
+                "found": share_words(one.found, one.shown),
+                "false": str(one.false),
+                "with_false": share_words(one.with_false, frames),
+                "tracks": str(one.tracks),
+                "by_false": share_words(one.by_false, one.tracks),
+                "rmse": _metres(one.sight["rmse"]),
+                "sd": _metres(one.sight["sd"]),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def frames_words(
+    drawn: Counted, by_weather: Mapping[str, Counted], frames: int, seconds: float, believed: float
+) -> str:
+    """What rendered frames give, weather by weather, beside drawn detections.
+
+    Parameters
+    ----------
+    drawn, by_weather
+        From `counts_of`.
+    frames, seconds
+        How many, and over how long.
+    believed
+        Probability of a detection that the filter takes the camera for.
+    """
+    said = [
+        f"The first {frames} images of the multicopter, {seconds / 60:.0f} min, are rendered whole, and F's "
+        "chain looks at each: background off, adaptive threshold, contours of an animal's size; the "
+        "detections go to the ground and to the same particle filter."
+    ]
+    said += [weather_words(WHEN[name], one, drawn, frames, believed) for name, one in by_weather.items()]
+    return " ".join(said)
+
+
+def weather_words(when: str, one: Counted, drawn: Counted, frames: int, believed: float) -> str:
+    """What the frames of one weather give."""
+    said = [_detected(when, one, believed), _false(one, frames), _tracks(one), _sight(one, drawn)]
+    return " ".join(part for part in said if part)
+
+
+def _detected(when: str, one: Counted, believed: float) -> str:
+    if not one.shown:
+        return f"{when} no animal is in view."
+    found = share_interval(one.found, one.shown)
+    if found.low > believed:
+        held = "more than"
+    elif found.high < believed:
+        held = "fewer than"
+    else:
+        held = "not different for certain from"
+    off = f", {one.off_px:.1f} px from their middles (RMS, an axis)" if np.isfinite(one.off_px) else ""
+    return (
+        f"{when}, of the times that an animal is in view {share_words(one.found, one.shown)} are detected"
+        f"{off}: {held} the {100 * believed:.0f} % that the filter believes."
+    )
+
+
+def _false(one: Counted, frames: int) -> str:
+    if not one.false:
+        return f"No detection is false: {share_words(0, frames)} frames have one."
+    return (
+        f"{one.false} detections are false, {one.false / frames:.1f} a frame, in "
+        f"{share_words(one.with_false, frames)} frames; {share_words(one.standing, one.false)} of them are "
+        "stones and trees, the others bare ground."
+    )
+
+
+def _tracks(one: Counted) -> str:
+    if not one.tracks:
+        return "No track begins."
+    begun = f"{one.tracks} tracks begin, {share_words(one.by_false, one.tracks)} of them by a false detection"
+    if 2 * one.by_false > one.tracks:
+        return (
+            f"{begun}: F's filter starts one on each detection that no track takes, and most follow nothing."
+        )
+    return f"{begun}."
+
+
+def _sight(one: Counted, drawn: Counted) -> str:
+    here, there = one.sight["rmse"], drawn.sight["rmse"]
+    if not (np.isfinite(here) and np.isfinite(there)):
+        return ""
+    return (
+        f"Out of sight animals are known to {here:.1f} m (RMS), by drawn detections of the same images to "
+        f"{there:.1f} m."
+    )
+
+
+def limit_words(runs: Renderings) -> str:
+    """What the rendered frames leave out."""
+    hours = " and ".join(
+        f"{one.weather.hour:.0f} h with {100 * one.weather.clouds:.0f} % of clouds"
+        for one in runs.by_weather.values()
+    )
+    return (
+        f"Of the rendered frames: one world, {len(runs.world.images.times)} images, and the weather stays "
+        f"({hours}). Stones and trees are strewn evenly; what throws no shadow and leaves no warm trace in "
+        "life does not here either. Animals keep their heading as they walk. The detector's numbers are F's "
+        "for other images."
+    )
