@@ -255,7 +255,7 @@ def frames_shown(runs: Renderings) -> Shown:
     k = telling_image(runs)
     fig, axes = new_figure(5.9, 4.1 * len(runs.by_weather), rows=len(runs.by_weather), squeeze=False)
     said = []
-    in_view = int(runs.world.images.in_view[k].sum())
+    in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
     for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
         grey, found, judged = seen_again(runs.world, one, k)
         ax.imshow(grey, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
@@ -267,7 +267,7 @@ def frames_shown(runs: Renderings) -> Shown:
         ax.set(xlim=(-0.5, grey.shape[1] - 0.5), ylim=(grey.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
         ax.grid(False)
         false = int((judged.animal == NONE).sum())
-        one_said = f"{len(set(judged.animal.tolist()) - {NONE})} of {in_view} found, {false} false"
+        one_said = f"{len(in_view & set(judged.animal.tolist()))} of {len(in_view)} found, {false} false"
         ax.set_title(f"{WHEN[name]}: {one_said}")
         said.append(f"{WHEN[name].lower()} {one_said}")
     return (

@@ -96,7 +96,8 @@ class Counted(NamedTuple):
     shown, found
         How often an animal was in view, and of these how often it was detected there.
     detections, false, standing, with_false
-        All; those of no animal; of these those of stones and trees; and how many images have a false one.
+        All; those of no animal; of these those where something stands, and not bare ground; and how many
+        images have a false one.
     off_px
         RMS distance, an axis, of detections from the middles of their animals, px.
     tracks, by_false

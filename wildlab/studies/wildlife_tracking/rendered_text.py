@@ -8,7 +8,21 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import share_interval
+from wildlab.pipeline.animals.frames import NEAR, STONES, TOO_LARGE, TREES
+from wildlab.simulation.scene.animals import ANIMALS
+from wildlab.studies.wildlife_detection.trial import AREA
 from wildlab.studies.wildlife_tracking.rendered import CLOUDS, DAWN, Counted, Renderings, counted
+
+METHOD = rf"""The rendered frames are those of the world shown, from the beginning of the multicopter's way:
+every image, not only those with an animal in view. The ground is that of the world; grass, sand and rock lie
+on it, and {STONES:g} stones and {TREES:g} trees a hectare are strewn over the enclosures. Each animal is of
+one of {len(ANIMALS)} kinds, stands where its walk has it, and keeps its heading. A frame is rendered from
+where the camera truly is, with the noise and faults of its sensor. The operator sets brightness and contrast
+at the first frame (F 3.1) and leaves them. The chain is the one that the study of animals' detection calls
+background subtraction (F figure 7.10a), with contours from {AREA[0]:g} to {AREA[1]:g} m² on the ground, by
+where the camera is said to be (F 3.2): its numbers were set there, not on these frames. A detection is an
+animal's if its middle lies on that animal's pixels or within {NEAR} px of them and it is not more than
+{TOO_LARGE:g} times as large. What the filter believes of the detector stays as for drawn detections."""
 
 #: What weathers are called, at the beginning of a sentence and in a table.
 WHEN = {DAWN: "At dawn", CLOUDS: "Under clouds at noon"}
@@ -128,8 +142,8 @@ def _false(one: Counted, frames: int) -> str:
         return f"No detection is false: {share_words(0, frames)} frames have one."
     return (
         f"{one.false} detections are false, {one.false / frames:.1f} a frame, in "
-        f"{share_words(one.with_false, frames)} frames; {share_words(one.standing, one.false)} of them are "
-        "stones and trees, the others bare ground."
+        f"{share_words(one.with_false, frames)} frames; {share_words(one.standing, one.false)} of them lie "
+        "on a stone, a tree or an animal that is much smaller, the others on bare ground."
     )
 
 
@@ -138,9 +152,7 @@ def _tracks(one: Counted) -> str:
         return "No track begins."
     begun = f"{one.tracks} tracks begin, {share_words(one.by_false, one.tracks)} of them by a false detection"
     if 2 * one.by_false > one.tracks:
-        return (
-            f"{begun}: F's filter starts one on each detection that no track takes, and most follow nothing."
-        )
+        return f"{begun}: F's filter starts one on each detection that no track takes."
     return f"{begun}."
 
 
