@@ -127,6 +127,8 @@ def test_words_on_false_detections_turn_with_them() -> None:
     few = said(detections=42, false=2, with_false=2, tracks=6, by_false=1)
     assert "6 tracks begin, 1 of 6" in few and "F's filter" not in few
     assert "No track begins." in said(tracks=0)
+    assert "1 detection is false, 0.0 a frame" in said(false=1, with_false=1, standing=1)
+    assert "1 track begins, 0 of 1" in said(tracks=1)
 
 
 def test_words_on_distance_turn_with_it() -> None:

@@ -140,8 +140,9 @@ def _detected(when: str, one: Counted, believed: float) -> str:
 def _false(one: Counted, frames: int) -> str:
     if not one.false:
         return f"No detection is false: {share_words(0, frames)} frames have one."
+    said = "1 detection is false" if one.false == 1 else f"{one.false} detections are false"
     return (
-        f"{one.false} detections are false, {one.false / frames:.1f} a frame, in "
+        f"{said}, {one.false / frames:.1f} a frame, in "
         f"{share_words(one.with_false, frames)} frames; {share_words(one.standing, one.false)} of them lie "
         "on a stone, a tree or an animal that is much smaller, the others on bare ground."
     )
@@ -150,7 +151,8 @@ def _false(one: Counted, frames: int) -> str:
 def _tracks(one: Counted) -> str:
     if not one.tracks:
         return "No track begins."
-    begun = f"{one.tracks} tracks begin, {share_words(one.by_false, one.tracks)} of them by a false detection"
+    said = "1 track begins" if one.tracks == 1 else f"{one.tracks} tracks begin"
+    begun = f"{said}, {share_words(one.by_false, one.tracks)} of them by a false detection"
     if 2 * one.by_false > one.tracks:
         return f"{begun}: F's filter starts one on each detection that no track takes."
     return f"{begun}."
