@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.pipeline.animals.follow import Followed, Found, Known
@@ -31,8 +32,8 @@ CAMERA = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)
 POSES = CameraPoses.at_lens(CAMERA, np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)), np.eye(3))
 SIGHT = {"rmse": 6.0, "sd": 5.0}
 GOOD = Counted(
-    shown=40, found=38, detections=40, false=0, standing=0, with_false=0, off_px=1.2, tracks=5, by_false=0,
-    sight=SIGHT,
+    shown=40, found=38, further=0, animals=4, detections=40, false=0, standing=0, with_false=0,
+    off_px=1.2, tracks=5, by_false=0, sight=SIGHT,
 )  # fmt: skip
 
 
@@ -65,6 +66,7 @@ def test_what_frames_gave_is_counted_by_hand(monkeypatch: pytest.MonkeyPatch) ->
     world: World = None  # type: ignore[assignment]
     got = counted(world, IMAGES, FOLLOWED, Framed(IMAGES, np.zeros((6, 2)), standing))
     assert got.shown == 4 and got.found == 1  # animal 0 in the first image alone
+    assert got.further == 1 and got.animals == 2
     assert (got.detections, got.false, got.standing, got.with_false) == (6, 3, 1, 2)
     assert (got.tracks, got.by_false, got.off_px) == (4, 2, 1.5)
     drawn = counted(world, IMAGES, FOLLOWED)
@@ -116,6 +118,9 @@ def test_words_on_detections_turn_with_them() -> None:
     assert "fewer than the 90 %" in said(found=20)
     assert "more than the 90 %" in said(shown=400, found=399)
     assert "no animal is in view" in said(shown=0, found=0, off_px=np.nan)
+    assert "not count as in view" not in said()
+    assert "detected once that do not count as in view" in said(further=1)
+    assert "detected 3 times that do not count as in view" in said(further=3)
 
 
 def test_words_on_false_detections_turn_with_them() -> None:
@@ -123,12 +128,14 @@ def test_words_on_false_detections_turn_with_them() -> None:
     many = said(detections=290, false=250, with_false=80, standing=50, tracks=60, by_false=55)
     assert "250 detections are false, 2.5 a frame, in 80 of 100 (71 to 87 %) frames" in many
     assert "50 of 250 (16 to 25 %) of them lie on a stone" in many
-    assert "60 tracks begin, 55 of 60 (82 to 96 %) of them by a false detection: F's filter" in many
+    assert "60 tracks begin, 55 of 60 (82 to 96 %) of them by a false detection, where 4 animals" in many
+    assert "F's filter starts one on each detection" in many
+    assert "5 tracks begin, none by a false detection, where 4 animals are detected." in said()
     few = said(detections=42, false=2, with_false=2, tracks=6, by_false=1)
     assert "6 tracks begin, 1 of 6" in few and "F's filter" not in few
     assert "No track begins." in said(tracks=0)
     assert "1 detection is false, 0.0 a frame" in said(false=1, with_false=1, standing=1)
-    assert "1 track begins, 0 of 1" in said(tracks=1)
+    assert "1 track begins, none by" in said(tracks=1)
 
 
 def test_words_on_distance_turn_with_it() -> None:
@@ -144,6 +151,17 @@ def test_the_table_has_a_row_for_each_way() -> None:
     assert set(table.columns) == set(text.COLUMNS)
     assert table["false"].tolist() == ["0", "0", "7"] and table["rmse"].tolist() == ["6.0", "6.0", "–"]
     assert table["by_false"][2].startswith("4 of 9") and table["with_false"][2].startswith("5 of 50")
+
+
+def test_a_paragraph_for_each_weather() -> None:
+    both = text.frames_words(GOOD, {DAWN: GOOD, CLOUDS: GOOD}, 100, 0.9)
+    assert [one.partition(",")[0] for one in both.split("\n\n")] == ["At dawn", "Under clouds at noon"]
+    assert "first 100 images of the multicopter, 2 min" in text.opening_words(100, 99.0)
+
+
+def test_no_frame_at_all_is_refused() -> None:
+    with pytest.raises(WildlabError, match="0 frames to be rendered"):
+        run_rendered(None, 1, 0)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.animals.follow import Followed, Known
 from wildlab.pipeline.animals.frames import NONE
+from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.pipeline.animals.revisit import Patrolled
 from wildlab.planning.high_level import SEARCH
 from wildlab.reporting.figures import (
@@ -254,7 +255,7 @@ def frames_shown(runs: Renderings) -> Shown:
     """One frame in each weather, with what is detected in it."""
     k = telling_image(runs)
     fig, axes = new_figure(5.9, 4.1 * len(runs.by_weather), rows=len(runs.by_weather), squeeze=False)
-    said = []
+    said, further = [], set[int]()
     in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
     for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
         grey, found, judged = seen_again(runs.world, one, k)
@@ -267,12 +268,19 @@ def frames_shown(runs: Renderings) -> Shown:
         ax.set(xlim=(-0.5, grey.shape[1] - 0.5), ylim=(grey.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
         ax.grid(False)
         false = int((judged.animal == NONE).sum())
+        further |= set(judged.animal.tolist()) - in_view - {NONE}
         one_said = f"{len(in_view & set(judged.animal.tolist()))} of {len(in_view)} found, {false} false"
         ax.set_title(f"{WHEN[name]}: {one_said}")
         said.append(f"{WHEN[name].lower()} {one_said}")
+    more = (
+        f" Of animals that do not count as in view, at the border or more than {FURTHEST:.0f} m off: "
+        f"{len(further)}."
+        if further
+        else ""
+    )
     return (
         fig, "frames", f"One rendered frame in {len(said)} weathers: {'; '.join(said)}.",
         f"The frame {runs.world.images.times[k]:.0f} s after take-off, as the operator's window shows it: of "
         "those with a false detection in any weather, if there are, the one with most animals in view. "
-        f"Boxes: detections, blue of animals, red of something else. {'; '.join(said).capitalize()}.",
+        f"Boxes: detections, blue of animals, red of something else. {'; '.join(said).capitalize()}.{more}",
     )  # fmt: skip

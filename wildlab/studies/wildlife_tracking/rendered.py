@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.detections import Detections
 from wildlab.detection.warm import find_warm, gate_from_distance, to_grey
+from wildlab.errors import WildlabError
 from wildlab.geometry.frames import Array
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.pipeline.animals.follow import Followed, follow
@@ -95,6 +96,10 @@ class Counted(NamedTuple):
     ----------
     shown, found
         How often an animal was in view, and of these how often it was detected there.
+    further
+        How often an animal was detected that does not count as in view: cut by the border, or too far.
+    animals
+        How many were detected at all.
     detections, false, standing, with_false
         All; those of no animal; of these those where something stands, and not bare ground; and how many
         images have a false one.
@@ -108,6 +113,8 @@ class Counted(NamedTuple):
 
     shown: int
     found: int
+    further: int
+    animals: int
     detections: int
     false: int
     standing: int
@@ -136,7 +143,14 @@ def run_rendered(world: World, seed: int, count: int) -> Renderings:
         Of scenery, sensor and noise too.
     count
         How many images.
+
+    Raises
+    ------
+    WildlabError
+        Where that is none.
     """
+    if count < 1:
+        raise WildlabError(f"{count} frames to be rendered", "ask for one at least", field="frames")
     part = world._replace(images=world.images.first(count))
     by_weather = {name: _in_weather(part, seed, one) for name, one in weathers(world.twin).items()}
     return Renderings(part, _followed(part, part.images, seed), by_weather)
@@ -194,6 +208,8 @@ def counted(world: World, images: Images, followed: Followed, framed: Framed | N
     return Counted(
         shown=int(images.in_view.sum()),
         found=int((images.in_view & hit).sum()),
+        further=int((~images.in_view & hit).sum()),
+        animals=int(hit.any(axis=0).sum()),
         detections=len(false),
         false=int(false.sum()),
         standing=0 if framed is None else int((false & framed.standing).sum()),

@@ -9,6 +9,7 @@ import pandas as pd
 
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.animals.frames import NEAR, STONES, TOO_LARGE, TREES
+from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.simulation.scene.animals import ANIMALS
 from wildlab.studies.wildlife_detection.trial import AREA
 from wildlab.studies.wildlife_tracking.rendered import CLOUDS, DAWN, Counted, Renderings, counted
@@ -91,27 +92,30 @@ def frames_table(drawn: Counted, by_weather: Mapping[str, Counted], frames: int)
     return pd.DataFrame(rows)
 
 
-def frames_words(
-    drawn: Counted, by_weather: Mapping[str, Counted], frames: int, seconds: float, believed: float
-) -> str:
-    """What rendered frames give, weather by weather, beside drawn detections.
+def opening_words(frames: int, seconds: float) -> str:
+    """What was done, with how many frames over how long."""
+    return (
+        f"The first {frames} images of the multicopter, {seconds / 60:.0f} min, are rendered whole, and F's "
+        "chain looks at each: background off, adaptive threshold, contours of an animal's size; the "
+        "detections go to the ground and to the same particle filter."
+    )
+
+
+def frames_words(drawn: Counted, by_weather: Mapping[str, Counted], frames: int, believed: float) -> str:
+    """What rendered frames give beside drawn detections, a paragraph for each weather.
 
     Parameters
     ----------
     drawn, by_weather
         From `counts_of`.
-    frames, seconds
-        How many, and over how long.
+    frames
+        How many.
     believed
         Probability of a detection that the filter takes the camera for.
     """
-    said = [
-        f"The first {frames} images of the multicopter, {seconds / 60:.0f} min, are rendered whole, and F's "
-        "chain looks at each: background off, adaptive threshold, contours of an animal's size; the "
-        "detections go to the ground and to the same particle filter."
-    ]
-    said += [weather_words(WHEN[name], one, drawn, frames, believed) for name, one in by_weather.items()]
-    return " ".join(said)
+    return "\n\n".join(
+        weather_words(WHEN[name], one, drawn, frames, believed) for name, one in by_weather.items()
+    )
 
 
 def weather_words(when: str, one: Counted, drawn: Counted, frames: int, believed: float) -> str:
@@ -131,9 +135,16 @@ def _detected(when: str, one: Counted, believed: float) -> str:
     else:
         held = "not different for certain from"
     off = f", {one.off_px:.1f} px from their middles (RMS, an axis)" if np.isfinite(one.off_px) else ""
+    times = "once" if one.further == 1 else f"{one.further} times"
+    further = (
+        f" Animals are detected {times} that do not count as in view: cut by the border, or more than "
+        f"{FURTHEST:.0f} m off."
+        if one.further
+        else ""
+    )
     return (
         f"{when}, of the times that an animal is in view {share_words(one.found, one.shown)} are detected"
-        f"{off}: {held} the {100 * believed:.0f} % that the filter believes."
+        f"{off}: {held} the {100 * believed:.0f} % that the filter believes.{further}"
     )
 
 
@@ -152,9 +163,13 @@ def _tracks(one: Counted) -> str:
     if not one.tracks:
         return "No track begins."
     said = "1 track begins" if one.tracks == 1 else f"{one.tracks} tracks begin"
-    begun = f"{said}, {share_words(one.by_false, one.tracks)} of them by a false detection"
+    of = "1 animal" if one.animals == 1 else f"{one.animals} animals"
+    if not one.by_false:
+        return f"{said}, none by a false detection, where {of} are detected."
+    share = share_words(one.by_false, one.tracks)
+    begun = f"{said}, {share} of them by a false detection, where {of} are detected"
     if 2 * one.by_false > one.tracks:
-        return f"{begun}: F's filter starts one on each detection that no track takes."
+        return f"{begun}. F's filter starts one on each detection that no track takes."
     return f"{begun}."
 
 
@@ -174,9 +189,10 @@ def limit_words(runs: Renderings) -> str:
         f"{one.weather.hour:.0f} h with {100 * one.weather.clouds:.0f} % of clouds"
         for one in runs.by_weather.values()
     )
+    count = len(runs.world.images.times)
     return (
-        f"Of the rendered frames: one world, {len(runs.world.images.times)} images, and the weather stays "
-        f"({hours}). Stones and trees are strewn evenly; what throws no shadow and leaves no warm trace in "
-        "life does not here either. Animals keep their heading as they walk. The detector's numbers are F's "
-        "for other images."
+        f"The rendered frames are {count} of one world, at {hours}; the weather stays. "
+        "Bodies throw no shadow and warm no ground, stones and trees are strewn evenly over the enclosures, "
+        "and the patches of warm ground are drawn. The detector's numbers are those F prints for its own "
+        "images."
     )
