@@ -53,7 +53,7 @@ class Found(NamedTuple):
     Attributes
     ----------
     image, animal
-        Where, and whose it is.
+        Where, and whose it is; -1 where it is of no animal.
     track
         That it was given to, or that it started.
     started
@@ -67,7 +67,7 @@ class Found(NamedTuple):
     own
         Number of that track, 0 for none.
     away
-        How long the animal had not been detected, s; infinite for the first time.
+        How long the animal had not been detected, s; infinite for the first time, and for none.
     """
 
     image: int
@@ -242,17 +242,20 @@ class Ledger:
         after: dict[int, float],
     ) -> None:
         """The detections of one image; traces of all tracks before and after it, by their number."""
+        own = np.append(self._own, 0)  # the last row is that of no animal
         for animal, name in zip(animals.tolist(), names.tolist(), strict=True):
             if not name:
                 continue
+            away = time - float(self._seen_at[animal]) if animal >= 0 else np.inf
             self.found.append(
                 Found(
                     image, animal, name, name not in before, before.get(name, np.nan), after[name],
-                    self._after_last.get(name, np.nan), before.get(int(self._own[animal]), np.nan),
-                    int(self._own[animal]), time - float(self._seen_at[animal]),
+                    self._after_last.get(name, np.nan), before.get(int(own[animal]), np.nan),
+                    int(own[animal]), away,
                 )
             )  # fmt: skip
-            self._own[animal], self._seen_at[animal] = name, time
+            if animal >= 0:
+                self._own[animal], self._seen_at[animal] = name, time
         for name in set(names.tolist()) - {0}:
             self._after_last[name] = after[name]
 

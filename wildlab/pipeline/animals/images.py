@@ -60,7 +60,7 @@ class Images(NamedTuple):
     image
         (D,) which image each is in, ascending.
     animal
-        (D,) whose each is, which the tracks are not told.
+        (D,) whose each is, which the tracks are not told; -1 for a detection of no animal.
     truth
         (T, A, 2) m.
     in_view
@@ -80,6 +80,14 @@ class Images(NamedTuple):
         """Detections, covariances and animals of one image."""
         rows = slice(*np.searchsorted(self.image, [image, image + 1]))
         return self.z[rows], self.R[rows], self.animal[rows]
+
+    def first(self, count: int) -> Images:
+        """So many images from the beginning."""
+        rows = slice(0, int(np.searchsorted(self.image, count)))
+        return Images(
+            self.times[:count], self.poses.take(slice(0, count)), self.z[rows], self.R[rows],
+            self.image[rows], self.animal[rows], self.truth[:count], self.in_view[:count],
+        )  # fmt: skip
 
 
 def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array) -> PoseErrors:
@@ -224,11 +232,27 @@ def put_on_ground(
 ) -> tuple[Array, Array]:
     """Detections (D, 2) m of animals at places (D, 2), and their covariances (D, 2, 2).
 
-    There is a pose and a heading for each. The covariance takes the ground about a detection as level.
+    There is a pose and a heading for each.
     """
     points = np.column_stack([places, -terrain.heights_at(places) - detector.height])
     uv = ground_to_pixel(true.camera, points, true.p_nc, true.R_nc)
     uv = uv + detector.sd * rng.standard_normal(uv.shape)
+    return to_ground(terrain, told, headings, uv, errors, detector, rng)
+
+
+def to_ground(
+    terrain: Terrain,
+    told: CameraPoses,
+    headings: Array,
+    uv: Array,
+    errors: ExecutionErrors,
+    detector: Detector,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Pixels (D, 2) of middles of animals as places (D, 2) m and covariances (D, 2, 2) m^2.
+
+    There is a pose and a heading for each. The covariance takes the ground about a detection as level.
+    """
     met = pixels_to_terrain(told, uv, raised(terrain, detector.height)).points
     R = ground_covariance(
         told, uv, met[:, 2], pose_errors(errors, detector.sd, told.R_nc, headings), rng

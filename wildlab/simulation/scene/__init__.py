@@ -3,9 +3,9 @@
 A scene is rendered from a pose, with the projection of `wildlab.geometry`; what is found in it is then judged
 against labels that are known and not marked by anybody. `bodies` has vessels, people, buoys and whales,
 `sea` the water, `render` makes kelvin and labels, `response` the image of a camera with its faults. On land
-`ground` has covers under the sun of a day, `animals` what stands there, and `land` renders it. `coloured` is
-even ground and a tarpaulin as a colour camera sees them. All of it is chosen; nothing in it knows of a
-detector.
+`ground` has covers under the sun of a day, `on_terrain` lays them over a terrain, `animals` has what stands
+there, and `land` renders it. `coloured` is even ground and a tarpaulin as a colour camera sees them. All of
+it is chosen; nothing in it knows of a detector.
 
 A body's temperatures are even parts, textures and hot places; there is no heat flow, no spray, no reflection
 of the body in the water, and no weather between.
@@ -37,6 +37,7 @@ from wildlab.simulation.scene.ground import (
     rolling_land,
 )
 from wildlab.simulation.scene.land import LandScene, LandView, ground_points, height_at, render_land
+from wildlab.simulation.scene.on_terrain import land_on
 from wildlab.simulation.scene.render import Scene, Seen, View, outline_of, render
 from wildlab.simulation.scene.response import (
     IDEAL,
@@ -88,6 +89,7 @@ __all__ = [
     "group",
     "height_at",
     "in_shutter",
+    "land_on",
     "mammal",
     "outline_of",
     "person",

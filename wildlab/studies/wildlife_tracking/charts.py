@@ -6,13 +6,28 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from wildlab.evaluation.runs import mean_interval
 from wildlab.geometry.frames import Array
 from wildlab.pipeline.animals.follow import Followed, Known
+from wildlab.pipeline.animals.frames import NONE
+from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.pipeline.animals.revisit import Patrolled
 from wildlab.planning.high_level import SEARCH
-from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, ellipse, map_axes, new_figure
+from wildlab.reporting.figures import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    SKY,
+    VERMILLION,
+    ellipse,
+    map_axes,
+    new_figure,
+)
+from wildlab.studies.wildlife_tracking.rendered import Renderings, seen_again, telling_image
+from wildlab.studies.wildlife_tracking.rendered_text import WHEN
 from wildlab.studies.wildlife_tracking.text import PLATFORMS
 from wildlab.studies.wildlife_tracking.trial import NEGATIVE, POSITIVE, UAV, Runs, World
 
@@ -234,3 +249,38 @@ def _plain(value: float) -> str:
 def visited_share(flown: Patrolled) -> float:
     """Share of the images of a search that were taken on the way to an animal, or over it."""
     return float((flown.goal != SEARCH).mean())
+
+
+def frames_shown(runs: Renderings) -> Shown:
+    """One frame in each weather, with what is detected in it."""
+    k = telling_image(runs)
+    fig, axes = new_figure(5.9, 4.1 * len(runs.by_weather), rows=len(runs.by_weather), squeeze=False)
+    said, further = [], set[int]()
+    in_view = set(np.flatnonzero(runs.world.images.in_view[k]).tolist())
+    for ax, (name, one) in zip(axes.flat, runs.by_weather.items(), strict=True):
+        grey, found, judged = seen_again(runs.world, one, k)
+        ax.imshow(grey, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+        for (left, top, width, height), animal in zip(found.box, judged.animal, strict=True):
+            colour = VERMILLION if animal == NONE else SKY
+            ax.add_patch(
+                Rectangle((left - 5, top - 5), width + 10, height + 10, fill=False, ec=colour, lw=1.6)
+            )
+        ax.set(xlim=(-0.5, grey.shape[1] - 0.5), ylim=(grey.shape[0] - 0.5, -0.5), xticks=[], yticks=[])
+        ax.grid(False)
+        false = int((judged.animal == NONE).sum())
+        further |= set(judged.animal.tolist()) - in_view - {NONE}
+        one_said = f"{len(in_view & set(judged.animal.tolist()))} of {len(in_view)} found, {false} false"
+        ax.set_title(f"{WHEN[name]}: {one_said}")
+        said.append(f"{WHEN[name].lower()} {one_said}")
+    more = (
+        f" Of animals that do not count as in view, at the border or more than {FURTHEST:.0f} m off: "
+        f"{len(further)}."
+        if further
+        else ""
+    )
+    return (
+        fig, "frames", f"One rendered frame in {len(said)} weathers: {'; '.join(said)}.",
+        f"The frame {runs.world.images.times[k]:.0f} s after take-off, as the operator's window shows it: of "
+        "those with a false detection in any weather, if there are, the one with most animals in view. "
+        f"Boxes: detections, blue of animals, red of something else. {'; '.join(said).capitalize()}.{more}",
+    )  # fmt: skip

@@ -39,7 +39,8 @@ and stay inside. The gondola goes two laps with the adaptive roll rotation of F 
 its rows twice with the camera rolling from side to side. Of the gondola {RATES[GONDOLA]:g} images a second
 are looked at, of the multicopter {RATES[UAV]:g}: so many that neighbouring images still touch. The camera is
 off its plan by the errors that the twin's autopilot has, correlated in time; detections have the twin's
-noise, and each is put on the terrain from where the camera is *said* to be. There are no false detections.
+noise, and each is put on the terrain from where the camera is *said* to be. None of
+these detections is false.
 
 Each animal that is detected has {PARTICLES} particles (F 4.2.1), which walk as animals do and stay inside the
 fence they began in; they are resampled by their effective number (F (4.14), two thirds), systematically. F's
@@ -66,7 +67,7 @@ LIMITS = [
     "in half an hour.",
     "Animals walk independently, and start anywhere in their enclosure. Those of a herd go together, which "
     "makes them harder to tell apart.",
-    "There are no false detections and no trees.",
+    "But in the rendered frames there are no false detections and no trees.",
     "The multicopter turns on the spot and at once where its tracks steer it; its battery is not asked for.",
     "The covariance of a detection takes the ground about it as level.",
 ]

@@ -89,6 +89,8 @@ class World(NamedTuple):
         (E,) animals in each.
     images
         Of `LAPS` laps.
+    true, headings
+        Where the camera truly was, and where the platform headed, rad: a row for each image.
     lap
         How long one takes, s.
     detector, errors
@@ -102,6 +104,8 @@ class World(NamedTuple):
     fences: list[Array]
     lives: NDArray[np.intp]
     images: Images
+    true: CameraPoses
+    headings: Array
     lap: float
     detector: Detector
     errors: ExecutionErrors
@@ -194,15 +198,15 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
         way, errors = uav_way(twin, land, fences, rate), uav.errors_of_execution(twin)
     rows = np.tile(np.arange(len(way.times)), LAPS)
     times = (way.times + way.lap * np.arange(LAPS)[:, None]).ravel()
-    told = way.poses.take(rows)
-    true = with_errors(told, way.headings[rows], errors, 1 / rate, stream(seed, f"execution, {platform}"))
+    told, headings = way.poses.take(rows), way.headings[rows]
+    true = with_errors(told, headings, errors, 1 / rate, stream(seed, f"execution, {platform}"))
     detector = detector_of(twin)
     truth = herds(twin, fences, times, seed)
     images = take_images(
         land,
         told,
         true,
-        way.headings[rows],
+        headings,
         times,
         truth,
         errors,
@@ -212,8 +216,9 @@ def draw_world(platform: str, twin_name: str, seed: int) -> World:
     a = uav.required(twin.animals, "animals")
     lives = np.array([int(one.animals.number) for one in twin.enclosures.values()])
     return World(
-        twin, land, fences, lives, images, way.lap, detector, errors, walk_of(a.speed_sd.si, a.step.si)
-    )
+        twin, land, fences, lives, images, true, headings, way.lap, detector, errors,
+        walk_of(a.speed_sd.si, a.step.si),
+    )  # fmt: skip
 
 
 def particles_of(world: World, seed: int, negative: bool) -> Particles:
@@ -290,7 +295,8 @@ def out_of_sight(known: list[Known], found: list[Found], times: Array, truth: Ar
         while row < len(found) and found[row].image <= one.image:
             if first.setdefault(found[row].track, found[row].animal) != found[row].animal:
                 mixed.add(found[row].track)
-            own[found[row].animal], seen_at[found[row].animal] = found[row].track, times[found[row].image]
+            if found[row].animal >= 0:
+                own[found[row].animal], seen_at[found[row].animal] = found[row].track, times[found[row].image]
             row += 1
         at = {int(name): k for k, name in enumerate(one.identity)}
         for animal in np.flatnonzero(times[one.image] - seen_at > OUT_OF_SIGHT):
