@@ -32,6 +32,8 @@ _REFERENCES = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
 #: Scripts and whatever else loads or runs something; pictures inside of the page stay.
 _NEVER = ("script", "iframe", "object", "embed", "link", "meta", "base", "form", "noscript", "template")
+#: What screen readers list by its name, to go to.
+_LANDMARKS = "section[aria-label], nav[aria-label], aside[aria-label], [role=region][aria-label]"
 
 
 @dataclass(frozen=True)
@@ -174,8 +176,7 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
     parts = [part for chapter in chapters for part in chapter.parts]
     contents = ""
     if len(parts) > 1:
-        listed = "".join(f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in parts)
-        contents = f'<nav aria-label="Reports"><h2>In this file</h2><ol>{listed}</ol></nav>'
+        contents = f'<nav aria-label="Reports"><h2>In this file</h2>{_listed(chapters)}</nav>'
     body.append(contents if several else "")
     level = "h2" if several else "h1"
     for chapter in chapters:
@@ -186,7 +187,7 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
         body.append("" if several else contents)
         body += [
             f'<article class="shared" id="r{part.number}-top" aria-label="{escape(part.title)}">\n'
-            f"{part.body}\n</article>"
+            f"{_set_apart(part, parts)}\n</article>"
             for part in chapter.parts
         ]
         told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
@@ -195,6 +196,33 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
     styles = dict.fromkeys([*(part.style for part in parts if part.style), _STYLE])
     title = heading if several else chapters[0].heading
     return page(title=title, body="\n".join(filter(None, body)), style="\n".join(styles))
+
+
+def _listed(chapters: Sequence[Chapter]) -> str:
+    """Links to the reports, under the chapters' headings where there are several: titles alone may be the
+    same."""
+    lists, before = [], 0
+    for chapter in chapters:
+        items = "".join(
+            f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in chapter.parts
+        )
+        heading = f"<h3>{escape(chapter.heading)}</h3>" if len(chapters) > 1 else ""
+        # Counted through all chapters: a report is also told from one of the same title by its number.
+        lists.append(f'{heading}<ol start="{before + 1}">{items}</ol>' if items else "")
+        before += len(chapter.parts)
+    return "".join(lists)
+
+
+def _set_apart(part: Part, parts: Sequence[Part]) -> str:
+    """The part's HTML; beside others, what screen readers list by name is called by the report it is in."""
+    if len(parts) == 1:
+        return part.body
+    alike = sum(one.title == part.title for one in parts) > 1
+    whose = f"{part.title} ({parts.index(part) + 1})" if alike else part.title
+    soup = BeautifulSoup(part.body, "html.parser")
+    for region in soup.select(_LANDMARKS):
+        region["aria-label"] = f"{region['aria-label']}: {whose}"
+    return soup.decode()
 
 
 _STYLE = """.shared { border-top: 3px solid var(--line); margin-top: 3rem; padding-top: 1.5rem }
