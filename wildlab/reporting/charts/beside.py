@@ -129,7 +129,7 @@ def beside_plain_shown(tracks: Sequence[SensorTrack]) -> Shown | None:
     strips[-1, 0].set_xlabel("time (s)")
     brief = [f"{short_words(one.filter)} {_percent(one.nearer)}" for one in shown]
     strips[0, 0].set_title(
-        f"{first.target} by {first.sensor}: looks nearer than {short_words(plain)}\n{few(brief)}"
+        f"{first.target} by {first.sensor}, looks nearer than {short_words(plain)}:\n{few(brief)}"
     )
     said = "; ".join(
         f"{filter_words(one.filter)} nearer at {_percent(one.nearer)} and farther at {_percent(one.farther)} "
