@@ -23,8 +23,9 @@ MADE_UP = Viewer("0", "var wasm_bindgen = '</script><script>alert(1)//<!--';", b
 
 
 def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
-    text = page(b"\0recording\xff", MADE_UP, "</title><script>x")
-    assert dict(parts_of(text)) == {"viewer": MADE_UP.wasm, "recording": b"\0recording\xff"}
+    text = page(b"\0recording\xff", MADE_UP, "</title><script>x", b"narrow")
+    parts = {"viewer": MADE_UP.wasm, "recording": b"\0recording\xff", "narrow-layout": b"narrow"}
+    assert dict(parts_of(text)) == parts
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', text)
     assert policy is not None
     rules = dict(part.strip().split(" ", 1) for part in policy[1].split(";"))
@@ -38,16 +39,49 @@ def test_the_page_holds_all_and_allows_only_its_own_scripts() -> None:
     assert not re.search(r"""(?:src|href)=(?!["']data:)""", text)
 
 
-def test_a_narrow_screen_is_told_what_stands_in_for_it() -> None:
+def test_a_narrow_screen_is_told_what_it_sees_and_what_is_easier() -> None:
     """In plain HTML, above the picture and not over it; a wide screen does not see it."""
-    html = page(
-        b"recording",
-        Viewer("0", "var wasm_bindgen = '</script><script>alert(1)//<!--';", b"\0asm and more"),
-        "f",
-    )
+    html = page(b"recording", MADE_UP, "<b>f", b"narrow")
     before = html.partition('<canvas id="canvas"')[0]
-    assert '<p id="narrow">This wants a wide screen' in before and "moving picture" in before
-    assert "#narrow{display:none" in html and "#narrow{display:block}canvas{top:6rem" in html
+    assert '<p id="narrow" hidden><b>Replay of &lt;b&gt;f</b>' in before and "moving picture" in before
+    assert "#narrow{display:none" in html and "#narrow{display:block}canvas{top:8rem" in html
+
+
+NO_VIEWER = Viewer("0", "var wasm_bindgen = () => { throw new Error('no viewer') };", b"")
+
+
+@pytest.mark.parametrize(
+    ("why", "arguments", "script", "said"),
+    [
+        ("no graphics", ["--disable-gpu", "--disable-3d-apis"], True, "no WebGL 2"),
+        ("no script", [], False, "scripts are off"),
+        (
+            "no viewer",
+            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"],
+            True,
+            "no viewer",
+        ),
+    ],
+)
+def test_where_it_cannot_be_shown_a_phone_is_told_why_and_what_is_instead(
+    launch: Callable[..., Any], tmp_path: Path, why: str, arguments: list[str], script: bool, said: str
+) -> None:
+    file = tmp_path / PAGE
+    file.write_text(page(b"recording", NO_VIEWER, "a-flight", b"narrow"), encoding="utf-8")
+    chromium = launch(*arguments)
+    context = chromium.new_context(
+        viewport={"width": 390, "height": 844}, offline=True, is_mobile=True, has_touch=True,
+        java_script_enabled=script, bypass_csp=True,
+    )  # fmt: skip
+    opened = context.new_page()
+    opened.goto(file.as_uri())
+    opened.wait_for_timeout(500)
+    words = opened.inner_text("#said")
+    assert "Replay of a-flight" in words and said in words and "moving picture" in words
+    assert "some seconds" not in words and not opened.is_visible("#narrow")
+    box = opened.locator("#said p").last.bounding_box()
+    assert box is not None and 0 <= box["x"] <= 390 - box["width"]
+    chromium.close()
 
 
 def test_where_the_viewer_is_missing_it_is_said_what_to_install(
@@ -130,6 +164,37 @@ def test_a_browser_without_a_network_plays_it(graphics: Any, tmp_path: Path) -> 
     first, second = pictures
     assert first.std() > 5, "nothing is drawn"
     assert (abs(first - second).max(axis=2) > 24).sum() > 100, "nothing moves"
+
+
+#: Where the viewer begins on a phone, px.
+TOP = 128
+
+
+@pytest.mark.slow
+def test_on_a_phone_the_map_is_as_wide_as_the_screen_and_the_rest_is_below(
+    graphics: Any, tmp_path: Path
+) -> None:
+    save_flight(simulate_twin("large-ship", 1), tmp_path / "flight")
+    written, _ = replay(tmp_path / "flight", into=tmp_path / "out", html=True)
+    # Without a density of its own: Chromium does not tell the viewer of one that is only pretended.
+    context = graphics.new_context(
+        viewport={"width": 390, "height": 844}, offline=True, is_mobile=True, has_touch=True
+    )
+    opened = context.new_page()
+    opened.goto(written[1].as_uri())
+    opened.wait_for_selector("html[data-shown=yes]", state="attached", timeout=180_000)
+    opened.wait_for_timeout(8000)
+    assert opened.evaluate("document.getElementById('canvas').getBoundingClientRect().top") == TOP
+    assert opened.is_visible("#narrow") and "Replay of large-ship-1" in opened.inner_text("#narrow")
+    notice = opened.locator("#narrow")
+    assert notice.evaluate("one => one.scrollHeight <= one.clientHeight"), "its words are cut off"
+    picture = _pixels(opened.screenshot())
+    context.close()
+    # Of a map from edge to edge the title stands to the left and its buttons to the right; where a panel
+    # stands beside it, buttons and that one's title are between.
+    bar = picture[TOP + 6 : TOP + 24]
+    assert bar[:, :130].min() < 100 and bar[:, 300:].min() < 100, "the map has no title"
+    assert bar[:, 150:290].min() > 200
 
 
 def _pixels(png: bytes) -> Any:

@@ -100,3 +100,12 @@ def test_a_faulty_glossary_is_refused(tmp_path: Path, toml: str, sentence: str) 
     file.write_text(toml, encoding="utf-8")
     with pytest.raises(WildlabError, match=sentence):
         words(file)
+
+
+def test_words_of_the_first_screen_are_explained_before_those_that_come_more_often() -> None:
+    many = [Word(f"word{i}", (f"word{i}",), "w") for i in range(MOST)]
+    often = " ".join(f"{word.name} {word.name}" for word in many)
+    html = with_glossary(f"<p>a pose</p><h2>More</h2><p>{often}</p>", [*many, B])
+    assert "#word-pose" in [to for to, _ in links(html)] and len(links(html)) == MOST
+    later = with_glossary(f"<p>word1</p><h2>More</h2><p>{often} a pose</p>", [*many, B])
+    assert "#word-pose" not in [to for to, _ in links(later)]

@@ -12,8 +12,16 @@ from wildlab.replay.scene import Scene, heights
 STAY_S, PLAYED_S = 10.0, 120.0
 
 
-def blueprint_of(scene: Scene) -> Any:
-    """The layout of a scene, with rerun's panels folded but for the time line."""
+def blueprint_of(scene: Scene, *, narrow: bool = False) -> Any:
+    """The layout of a scene, with rerun's panels folded but for the time line.
+
+    Parameters
+    ----------
+    scene
+        From `wildlab.replay.gather.scene_of`.
+    narrow
+        For a phone held upright: the map, and below it all else in tabs.
+    """
     import rerun.blueprint as rrb
 
     line = "flight_time" if scene.timed else "image"
@@ -58,14 +66,19 @@ def blueprint_of(scene: Scene) -> Any:
         )
     right.append(rrb.TextDocumentView(origin="/about", name="What is shown"))
     plots = _plots(rrb, scene)
-    body: list[Any] = [
-        rrb.Horizontal(*views, rrb.Vertical(*right, row_shares=[3, 2][: len(right)]), column_shares=[3, 2])
-    ]
-    if plots:
-        body.append(rrb.Horizontal(*plots))
+    if narrow:
+        # The words first: nothing else says what it is.
+        body: list[Any] = [*views, rrb.Tabs(*right[::-1], *plots, active_tab=0)]
+        shares = [3, 2]
+    else:
+        beside = rrb.Vertical(*right, row_shares=[3, 2][: len(right)])
+        body = [rrb.Horizontal(*views, beside, column_shares=[3, 2])]
+        shares = [7, 3]
+        if plots:
+            body.append(rrb.Horizontal(*plots))
     speed = max(1.0, round(scene.length / PLAYED_S)) if scene.timed else 1.0
     return rrb.Blueprint(
-        rrb.Vertical(*body, row_shares=[7, 3][: len(body)]),
+        rrb.Vertical(*body, row_shares=shares[: len(body)]),
         rrb.TopPanel(state="hidden"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

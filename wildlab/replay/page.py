@@ -22,9 +22,9 @@ body{background:#f6f8f9;color:#18222d;font:16px/1.5 system-ui,sans-serif}
 canvas{position:absolute;inset:0;width:100%;height:100%}
 #said{position:absolute;inset:0;display:grid;place-content:center;padding:1.5rem;text-align:center}
 #said p{max-width:34rem;margin:.4rem auto}
-#narrow{display:none;box-sizing:border-box;height:6rem;margin:0;padding:.5rem .8rem;overflow:auto;
+#narrow{display:none;box-sizing:border-box;height:8rem;margin:0;padding:.5rem .8rem;overflow:auto;
   font-size:14px}
-@media(max-width:44rem){#narrow{display:block}canvas{top:6rem;height:calc(100% - 6rem)}#said{top:6rem}}
+@media(max-width:44rem){#narrow{display:block}canvas{top:8rem;height:calc(100% - 8rem)}}
 [hidden]{display:none!important}
 """
 
@@ -38,10 +38,19 @@ for (const name of doors)
 navigator.sendBeacon = () => false;
 for (const name of ["debug", "info", "log"]) console[name] = () => {};
 window.open = () => null;
+document.getElementById("wait").hidden = false;
 """
 
-AFTER = """
-const say = (text) => { const p = document.getElementById("why"); p.textContent = text; p.hidden = false; };
+#: What stands in for it, where it cannot be shown.
+INSTEAD = "The moving picture in the flight's report shows the same path in any browser."
+
+AFTER = (
+    """
+const say = (text) => {
+  const hidden = { canvas: true, narrow: true, wait: true, said: false, why: false };
+  for (const id in hidden) document.getElementById(id).hidden = hidden[id];
+  document.getElementById("why").textContent = text + " INSTEAD";
+};
 async function unpack(id) {
   const text = atob(document.getElementById(id).textContent.trim());
   const packed = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
@@ -52,6 +61,8 @@ async function show() {
   if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function") {
     return say("This browser is too old to show it: Chrome 91, Firefox 113, Safari 16.4 and newer ones can.");
   }
+  if (!document.createElement("canvas").getContext("webgl2"))
+    return say("This browser cannot draw it here: it has no WebGL 2, or that is switched off.");
   await wasm_bindgen({ module_or_path: await unpack("viewer") });
   const handle = new wasm_bindgen.WebHandle({
     url: [], manifest_url: null, render_backend: "webgl", video_decoder: null, hide_welcome_screen: true,
@@ -61,20 +72,23 @@ async function show() {
   await handle.start(document.getElementById("canvas"));
   handle.open_channel("replay", "replay");
   handle.send_rrd_to_channel("replay", await unpack("recording"));
+  if (matchMedia("(max-width:44rem)").matches)
+    handle.send_rrd_to_channel("replay", await unpack("narrow-layout"));
   handle.close_channel("replay");
   document.getElementById("said").hidden = true;
-  document.getElementById("canvas").hidden = false;
+  for (const id of ["canvas", "narrow"]) document.getElementById(id).hidden = false;
   document.documentElement.dataset.shown = "yes";
-  setInterval(() => { if (handle.has_panicked()) {
-    document.getElementById("canvas").hidden = true; document.getElementById("said").hidden = false;
-    say("The viewer broke off. Open this file again; the report beside it shows the same without it.");
+  const watch = setInterval(() => { if (handle.has_panicked()) {
+    clearInterval(watch);
+    say("The viewer broke off. Open this file again.");
   } }, 1000);
 }
-show().catch((error) => say("This browser cannot show it: " + error));
+show().catch((error) => say("This browser cannot show it (" + error + ")."));
 """
+).replace("INSTEAD", INSTEAD)
 
 
-def page(recording: bytes, viewer: Viewer, name: str) -> str:
+def page(recording: bytes, viewer: Viewer, name: str, narrow: bytes) -> str:
     """One HTML file with all of it inside.
 
     Parameters
@@ -85,6 +99,8 @@ def page(recording: bytes, viewer: Viewer, name: str) -> str:
         Of the version that wrote it.
     name
         Of the flight.
+    narrow
+        A layout that narrow screens get, as ``.rbl``.
 
     Returns
     -------
@@ -100,15 +116,19 @@ def page(recording: bytes, viewer: Viewer, name: str) -> str:
         '<meta name="viewport" content="width=device-width,initial-scale=1">',
         '<meta name="referrer" content="no-referrer"><link rel="icon" href="data:,">',
         f"<title>{title}</title><style>{STYLE}</style></head><body>",
-        '<p id="narrow">This wants a wide screen: its panels stand side by side, and are cut off here. The '
-        "moving picture in the flight's report shows the same path on a narrow one.</p>",
-        f'<div id="said" role="status"><p><b>{title}</b></p><p>It takes some seconds to open.</p>'
-        '<p id="why" hidden></p><noscript><p>This file plays a flight with a script of its own, and they are '
-        "off here.</p></noscript></div>",
+        f'<p id="narrow" hidden><b>{title}</b>, played over and over. Drag the map to turn it, and '
+        "spread two fingers to come closer. Held sideways, the screen has a time line. Less, and easier to "
+        "read: the moving picture in the flight's report.</p>",
+        f'<div id="said" role="status"><p><b>{title}</b></p>'
+        '<p id="wait" hidden>It takes some seconds to open.</p><p id="why" hidden></p>'
+        "<noscript><p>This file plays a flight with a script of its own, and scripts are off here. "
+        f"{INSTEAD}</p></noscript></div>",
         f'<canvas id="canvas" hidden tabindex="0" aria-label="{title}, an interactive view"></canvas>',
+        f"<script>{scripts[0]}</script>",
         f'<script type="application/octet-stream" id="viewer">{_packed(viewer.wasm)}</script>',
         f'<script type="application/octet-stream" id="recording">{_packed(recording)}</script>',
-        *(f"<script>{one}</script>" for one in scripts),
+        f'<script type="application/octet-stream" id="narrow-layout">{_packed(narrow)}</script>',
+        *(f"<script>{one}</script>" for one in scripts[1:]),
         "</body></html>\n",
     ]
     return "\n".join(parts)

@@ -22,6 +22,8 @@ from wildlab.replay.shapes import ellipse_rings, mesh
 from wildlab.replay.shots import Shot
 from wildlab.replay.words import about, path_part, plain
 
+#: Whose layouts and recordings belong together.
+APPLICATION = "wildlab replay"
 #: Time lines.
 SECONDS, IMAGES = "flight_time", "image"
 #: The 95 % band of a NEES with two degrees of freedom is drawn in the plot.
@@ -68,6 +70,16 @@ def save_recording(
         raise
 
 
+def narrow_layout(scene: Scene) -> bytes:
+    """The layout for a narrow screen, which a viewer may be given after the recording."""
+    from wildlab.replay.blueprint import blueprint_of
+
+    with tempfile.TemporaryDirectory(prefix="wildlab-layout.") as folder:
+        file = FilePath(folder) / "narrow.rbl"
+        blueprint_of(scene, narrow=True).save(APPLICATION, file)
+        return file.read_bytes()
+
+
 def log_scene(scene: Scene) -> Any:
     """A scene as a stream of rerun that a widget shows; nothing is written.
 
@@ -88,7 +100,7 @@ def log_scene(scene: Scene) -> Any:
 
 
 def _stream(rr: Any) -> Any:
-    stream = rr.RecordingStream("wildlab replay", recording_id="replay", send_properties=False)
+    stream = rr.RecordingStream(APPLICATION, recording_id="replay", send_properties=False)
     stream.disable_timeline("log_time")
     stream.disable_timeline("log_tick")
     return stream

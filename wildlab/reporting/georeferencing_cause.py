@@ -131,8 +131,8 @@ def lost_sentence(lost: int, total: int) -> str:
     if lost == total:
         return (
             f"None of the {total} points has a position: no ray of theirs has a pose and meets the ground. "
-            "Where the camera looks, the signs of roll and pitch and the height of the ground come first: "
-            "see `wildlab check`."
+            "Where the camera looks, the signs of roll and pitch and the height of the ground come first. "
+            "`wildlab check` looks at them."
         )
     first = f"{lost} of {total} points ({100 * lost / total:.0f} %) have no position on the ground"
     if lost > MANY_LOST * total:

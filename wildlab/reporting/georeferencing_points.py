@@ -62,6 +62,6 @@ def points_section(report: Report, flight: Flight, points: pd.DataFrame, source:
     said = f"**All {len(points)} points** with their 90 % ellipses; {placed} have a place."
     if lacking:
         kinds = "One file is" if lacking == 1 else "Both files are"
-        said += f" {kinds} larger than the {MOST_BYTES // 1000} kB that a page carries; "
+        said += f" {kinds} larger than the {MOST_BYTES // 1000} kB that a page carries. "
         said += "`wildlab georeference` writes them all."
     report.files(said, kept)

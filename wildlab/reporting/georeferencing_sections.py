@@ -117,7 +117,7 @@ def amiss_section(report: Report, amiss: Sequence[str], *, shown: bool) -> None:
     if not amiss:
         return
     count = "1 finding" if len(amiss) == 1 else f"{len(amiss)} findings"
-    said = list(amiss) if shown else [f"{count}: `wildlab check` on the flight's folder says which."]
+    said = list(amiss) if shown else [f"{count}. `wildlab check` on the flight's folder says which."]
     report.alert("What does not fit together", said)
 
 

@@ -89,12 +89,18 @@ def with_glossary(body: str, known: Sequence[Word] | None = None) -> str:
     soup = BeautifulSoup(body, "html.parser")
     pattern, by_spelling = _pattern(known)
     uses: dict[str, int] = {}
+    first: set[str] = set()
+    top = soup.find("h2")
+    before = set() if top is None else {id(text) for text in top.find_all_previous(string=True)}
     for node in _texts(soup):
         for match in pattern.finditer(str(node)):
             name = by_spelling[_key(match[0], by_spelling)].name
             uses[name] = uses.get(name, 0) + 1
+            if id(node) in before:
+                first.add(name)
     order = {word.name: i for i, word in enumerate(known)}
-    kept = sorted(uses, key=lambda name: (-uses[name], order[name]))[:MOST]
+    # Those of the first screens come before all others: not everybody reads on.
+    kept = sorted(uses, key=lambda name: (name not in first, -uses[name], order[name]))[:MOST]
     if not kept:
         return body
     _link_first(soup, pattern, by_spelling, set(kept))

@@ -133,6 +133,6 @@ def offset_sentence(flight: Flight) -> str:
     beside = f" beside a zone of {zone / 3600:+g} h" if zone else ""
     return (
         f"The camera's clock was corrected by {offset - zone:+.2f} s{beside}, and nothing says where that "
-        "came from. If it was fitted on these same points, as what `wildlab check` proposes is, these "
-        "figures flatter: another flight would tell."
+        "came from. If it was fitted on these same points, these figures flatter: another flight would "
+        "tell. What `wildlab check` proposes is fitted on them."
     )

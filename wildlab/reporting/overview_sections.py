@@ -23,7 +23,7 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
     """The few numbers to remember."""
     found = []
     if np.isfinite(overview.length_s):
-        found.append((words.duration_words(overview.length_s), "from the first to the last stamp"))
+        found.append((words.duration_words(overview.length_s), "from the first to the last record"))
     way = words.way_of(overview)
     if np.isfinite(way) and overview.path is not None:
         found.append((words.length_words(way), f"path of {charts.path_name(overview.path)}"))
@@ -57,7 +57,7 @@ def places_section(report: Report, overview: Overview) -> None:
                 f"Map of the path in metres east and north of a local origin. {title}.",
                 f"Path of {charts.path_name(path)}, coloured by what is wrong; where several things "
                 "are, by the "
-                "first in the list. Metres from a local origin, north up.",
+                "first in the list. Metres from a chosen point, north up.",
             )
         )
     if coverage is not None and coverage.placed.any():

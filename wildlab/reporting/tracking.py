@@ -59,9 +59,11 @@ def length(metres: float) -> str:
 
     Examples
     --------
-    >>> length(0.234), length(12.3), length(3.46)
-    ('0.23 m', '12 m', '3.5 m')
+    >>> length(0.234), length(12.3), length(3.46), length(6_070_000.0)
+    ('0.23 m', '12 m', '3.5 m', '6070 km')
     """
+    if metres >= 10_000:
+        return f"{metres / 1000:.0f} km"
     return f"{metres:.2f} m" if metres < 1 else f"{metres:.1f} m" if metres < 10 else f"{metres:.0f} m"
 
 

@@ -11,6 +11,7 @@ from wildlab.pipeline.following.judged import Apart, verdict
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting import tracking as words
 from wildlab.reporting.charts import following as charts
+from wildlab.reporting.charts.beside import beside_plain_shown
 from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
 
@@ -88,7 +89,13 @@ def pictures_section(
         mine = [one for one in followed.tracks if (one.sensor, one.target) == (sensor, target)]
         figures = [charts.squares_shown(mine, rows, "nis")]
         if any(np.isfinite(one.nees).any() for one in mine):
-            figures = [charts.errors_shown(mine, rows), charts.squares_shown(mine, rows, "nees"), *figures]
+            beside = beside_plain_shown(mine)
+            figures = [
+                charts.errors_shown(mine, rows),
+                *([beside] if beside else []),
+                charts.squares_shown(mine, rows, "nees"),
+                *figures,
+            ]
         if sensor in followed.scans and (
             white := charts.whiteness_shown(mine, followed.scans[sensor].elements)
         ):

@@ -21,7 +21,7 @@ from wildlab.paths import REPORTS
 from wildlab.pipeline.following.estimates import read_estimates
 from wildlab.replay.gather import scene_of
 from wildlab.replay.page import page
-from wildlab.replay.recording import save_recording
+from wildlab.replay.recording import narrow_layout, save_recording
 from wildlab.replay.scene import Scene
 from wildlab.replay.shots import Shot, read_shots
 from wildlab.replay.viewer import read_viewer
@@ -91,7 +91,7 @@ def replay(
         if viewer is not None:
             tell("packing the viewer", None, None)
             written.append(target / PAGE)
-            write_atomic(written[1], page(written[0].read_bytes(), viewer, scene.name))
+            write_atomic(written[1], page(written[0].read_bytes(), viewer, scene.name, narrow_layout(scene)))
     return written, scene
 
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bs4 import BeautifulSoup, Comment, Tag
+from bs4 import BeautifulSoup, Comment, NavigableString, Tag
+from bs4.element import PageElement
 
 from wildlab.errors import WildlabError
 from wildlab.flight.files import read_regular
@@ -32,6 +33,11 @@ _REFERENCES = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
 #: Scripts and whatever else loads or runs something; pictures inside of the page stay.
 _NEVER = ("script", "iframe", "object", "embed", "link", "meta", "base", "form", "noscript", "template")
+#: What is typed, where wildlab and the flight are; what a sentence stands in.
+_COMMAND = re.compile(r"wildlab [a-z]|--[a-z]")
+_BLOCKS = ("p", "li", "td", "th", "figcaption", "caption", "summary", "dd", "h2", "h3", "div")
+#: What screen readers list by its name, to go to.
+_LANDMARKS = "section[aria-label], nav[aria-label], aside[aria-label], [role=region][aria-label]"
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,7 @@ class Part:
     style: str
 
 
-def read_part(report: Path, number: int, *, hashes: bool) -> Part:
+def read_part(report: Path, number: int, *, exact: bool) -> Part:
     """One report out of its file.
 
     Parameters
@@ -53,9 +59,9 @@ def read_part(report: Path, number: int, *, hashes: bool) -> Part:
         ``report.html``.
     number
         Which one it is on its page; what it names by id then is its own.
-    hashes
-        Whether the foot of the page may say by which hashes its data and code are known, and when it was
-        made.
+    exact
+        Whether it is for those who have the flight and wildlab: then the foot of the page says by which
+        hashes its data and code are known and when it was made, and advice may be a command to type.
 
     Returns
     -------
@@ -84,12 +90,14 @@ def read_part(report: Path, number: int, *, hashes: bool) -> Part:
     for comment in body.find_all(string=lambda text: isinstance(text, Comment)):
         comment.extract()
     footer = body.find("footer")
-    kept = [] if not isinstance(footer, Tag) else [one for one in footer.find_all("p") if _stays(one, hashes)]
+    kept = [] if not isinstance(footer, Tag) else [one for one in footer.find_all("p") if _stays(one, exact)]
     for one in kept:
         one["class"] = "note"
         main.append(one)
     for link in main.find_all("a"):
         _tie(link)
+    if not exact:
+        _leave_out_commands(main)
     prefix = f"r{number}-"
     ids = {str(one["id"]) for one in main.find_all(id=True)}
     for tag in main.find_all(True):
@@ -98,10 +106,43 @@ def read_part(report: Path, number: int, *, hashes: bool) -> Part:
     return Part(number, title, main.decode_contents().strip(), style)
 
 
-def _stays(paragraph: Tag, hashes: bool) -> bool:
+def _stays(paragraph: Tag, exact: bool) -> bool:
     """Whether a line at the foot stays: not where it points to files beside the page."""
     beside = any(not str(a.get("href", "")).startswith(("#", "data:")) for a in paragraph.find_all("a"))
-    return not beside and (hashes or (paragraph.code is None and not _HASH.search(paragraph.get_text())))
+    return not beside and (exact or (paragraph.code is None and not _HASH.search(paragraph.get_text())))
+
+
+def _leave_out_commands(main: Tag) -> None:
+    """Without the sentences that say what to type: who gets the copy has neither program nor flight."""
+    for code in main.find_all("code"):
+        block = code.find_parent(_BLOCKS)
+        if block is None or not _COMMAND.match(code.get_text().strip()):
+            continue
+        kept: list[PageElement] = []
+        for sentence in _sentences(block):
+            found = [tag for one in sentence if isinstance(one, Tag) for tag in (one, *one.find_all("code"))]
+            if not any(tag.name == "code" and _COMMAND.match(tag.get_text().strip()) for tag in found):
+                kept += sentence
+        block.clear()
+        block.extend(kept)
+        while not block.get_text(strip=True) and block.name in ("p", "li", "ul", "ol") and block.parent:
+            block, empty = block.parent, block
+            empty.decompose()
+
+
+def _sentences(block: Tag) -> list[list[PageElement]]:
+    """What is in a block, in sentences; what is marked in it stays whole."""
+    found: list[list[PageElement]] = [[]]
+    for child in list(block.children):
+        # The end of a sentence stays with it.
+        pieces = re.split(r"(?<=[.!?])(?=\s)", str(child)) if type(child) is NavigableString else [child]
+        for i, piece in enumerate(pieces):
+            last = "".join(one.get_text() for one in found[-1])
+            begins = piece if isinstance(piece, str) else piece.get_text()
+            if i or re.search(r"[.!?]\s+$", last) or re.search(r"[.!?]\s", last[-1:] + begins[:1]):
+                found.append([])
+            found[-1].append(NavigableString(piece) if isinstance(piece, str) else piece)
+    return found
 
 
 def _tie(link: Tag) -> None:
@@ -174,8 +215,7 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
     parts = [part for chapter in chapters for part in chapter.parts]
     contents = ""
     if len(parts) > 1:
-        listed = "".join(f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in parts)
-        contents = f'<nav aria-label="Reports"><h2>In this file</h2><ol>{listed}</ol></nav>'
+        contents = f'<nav aria-label="Reports"><h2>In this file</h2>{_listed(chapters)}</nav>'
     body.append(contents if several else "")
     level = "h2" if several else "h1"
     for chapter in chapters:
@@ -186,7 +226,7 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
         body.append("" if several else contents)
         body += [
             f'<article class="shared" id="r{part.number}-top" aria-label="{escape(part.title)}">\n'
-            f"{part.body}\n</article>"
+            f"{_set_apart(part, parts)}\n</article>"
             for part in chapter.parts
         ]
         told = "".join(f"<li>{escape(one)}</li>" for one in chapter.about)
@@ -195,6 +235,33 @@ def joined(chapters: Sequence[Chapter], heading: str) -> str:
     styles = dict.fromkeys([*(part.style for part in parts if part.style), _STYLE])
     title = heading if several else chapters[0].heading
     return page(title=title, body="\n".join(filter(None, body)), style="\n".join(styles))
+
+
+def _listed(chapters: Sequence[Chapter]) -> str:
+    """Links to the reports, under the chapters' headings where there are several: titles alone may be the
+    same."""
+    lists, before = [], 0
+    for chapter in chapters:
+        items = "".join(
+            f'<li><a href="#r{part.number}-top">{escape(part.title)}</a></li>' for part in chapter.parts
+        )
+        heading = f"<h3>{escape(chapter.heading)}</h3>" if len(chapters) > 1 else ""
+        # Counted through all chapters: a report is also told from one of the same title by its number.
+        lists.append(f'{heading}<ol start="{before + 1}">{items}</ol>' if items else "")
+        before += len(chapter.parts)
+    return "".join(lists)
+
+
+def _set_apart(part: Part, parts: Sequence[Part]) -> str:
+    """The part's HTML; beside others, what screen readers list by name is called by the report it is in."""
+    if len(parts) == 1:
+        return part.body
+    alike = sum(one.title == part.title for one in parts) > 1
+    whose = f"{part.title} ({parts.index(part) + 1})" if alike else part.title
+    soup = BeautifulSoup(part.body, "html.parser")
+    for region in soup.select(_LANDMARKS):
+        region["aria-label"] = f"{region['aria-label']}: {whose}"
+    return soup.decode()
 
 
 _STYLE = """.shared { border-top: 3px solid var(--line); margin-top: 3rem; padding-top: 1.5rem }

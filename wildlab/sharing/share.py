@@ -230,7 +230,7 @@ def _generalised(
     with tempfile.TemporaryDirectory(prefix="wildlab-share-") as work:
         drawn = redraw(flight, source, treatment, Path(work), name=name, notebooks=notebooks, console=console)
         parts = [
-            read_part(one / "report.html", number, hashes=False)
+            read_part(one / "report.html", number, exact=False)
             for number, one in enumerate(drawn.folders.values(), first)
         ]
     made = drawn.made
@@ -304,7 +304,7 @@ def _told(drawn: Redrawn, treatment: Treatment) -> Iterator[str]:
 def _copied(source: Source, tier: Tier, name: str, first: int) -> _Document:
     """A study's reports, or a flight's for those who have it, as they are."""
     parts = [
-        read_part(one / "report.html", number, hashes=load_tiers().tier[tier].exact)
+        read_part(one / "report.html", number, exact=load_tiers().tier[tier].exact)
         for number, one in enumerate(source.folders, first)
     ]
     about = (

@@ -158,6 +158,67 @@ def test_mgrs_as_published() -> None:
     assert "MGRS" not in kinds("at 5QFJ1234567890.", known)
 
 
+# As two programs with no code in common (GEOTRANS and PyGeodesy) write these places, to a metre.
+MGRS = {
+    "32VKN9735300648": (60.3913, 5.3221),  # Bergen: zone 32 reaches west to 3 degrees
+    "31UEC9357105982": (55.99, 4.5),  # south of that exception
+    "31WEL7336097988": (64.001, 4.5),  # north of it
+    "31VDG9944251411": (60.0, 2.99),
+    "32WME6549288103": (71.99, 8.0),  # south of the exceptions of Svalbard
+    "31XFV7218297198": (72.01, 8.0),
+    "31XFG3651587681": (78.2, 8.99),
+    "33XUG6348487681": (78.2, 9.01),
+    "33XVH3402763342": (78.925, 11.9222),  # Ny-Alesund
+    "33XXG3879565473": (78.0, 20.99),
+    "35XLG6120465473": (78.0, 21.01),
+    "35XPJ1592187559": (80.0, 32.99),
+    "37XCJ8407887559": (80.0, 33.01),
+    "37XEJ5619682986": (80.0, 41.9),
+    "38XMP4380382986": (80.0, 42.1),
+    "35XNP3505227890": (83.99, 30.0),
+    "36JUU4592943693": (-24.0113, 31.4852),
+    "33KXV4003814624": (-18.8556, 16.3293),
+    "21HUB7331770036": (-34.6037, -58.3816),
+    "37MBV2172399955": (-0.0004, 36.5),  # either side of the equator
+    "37NBA2172300044": (0.0004, 36.5),
+    "60KZF1805229394": (-17.8, 179.9999),  # and of the antimeridian
+    "01KAA8194729394": (-17.8, -179.9999),
+    "58CEU3923257811": (-77.85, 166.67),
+    "36CVS4181018029": (-79.99, 30.0),
+    "YRJ9867108737": (84.5, -100.25),  # around the poles
+    "ZAP0562344441": (84.2, 179.5),
+    "ZGE3418852343": (85.5, 60.3),
+    "YZF9874055668": (88.7, -0.5),
+    "ZAH0000000000": (90.0, 0.0),
+    "AUX3673392671": (-80.5, -20.1),
+    "BPM1879711529": (-81.7, 95.5),
+    "AZM5558923079": (-89.2, -150.0),
+    "BAS9522722556": (-86.1, 12.7),
+    "AJN9831413460": (-80.1, -89.3),
+}
+
+
+@pytest.mark.parametrize("code", MGRS)
+def test_mgrs_as_others_write_it(code: str) -> None:
+    latitude, longitude = MGRS[code]
+    known = replace(secrets(latitude, longitude), near_m=2.0)
+    coarse = f"{code[:-10]} {code[-10:-7]} {code[-5:-2]}"
+    assert "MGRS" in kinds(f"at {code}.", known) and "MGRS" in kinds(f"at {coarse}", known)
+    # Ten metres to the east, or to the north, is not within two.
+    for place in (slice(-10, -5), slice(-5, None)):
+        metres = int(code[place])
+        moved = f"{metres + 10 if metres < 50_000 else metres - 10:05d}"
+        other = code[:-10] + (moved + code[-5:] if place.stop else code[-10:-5] + moved)
+        assert "MGRS" not in kinds(f"at {other}.", known), other
+
+
+def test_around_the_poles_places_are_found_as_metres_of_their_grid() -> None:
+    # By GEOTRANS: ZGE 34188 52343, whose square begins 2 400 km east and 1 700 km north.
+    assert places("E 2434188 N 1752343", secrets(85.5, 60.3))
+    assert not places("E 2534188 N 1752343", secrets(85.5, 60.3))
+    assert not places("E 2434188 N 1752343", secrets(80.5, 60.3))
+
+
 @given(latitude=some.floats(-84, 84), longitude=some.floats(-179, 179))
 @settings(max_examples=20)
 def test_codes_are_found_anywhere(latitude: float, longitude: float) -> None:
@@ -174,6 +235,31 @@ def test_the_zone_is_found_and_others_are_not() -> None:
     for text in ("EPSG:32632", "EPSG 25832", "UTM zone 32V", "utm32"):
         assert "the zone of UTM" in kinds(text, secrets()), text
     assert "the zone of UTM" not in kinds("EPSG:32634, UTM zone 3, UTM zone 322", secrets())
+
+
+# The zone that maps use there, and the one by longitude alone.
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "zones"),
+    [
+        (60.3913, 5.3221, {31, 32}),  # Bergen
+        (55.9, 5.3221, {31}),
+        (64.1, 5.3221, {31}),
+        (78.2, 8.9, {32, 31}),  # Svalbard
+        (78.2, 9.1, {32, 33}),
+        (78.2, 20.9, {34, 33}),
+        (78.2, 21.1, {34, 35}),
+        (80.0, 32.9, {36, 35}),
+        (80.0, 33.1, {36, 37}),
+        (71.9, 8.9, {32}),
+        (-24.0, 31.5, {36}),
+    ],
+)
+def test_the_zone_by_the_exceptions_of_norway_and_svalbard(
+    latitude: float, longitude: float, zones: set[int]
+) -> None:
+    known = secrets(latitude, longitude)
+    found = {zone for zone in range(1, 61) if "the zone of UTM" in kinds(f"EPSG:{32600 + zone}", known)}
+    assert found == zones
 
 
 def test_a_geohash_is_no_part_of_a_word() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.evaluation.whiteness import autocorrelation, white_bound
@@ -32,7 +33,7 @@ from wildlab.reporting.figures import (
     new_figure,
     thinned,
 )
-from wildlab.reporting.tracking import WORDS, filter_words, short_words
+from wildlab.reporting.tracking import WORDS, filter_words, length, short_words
 
 #: What `Report.figures` takes: figure, name, alternative text, caption.
 Shown = tuple[Figure, str, str, str]
@@ -40,6 +41,8 @@ Shown = tuple[Figure, str, str, str]
 SENSOR_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 #: Lags of innovations shown, detections; metres beyond the targets' ways that a map shows, as a share.
 LAGS, MARGIN = 20, 0.15
+#: Where the largest value is this many times the middle one, an axis that is even would show it alone.
+UNEVEN = 20.0
 #: A pause in the detections longer than this many of its usual intervals is shaded.
 PAUSE = 5.0
 
@@ -127,7 +130,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
     if len(used) > 2:
         mark_gaps(ax, used, max(PAUSE * float(np.median(np.diff(used))), 1.0))
     ax.set(xlabel="time (s)", ylabel="NEES of the position" if what == "nees" else "NIS of the detections")
-    ax.set_title(f"{first.target} by {first.sensor}: mean {what.upper()}, {dof:g} is right\n" + _few(brief))
+    ax.set_title(f"{first.target} by {first.sensor}: mean {what.upper()}, {dof:g} is right\n" + few(brief))
     fig.legend(loc="outside lower center", ncols=2, markerscale=3)
     words = "; ".join(said)
     alt = (
@@ -137,7 +140,7 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
     return fig, slug(what, first.sensor, first.target), alt, f"Means: {words}; {dof:g} is ideal."
 
 
-def _few(brief: Sequence[str]) -> str:
+def few(brief: Sequence[str]) -> str:
     """No more than fit into a title."""
     return " · ".join(brief[:3]) + (" …" if len(brief) > 3 else "")
 
@@ -148,6 +151,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
     mine = rows[(rows["sensor"] == first.sensor) & (rows["target"] == first.target)].set_index("filter")
     fig, ax = new_figure(5.8, 3.6)
     said, brief = [], []
+    sizes: list[Array] = []
     for one in tracks:
         away = np.hypot(*one.error[:, :2].T)
         there = np.isfinite(away)
@@ -164,12 +168,20 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
             lw=1.0,
             ls=":",
         )
-        said.append(f"{filter_words(one.filter)} {mine.loc[one.filter, 'rmse']:.3g} m")
-        brief.append(f"{short_words(one.filter)} {mine.loc[one.filter, 'rmse']:.3g} m")
+        far = length(float(mine.loc[one.filter, "rmse"]))
+        said.append(f"{filter_words(one.filter)} {far}")
+        brief.append(f"{short_words(one.filter)} {far}")
+        sizes.append(away[there])
     ax.plot([], [], color=INK, lw=1.0, ls=":", label="what each states of it")
-    ax.set_ylim(bottom=0)
+    # One filter that is lost would press all others flat.
+    if len(sizes) > 1 and max(map(np.max, sizes)) > UNEVEN * min(map(np.max, sizes)):
+        ax.set_yscale("log")
+        ax.set_ylim(bottom=max(float(np.quantile(np.concatenate(sizes), 0.01)), 1e-3))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: signed(value)))
+    else:
+        ax.set_ylim(bottom=0)
     ax.set(xlabel="time (s)", ylabel="distance from the truth (m)")
-    ax.set_title(f"{first.target} by {first.sensor}: root mean square error\n{_few(brief)}")
+    ax.set_title(f"{first.target} by {first.sensor}: root mean square error\n{few(brief)}")
     fig.legend(loc="outside lower center", ncols=2)
     words = "; ".join(said)
     alt = (
@@ -181,6 +193,21 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         alt,
         "Dotted: the standard deviation stated. Means: of looks with the target seen.",
     )
+
+
+def signed(metres: float) -> str:
+    """Metres beside an axis over many powers of ten.
+
+    Examples
+    --------
+    >>> signed(-2e6), signed(30.0), signed(0.0)
+    ('−2·10⁶', '30', '0')
+    """
+    if abs(metres) < 1e4:
+        return f"{metres:g}".replace("-", "−")
+    factor, power = f"{metres:.0e}".split("e")
+    raised = str(int(power)).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{factor}·10{raised}".replace("-", "−")
 
 
 def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> Shown | None:
@@ -199,7 +226,7 @@ def whiteness_shown(tracks: Sequence[SensorTrack], elements: Sequence[str]) -> S
     said = [f"{filter_words(name)} {value:+.2f}".replace("-", "−") for name, value in far.items()]
     names = {name: WORDS.get(name, filter_words(name)) for name in series}
     brief = [f"{short_words(name)} {value:+.2f}".replace("-", "−") for name, value in far.items()]
-    title = f"{first.target} by {first.sensor}: autocorrelation at lag one\n{_few(brief)}"
+    title = f"{first.target} by {first.sensor}: autocorrelation at lag one\n{few(brief)}"
     axes = tuple(f"element {i + 1}" for i in range(len(elements))) if len(elements) > 1 else (elements[0],)
     fig = innovation_correlations(series, white_bound(n), names, title, axes)
     words = "; ".join(said)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from pyproj import Proj
 
-from wildlab.sharing.scan.encodings import DEGREE_M
+from wildlab.sharing.scan.encodings import DEGREE_M, UPS, UPS_FROM, utm_zones
 from wildlab.sharing.scan.hits import Hit
 from wildlab.sharing.scan.secrets import Array
 
@@ -16,6 +16,8 @@ GEOHASH = "0123456789bcdefghjkmnpqrstuvwxyz"
 PLUS = "23456789CFGHJMPQRVWX"
 #: Letters of MGRS' squares: neither I nor O.
 SQUARES = "ABCDEFGHJKLMNPQRSTUVWXYZ"
+#: Letters of its columns around the poles.
+POLAR_COLUMNS = "ABCFGHJKLPQRSTUXYZ"
 #: Northings of MGRS begin again after so many squares of 100 km.
 ROWS = 20
 #: Shorter geohashes and plus codes are coarser than a few kilometres.
@@ -24,6 +26,8 @@ SHORTEST_GEOHASH, PLUS_BEFORE = 6, 8
 _PLUS = re.compile(
     rf"(?<![A-Z0-9])([{PLUS}]{{2}}(?:[{PLUS}]{{2}}){{1,3}})\+([{PLUS}]{{2,7}})(?![A-Z0-9])", re.IGNORECASE
 )
+#: Easting and northing of MGRS: to a kilometre or finer.
+_DIGITS = r"\s?(\d{2,5}\s\d{2,5}|\d{4,10})(?!\d)"
 
 Cell = tuple[float, float, float, float]
 
@@ -146,11 +150,6 @@ def locator_of(latitude: float, longitude: float) -> str:
     return field + square + chr(97 + int(east % 2 * 12)) + chr(97 + int(north % 1 * 24))
 
 
-def utm_zone(longitude: float) -> int:
-    """The zone of UTM by longitude alone, deg."""
-    return int((longitude + 180) // 6) % 60 + 1
-
-
 def mgrs_metres(zone: int, column: str, row: str, digits: str) -> tuple[float, float, float] | None:
     """Easting, northing modulo 2000 km, and half the side of the square, m; None where there is none such.
 
@@ -179,6 +178,33 @@ def mgrs_metres(zone: int, column: str, row: str, digits: str) -> tuple[float, f
     )
 
 
+def mgrs_polar_metres(area: str, column: str, row: str, digits: str) -> tuple[float, float, float] | None:
+    """Easting and northing of UPS, and half the side of the square, m; None where there is none such.
+
+    Parameters
+    ----------
+    area
+        A and B west and east of the south pole, Y and Z of the north pole.
+    column, row
+        The letters of the square of 100 km, capitals.
+    digits
+        Easting and northing, as many of each.
+    """
+    if column not in POLAR_COLUMNS or row not in SQUARES:
+        return None
+    column_at = POLAR_COLUMNS.index(column)
+    # East of the pole they are counted from it, west of it the last of them ends there.
+    east = 20 + column_at if area in "BZ" else 20 - len(POLAR_COLUMNS) + column_at
+    north = (8 if area in "AB" else 13) + SQUARES.index(row)
+    n = len(digits) // 2
+    side = 10.0 ** (5 - n)
+    return (
+        east * 1e5 + int(digits[:n]) * side + side / 2,
+        north * 1e5 + int(digits[n:]) * side + side / 2,
+        side / 2,
+    )
+
+
 class Codes:
     """Looks for places that are written as codes."""
 
@@ -195,7 +221,7 @@ class Codes:
         ]
         hashes = sorted({geohash_of(lat, lon, 5) for lat, lon in around})
         self.plus = sorted({plus_of(lat, lon) for lat, lon in around})
-        zones = {utm_zone(lon) for _, lon in around}
+        zones = {zone for at in around for zone in utm_zones(*at)}
         near = sorted({(zone - 1 + step) % 60 + 1 for zone in zones for step in (-1, 0, 1)})
         zone = "|".join(f"0?{one}" for one in near)
         own = "|".join(f"0?{one}" for one in sorted(zones))
@@ -205,13 +231,16 @@ class Codes:
             name: re.compile(pattern, re.IGNORECASE)
             for name, pattern in {
                 "geohash": rf"(?<![A-Z0-9])(?:{'|'.join(hashes)})[{GEOHASH}]{{1,7}}(?![A-Z0-9])",
-                "MGRS": rf"(?<![A-Z0-9.])({zone})\s?[C-HJ-NP-X]\s?([A-HJ-NP-Z])([A-HJ-NP-V])"
-                r"\s?(\d{2,5}\s\d{2,5}|\d{4,10})(?!\d)",
+                "MGRS": rf"(?<![A-Z0-9.])({zone})\s?[C-HJ-NP-X]\s?([A-HJ-NP-Z])([A-HJ-NP-V]){_DIGITS}",
                 "locator": rf"(?<![A-Z0-9])(?:{locators})(?:[0-9]{{2}}(?:[A-X]{{2}})?)?(?![A-Z0-9])",
                 "zone": rf"EPSG\W{{0,12}}(?:326|327|258|230|227)(?:{two})(?!\d)"
                 rf"|(?<![A-Z])UTM\W{{0,3}}(?:zone)?\W{{0,3}}(?:{own})(?!\d)",
             }.items()
         }
+        if places[:, 0].max() > UPS_FROM[0] or places[:, 0].min() < UPS_FROM[1]:
+            self.patterns["polar MGRS"] = re.compile(
+                rf"(?<![A-Z0-9.])([ABYZ])\s?([{POLAR_COLUMNS}])([A-HJ-NP-Z]){_DIGITS}", re.IGNORECASE
+            )
 
     def _steps(self, shrink: float) -> Array:
         """Degrees to the sides, no further apart than the smallest cell (of a geohash of five letters)."""
@@ -243,13 +272,14 @@ class Codes:
             full = {one[: PLUS_BEFORE - len(before)] + before for one in self.plus}
             if any(self._near(plus_cell(one, after)) for one in full):
                 yield Hit(match.start(), match.end(), "place", "a plus code")
-        for match in self.patterns["MGRS"].finditer(text):
-            digits = "".join(match[4].split())
-            halves = match[4].split()
-            if len(digits) % 2 or len({len(half) for half in halves}) > 1:
-                continue
-            if self._near_square(int(match[1]), match[2].upper(), match[3].upper(), digits):
-                yield Hit(match.start(), match.end(), "place", "MGRS")
+        for name in ("MGRS", "polar MGRS"):
+            for match in self.patterns[name].finditer(text) if name in self.patterns else ():
+                digits = "".join(match[4].split())
+                halves = match[4].split()
+                if len(digits) % 2 or len({len(half) for half in halves}) > 1:
+                    continue
+                if self._near_square(match[1].upper(), match[2].upper(), match[3].upper(), digits):
+                    yield Hit(match.start(), match.end(), "place", "MGRS")
         for match in self.patterns["locator"].finditer(text):
             yield Hit(match.start(), match.end(), "place", "a Maidenhead locator")
         for match in self.patterns["zone"].finditer(text):
@@ -263,11 +293,21 @@ class Codes:
         reach = self.near_m / DEGREE_M
         return bool(((north <= reach) & (east * across <= reach)).any())
 
-    def _near_square(self, zone: int, column: str, row: str, digits: str) -> bool:
-        metres = mgrs_metres(zone, column, row, digits)
-        if metres is None:
+    def _near_square(self, zone: str, column: str, row: str, digits: str) -> bool:
+        """Whether a square is near a place; ``zone`` is one of UTM, or an area around a pole."""
+        polar = not zone.isdigit()
+        if polar:
+            metres = mgrs_polar_metres(zone, column, row, digits)
+            grid = UPS["south" if zone in "AB" else "north"]
+            places = self.places[(self.places[:, 0] < 0) == (zone in "AB")]
+        else:
+            metres = mgrs_metres(int(zone), column, row, digits)
+            grid, places = f"+proj=utm +zone={int(zone)} +ellps=WGS84", self.places
+        if metres is None or not len(places):
             return False
-        east, north = Proj(f"+proj=utm +zone={zone} +ellps=WGS84")(self.places[:, 1], self.places[:, 0])
-        off_north = (np.asarray(north) - metres[1] + 1e6) % 2e6 - 1e6
+        east, north = (np.asarray(one) for one in Proj(grid)(places[:, 1], places[:, 0]))
+        off_north = north - metres[1]
+        if not polar:
+            off_north = (off_north + 1e6) % 2e6 - 1e6
         reach = self.near_m + metres[2]
-        return bool(((np.abs(np.asarray(east) - metres[0]) <= reach) & (np.abs(off_north) <= reach)).any())
+        return bool(((np.abs(east - metres[0]) <= reach) & (np.abs(off_north) <= reach)).any())

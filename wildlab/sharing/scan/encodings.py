@@ -17,6 +17,14 @@ EARTH_M = 6_371_000.0
 #: Zones of UTM to either side of the own: Norway counts from zone 31 to 36 in zone 33.
 ZONES = 3
 
+#: Where UTM ends and the polar grids begin, deg; they overlap by half a degree.
+UPS_FROM = (83.5, -79.5)
+#: The grids around the poles (Universal Polar Stereographic).
+UPS = {
+    name: f"+proj=stere +lat_0={pole} +lon_0=0 +k=0.994 +x_0=2000000 +y_0=2000000 +ellps=WGS84"
+    for name, pole in (("north", 90), ("south", -90))
+}
+
 
 class Axis(NamedTuple):
     """One of the numbers.
@@ -99,9 +107,35 @@ def encodings_of(places: Array) -> list[Encoding]:
     return found + _grids(latitude, longitude)
 
 
+def utm_zones(latitude: float, longitude: float) -> set[int]:
+    """The zones of UTM a place is in: by its longitude, and by the exceptions of the standard.
+
+    Zone 32 reaches west to 3 degrees in the band V (southern Norway), and around Svalbard, in the band X, the
+    zones 31, 33, 35 and 37 leave nothing to those between. Programs may know the exceptions or not.
+
+    Parameters
+    ----------
+    latitude, longitude
+        Of WGS84, deg.
+
+    Examples
+    --------
+    Bergen:
+
+    >>> sorted(utm_zones(60.39, 5.32))
+    [31, 32]
+    """
+    zones = {int((longitude + 180) // 6) % 60 + 1}
+    if 56 <= latitude < 64 and 3 <= longitude < 12:
+        zones.add(32)
+    if latitude >= 72 and 0 <= longitude < 42:
+        zones.add(31 + 2 * int((longitude + 3) // 12))
+    return zones
+
+
 def _grids(latitude: Array, longitude: Array) -> list[Encoding]:
     """Eastings and northings: UTM of the zones around, Web Mercator, and other common grids."""
-    zones = {int(zone) for zone in np.floor((longitude + 180) / 6).astype(int) % 60 + 1}
+    zones = {zone for at in zip(latitude, longitude, strict=True) for zone in utm_zones(*map(float, at))}
     around = sorted({(zone - 1 + shift) % 60 + 1 for zone in zones for shift in range(-ZONES, ZONES + 1)})
     grids: list[tuple[str, str, bool]] = [
         (
@@ -123,6 +157,9 @@ def _grids(latitude: Array, longitude: Array) -> list[Encoding]:
         )
     for middle in sorted({int(2 * np.floor(m / 2) + 1) for m in longitude}):
         grids.append((f"Lo{middle}", f"+proj=tmerc +lon_0={middle} +k=1 +ellps=WGS84", False))
+    for name, reached in (("north", latitude.max() > UPS_FROM[0]), ("south", latitude.min() < UPS_FROM[1])):
+        if reached:
+            grids.append((f"UPS {name}", UPS[name], True))
     grids.append(("Web Mercator", "+proj=webmerc +datum=WGS84", True))
     grids.append(("World Mercator", "+proj=merc +datum=WGS84", True))
     grids.append(
