@@ -359,7 +359,7 @@ def test_outcomes_are_named(flown, monkeypatch):
 def test_joint_association_of_two_far_apart_is_two_tracks():
     crossing = passing(closest=400, noise=5)
     numbers = study.joint_numbers(crossing)
-    assert numbers[study.JOINT, "tracks"] == 2
+    assert len(study.joint_of(crossing, study.density_of(INTERVAL)).tracks) == 2
     assert numbers[study.JOINT, "swaps"] == numbers[study.JOINT, "swapped"] == 0
     assert numbers[study.JOINT, "gospa"] < 10
 

@@ -157,6 +157,11 @@ class Particles:
         """(K,) which fence each track began in, -1 for none."""
         return self._home
 
+    def seen_now(self, track: int) -> bool:
+        """Whether the latest image had a detection of a track, by its number."""
+        mine = self.herd.identity == track
+        return bool((self.herd.seen_at[mine] == self.herd.time).any())
+
     def give_up(self, track: int) -> None:
         """Take a track, by its number, for lost: it was looked for and not found (F 5.3.4)."""
         lost = self.herd.lost | (self.herd.identity == track)

@@ -143,7 +143,7 @@ def patrol(
     here, heading, reached = way_points[0].astype(float), 0.0, 0
     ledger, known, goals, path = Ledger(truth.shape[1]), list[Known](), list[int](), list[Array]()
     given_up, done = list[int](), np.full(len(lives), np.inf)
-    scanned = 0.0
+    sought, arrived, scanned = SEARCH, False, 0.0
     for k, time in enumerate(times.tolist()):
         identity, mean, P = follower.known()
         here_live, home = ~follower.herd.lost, follower.home
@@ -166,15 +166,17 @@ def patrol(
         here = aim.astype(float) if away <= reach else here + (aim - here) * (reach / away)
         if goal == SEARCH:
             reached += away <= reach
-        # On the spot the camera scans; an animal that this does not find is given up.
-        scanned = scanned + step if goal != SEARCH and away <= reach else 0.0
+        # From where the animal should be the camera scans; one that this does not find is given up.
+        if goal != sought:
+            sought, arrived, scanned = goal, False, 0.0
+        arrived |= goal != SEARCH and away <= reach
+        scanned += step if arrived else 0.0
         told = _pose(terrain, aircraft, here, heading, times[k : k + 1])
         true = displaced(told, [heading], off[k : k + 1], turn[k : k + 1])
         _see(terrain, aircraft, told, true, heading, truth[k], time, follower, ledger, k, rng)
-        if scanned > visits.patience:
+        if scanned > visits.patience and not follower.seen_now(goal):
             follower.give_up(goal)
             given_up.append(goal)
-            scanned = 0.0
         known.append(Known(k, *follower.known()))
         goals.append(goal)
         path.append(told.p_nc[0])

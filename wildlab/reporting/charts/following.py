@@ -168,7 +168,7 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
             lw=1.0,
             ls=":",
         )
-        far = length(float(mine.loc[one.filter, "rmse"]))
+        far = length(float(mine["rmse"].to_dict()[one.filter]))
         said.append(f"{filter_words(one.filter)} {far}")
         brief.append(f"{short_words(one.filter)} {far}")
         sizes.append(away[there])

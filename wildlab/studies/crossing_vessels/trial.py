@@ -286,7 +286,6 @@ def joint_numbers(crossing: Crossing) -> Numbers:
     after, end = joint_swapped(crossing, told)
     anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
     return {
-        (JOINT, "tracks"): float(len(told.tracks)),
         (JOINT, "swapped"): float(after),
         (JOINT, "swapped_at_end"): float(end),
         (JOINT, "swaps"): float(told.swaps),

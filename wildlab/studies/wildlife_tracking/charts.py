@@ -35,6 +35,8 @@ from wildlab.studies.wildlife_tracking.trial import NEGATIVE, POSITIVE, UAV, Run
 Shown = tuple[Figure, str, str, str]
 #: Probability that the drawn ellipses hold, as in F figure 4.1.
 HELD = 0.95
+#: So many images after a visit has found its animal is the last of the maps of it.
+AFTER = 60
 KEY = (
     f"Dots: animals, hollow where none was detected yet. Ellipses: the tracks, {100 * HELD:.0f} % of each "
     "covariance."
@@ -42,7 +44,7 @@ KEY = (
 
 
 def map_shown(
-    world: World, followed: Followed, share: float, name: str, what: str, counterpart: str
+    world: World, followed: Followed, share: float, name: str, what: str, counterpart: str, seed: int
 ) -> Shown:
     """Animals, tracks and the way up to a share of the first lap.
 
@@ -60,6 +62,8 @@ def map_shown(
         When that is, in words, for the title.
     counterpart
         Of which figure.
+    seed
+        Of the world.
     """
     fig, ax = new_figure(5.9, 4.2)
     times = world.images.times
@@ -74,7 +78,7 @@ def map_shown(
     ax.set_title(f"{what}: {said}")
     return (
         fig, name, f"Map of five enclosures {what.lower()}: {said}.",
-        f"{KEY} Counterpart of F figure {counterpart}.",
+        f"World {seed}. {KEY} Counterpart of F figure {counterpart}.",
     )  # fmt: skip
 
 
@@ -133,12 +137,13 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
         return None
     first, found = rows
     track = int(flown.goal[found])
-    later = min(found + 60, len(flown.times) - 1)
+    later = min(found + AFTER, len(flown.times) - 1)
+    waited = f"{flown.times[later] - flown.times[found]:.0f} s later"
     fig, axes = new_figure(5.9, 8.2, rows=3)
     said, sizes = [], []
     middle = flown.known[found].mean[flown.known[found].identity == track][0]
     for ax, row, what in zip(
-        axes, (max(first - 1, 0), found, later), ("Before the visit", "Found", "A minute later"), strict=True
+        axes, (max(first - 1, 0), found, later), ("Before the visit", "Seen again", waited), strict=True
     ):
         known = flown.known[row]
         mine = known.identity == track

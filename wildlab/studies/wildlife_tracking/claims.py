@@ -42,7 +42,13 @@ def check_claims(spread: pd.DataFrame, cost: Array | None = None) -> dict[str, C
 
     def lower(name: str, first: str, second: str) -> Check:
         one, other = of(first, name), of(second, name)
-        return Check(true=one < other, first=one, second=other, unit="m")
+        # A world in which there is nothing to compare says neither.
+        return Check(
+            true=one < other, first=one, second=other, unit="m", premise=np.isfinite(one) & np.isfinite(other)
+        )
+
+    def known(values: Array, *, above: bool = False, most: float = np.inf) -> Check:
+        return Check(measured=values, above=above, premise=np.isfinite(values), reach=(0, most))
 
     def large(platform: str) -> Check:
         return Check(
@@ -52,15 +58,14 @@ def check_claims(spread: pd.DataFrame, cost: Array | None = None) -> dict[str, C
             reach=(0, np.inf),
         )
 
-    visited = of(REVISITS, "visits") > 0
     found = {
-        "falls-on-revisit": Check(measured=of(REVISITS, "fall"), premise=visited, reach=(0, np.inf)),
-        "grows-between": Check(measured=of(REVISITS, "grew"), above=True, premise=visited, reach=(0, 1)),
-        "couple-of-seconds": Check(measured=of(GONDOLA, "in_view"), reach=(0, np.inf)),
+        "falls-on-revisit": known(of(REVISITS, "fall")),
+        "grows-between": known(of(REVISITS, "grew"), above=True, most=1),
+        "couple-of-seconds": known(of(GONDOLA, "in_view")),
         "very-large-a-lap-later": large(GONDOLA),
         "hard-to-associate": wrong(GONDOLA),
         "same-problem-uav": wrong(UAV),
-        "visits-keep-known": lower("sd", REVISITS, ROWS),
+        "visits-keep-known": lower("rmse", REVISITS, ROWS),
     }
     for platform in (GONDOLA, UAV):
         one, other = f"{platform}-{NEGATIVE}", f"{platform}-{POSITIVE}"

@@ -33,12 +33,13 @@ from wildlab.pipeline.animals.frames import (
     take_frames,
 )
 from wildlab.pipeline.animals.images import Images
+from wildlab.pipeline.animals.measures import out_of_sight, sight_numbers
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import TwinParameters
 from wildlab.simulation.scene.ground import Weather
 from wildlab.simulation.scene.response import CameraResponse, sensor_of
 from wildlab.studies.wildlife_detection.trial import AREA, CLOUDY, METHODS, SUBTRACTED, WEATHERS, Operator
-from wildlab.studies.wildlife_tracking.trial import NEGATIVE, World, follower_of, sight_numbers
+from wildlab.studies.wildlife_tracking.trial import NEGATIVE, World, follower_of
 
 #: When frames are taken: at the twin's epoch, and under clouds, as most of F's images (F 7.4).
 DAWN, CLOUDS = "dawn", "clouds"
@@ -217,7 +218,7 @@ def counted(world: World, images: Images, followed: Followed, framed: Framed | N
         off_px=np.nan if framed is None else off_px(world, framed),
         tracks=followed.tracks,
         by_false=sum(one.started and one.animal == NONE for one in followed.found),
-        sight=sight_numbers(followed.known, followed.found, images.times, images.truth),
+        sight=sight_numbers(out_of_sight(followed.known, followed.found, images.times, images.truth)),
     )
 
 

@@ -6,16 +6,19 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
-from wildlab.reporting.text import percent
+from wildlab.pipeline.animals.follow import STATION_S
+from wildlab.pipeline.animals.measures import OUT_OF_SIGHT
+from wildlab.reporting.text import NOTHING, percent
 from wildlab.studies.wildlife_tracking.timing import middle_ratio
 from wildlab.studies.wildlife_tracking.trial import (
+    EVERY,
     FILTERS,
     GATE,
     GONDOLA,
     KALMAN,
     NEGATIVE,
-    OUT_OF_SIGHT,
     PARTICLES,
+    PATROL_S,
     POSITIVE,
     RATES,
     REVISITS,
@@ -23,6 +26,7 @@ from wildlab.studies.wildlife_tracking.trial import (
     UAV,
     VISITS,
 )
+from wildlab.tracking.particles.steps import LEAST_EFFECTIVE
 
 #: What the platforms and the filters are called.
 PLATFORMS = {GONDOLA: "gondola", UAV: "multicopter"}
@@ -51,20 +55,34 @@ would have shown, by one minus the probability of a detection: the footprint is 
 has, with what the terrain hides. The Kalman filter has the same rule of association and neither fences nor
 images without detections.
 
-An animal counts as out of sight once it has not been detected for {OUT_OF_SIGHT:g} s. Then, every 20 s, the
-track that its latest detection was given to is held against where it is. Tracks that were given another
-animal's detection are part of that; what the filter alone is worth is read from those that never were.
+An animal counts as out of sight once it has been detected and then not for {OUT_OF_SIGHT:g} s. Then, every
+{STATION_S:g} s, on searches every {EVERY * PATROL_S:g} s, the track that its latest detection was given to is
+held against where it is. Tracks that were given another animal's detection are part of that; what the filter
+alone is worth is read from those that had not been by then.
+
+The second lap tells of the first: of each animal that was detected in the first lap, the first detection in
+the second is looked at. It gets its track back where that is given to the track that its detection before was
+given to.
+
+Where a detection leaves a cloud with fewer than {LEAST_EFFECTIVE:g} particles' worth of weight, the cloud is
+drawn anew about it, as a Kalman filter would have it: F resamples, and what one particle becomes by that
+knows nothing of its error.
 
 The search with visits (F 5.3): before each second the multicopter chooses by F (5.2) and (5.3) between the
 next way point and the tracks, with $\alpha$ = {VISITS.alpha:g} and $c$ = {VISITS.c:g} m². A track is worth a
 visit once the trace of its covariance is beyond {VISITS.worth_m2:g} m². An animal that
-{VISITS.patience:g} s of scanning about its place do not find is lost. An enclosure is done as soon as it has
-as many tracks as animals live there, which F takes as known; its rows are then left out."""
+{VISITS.patience:g} s of scanning from where it should be do not find is lost. An enclosure is done as soon as
+it has as many tracks as animals live there, which F takes as known; its rows are then left out, and its
+animals are not visited any more. So animals count in the comparison only while their enclosure is searched,
+and only up to when the shorter of the two searches ended."""
 
 LIMITS = [
-    "The thesis prints no number of its simulations of tracking, nor how fast animals walk, and all that a "
-    "lap later shows follows from that: half a metre in each second, chosen, spreads an animal by 21 m a way "
-    "in half an hour.",
+    "The thesis prints no result of its simulations of tracking, nor how fast animals walk, and what the "
+    "second lap shows follows from that: half a metre in each second, chosen, spreads an animal by 21 m a "
+    "way in half an hour. F's figure 7.13 is planned while it flies; ours shows rows.",
+    "The filters take the errors of every image as new ones; those of the pose last for a minute and more.",
+    "Animals of one world are counted as if each had its own luck; two that take each other's tracks have "
+    "not.",
     "Animals walk independently, and start anywhere in their enclosure. Those of a herd go together, which "
     "makes them harder to tell apart.",
     "But in the rendered frames there are no false detections and no trees.",
@@ -74,11 +92,12 @@ LIMITS = [
 
 
 def _mean(values: pd.Series, digits: int = 1) -> str:
+    """A mean over worlds with its interval; of fewer than two known ones without."""
     known = values[np.isfinite(values)].to_numpy(float)
     if not len(known):
-        return "–"
+        return NOTHING
     if len(known) < 2:
-        return f"{known[0]:.{digits}f}"
+        return f"{known[0]:.{digits}f}" + (f" (1 of {len(values)} worlds)" if len(values) > 1 else "")
     found = mean_interval(known)
     text = f"{found.estimate:.{digits}f} ({found.low:.{digits}f} to {found.high:.{digits}f})"
     return text.replace("-", "−")
@@ -86,14 +105,17 @@ def _mean(values: pd.Series, digits: int = 1) -> str:
 
 def _mean_share(values: pd.Series) -> str:
     """A mean of shares in per cent, with an interval that ends at none and at all."""
-    if len(values) < 2:
-        return f"{100 * values.iloc[0]:.0f} %"
-    found = mean_share_interval(values.to_numpy(float))
+    known = values[np.isfinite(values)].to_numpy(float)
+    if not len(known):
+        return NOTHING
+    if len(known) < 2:
+        return f"{100 * known[0]:.0f} %"
+    found = mean_share_interval(known)
     return f"{100 * found.estimate:.0f} ({100 * found.low:.0f} to {100 * found.high:.0f}) %"
 
 
 def right_share(spread: pd.DataFrame, subject: str) -> Interval | None:
-    """Share of the animals seen again a lap later that got their track back; None where none was seen."""
+    """Share of the animals detected in both laps that got their track back; None where none was seen."""
     later = int(spread[subject, "later"].sum())
     return share_interval(int(spread[subject, "right"].sum()), later) if later else None
 
@@ -115,7 +137,7 @@ def right_words(spread: pd.DataFrame, subject: str) -> str:
 
 
 def difference(spread: pd.DataFrame, name: str, first: str, second: str) -> Interval | None:
-    """Mean over worlds of the first less the second, with its interval; None of one world."""
+    """Mean over worlds of the first less the second, with its interval; None of fewer than two known."""
     both = (spread[first, name] - spread[second, name]).to_numpy(float)
     both = both[np.isfinite(both)]
     return mean_interval(both) if len(both) > 1 else None
@@ -132,15 +154,22 @@ def changed_words(spread: pd.DataFrame, name: str, first: str, second: str) -> s
     """
     found = difference(spread, name, first, second)
     if found is None:
-        value = float((spread[first, name] - spread[second, name]).iloc[0])
+        known = (spread[first, name] - spread[second, name]).dropna()
+        if not len(known):
+            return "not known in any world"
+        value = float(known.iloc[0])
+        if _signed(value) == "0.00":
+            return "the same in the one world"
         return f"{'lower' if value < 0 else 'higher'} by {abs(value):.2f} m in the one world"
+    if _signed(found.low) == _signed(found.high) == "0.00":
+        return "the same to a centimetre"
     if found.low > 0 or found.high < 0:
         low, high = sorted((abs(found.low), abs(found.high)))
         way = "lower" if found.high < 0 else "higher"
         return f"{way} by {abs(found.estimate):.2f} m ({low:.2f} to {high:.2f})"
     return (
-        f"not different for certain ({_signed(found.estimate)} m, "
-        f"{_signed(found.low)} to {_signed(found.high)})"
+        f"changed by {_signed(found.estimate)} m, which chance may have done too "
+        f"({_signed(found.low)} to {_signed(found.high)})"
     )
 
 
@@ -151,20 +180,33 @@ def _signed(value: float) -> str:
 
 def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what the worlds gave."""
-    seen = {one: spread[one, "seen_share"].mean() for one in PLATFORMS}
-    view = {one: spread[one, "in_view"].median() for one in PLATFORMS}
     ours = {one: f"{one}-{NEGATIVE}" for one in PLATFORMS}
+    shown = "; ".join(_seen_words(spread, one) for one in PLATFORMS)
     return [
-        f"In a lap the gondola shows {percent(seen[GONDOLA])} of the animals, each of these for "
-        f"{view[GONDOLA]:.1f} s in the median; the multicopter shows {percent(seen[UAV])}, for "
-        f"{view[UAV]:.0f} s.",
-        f"Out of sight they are known to {_mean(spread[ours[GONDOLA], 'rmse'], 0)} m from the gondola and to "
-        f"{_mean(spread[ours[UAV], 'rmse'], 0)} m from the multicopter (RMS distance, mean over worlds); "
-        f"tracks that never took another animal's detection to "
+        f"In a lap {shown}.",
+        f"Animals that were detected and are out of sight are known to "
+        f"{_mean(spread[ours[GONDOLA], 'rmse'], 0)} m from the gondola and to "
+        f"{_mean(spread[ours[UAV], 'rmse'], 0)} m from the multicopter (RMS distance, mean over worlds); by "
+        f"tracks that had not taken another animal's detection to "
         f"{_mean(spread[ours[GONDOLA], 'rmse_own'], 0)} m and {_mean(spread[ours[UAV], 'rmse_own'], 0)} m.",
-        f"A lap later, of the animals seen again from the gondola {right_words(spread, ours[GONDOLA])} get "
-        f"their track back, from the multicopter {right_words(spread, ours[UAV])}.",
+        " ".join(_back_words(spread, one) for one in PLATFORMS),
     ]
+
+
+def _seen_words(spread: pd.DataFrame, platform: str) -> str:
+    share, seconds = spread[platform, "seen_share"].mean(), spread[platform, "in_view"].median()
+    each = f", each of these for {seconds:.1f} s in the median" if np.isfinite(seconds) else ""
+    return f"the {PLATFORMS[platform]} shows {percent(share)} of the animals{each}"
+
+
+def _back_words(spread: pd.DataFrame, platform: str) -> str:
+    subject, words = f"{platform}-{NEGATIVE}", PLATFORMS[platform]
+    if right_share(spread, subject) is None:
+        return f"From the {words} no animal is detected in both laps."
+    return (
+        f"Of the animals detected from the {words} in both laps, {right_words(spread, subject)} get their "
+        "track back."
+    )
 
 
 COLUMNS = {
@@ -173,16 +215,18 @@ COLUMNS = {
     "rmse": "off (m)",
     "sd": "said (m)",
     "anees": "ANEES",
+    "beyond": "outside the 95 % ellipse",
     "rmse_own": "off, own tracks (m)",
     "anees_own": "ANEES, own tracks",
-    "right": "track back a lap later",
+    "own_share": "own tracks",
+    "right": "track back in the next lap",
     "tracks": "tracks",
 }
 CAPTION = (
-    "Means over worlds with their 95 % intervals, of animals out of sight. Off: RMS distance of the track "
-    "from the animal. Said: standard deviation that the track states, each way; off is expected to be 1.4 "
-    "times of it. ANEES: 2 where the covariance is right. Own tracks: those that never took another animal's "
-    "detection."
+    "Means over worlds with their 95 % intervals, of animals that were detected and are out of sight. Off: "
+    "RMS distance of the track from the animal. Said: standard deviation that the track states, each way; "
+    "off is expected to be 1.4 times of it. ANEES: 2 where the covariance is right. Own tracks: those that "
+    "had not taken another animal's detection by then. Track back: animals of all worlds together."
 )
 
 
@@ -195,6 +239,7 @@ def table(spread: pd.DataFrame) -> pd.DataFrame:
             rows.append(
                 {"platform": words, "filter": NAMES[one]}
                 | {k: _mean(spread[subject, k]) for k in ("rmse", "sd", "anees", "rmse_own", "anees_own")}
+                | {k: _mean_share(spread[subject, k]) for k in ("beyond", "own_share")}
                 | {"right": right_words(spread, subject), "tracks": _mean(spread[subject, "tracks"])}
             )
     return pd.DataFrame(rows)
@@ -209,10 +254,10 @@ def consistency_words(spread: pd.DataFrame) -> str:
         if len(every) < 2 or len(own) < 2:
             continue
         said.append(
-            f"From the {words} the ANEES is {_mean(every)}, {_verdict(every)}; of tracks that never took "
+            f"From the {words} the ANEES is {_mean(every)}, {_verdict(every)}; of tracks that had not taken "
             f"another animal's detection {_mean(own)}, {_verdict(own)}."
         )
-    return " ".join(said) or "One world says nothing of whether tracks are as far off as they say."
+    return " ".join(said) or "So few worlds say nothing of whether tracks are as far off as they say."
 
 
 def _verdict(values: pd.Series) -> str:
@@ -221,7 +266,7 @@ def _verdict(values: pd.Series) -> str:
         return f"{found.estimate / 2:.1f} times what it should be: too sure of itself"
     if found.high < 2:
         return f"{found.estimate / 2:.2f} times what it should be: too cautious"
-    return "not different from 2 for certain"
+    return "from which 2 is not told apart"
 
 
 def negative_words(spread: pd.DataFrame) -> str:
@@ -237,28 +282,24 @@ def negative_words(spread: pd.DataFrame) -> str:
     return " ".join(said)
 
 
-def later_words(spread: pd.DataFrame) -> str:
-    """How well animals are known when they are seen again a lap later."""
-    said = []
-    for platform, words in PLATFORMS.items():
-        subject = f"{platform}-{NEGATIVE}"
-        sd = spread[subject, "sd_later"].dropna()
-        if not len(sd):
-            said.append(f"From the {words} no animal is seen again a lap later.")
-            continue
-        alone = spread[platform, "by_fence_alone"].median()
-        said.append(
-            f"From the {words} the track of an animal that is seen again a lap later states "
-            f"{sd.median():.0f} m each way (median); its fence alone would tell {alone:.0f} m. "
-            f"Of these animals {right_words(spread, subject)} get their track back."
-        )
-    return " ".join(said)
+def later_words(spread: pd.DataFrame, platform: str) -> str:
+    """How well animals are known when they are detected again in the next lap."""
+    subject, words = f"{platform}-{NEGATIVE}", PLATFORMS[platform]
+    sd = spread[subject, "sd_later"].dropna()
+    if right_share(spread, subject) is None or not len(sd):
+        return f"From the {words} no animal is detected in both laps."
+    alone = spread[platform, "by_fence_alone"].median()
+    return (
+        f"Just before an animal is detected again in the next lap its track states {sd.median():.0f} m each "
+        f"way (median); its fence alone would tell {alone:.0f} m. {_back_words(spread, platform)}"
+    )
 
 
 SEARCH_COLUMNS = {
     "search": "search",
     "minutes": "time (min)",
-    "visits": "visits",
+    "turns": "turns to an animal",
+    "visits": "found by that",
     "given_up": "given up",
     "rmse": "off (m)",
     "sd": "said (m)",
@@ -266,8 +307,9 @@ SEARCH_COLUMNS = {
     "found": "animals found",
 }
 SEARCH_CAPTION = (
-    "Means over worlds with their 95 % intervals. Off and said are of animals out of sight, as above. A "
-    "search ends when all enclosures are called done, or all rows are flown."
+    "Means over worlds with their 95 % intervals. Off and said are of animals out of sight while their "
+    "enclosure is searched, up to when the shorter search ended. A search ends when all enclosures are "
+    "called done, all rows are flown, or after the time of two laps."
 )
 
 
@@ -277,7 +319,7 @@ def search_table(spread: pd.DataFrame) -> pd.DataFrame:
     for subject, words in SEARCHES.items():
         rows.append(
             {"search": words}
-            | {k: _mean(spread[subject, k]) for k in ("minutes", "visits", "given_up", "rmse", "sd")}
+            | {k: _mean(spread[subject, k]) for k in ("minutes", "turns", "visits", "given_up", "rmse", "sd")}
             | {
                 "done": _mean_share(spread[subject, "done"]),
                 "found": _mean_share(spread[subject, "animals_share"]),
@@ -293,24 +335,32 @@ def search_words(spread: pd.DataFrame) -> str:
     if len(longer) > 1:
         found = mean_interval(longer)
         sure = found.low > 0 or found.high < 0
+        low, high = sorted((abs(found.low), abs(found.high)))
         time = (
             f" The search takes {abs(found.estimate):.1f} min {'longer' if found.estimate > 0 else 'less'} "
-            f"({_signed(found.low)} to {_signed(found.high)})."
+            f"({low:.1f} to {high:.1f})."
             if sure
             else f" That the search takes another time is not certain ({_signed(found.low)} to "
             f"{_signed(found.high)} min)."
         )
-    missed = 1 - spread[REVISITS, "animals_share"].mean()
-    early = (
-        " Enclosures are called done by their number of tracks, where two of one animal count twice: when "
-        f"the search ended, {percent(missed)} of the animals had not been found."
-        if missed > 0
-        else ""
-    )
     return (
-        f"With visits the stated standard deviation of animals out of sight is "
-        f"{changed_words(spread, 'sd', REVISITS, ROWS)}, and their RMS distance is "
-        f"{changed_words(spread, 'rmse', REVISITS, ROWS)}.{time}{early}"
+        f"While an enclosure is searched, with visits the RMS distance of its animals out of sight is "
+        f"{changed_words(spread, 'rmse', REVISITS, ROWS)}, and the stated standard deviation is "
+        f"{changed_words(spread, 'sd', REVISITS, ROWS)}.{time}{_early_words(spread)}"
+    )
+
+
+def _early_words(spread: pd.DataFrame) -> str:
+    """Whether animals were missed where every enclosure was called done: that is of counting by tracks."""
+    whole = spread[REVISITS, "done"] == 1
+    if not whole.any():
+        return ""
+    missed = 1 - float(spread[REVISITS, "animals_share"].to_numpy(float)[whole.to_numpy()].mean())
+    if not missed > 0:
+        return ""
+    return (
+        f" In the worlds where all enclosures were called done ({int(whole.sum())} of {len(spread)}), "
+        f"{percent(missed)} of the animals had not been found by then: two tracks of one animal count as two."
     )
 
 

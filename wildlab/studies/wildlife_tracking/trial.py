@@ -16,15 +16,21 @@ from numpy.typing import NDArray
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
-from wildlab.pipeline.animals.follow import Followed, Follower, Found, Kalman, Known, Particles, follow
+from wildlab.pipeline.animals.follow import Followed, Follower, Kalman, Particles, follow
 from wildlab.pipeline.animals.images import Detector, Images, take_images
+from wildlab.pipeline.animals.measures import (
+    found_on_visits,
+    next_lap,
+    out_of_sight,
+    sight_numbers,
+    turns,
+)
 from wildlab.pipeline.animals.revisit import Aircraft, Patrolled, Visits, patrol
 from wildlab.pipeline.plans.flown import ExecutionErrors, with_errors
 from wildlab.planning.areas import check_area, inside_of
 from wildlab.planning.courses import fly
 from wildlab.planning.gimbal import GimbalAngles, camera_on_course, swing_roll
 from wildlab.planning.heights import follow_terrain
-from wildlab.planning.high_level import SEARCH
 from wildlab.planning.moving import walks
 from wildlab.planning.patterns import Pattern, lawn_mowers
 from wildlab.simulation.error_models import stream
@@ -47,9 +53,9 @@ SUBJECTS = (
     *(f"{platform}-{one}" for platform in (GONDOLA, UAV) for one in FILTERS), GONDOLA, UAV, REVISITS, ROWS,
 )  # fmt: skip
 RECORDED = {
-    "rmse": "m", "sd": "m", "anees": "1", "right_share": "1", "sd_later": "m", "tracks": "1", "fell": "1",
-    "grew": "1", "seen_share": "1", "in_view": "s", "minutes": "min", "visits": "1", "given_up": "1",
-    "done": "1", "animals_share": "1", "rmse_own": "m", "anees_own": "1",
+    "rmse": "m", "sd": "m", "anees": "1", "right_share": "1", "sd_later": "m", "tracks": "1", "beyond": "1",
+    "grew": "1", "seen_share": "1", "in_view": "s", "minutes": "min", "visits": "1", "turns": "1",
+    "given_up": "1", "done": "1", "animals_share": "1", "rmse_own": "m", "anees_own": "1",
 }  # fmt: skip
 #: F 4.2.1, figure 4.1.
 PARTICLES = 500
@@ -60,9 +66,6 @@ STRATEGY = "adaptive-60"
 LAPS = 2
 #: Images that are looked at, Hz: so many that what two of them show still touches while the camera swings.
 RATES = {GONDOLA: 2.0, UAV: 1.0}
-#: An animal is out of sight once it has not been detected for so long, s; and a lap later once it is so share
-#: of a lap. Both chosen.
-OUT_OF_SIGHT, LATER = 30.0, 0.5
 #: Of F (5.2), not printed: an animal not known to 5 m each way is worth as much as the search, and none that
 #: is known better is worth a visit; two swings of the camera are patience enough.
 VISITS = Visits(alpha=1.0, c=50.0, worth_m2=50.0, patience=16.0)
@@ -225,7 +228,9 @@ def particles_of(world: World, seed: int, negative: bool) -> Particles:
     """F's particle filter, which knows how animals walk, their fences, and what the camera shows."""
 
     def rules(moves: Moves) -> Rules:
-        return Rules(moves, particles=PARTICLES, gate_probability=GATE, negative=negative)
+        return Rules(
+            moves, particles=PARTICLES, gate_probability=GATE, negative=negative, scheme="systematic"
+        )
 
     return Particles(world.motion, insides(world.fences), stream(seed, "particles"), rules)
 
@@ -258,88 +263,15 @@ def run_patrol(world: World, seed: int, visits: Visits) -> Patrolled:
     )  # fmt: skip
 
 
-class OutOfSight(NamedTuple):
-    """Animals with a track at a time when they were not detected for a while; N of them, at all stations.
-
-    Attributes
-    ----------
-    off
-        (N, 2) m, the track's mean from the animal.
-    covariance
-        (N, 2, 2) m^2, the track's.
-    own
-        (N,) bool: whether the track was never given another animal's detection.
-    """
-
-    off: Array
-    covariance: Array
-    own: NDArray[np.bool_]
-
-    @property
-    def nees(self) -> Array:
-        """(N,) squared distances in units of the covariance; 2 on average where it is right."""
-        solved = np.linalg.solve(self.covariance, self.off[..., None])[..., 0]
-        return np.asarray(np.einsum("ni,ni->n", self.off, solved))
-
-
-def out_of_sight(known: list[Known], found: list[Found], times: Array, truth: Array) -> OutOfSight:
-    """Where tracks are and animals are, once these were not detected for `OUT_OF_SIGHT`.
-
-    An animal's track is the one that its latest detection was given to.
-    """
-    animals = truth.shape[1]
-    own, seen_at = np.zeros(animals, np.int64), np.full(animals, np.inf)
-    off, covariance, pure, row = list[Array](), list[Array](), list[bool](), 0
-    first, mixed = dict[int, int](), set[int]()
-    for one in known:
-        while row < len(found) and found[row].image <= one.image:
-            if first.setdefault(found[row].track, found[row].animal) != found[row].animal:
-                mixed.add(found[row].track)
-            if found[row].animal >= 0:
-                own[found[row].animal], seen_at[found[row].animal] = found[row].track, times[found[row].image]
-            row += 1
-        at = {int(name): k for k, name in enumerate(one.identity)}
-        for animal in np.flatnonzero(times[one.image] - seen_at > OUT_OF_SIGHT):
-            k = at.get(int(own[animal]))
-            if k is not None:
-                off.append(one.mean[k] - truth[one.image, animal])
-                covariance.append(one.covariance[k])
-                pure.append(int(own[animal]) not in mixed)
-    return OutOfSight(
-        np.array(off).reshape(-1, 2), np.array(covariance).reshape(-1, 2, 2), np.array(pure, bool)
-    )  # fmt: skip
-
-
-def sight_numbers(known: list[Known], found: list[Found], times: Array, truth: Array) -> dict[str, float]:
-    """How well animals out of sight are known, and what the covariance does between two sightings."""
-    away = out_of_sight(known, found, times, truth)
-    back = [one for one in found if OUT_OF_SIGHT < one.away < np.inf and one.track == one.own]
-    names = ("rmse", "sd", "anees", "rmse_own", "anees_own", "own_share", "fell", "fall", "grew")
-    if not len(away.off):
-        return dict.fromkeys(names, np.nan)
-    squares, mine = (away.off**2).sum(axis=1), away.own
-    trace = np.trace(away.covariance, axis1=1, axis2=2)
-    return {
-        "rmse": float(np.sqrt(squares.mean())),
-        "sd": float(np.sqrt(trace.mean() / 2)),
-        "anees": float(away.nees.mean()),
-        "rmse_own": float(np.sqrt(squares[mine].mean())) if mine.any() else np.nan,
-        "anees_own": float(away.nees[mine].mean()) if mine.any() else np.nan,
-        "own_share": float(mine.mean()),
-        "fell": float(np.mean([one.after < one.before for one in back])) if back else np.nan,
-        "fall": float(np.median([one.after / one.before for one in back])) if back else np.nan,
-        "grew": float(np.mean([one.before > one.after_last for one in back])) if back else np.nan,
-    }
-
-
 def filter_numbers(world: World, followed: Followed) -> dict[str, float]:
     """What is compared of a filter, by name."""
     images = world.images
-    later = [one for one in followed.found if LATER * world.lap < one.away < np.inf]
+    later = next_lap(followed.found, images.times, world.lap)
     own = [np.sqrt(one.own_before / 2) for one in later if np.isfinite(one.own_before)]
     right = sum(one.track == one.own for one in later)
+    away = out_of_sight(followed.known, followed.found, images.times, images.truth)
     return {
-        **sight_numbers(followed.known, followed.found, images.times, images.truth),
+        **sight_numbers(away),
         "later": float(len(later)),
         "right": float(right),
         "right_share": right / len(later) if later else np.nan,
@@ -369,18 +301,25 @@ def _uniform_trace(fence: Array) -> float:
     return float((sides**2).sum() / 12)
 
 
-def patrol_numbers(world: World, flown: Patrolled, seed: int) -> dict[str, float]:
-    """What is compared of a search with visits and of one without, by name."""
+def patrol_numbers(world: World, flown: Patrolled, seed: int, until: float) -> dict[str, float]:
+    """What is compared of a search with visits and of one without, by name.
+
+    Animals out of sight count while their enclosure is searched, which is when they may be visited, and up to
+    ``until``, s: when the shorter of the two searches ended.
+    """
     truth = herds(world.twin, world.fences, np.arange(0.0, LAPS * world.lap, PATROL_S), seed)
-    goal = np.append(SEARCH, flown.goal)
-    began = (goal[1:] != goal[:-1]) & (goal[1:] != SEARCH)
+    done = np.minimum(np.repeat(flown.done, world.lives), until)
+    away = out_of_sight(flown.known[::EVERY], flown.found, flown.times, truth, done)
+    back = found_on_visits(flown)
     return {
-        **sight_numbers(flown.known[::EVERY], flown.found, flown.times, truth),
+        **sight_numbers(away),
+        "fall": float(np.median([one.after / one.before for one in back])) if back else np.nan,
+        "grew": float(np.mean([one.before > one.after_last for one in back])) if back else np.nan,
         "minutes": float(flown.times[-1]) / 60,
-        "visits": float(began.sum()),
+        "turns": float(turns(flown)),
+        "visits": float(len(back)),
         "given_up": float(len(flown.given_up)),
         "done": float(np.isfinite(flown.done).mean()),
-        "tracks": float(max((one.track for one in flown.found), default=0)),
         "animals_share": len({one.animal for one in flown.found}) / truth.shape[1],
     }
 
@@ -418,8 +357,9 @@ def all_runs(seed: int, twin: str, second: str) -> tuple[Runs, dict[tuple[str, s
     for (name, one), run in followed.items():
         found = filter_numbers(worlds[name], run)
         numbers |= {(f"{name}-{one}", key): value for key, value in found.items()}
+    both = min(float(flown.times[-1]) for flown in patrolled.values())
     for name, flown in patrolled.items():
-        found = patrol_numbers(worlds[UAV], flown, seed)
+        found = patrol_numbers(worlds[UAV], flown, seed, both)
         numbers |= {(name, key): value for key, value in found.items()}
     return Runs(worlds, followed, patrolled), numbers
 

@@ -1,6 +1,7 @@
 """Back over the tracks of many targets once the flight is over: what was seen later tells of what was before.
 
-Which measurements were of which target stays as it was taken at the time; kinds of hull stay merged.
+Which measurements were of which target stays as it was taken at the time, and the covariance knows nothing
+of what was taken wrongly: among many false measurements it is too small. Kinds of hull stay merged.
 """
 
 from __future__ import annotations

@@ -15,8 +15,16 @@ from numpy.typing import NDArray
 
 from wildlab.geometry.frames import Array
 from wildlab.geometry.validation import gate_threshold
+from wildlab.tracking.kalman import update
 from wildlab.tracking.particles.association import mahalanobis_squared, nearest_animal, one_to_one
-from wildlab.tracking.particles.clouds import Cloud, moments, weigh, weigh_unseen
+from wildlab.tracking.particles.clouds import (
+    Cloud,
+    effective_size,
+    moments,
+    start_gaussian,
+    weigh,
+    weigh_unseen,
+)
 from wildlab.tracking.particles.counting import existence_after
 from wildlab.tracking.particles.herd import Herd, Look, Rules, kept, moved, start_tracks, with_new
 from wildlab.tracking.particles.likelihoods import log_likelihood
@@ -26,6 +34,8 @@ Integers = NDArray[np.int64]
 
 #: A track that is less probable than this is given up where animals are counted.
 LEAST_EXISTENCE = 1e-3
+#: A detection that leaves a cloud with fewer particles' worth of weight than this says more than they can.
+LEAST_EFFECTIVE = 10.0
 #: What stands for a density of zero, 1/m^2, so that ratios stay finite.
 LEAST_DENSITY = 1e-100
 
@@ -77,10 +87,14 @@ def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> 
         given[a] += log_likelihood(herd.cloud.x[a, :, :2], look.z[j], look.R[j])
         seen[a] = True
     found, _ = weigh(herd.cloud, given)
-    unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
-    missed = np.where(seen, 1.0, herd.missed * np.exp(log_nothing))
-    w = np.where(seen[:, None], found.w, unseen.w) if rules.negative else found.w
-    cloud = Cloud(herd.cloud.x, w)
+    found = _revived(found, seen, mean, covariance, taken, look, rng)
+    missed, w = herd.missed, found.w
+    if rules.negative:
+        unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
+        missed = herd.missed * np.exp(log_nothing)
+        w = np.where(seen[:, None], found.w, unseen.w)
+    missed = np.where(seen, 1.0, missed)
+    cloud = Cloud(found.x, w)
     herd = herd._replace(
         cloud=cloud, missed=missed, lost=herd.lost & ~seen, seen_at=np.where(seen, look.time, herd.seen_at)
     )
@@ -89,6 +103,31 @@ def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> 
     names[new] = herd.born + 1 + np.arange(len(new))
     herd = with_new(herd, start_tracks(look.z[new], look.R[new], rules, rng), np.ones(len(new)), look.time)
     return _resampled(_lost(herd, rules), rules, rng), names
+
+
+def _revived(
+    cloud: Cloud, seen: NDArray[np.bool_], mean: Array, covariance: Array, taken: Integers, look: Look,
+    rng: np.random.Generator,
+) -> Cloud:  # fmt: skip
+    """Clouds of which a detection leaves hardly a particle, drawn anew about it.
+
+    A sharp detection at the edge of a wide cloud gives one particle all the weight, and what resampling makes
+    of that is a point that knows nothing of its error. Such a cloud is drawn from the normal distribution
+    that a Kalman filter would have come to from the cloud's own mean (A, n) and covariance (A, n, n).
+    """
+    thin = np.flatnonzero(seen & (effective_size(cloud.w) < LEAST_EFFECTIVE))
+    if not len(thin):
+        return cloud
+    x, w = cloud.x.copy(), cloud.w.copy()
+    H = np.eye(2, x.shape[2])
+    for a in thin:
+        at, P = mean[a], covariance[a]
+        for j in np.flatnonzero(taken == a):
+            after = update(at, P, look.z[j], H, look.R[j])
+            at, P = after.x, after.P
+        fresh = start_gaussian(at[None], ((P + P.T) / 2)[None], x.shape[1], rng)
+        x[a], w[a] = fresh.x[0], fresh.w[0]
+    return Cloud(x, w)
 
 
 def step_counting(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> tuple[Herd, Integers]:
