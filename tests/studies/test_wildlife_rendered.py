@@ -203,4 +203,6 @@ def test_the_figure_says_what_it_draws(beginning: Renderings) -> None:
         assert ax.get_title(loc="left") == f"{text.WHEN[weather]}: {words}"
         assert words in alt and words in caption
         assert len(ax.patches) == rows.sum()
+        beyond = {one for one in set(animal) - {NONE} if not shown[one]}
+        assert ("Boxed too" in caption) >= bool(beyond)
     assert name == "frames"

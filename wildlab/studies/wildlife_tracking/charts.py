@@ -277,12 +277,9 @@ def frames_shown(runs: Renderings) -> Shown:
         one_said = f"{len(in_view & set(judged.animal.tolist()))} of {len(in_view)} found, {false} false"
         ax.set_title(f"{WHEN[name]}: {one_said}")
         said.append(f"{WHEN[name].lower()} {one_said}")
-    more = (
-        f" Of animals that do not count as in view, at the border or more than {FURTHEST:.0f} m off: "
-        f"{len(further)}."
-        if further
-        else ""
-    )
+    boxed = "1 animal that does" if len(further) == 1 else f"{len(further)} animals that do"
+    more = f" Boxed too: {boxed} not count as in view, cut by the border or more than {FURTHEST:.0f} m off."
+    more = more if further else ""
     return (
         fig, "frames", f"One rendered frame in {len(said)} weathers: {'; '.join(said)}.",
         f"The frame {runs.world.images.times[k]:.0f} s after take-off, as the operator's window shows it: of "
