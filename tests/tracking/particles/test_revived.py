@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wildlab.tracking.particles import Look, Rules, effective_size, moments, move, no_herd, step_nearest, walk_of
+from wildlab.tracking.particles import (
+    Look,
+    Rules,
+    effective_size,
+    moments,
+    move,
+    no_herd,
+    step_nearest,
+    walk_of,
+)
 
 R = 0.04 * np.eye(2)
 

@@ -88,12 +88,9 @@ def _nearest(herd: Herd, look: Look, rules: Rules, rng: np.random.Generator) -> 
         seen[a] = True
     found, _ = weigh(herd.cloud, given)
     found = _revived(found, seen, mean, covariance, taken, look, rng)
-    missed, w = herd.missed, found.w
-    if rules.negative:
-        unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
-        missed = herd.missed * np.exp(log_nothing)
-        w = np.where(seen[:, None], found.w, unseen.w)
-    missed = np.where(seen, 1.0, missed)
+    unseen, log_nothing = weigh_unseen(herd.cloud, look.sight(herd.cloud.x[..., :2]))
+    missed = np.where(seen, 1.0, herd.missed * np.exp(log_nothing))
+    w = np.where(seen[:, None], found.w, unseen.w) if rules.negative else found.w
     cloud = Cloud(found.x, w)
     herd = herd._replace(
         cloud=cloud, missed=missed, lost=herd.lost & ~seen, seen_at=np.where(seen, look.time, herd.seen_at)
