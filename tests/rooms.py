@@ -34,6 +34,7 @@ DOCUMENTED = (
 WITH_EXAMPLES = (
     *DOCUMENTED,
     "wildlab.api",
+    "wildlab.sharing",
 )
 
 

@@ -157,7 +157,7 @@ def _ticks(even: float, largest: float) -> list[float]:
     Examples
     --------
     >>> _ticks(1.0, 250.0)
-    [-100.0, -1.0, 0.0, 1.0, 100.0]
+    [-100.0, -10.0, -1.0, 0.0, 1.0, 10.0, 100.0]
     """
     decades = int(np.log10(largest / even))
     step = max(1, -(-decades // 2))

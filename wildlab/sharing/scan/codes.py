@@ -95,8 +95,8 @@ def plus_cell(before: str, after: str) -> Cell:
     Examples
     --------
     >>> latitude, longitude, _, _ = plus_cell("8FVC9G8F", "6X")
-    >>> print(f"{latitude:.6f} {longitude:.6f}")
-    47.365562 8.524813
+    >>> print(f"{latitude:.5f} {longitude:.5f}")
+    47.36556 8.52494
     """
     letters = before + after
     south, west, step = -90.0, -180.0, 400.0

@@ -46,8 +46,7 @@ def scan(paths: Iterable[Path | str], secrets: Secrets) -> list[Finding]:
     >>> with TemporaryDirectory() as folder:
     ...     page = Path(folder) / "page.html"
     ...     _ = page.write_text("<p>60&deg; 7' 24.3&quot; N, 10&deg; 15' 0.8&quot; E</p>")
-    ...     for finding in scan([page], Secrets(places=np.array([[60.12342, 10.25022, 40.0]]))):
-    ...         print(finding)
+    ...     print(scan([page], Secrets(places=np.array([[60.12342, 10.25022, 40.0]])))[0])
     page.html: line 1: place: latitude and longitude, degrees, minutes and seconds
     """
     look = Look(secrets)
