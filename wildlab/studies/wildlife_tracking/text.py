@@ -85,7 +85,7 @@ LIMITS = [
     "not.",
     "Animals walk independently, and start anywhere in their enclosure. Those of a herd go together, which "
     "makes them harder to tell apart.",
-    "But in the rendered frames there are no false detections and no trees.",
+    "There are no false detections and no trees, except in the rendered frames.",
     "The multicopter turns on the spot and at once where its tracks steer it; its battery is not asked for.",
     "The covariance of a detection takes the ground about it as level.",
 ]
