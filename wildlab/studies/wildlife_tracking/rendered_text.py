@@ -96,7 +96,7 @@ def opening_words(frames: int, seconds: float) -> str:
     """What was done, with how many frames over how long."""
     return (
         f"The first {frames} images of the multicopter, {seconds / 60:.0f} min, are rendered whole, and F's "
-        "chain looks at each: background off, adaptive threshold, contours of an animal's size; the "
+        "chain looks at each: background taken off, adaptive threshold, contours of an animal's size; the "
         "detections go to the ground and to the same particle filter."
     )
 
