@@ -253,12 +253,24 @@ def test_a_world_follows_as_it_should() -> None:
 
 
 @pytest.mark.slow
+def test_a_fence_alone_tells_what_places_drawn_in_it_do() -> None:
+    done, numbers = runs()
+    rng = np.random.default_rng(1)
+    spreads = []
+    for fence in done.worlds[UAV].fences:
+        a, b, _, d = fence
+        places = a + rng.random((20_000, 1)) * (b - a) + rng.random((20_000, 1)) * (d - a)
+        spreads.append(np.trace(np.cov(places.T)) / 2)
+    assert numbers[UAV, "by_fence_alone"] == pytest.approx(np.sqrt(np.mean(spreads)), rel=0.02)
+
+
+@pytest.mark.slow
 def test_charts_say_what_they_draw() -> None:
     done, _ = runs()
     world, followed = done.worlds[GONDOLA], done.followed[GONDOLA, NEGATIVE]
-    _, _, alt, caption = charts.map_shown(world, followed, 1.0, "x", "After a lap", "7.19 (b)")
+    _, _, alt, caption = charts.map_shown(world, followed, 1.0, "x", "After a lap", "7.19 (b)", 5)
     seen = {one.animal for one in followed.found if world.images.times[one.image] <= world.lap}
-    assert f"{len(seen)} of 25 animals found" in alt and "7.19 (b)" in caption
+    assert f"{len(seen)} of 25 animals found" in alt and "7.19 (b)" in caption and "World 5." in caption
     times, sd = charts.sd_of(done.worlds[UAV], done.followed[UAV, NEGATIVE], 3)
     assert len(times) == len(sd) and np.nanmax(sd) > 5
     shown = charts.visit_shown(done.worlds[UAV], done.patrolled[REVISITS])
