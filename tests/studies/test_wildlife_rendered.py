@@ -206,3 +206,10 @@ def test_the_figure_says_what_it_draws(beginning: Renderings) -> None:
         beyond = {one for one in set(animal) - {NONE} if not shown[one]}
         assert ("Boxed too" in caption) >= bool(beyond)
     assert name == "frames"
+
+
+def test_the_summary_counts_tracks_that_false_detections_begin() -> None:
+    bad = GOOD._replace(tracks=20, by_false=19, false=80)
+    said = text.summary_words({DAWN: GOOD, CLOUDS: bad})
+    assert "at dawn 0 of 5 (0 to 43 %)" in said and "under clouds at noon 19 of 20 (76 to 99 %)" in said
+    assert "none of 0" in text.summary_words({DAWN: GOOD._replace(tracks=0)})

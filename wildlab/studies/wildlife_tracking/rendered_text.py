@@ -92,6 +92,15 @@ def frames_table(drawn: Counted, by_weather: Mapping[str, Counted], frames: int)
     return pd.DataFrame(rows)
 
 
+def summary_words(by_weather: Mapping[str, Counted]) -> str:
+    """A sentence on how many tracks false detections begin."""
+    parts = [
+        f"{WHEN[name][0].lower()}{WHEN[name][1:]} {share_words(one.by_false, one.tracks)}"
+        for name, one in by_weather.items()
+    ]
+    return f"Of the tracks from rendered frames of one world, false detections begin {', '.join(parts)}."
+
+
 def opening_words(frames: int, seconds: float) -> str:
     """What was done, with how many frames over how long."""
     return (
