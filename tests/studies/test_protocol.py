@@ -30,6 +30,7 @@ TOLD = {
     "static-point": {"bound": white_bound(551)},
     "navigation": {"tuned": next(iter(TUNINGS))},
     "information-planning": {"loads": np.full(3, 1e-3)},
+    "wildlife-tracking": {"cost": np.full(3, 9.0)},
 }
 
 
