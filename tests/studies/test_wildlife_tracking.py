@@ -276,3 +276,8 @@ def test_charts_say_what_they_draw() -> None:
     shown = charts.visit_shown(done.worlds[UAV], done.patrolled[REVISITS])
     assert shown is not None and "before the visit" in shown[2]
     assert charts.covariance_shown(done) is not None
+    # 0.5 m drawn anew each second for a lap of half an hour.
+    lap = done.worlds[GONDOLA].lap
+    assert f"{0.5 * np.sqrt(lap):.0f} m away" in text.walk_limit(done.worlds[GONDOLA])
+    faster = done.worlds[GONDOLA]._replace(motion=lambda dt: (np.eye(2), 4 * dt * np.eye(2)))
+    assert f"{2 * np.sqrt(lap):.0f} m away" in text.walk_limit(faster)

@@ -17,7 +17,6 @@ from wildlab.pipeline.animals.images import (
     Detector,
     footprint_circles,
     put_on_ground,
-    raised,
     shown,
     sight_from,
     take_images,
@@ -92,8 +91,6 @@ def test_without_errors_detections_are_where_the_animals_are() -> None:
     z, R = put_on_ground(LAND, one.take(rows), one.take(rows), np.zeros(len(seen)), seen, NONE, EXACT, rng)
     assert len(seen) > 10
     assert z == pytest.approx(seen, abs=1e-3)
-    # Without the animal's height rays would meet the ground beyond it.
-    assert raised(LAND, 0.7).height == pytest.approx(LAND.height + 0.7, abs=1e-4)
     assert pytest.approx(0.0, abs=1e-9) == R
 
 

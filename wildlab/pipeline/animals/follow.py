@@ -7,7 +7,6 @@ detect nothing. These are left out, which changes nothing of the tracks but how 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from wildlab.geometry.frames import Array
 from wildlab.geometry.terrain import Terrain
 from wildlab.pipeline.animals.images import Detector, Images, footprint_circles, sight_from
+from wildlab.tracking.kalman import update
 from wildlab.tracking.motion import Motion
 from wildlab.tracking.particles import Look, Rules, mahalanobis_squared, moments, nearest_animal, no_herd
 from wildlab.tracking.particles.clouds import Cloud, Inside
@@ -131,14 +131,17 @@ class Particles:
     def _moves(self, cloud: Cloud, seen: NDArray[np.bool_], dt: float, rng: np.random.Generator) -> Cloud:
         steps = max(int(np.ceil(dt / STATION_S - 1e-9)), 1)
         for _ in range(steps):
-            after = move(cloud, self._motion, dt / steps, rng)
-            inside = np.ones(after.w.shape, bool)
-            for number, fence in enumerate(self._fences):
-                mine = self._home == number
-                if mine.any():
-                    inside[mine] = fence(after.x[mine, :, :2])
-            cloud = stay_inside(cloud, after, partial(_known, inside))
+            cloud = stay_inside(cloud, move(cloud, self._motion, dt / steps, rng), self._inside)
         return cloud
+
+    def _inside(self, places: Array) -> NDArray[np.bool_]:
+        """(K, N) whether places (K, N, 2) are inside the fence that each track began in."""
+        inside = np.ones(places.shape[:-1], bool)
+        for number, fence in enumerate(self._fences):
+            mine = self._home == number
+            if mine.any():
+                inside[mine] = fence(places[mine])
+        return inside
 
     def step(self, look: Look) -> NDArray[np.int64]:
         """As `Follower` has it."""
@@ -180,11 +183,6 @@ class Particles:
         return np.asarray(np.sqrt((off**2).sum(axis=-1).max(axis=1)))
 
 
-def _known(inside: NDArray[np.bool_], places: Array) -> NDArray[np.bool_]:
-    """What was found out of all places at once."""
-    return inside
-
-
 class Kalman:
     """The same rule of association with a Kalman filter for each track, which no image without detections and
     no fence can tell anything: the ellipse that F 8.3 holds the particle filter against."""
@@ -198,8 +196,7 @@ class Kalman:
         """As `Follower` has it."""
         if len(self._mean):
             F, Q = self._motion(look.time - self._time)
-            self._mean = self._mean @ F.T
-            self._P = F @ self._P @ F.T + Q
+            self._mean, self._P = self._mean @ F.T, F @ self._P @ F.T + Q
         self._time = look.time
         usable = np.isfinite(look.z).all(axis=1) & np.isfinite(look.R).all(axis=(1, 2))
         z, R = look.z[usable], look.R[usable]
@@ -209,10 +206,8 @@ class Kalman:
         taken = nearest_animal(mahalanobis_squared(self._mean, self._P, z, R), self._gate)
         for j in np.flatnonzero(taken >= 0):
             a = taken[j]
-            gain = self._P[a] @ np.linalg.inv(self._P[a] + R[j])
-            self._mean[a] += gain @ (z[j] - self._mean[a])
-            rest = np.eye(2) - gain
-            self._P[a] = rest @ self._P[a] @ rest.T + gain @ R[j] @ gain.T
+            after = update(self._mean[a], self._P[a], z[j], np.eye(2), R[j])
+            self._mean[a], self._P[a] = after.x, after.P
         new = np.flatnonzero(taken < 0)
         taken[new] = len(self._mean) + np.arange(len(new))
         self._mean, self._P = np.concatenate([self._mean, z[new]]), np.concatenate([self._P, R[new]])

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from wildlab.geometry.camera import Camera, in_image, normalise
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array
-from wildlab.geometry.georeference import ground_to_pixel
-from wildlab.geometry.terrain import Terrain, intersect_terrain, pixels_to_terrain
+from wildlab.geometry.georeference import ground_to_pixel, pixel_rays
+from wildlab.geometry.terrain import Terrain, intersect_terrain
 from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.geometry.visibility import lines_clear
 from wildlab.pipeline.plans.flown import ExecutionErrors
@@ -116,11 +116,6 @@ def pose_errors(errors: ExecutionErrors, sd: float, R_nc: Array, headings: Array
     pose[:, range(3), range(3)] = np.square([errors.horizontal, errors.horizontal, errors.vertical])
     pose[:, 3:, 3:] = turned @ np.swapaxes(turned, -1, -2)
     return PoseErrors(pixel=sd**2 * np.eye(2), pose=pose, mount=np.zeros((3, 3)), plane=0.0)
-
-
-def raised(terrain: Terrain, height: float) -> Terrain:
-    """The surface that the middles of animals are on: the ground, so many metres higher."""
-    return Terrain(terrain.height + np.float32(height), terrain.north, terrain.east, terrain.step, terrain.sd)
 
 
 def shown(
@@ -253,7 +248,10 @@ def to_ground(
 
     There is a pose and a heading for each. The covariance takes the ground about a detection as level.
     """
-    met = pixels_to_terrain(told, uv, raised(terrain, detector.height)).points
+    # Rays from a camera so much lower meet the ground where middles above it are looked at.
+    up = np.array([0.0, 0.0, detector.height])
+    rays = pixel_rays(told.camera, uv, told.R_nc)
+    met = intersect_terrain(terrain, rays, told.p_nc + up).points - up
     R = ground_covariance(
         told, uv, met[:, 2], pose_errors(errors, detector.sd, told.R_nc, headings), rng
     ).covariance

@@ -16,7 +16,9 @@ from wildlab.studies.crossing_vessels.trial import (
     JOINT,
     LOOKS,
     NEAR_M,
+    SENSOR,
     SEPARATIONS,
+    TARGETS,
     VETO,
     curve_subject,
 )
@@ -46,14 +48,15 @@ rendered images of other flights had.
 What a detection looks like is drawn from images of the same flight, rendered and searched with the seven
 steps of H 4.3, of the same vessel. An association is wrong where a detection goes to a track that the other
 vessel's detection started. Tracks are swapped where more than half of each vessel's detections go wrong,
-in the two minutes from when the two are 35 m apart again; at the end, in the last two minutes.
+in the two minutes from when the two are 35 m apart again; at the end, in the last two minutes."""
+METHOD += f"""
 
 Beside these rules stands joint integrated probabilistic data association with visibility (H 8.2), by distance
-alone and with the same noises; it is told besides that a vessel in view is detected in 95 % of the images,
-that it is in view for 5 s and out of it for 30 s, and that hardly anything else is detected. Each track is
-updated with both detections, weighed by how probable each is.
-There a vessel's track is the one that is on it most often, and tracks are swapped where each vessel has the
-other's from before the crossing."""
+alone and with the same noises; it is told besides that a vessel in view is detected in
+{100 * SENSOR.detection:.0f} % of the images, that it is in view for {TARGETS.visible_s:g} s and out of it for
+{TARGETS.hidden_s:g} s, and that hardly anything else is detected. Each track is updated with both detections,
+weighed by how probable each is. There a vessel's track is the one that is on it most often, and tracks are
+swapped where each vessel has the other's from before the crossing."""
 
 LIMITS = [
     "How the vessels looked is not printed: their lengths of 11 m and 7 m, warmth and wakes are chosen, and "

@@ -176,6 +176,20 @@ def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
     return np.asarray((bank.track >= 0) & (owner[bank.track] != crossing.boat))
 
 
+def apart_times(crossing: Crossing) -> tuple[float, float]:
+    """When the two were last `APART_M` from each other before they were nearest, and first after it, s.
+
+    The first and the last time where they never were.
+    """
+    apart, times = crossing.apart, crossing.times
+    nearest = int(np.nanargmin(apart))
+    before, after = (np.flatnonzero(part > APART_M) for part in (apart[:nearest], apart[nearest:]))
+    return (
+        float(times[before[-1]] if len(before) else times[0]),
+        float(times[nearest + after[0]] if len(after) else times[-1]),
+    )
+
+
 def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     """Whether the two have each other's track just after the crossing, and at the end.
 
@@ -183,10 +197,7 @@ def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     without detections then has no track of the other.
     """
     at = np.searchsorted(bank.images, crossing.looks.image)
-    apart = crossing.apart
-    nearest = int(np.nanargmin(apart))
-    again = np.flatnonzero(apart[nearest:] > APART_M)
-    from_s = crossing.times[nearest + again[0]] if len(again) else crossing.times[-1]
+    _, from_s = apart_times(crossing)
     wrong, when = wrong_of(crossing, bank), crossing.times[at]
 
     def both(since: float) -> bool:
@@ -194,7 +205,7 @@ def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
         of = [wrong[inside & (crossing.boat == number)] for number in (0, 1)]
         return all(len(one) > 0 and one.mean() > 0.5 for one in of)
 
-    return both(float(from_s)), both(float(crossing.times[-1] - WINDOW_S))
+    return both(from_s), both(float(crossing.times[-1] - WINDOW_S))
 
 
 def identities_of(crossing: Crossing, bank: Bank) -> Identities:
@@ -255,12 +266,8 @@ def joint_swapped(crossing: Crossing, told: Identities) -> tuple[bool, bool]:
     A vessel's track is the one that is on it most often: before the crossing since the beginning, after it in
     `WINDOW_S` from when the two are apart again, and at the end in the last.
     """
-    apart, times = crossing.apart, crossing.times
-    nearest = int(np.nanargmin(apart))
-    again = np.flatnonzero(apart[nearest:] > APART_M)
-    close = np.flatnonzero(apart[:nearest] > APART_M)
-    until = float(times[close[-1]]) if len(close) else float(times[0])
-    since = float(times[nearest + again[0]]) if len(again) else float(times[-1])
+    times = crossing.times
+    until, since = apart_times(crossing)
     at = times[::EVERY]
 
     def mostly(low: float, high: float) -> list[object]:

@@ -14,7 +14,6 @@ from wildlab.pipeline.animals.follow import Followed, Known
 from wildlab.pipeline.animals.frames import NONE
 from wildlab.pipeline.animals.images import FURTHEST
 from wildlab.pipeline.animals.revisit import Patrolled
-from wildlab.planning.high_level import SEARCH
 from wildlab.reporting.figures import (
     BLUE,
     GREY,
@@ -26,6 +25,7 @@ from wildlab.reporting.figures import (
     map_axes,
     new_figure,
 )
+from wildlab.reporting.text import number
 from wildlab.studies.wildlife_tracking.rendered import Renderings, seen_again, telling_image
 from wildlab.studies.wildlife_tracking.rendered_text import WHEN
 from wildlab.studies.wildlife_tracking.text import PLATFORMS
@@ -187,16 +187,18 @@ def covariance_shown(runs: Runs) -> Shown | None:
         times, sd = sd_of(world, runs.followed[UAV, name], animal)
         ax.plot(times / 60, sd, style, color=color, label=label)
         tops[name] = float(np.nanmax(sd))
+    seen = [one.image for one in runs.followed[UAV, NEGATIVE].found if one.animal == animal]
+    ax.plot(world.images.times[seen] / 60, np.zeros(len(seen)), "|", color=INK, ms=12, label="detected")
     ax.axvline(world.lap / 60, color=GREY, lw=1.0, ls=":", label="a lap")
     ax.set(xlabel="time (min)", ylabel="known to, each way (m)", ylim=(0, None))
     ax.set_title(f"At most {tops[NEGATIVE]:.0f} m, and {tops[POSITIVE]:.0f} m by detections alone")
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    fig.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return (
         fig, "covariance",
         f"Stated standard deviation of one animal's track over two laps: at most {tops[NEGATIVE]:.0f} m, by "
         f"detections alone {tops[POSITIVE]:.0f} m.",
-        "Of the multicopter's world, the animal that came back into sight most often: each fall is a "
-        "sighting. The track is that which its latest detection was given to.",
+        "Of the multicopter's world, the animal that came back into sight most often; ticks: images that "
+        "detect it. The track is that which its latest detection was given to.",
     )  # fmt: skip
 
 
@@ -221,17 +223,17 @@ def differences_shown(spread: pd.DataFrame) -> Shown:
     said = []
     for ax, name, label in zip(axes, ("sd", "rmse"), ("stated", "off"), strict=True):
         ends = []
-        for number, (platform, words) in enumerate(PLATFORMS.items()):
+        for place, (platform, words) in enumerate(PLATFORMS.items()):
             one, other = f"{platform}-{NEGATIVE}", f"{platform}-{POSITIVE}"
             values = (spread[one, name] - spread[other, name]).dropna().to_numpy(float)
-            across = number + rng.uniform(-0.16, 0.16, len(values))
-            ax.plot(across, values, "o", ms=4, color=(BLUE, ORANGE)[number], alpha=0.55, mew=0)
+            across = place + rng.uniform(-0.16, 0.16, len(values))
+            ax.plot(across, values, "o", ms=4, color=(BLUE, ORANGE)[place], alpha=0.55, mew=0)
             if len(values) > 1:
                 found = mean_interval(values)
                 bar = [[found.estimate - found.low], [found.high - found.estimate]]
-                ax.errorbar(number + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
+                ax.errorbar(place + 0.3, found.estimate, bar, fmt="D", color=INK, ms=5, capsize=4)
             if len(values):
-                ends.append(f"{words} {_plain(values.mean())} m")
+                ends.append(f"{words} {number(values.mean(), 2)} m")
         ax.axhline(0, color=GREY, lw=1.0)
         ax.set(xlim=(-0.5, 1.6), xticks=[0, 1], xticklabels=list(PLATFORMS.values()))
         ax.set_title(label.capitalize())
@@ -244,16 +246,6 @@ def differences_shown(spread: pd.DataFrame) -> Shown:
         "standard deviation that tracks state each way; off: their RMS distance from animals out of sight. "
         "Below zero the images help.",
     )  # fmt: skip
-
-
-def _plain(value: float) -> str:
-    text = f"{value:.2f}"
-    return "0.00" if float(text) == 0 else text.replace("-", "−")
-
-
-def visited_share(flown: Patrolled) -> float:
-    """Share of the images of a search that were taken on the way to an animal, or over it."""
-    return float((flown.goal != SEARCH).mean())
 
 
 def frames_shown(runs: Renderings) -> Shown:

@@ -8,7 +8,7 @@ import pandas as pd
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.pipeline.animals.follow import STATION_S
 from wildlab.pipeline.animals.measures import OUT_OF_SIGHT
-from wildlab.reporting.text import NOTHING, percent
+from wildlab.reporting.text import NOTHING, number, percent
 from wildlab.studies.wildlife_tracking.timing import middle_ratio
 from wildlab.studies.wildlife_tracking.trial import (
     EVERY,
@@ -25,6 +25,7 @@ from wildlab.studies.wildlife_tracking.trial import (
     ROWS,
     UAV,
     VISITS,
+    World,
 )
 from wildlab.tracking.particles.steps import LEAST_EFFECTIVE
 
@@ -41,9 +42,9 @@ METHOD = rf"""Each world is drawn from its seed: land of the size and relief of 
 five enclosures with five animals in each, which walk as F (4.5) has it, a velocity drawn anew each second,
 and stay inside. The gondola goes two laps with the adaptive roll rotation of F 5.4.2, the multicopter flies
 its rows twice with the camera rolling from side to side. Of the gondola {RATES[GONDOLA]:g} images a second
-are looked at, of the multicopter {RATES[UAV]:g}: so many that neighbouring images still touch. The camera is
-off its plan by the errors that the twin's autopilot has, correlated in time; detections have the twin's
-noise, and each is put on the terrain from where the camera is *said* to be. None of
+are looked at, of the multicopter {RATES[UAV]:g}: the camera turns by about an image's width from one to the
+next. It is off its plan by the errors that the twin's autopilot has, correlated in time; detections have the
+twin's noise, and each is put on the terrain from where the camera is *said* to be. None of
 these detections is false.
 
 Each animal that is detected has {PARTICLES} particles (F 4.2.1), which walk as animals do and stay inside the
@@ -77,9 +78,8 @@ animals are not visited any more. So animals count in the comparison only while 
 and only up to when the shorter of the two searches ended."""
 
 LIMITS = [
-    "The thesis prints no result of its simulations of tracking, nor how fast animals walk, and what the "
-    "second lap shows follows from that: half a metre in each second, chosen, spreads an animal by 21 m a "
-    "way in half an hour. F's figure 7.13 is planned while it flies; ours shows rows.",
+    "The thesis prints no result of its simulations of tracking. F's figure 7.13 is planned while it flies; "
+    "ours shows rows.",
     "The filters take the errors of every image as new ones; those of the pose last for a minute and more.",
     "Animals of one world are counted as if each had its own luck; two that take each other's tracks have "
     "not.",
@@ -91,6 +91,16 @@ LIMITS = [
 ]
 
 
+def walk_limit(world: World) -> str:
+    """What the chosen walk of the animals makes of a lap."""
+    spread = float(np.sqrt(world.motion(world.lap)[1][0, 0]))
+    return (
+        "How fast animals walk is not printed, and what the second lap shows follows from it: by the walk "
+        f"that is chosen an animal is {spread:.0f} m away, each way, after a lap of "
+        f"{world.lap / 60:.0f} minutes (standard deviation, without its fence)."
+    )
+
+
 def _mean(values: pd.Series, digits: int = 1) -> str:
     """A mean over worlds with its interval; of fewer than two known ones without."""
     known = values[np.isfinite(values)].to_numpy(float)
@@ -99,8 +109,8 @@ def _mean(values: pd.Series, digits: int = 1) -> str:
     if len(known) < 2:
         return f"{known[0]:.{digits}f}" + (f" (1 of {len(values)} worlds)" if len(values) > 1 else "")
     found = mean_interval(known)
-    text = f"{found.estimate:.{digits}f} ({found.low:.{digits}f} to {found.high:.{digits}f})"
-    return text.replace("-", "−")
+    middle, low, high = (number(one, digits) for one in (found.estimate, found.low, found.high))
+    return f"{middle} ({low} to {high})"
 
 
 def _mean_share(values: pd.Series) -> str:
@@ -158,24 +168,19 @@ def changed_words(spread: pd.DataFrame, name: str, first: str, second: str) -> s
         if not len(known):
             return "not known in any world"
         value = float(known.iloc[0])
-        if _signed(value) == "0.00":
+        if number(value, 2) == "0.00":
             return "the same in the one world"
         return f"{'lower' if value < 0 else 'higher'} by {abs(value):.2f} m in the one world"
-    if _signed(found.low) == _signed(found.high) == "0.00":
+    if number(found.low, 2) == number(found.high, 2) == "0.00":
         return "the same to a centimetre"
     if found.low > 0 or found.high < 0:
         low, high = sorted((abs(found.low), abs(found.high)))
         way = "lower" if found.high < 0 else "higher"
         return f"{way} by {abs(found.estimate):.2f} m ({low:.2f} to {high:.2f})"
     return (
-        f"changed by {_signed(found.estimate)} m, which chance may have done too "
-        f"({_signed(found.low)} to {_signed(found.high)})"
+        f"changed by {number(found.estimate, 2)} m, which chance may have done too "
+        f"({number(found.low, 2)} to {number(found.high, 2)})"
     )
-
-
-def _signed(value: float) -> str:
-    text = f"{value:.2f}"
-    return "0.00" if float(text) == 0 else text.replace("-", "−")
 
 
 def summary(spread: pd.DataFrame) -> list[str]:
@@ -340,8 +345,8 @@ def search_words(spread: pd.DataFrame) -> str:
             f" The search takes {abs(found.estimate):.1f} min {'longer' if found.estimate > 0 else 'less'} "
             f"({low:.1f} to {high:.1f})."
             if sure
-            else f" That the search takes another time is not certain ({_signed(found.low)} to "
-            f"{_signed(found.high)} min)."
+            else f" That the search takes another time is not certain ({number(found.low, 2)} to "
+            f"{number(found.high, 2)} min)."
         )
     return (
         f"While an enclosure is searched, with visits the RMS distance of its animals out of sight is "

@@ -64,7 +64,7 @@ GATE = 0.99
 #: The gondola's gimbal (F 7.5.2: the adaptive roll rotation; the limit is that of F 7.5.1).
 STRATEGY = "adaptive-60"
 LAPS = 2
-#: Images that are looked at, Hz: so many that what two of them show still touches while the camera swings.
+#: Images that are looked at, Hz: the camera turns by about an image's width between two.
 RATES = {GONDOLA: 2.0, UAV: 1.0}
 #: Of F (5.2), not printed: an animal not known to 5 m each way is worth as much as the search, and none that
 #: is known better is worth a visit; two swings of the camera are patience enough.
