@@ -391,3 +391,12 @@ def test_joint_words_turn_with_the_flights():
     assert "on fewer of them, beyond chance" in text.joint_words(pd.DataFrame(table))
     table = {(study.JOINT, "swapped"): [1.0, 0.0], (DISTANCE, "swapped"): [0.0, 0.0]}
     assert "cannot be told" in text.joint_words(pd.DataFrame(table))
+
+
+def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():
+    crossing = passing(images=600)
+    until, since = study.apart_times(crossing)
+    # They close at 2 m an image and meet at the 300th, half a second each: 35 m are 17.5 images.
+    assert until == (300 - 18) * INTERVAL and since == (300 + 18) * INTERVAL
+    together = crossing._replace(truth=np.zeros_like(crossing.truth))
+    assert study.apart_times(together) == (0.0, 599 * INTERVAL)

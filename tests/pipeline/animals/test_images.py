@@ -144,3 +144,12 @@ def test_images_detect_only_what_they_show_and_so_often() -> None:
     z, R, animals = found.taken(7)
     assert len(z) == len(R) == len(animals) == (found.image == 7).sum()
     assert z == pytest.approx(truth[7, animals], abs=1e-3)
+
+
+def test_a_covariance_is_that_of_the_distance_to_the_middle_of_the_animal() -> None:
+    # Straight down from 4 m: an animal's middle is 3.3 m away, a pixel there that over the focal length.
+    told = CameraPoses.at_lens(CAMERA, np.array([[0.0, 0.0, -4.0]]), R_MC_DOWN[None], np.eye(3))
+    at, detector = np.zeros((1, 2)), EXACT._replace(sd=2.0)
+    _, covariance = put_on_ground(FLAT, told, told, np.zeros(1), at, NONE, detector, np.random.default_rng(1))
+    sizes = sorted(np.sqrt(np.diag(covariance[0])))
+    assert sizes == pytest.approx([2 * 3.3 / 1267.0, 2 * 3.3 / 1117.0], rel=1e-4)

@@ -21,6 +21,7 @@ from wildlab.detection.warm import (
     to_grey,
 )
 from wildlab.geometry.camera import Camera
+from wildlab.pipeline.animals.frames import NEAR, TOO_LARGE
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.manifest import twin_manifest
 from wildlab.simulation.parameters import load_twin
@@ -108,8 +109,6 @@ WINDOW, LEAST_WINDOW = 2.0, 8.0
 WIDTHS, TRIED = (1.0, 1.5, 2.0, 3.0), ("floor", "offset")
 #: Of an animal that is to be found this share must show.
 SHOWN = 0.25
-#: A detection is no animal's that is so many times larger, or further from it than so many px.
-TOO_LARGE, NEAR = 3.0, 3
 #: The animal is larger than the block by its major axis, px: F's small block has 51.
 LARGER_THAN = 51.0
 COUNTS = ("found", "invented", "missed")
