@@ -39,7 +39,7 @@ def test_a_perfect_track():
 
 
 def test_a_swap_counts_for_each_track_when_the_targets_are_apart_again():
-    """Targets cross at t = 10; tracks turn back there. They hold on to their targets up to the cut-off."""
+    """Targets cross at t = 10; tracks turn back there, and hold on to theirs up to half the cut-off."""
     found = compare_identities(
         [
             scan(t, {1: (10 - abs(10 - t), 0), 2: (10 + abs(10 - t), 0)}, {"A": (t, 0), "B": (20 - t, 0)})
@@ -48,9 +48,9 @@ def test_a_swap_counts_for_each_track_when_the_targets_are_apart_again():
         CUTOFF,
     )
     assert (found.swaps, found.breaks) == (2, 0)
-    assert found.followed[19] == {"A": 1, "B": 2}
-    # 2 (t - 10) reaches the cut-off at t = 20.
-    assert found.followed[20] == {"A": 2, "B": 1}
+    # 2 (t - 10) passes half of the cut-off at t = 15.
+    assert found.followed[14] == {"A": 1, "B": 2}
+    assert found.followed[16] == {"A": 2, "B": 1}
     assert [found.targets[name].swaps for name in "AB"] == [1, 1]
     # GOSPA has no memory and sees nothing wrong.
     assert all(one.distance == 0 for one in found.gospa)
@@ -62,6 +62,30 @@ def test_noise_beside_another_target_is_no_swap():
     right = scan(0, {1: (1, 0), 2: (9, 0)}, {"A": (0, 0), "B": (10, 0)})
     found = compare_identities([right, wrong, right._replace(time=2.0)], CUTOFF)
     assert (found.swaps, found.followed[1]) == (0, {"A": 1, "B": 2})
+
+
+def test_a_track_that_went_over_leaves_its_target_to_the_new_track_there():
+    """Its own target is still within the cut-off of it, and a new track beside that target is on no other."""
+    before = scan(0, {1: (0, 0), 2: (12, 0)}, {"A": (0, 0), "B": (12, 0)})
+    after = scan(1, {1: (12, 0.5), 3: (0, 2)}, {"A": (0, 0), "B": (12, 0)})
+    found = compare_identities([before, after], CUTOFF)
+    assert found.followed[1] == {"A": 3, "B": 1} and (found.swaps, found.breaks) == (1, 1)
+    assert found.tracks[3].anees == pytest.approx(4 / 4)
+
+
+def test_where_not_all_targets_are_known_no_track_is_false():
+    """At t = 1 a target is there that nobody tells of: neither the track on it nor that minute counts."""
+    tracks = {1: (0, 0), 2: (90, 0)}
+    scans = [scan(t, tracks if t == 60 else {1: (0, 0)}, {"A": (0, 0)}) for t in (0, 60, 120, 180)]
+    whole = compare_identities(scans, CUTOFF)
+    assert whole.tracks[2].false and whole.false_tracks_per_minute == pytest.approx(1 / 3)
+    scans[1] = scans[1]._replace(complete=False)
+    found = compare_identities(scans, CUTOFF)
+    assert 2 not in found.tracks and found.incomplete == 1 and found.tracks[1].scans == 4
+    assert found.gospa[1].distance == 0 < whole.gospa[1].distance
+    # Where a track is false, it is so over the minutes that are judged.
+    late = scan(240, tracks, {"A": (0, 0)})
+    assert compare_identities([*scans, late], CUTOFF).false_tracks_per_minute == pytest.approx(1 / 2)
 
 
 def test_a_break_is_a_new_identity_on_the_same_target():

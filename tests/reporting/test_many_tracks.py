@@ -143,7 +143,9 @@ def test_a_track_that_goes_on_without_its_target_is_seen() -> None:
 
 def test_looks_without_truth_and_no_time_at_all_are_told() -> None:
     text, *_ = said(followed(looks=99), lives())
-    assert "Judged are 61 of 99 looks: every true place is known there." in text
+    assert "Judged are 61 of 99 looks: a true place is known there." in text and "not every" not in text
+    text, *_ = said(followed(), lives(incomplete=5))
+    assert "At 5 of the judged looks not every target's true place is known" in text
     text, *_ = said(followed(), lives(false_tracks_per_minute=float("nan")))
     assert "nan" not in text and "0 of 2 tracks are mostly on nothing" in text
 

@@ -9,9 +9,9 @@ import pytest
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
 from wildlab.studies.autoferry_many import judged as words
-from wildlab.studies.autoferry_many.tuning import draw
+from wildlab.studies.autoferry_many.tuning import Tuned, draw, order
 
-CLOCKS = {"lidar": -1.0, "radar": -2.0}
+CLOCKS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
 
 
 def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
@@ -20,7 +20,11 @@ def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
     for seed in range(50):
         settings = draw(np.random.default_rng(seed), CLOCKS)
         many, lidar = settings.targets.many, settings.sensors["lidar"].many
-        assert many is not None and 0.005 <= (many.birth or 0) <= 0.3 and many.hits in (3, 4, 5)
+        assert (
+            many is not None
+            and (many.forgotten or 1) < 0.03 <= (many.birth or 0) <= 0.3
+            and many.hits in (3, 4, 5)
+        )
         assert lidar.several and 105 <= (lidar.far_m or 0) <= 140
         assert settings.sensors["radar"].clock_offset_s == -2.0
     # As a file they say the same: kinds of hulls too.
@@ -64,6 +68,29 @@ def test_sentences_turn_with_the_numbers() -> None:
     assert "in 0 of 6 scenarios" in words.doubts(own.assign(anees=9.0))
     alone = table[table["case"] == "s1"]
     assert "nothing can be judged" in words.headline(alone, words.medians(alone, "s1"), "s1")[0]
+
+
+def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first() -> None:
+    settings = draw(np.random.default_rng(1), CLOCKS)
+    drawn = [
+        Tuned(1, settings, 3.0, 9.0), Tuned(2, settings, 5.0, 1.9), Tuned(3, settings, 4.0, 0.6),
+        Tuned(4, settings, 2.0, float("nan")), Tuned(5, settings, 4.0, 1.0),
+    ]  # fmt: skip
+    assert [one.number for one in sorted(drawn, key=order)] == [3, 5, 2, 4, 1]
+
+
+def test_cameras_are_judged_with_the_settings_of_those_without() -> None:
+    table = pd.DataFrame(
+        {"case": ["s1", "s2", "s3", "s2"], "rank": [1, 1, 1, 2], "with": [1.0, 4.0, 6.0, 5.0],
+         "without": [9.0, 5.0, 5.5, 7.0]}
+    )  # fmt: skip
+    said = words.cameras(table, "s1")
+    assert "smaller in 2 of 3 pairs" in said and "in the median 1.0 m smaller (-2.0 to +0.5 m)" in said
+    worse = table.rename(columns={"with": "without", "without": "with"})
+    assert "smaller in 1 of 3 pairs" in words.cameras(worse, "s1")
+    assert "1.0 m larger" in words.cameras(worse, "s1")
+    assert "no larger or smaller" in words.cameras(table.assign(without=table["with"]), "s1")
+    assert words.cameras(table, "none of them") and not words.cameras(table[:1], "s1")
 
 
 def test_the_table_of_draws_has_each_scenario_once() -> None:

@@ -12,6 +12,7 @@ three kinds at a scan:
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,9 @@ class Scan(NamedTuple):
         (M,) bools: whether it could be seen.
     ignored
         (M,) bools: whether it is don't-care.
+    complete
+        Whether all targets are among these. Where not, a track on none of them may be on another one: it is
+        not judged at this scan.
     """
 
     time: float
@@ -57,6 +61,7 @@ class Scan(NamedTuple):
     names: Sequence[Hashable]
     visible: ArrayLike
     ignored: ArrayLike
+    complete: bool = True
 
 
 class TargetLife(NamedTuple):
@@ -87,7 +92,7 @@ class TrackLife(NamedTuple):
     Attributes
     ----------
     scans
-        At which it was there.
+        At which it was there, and judged.
     on_target
         Of them, those at which it followed a target, of any kind.
     anees
@@ -119,9 +124,11 @@ class Identities(NamedTuple):
         Times a target's track is another one than its last, without the swaps: the new one was on no other
         target before, or comes back.
     false_tracks_per_minute
-        Tracks that are false, over the minutes from the first scan to the last; NaN where no time passes.
+        Tracks that are false, over the minutes between scans that are complete; NaN where no time passes.
     targets, tracks
         By name and by identity, in the order of their first scan.
+    incomplete
+        Scans that do not have all targets.
     """
 
     gospa: list[Gospa]
@@ -131,6 +138,7 @@ class Identities(NamedTuple):
     false_tracks_per_minute: float
     targets: dict[Hashable, TargetLife]
     tracks: dict[Hashable, TrackLife]
+    incomplete: int = 0
 
 
 class _Checked(NamedTuple):
@@ -144,6 +152,7 @@ class _Checked(NamedTuple):
     names: list[Hashable]
     visible: NDArray[np.bool_]
     ignored: NDArray[np.bool_]
+    complete: bool
 
 
 def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
@@ -176,10 +185,11 @@ def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
 def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0) -> Identities:
     """What became of tracks and targets over scans in the order of time.
 
-    Who follows whom is settled as by CLEAR MOT (Bernardin and Stiefelhagen 2008): a track stays on its target
-    of the scan before while it is nearer than the cut-off, for a moment's noise beside another target is no
-    swap; the rest are paired by GOSPA's assignment. GOSPA itself has no such memory. So a swap counts at the
-    scan at which the two targets are far enough apart for it to be seen.
+    Who follows whom is settled with the memory of CLEAR MOT (Bernardin and Stiefelhagen 2008), for a moment's
+    noise beside another target is no swap: GOSPA's assignment, in which a pair of the scan before costs less
+    by half of the cut-off to the power ``order``. So two tracks that exchange their targets swap at the scan
+    at which these are half the cut-off apart. CLEAR MOT keeps a pair up to the cut-off itself, also where the
+    track is on another target by then, whose own track is left with what remains; GOSPA has no memory.
 
     Parameters
     ----------
@@ -224,7 +234,8 @@ def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0)
         before = {one.identities[row]: one.names[column] for row, column in found}
     swaps, breaks = _changes(given, pairs)
     tracks = _track_lives(given, pairs)
-    minutes = (times[-1] - times[0]) / 60
+    both = [one.complete and other.complete for one, other in pairwise(given)]
+    minutes = float(np.diff(times)[both].sum()) / 60
     n_false = sum(track.false for track in tracks.values())
     return Identities(
         [_gospa(one, cutoff, order) for one in given],
@@ -237,6 +248,7 @@ def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0)
         n_false / minutes if minutes > 0 else np.nan,
         _target_lives(given, pairs, swaps, breaks),
         tracks,
+        sum(not one.complete for one in given),
     )
 
 
@@ -265,38 +277,41 @@ def _checked(scan: Scan) -> _Checked:
         raise WildlabError(
             f"a position at {scan.time:g} s is not finite", "leave out tracks and targets without a position"
         )
-    return _Checked(float(scan.time), x, P, identities, truth, names, visible, ignored)
+    return _Checked(float(scan.time), x, P, identities, truth, names, visible, ignored, bool(scan.complete))
 
 
 def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
     asked = one.visible & ~one.ignored
-    excused = {row for row, column in _assign(one.x, one.truth, cutoff, order) if not asked[column]}
+    on = dict(_assign(one.x, one.truth, cutoff, order))
+    excused = {row for row, column in on.items() if not asked[column]}
+    if not one.complete:
+        excused |= set(range(len(one.x))) - set(on)
     kept = [row for row in range(len(one.x)) if row not in excused]
     return gospa(one.truth[asked], one.x[kept], cutoff, order)
 
 
-def _assign(x: Array, truth: Array, cutoff: float, order: float) -> Pairs:
-    """GOSPA's pairs: of those nearer than the cut-off, what costs least."""
+def _assign(
+    x: Array, truth: Array, cutoff: float, order: float, kept: NDArray[np.bool_] | None = None
+) -> Pairs:
+    """GOSPA's pairs: of those nearer than the cut-off, what costs least; ``kept`` (N, M) costs less."""
     if not (len(x) and len(truth)):
         return []
     cost = np.minimum(cdist(x, truth), cutoff) ** order
+    near = cost < cutoff**order
+    if kept is not None:
+        cost = cost - np.where(kept & near, (cutoff / 2) ** order, 0.0)
     rows, columns = linear_sum_assignment(cost)
-    near = cost[rows, columns] < cutoff**order
-    return list(zip(rows[near].tolist(), columns[near].tolist(), strict=True))
+    made = near[rows, columns]
+    return list(zip(rows[made].tolist(), columns[made].tolist(), strict=True))
 
 
 def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float, order: float) -> Pairs:
-    """Pairs of the scan before that still hold, then the best of the rest."""
-    column_of = {name: column for column, name in enumerate(one.names)}
-    kept: Pairs = []
+    """The best pairs, those of the scan before being worth more."""
+    kept = np.zeros((len(one.x), len(one.truth)), bool)
     for row, identity in enumerate(one.identities):
-        column = column_of.get(before.get(identity, object()))
-        if column is not None and np.linalg.norm(one.x[row] - one.truth[column]) < cutoff:
-            kept.append((row, column))
-    rows = [row for row in range(len(one.x)) if row not in {pair[0] for pair in kept}]
-    columns = [column for column in range(len(one.truth)) if column not in {pair[1] for pair in kept}]
-    rest = _assign(one.x[rows], one.truth[columns], cutoff, order)
-    return sorted(kept + [(rows[row], columns[column]) for row, column in rest])
+        if identity in before:
+            kept[row] = [name == before[identity] for name in one.names]
+    return sorted(_assign(one.x, one.truth, cutoff, order, kept))
 
 
 def _changes(
@@ -357,8 +372,9 @@ def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hash
     on: dict[Hashable, int] = {}
     errors: dict[Hashable, list[tuple[Array, Array]]] = {}
     for one, found in zip(given, pairs, strict=True):
-        for identity in one.identities:
-            scans[identity] = scans.get(identity, 0) + 1
+        judged = set(range(len(one.x))) if one.complete else {row for row, _ in found}
+        for row in judged:
+            scans[one.identities[row]] = scans.get(one.identities[row], 0) + 1
         for row, column in found:
             identity = one.identities[row]
             on[identity] = on.get(identity, 0) + 1

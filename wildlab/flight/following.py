@@ -64,6 +64,7 @@ class ManySensorPart(Strict):
 
     detection: Probability | None = None
     clutter_per_m2: Above | None = None
+    clutter_per_rad: Above | None = None
     near_m: Annotated[float, Field(ge=0, le=1e6)] | None = None
     far_m: Above | None = None
     patience_s: Above | None = None
@@ -71,6 +72,7 @@ class ManySensorPart(Strict):
     rough_m: Lengths = ()
     along_m: Lengths = ()
     near_side_m: Lengths = ()
+    near_end_m: Lengths = ()
 
     @model_validator(mode="after")
     def _near_before_far(self) -> ManySensorPart:

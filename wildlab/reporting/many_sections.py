@@ -58,7 +58,7 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
         table,
         columns={name: heading for name, heading in words.TRACKS.items() if name in table},
         digits={"from": 1, "to": 1, "looks": 0, "on": 0, "nees": 2},
-        caption="Seconds since the first look."
+        caption="Seconds since the first look. On a target: of the looks at which the track is judged."
         + (
             " Mean NEES / 2: 1 where errors are as large as the track says, more where they are larger."
             if lives is not None

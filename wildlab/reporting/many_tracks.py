@@ -91,7 +91,12 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         f"and {_false_words(lives)}.",
     ]
     if len(lives.gospa) < looks:
-        said.append(f"Judged are {len(lives.gospa)} of {looks} looks: every true place is known there.")
+        said.append(f"Judged are {len(lives.gospa)} of {looks} looks: a true place is known there.")
+    if lives.incomplete:
+        said.append(
+            f"At {lives.incomplete} of the judged looks not every target's true place is known: tracks on "
+            "none of the known ones are left out there."
+        )
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
         said.append(f"Never followed: {', '.join(plain(str(name)) for name in lost)}.")

@@ -50,18 +50,47 @@ def test_a_target_out_of_reach_costs_nothing() -> None:
     assert max(one.distance for one in lives.gospa) == 0
 
 
-def test_bearings_are_left_out_with_a_word() -> None:
+def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
+    """They are exact here, and the places wrong by metres: across the line of sight tracks are nearer."""
     places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
     both = pd.concat([places.table("detections"), bearings.table("detections")], ignore_index=True)
     frames = pd.concat([places.table("frames"), bearings.table("frames")], ignore_index=True)
     joined = replace(places, tables={**places.tables, "detections": both, "frames": frames})
-    followed = follow_all(joined)
-    assert list(followed.places) == ["radar"]
-    assert followed.notes == ["eye was left out: what it detects (bearing) tells no place alone."]
-    with pytest.raises(WildlabError, match="no sensor detects places"):
+    with_eye, without = follow_all(joined), follow_all(places)
+    assert list(with_eye.places) == ["radar", "eye"] and not with_eye.notes
+    errors = []
+    for followed in (with_eye, without):
+        lives = judged(followed, at=["radar"])
+        assert lives is not None and len(lives.gospa) == len(without.scans)
+        errors.append(np.mean([one.distance for one in lives.gospa]))
+        assert len(lives.tracks) == 1
+    assert errors[0] < errors[1]
+    told = {one.what: one.value for one in with_eye.said if one.subject == "eye"}
+    assert "false detections in a look within a radian" in told
+    with pytest.raises(WildlabError, match="bearings alone begin no track"):
         follow_all(bearings)
-    with pytest.raises(WildlabError, match="tells no place alone"):
-        follow_all(bearings, sensors=["eye"])
+
+
+def test_bearings_whose_errors_last_are_thinned() -> None:
+    places, bearings = robot_flight(kind="position"), robot_flight(kind="bearing", sensor="eye")
+    both = pd.concat([places.table("detections"), bearings.table("detections")], ignore_index=True)
+    frames = pd.concat([places.table("frames"), bearings.table("frames")], ignore_index=True)
+    joined = replace(places, tables={**places.tables, "detections": both, "frames": frames})
+    followed = follow_all(joined, settings=parse_settings("[sensors.eye]\nthinning_s = 5.0\n"))
+    times = np.array([one.time for one in followed.places["eye"].scans])
+    every = len(follow_all(joined).places["eye"].scans)
+    assert np.diff(times).min() >= 5 - 1e-6 and len(times) < every
+    assert (
+        f"Of {every} looks of eye {len(times)} are used, 5 s apart: errors of bearings last."
+        in followed.notes
+    )
+
+
+def test_a_birth_that_nothing_survives_is_refused() -> None:
+    settings = parse_settings("[targets.many]\nbirth = 0.01\n")
+    with pytest.raises(WildlabError, match="no track would ever last") as caught:
+        follow_all(robot_flight(kind="position"), settings=settings)
+    assert caught.value.field == "targets.many.birth"
 
 
 def test_numbers_for_hulls_that_there_are_not() -> None:

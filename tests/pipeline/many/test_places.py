@@ -104,10 +104,20 @@ def test_how_much_ground_an_image_covers() -> None:
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
 
 
-@pytest.mark.parametrize("kind", ["bearing", "velocity"])
-def test_what_tells_no_place_is_refused(kind: str) -> None:
-    flight = robot_flight(kind=kind)
+def test_bearings_are_taken_as_they_are() -> None:
+    flight = robot_flight(kind="bearing")
     scans = scans_of(flight, "radar")
     belief, _ = of_sensor(flight, scans, of_flight(flight))
-    with pytest.raises(WildlabError, match="tells no place alone"):
+    found = places_of(flight, scans, belief, 0, None)
+    assert found.bearings and not len(found.distances())
+    row = int(np.isfinite(scans.detections[..., 0]).any(axis=1).argmax())
+    assert np.array_equal(found.scans[row].z[:1, 0], scans.detections[row, :1, 0])
+    assert np.allclose(found.scans[row].R, belief.noise[0] ** 2) and found.scans[row].R.shape[1:] == (1, 1)
+
+
+def test_what_tells_no_place_is_refused() -> None:
+    flight = robot_flight(kind="velocity")
+    scans = scans_of(flight, "radar")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    with pytest.raises(WildlabError, match="tells nothing of a place"):
         places_of(flight, scans, belief, 0, None)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import BOTH, LONG, SHIP
-from wildlab.tracking.many.hulls import STEERS_M_S, hull_noise, near_side, on_one_hull
+from wildlab.tracking.many.hulls import STEERS_M_S, gather, hull_noise, near_side, on_one_hull
 from wildlab.tracking.many.tracks import begin
 
 
@@ -41,6 +41,36 @@ def test_what_is_seen_lies_towards_the_platform_and_not_beyond_its_half() -> Non
     found = near_side(x, np.zeros(2), LONG)
     assert np.allclose(found[0], [[0, 0], [-3, 0]]) and np.allclose(found[1], [[0, 0], [0, 2]])
     assert np.allclose(found[2], 0)
+
+
+def test_the_near_side_of_a_ship_is_that_of_an_ellipse() -> None:
+    """Its side from abeam, its end from ahead or astern; else, as of one at rest, a mean of squares."""
+    ship = LONG._replace(near_side_m=(0.0, 3.0), near_end_m=(0.0, 12.0))
+
+    def seen(v: list[float]) -> float:
+        x = np.array([[[100.0, 0.0, *v]] * 2])
+        return float(-near_side(x, np.zeros(2), ship)[0, 1, 0])
+
+    steers = 9 / (9 + STEERS_M_S**2)
+    for v, cosine in (([3.0, 0.0], 1.0), ([-3.0, 0.0], 1.0), ([0.0, 3.0], 0.0), ([1.8, 2.4], 0.6)):
+        along = steers * cosine**2 + (1 - steers) / 2
+        assert np.isclose(seen(v), np.sqrt(along * 144 + (1 - along) * 9))
+    assert np.isclose(seen([0.0, 0.0]), np.sqrt((144 + 9) / 2))
+
+
+def test_parts_of_a_hull_count_as_they_are_likely() -> None:
+    """The stern, seen now and then, does not pull a track aft whose superstructure is seen always."""
+    z, R = np.array([[0.0, 1.0], [-20.0, 0.0], [300.0, 0.0]]), np.tile(np.eye(2), (3, 1, 1))
+    likely = np.zeros((1, 2, 3))
+    likely[0, 1] = [0.03, 0.01, 0.0]
+    sensor = LONG._replace(several=True)
+    kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
+    found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls)
+    assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.75]]) and len(found.R) == 2
+    # What no gate takes is of the hull all the same, each part alike.
+    z[1] = [-10.0, 0.0]
+    found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls)
+    assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.5]])
 
 
 def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:

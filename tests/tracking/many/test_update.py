@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.tracking.kalman import update as kalman_update
-from wildlab.tracking.many.update import compare, update
+from wildlab.tracking.many.update import compare, compare_bearings, update
 
 H = np.eye(2, 4)
 
@@ -27,6 +28,40 @@ def test_one_measurement_that_is_its_own_is_the_kalman_filter(seed: int) -> None
     assert np.allclose(found.x[0, 0], right.x) and np.allclose(found.P[0, 0], right.P)
     unseen = update(x, P, [[1.0]], [[1.0, 0.0]], compare(x, P, offset, noise, z, R, 1e9))
     assert np.allclose(unseen.x, x) and np.allclose(unseen.P, P)
+
+
+@given(st.integers(0, 10_000))
+def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
+    """Its Jacobian by central differences of the direction from the platform, hull's noise included."""
+    rng = np.random.default_rng(seed)
+    x, P, noise = 20 * rng.normal(size=(1, 1, 4)), spread(rng, 1, 1, 4), spread(rng, 1, 1, 2)
+    platform, R = x[0, 0, :2] + rng.uniform(5, 50) * np.array([np.cos(seed), np.sin(seed)]), 0.02**2
+
+    def direction(state: np.ndarray) -> float:
+        to = state[:2] - platform
+        return float(np.arctan2(to[1], to[0]))
+
+    step = 1e-4 * np.eye(4)
+    turn = np.exp([1j * (direction(x[0, 0] + h) - direction(x[0, 0] - h)) for h in step])
+    J = np.angle(turn)[None] / 2e-4
+    z = direction(x[0, 0]) + rng.normal(0, 0.02) + 2 * np.pi * rng.integers(-1, 2)
+    compared = compare_bearings(x, P, noise, platform, [[z]], [[[R]]], 1e9)
+    found = update(x, P, [[1.0]], [[0.0, 1.0]], compared)
+    gap = np.angle(np.exp(1j * (z - direction(x[0, 0]))))
+    own = R + (J[:, :2] @ noise[0, 0] @ J[:, :2].T)
+    right = kalman_update(x[0, 0], P[0, 0], J @ x[0, 0] + gap, J, own)
+    assert np.allclose(found.x[0, 0], right.x, atol=1e-5) and np.allclose(found.P[0, 0], right.P, atol=1e-5)
+    S = float((J @ P[0, 0] @ J.T + own)[0, 0])
+    assert compared.likelihood[0, 0, 0] == pytest.approx(
+        np.exp(-(gap**2) / S / 2) / np.sqrt(2 * np.pi * S), rel=1e-5
+    )
+    assert compare_bearings(x, P, noise, platform, [[z + 1.0]], [[[R]]], 1e-3).likelihood[0, 0, 0] == 0
+
+
+def test_what_is_at_the_platform_is_in_no_direction() -> None:
+    x, P = np.zeros((1, 1, 4)), np.eye(4)[None, None]
+    compared = compare_bearings(x, P, np.zeros((1, 1, 2, 2)), np.array([0.3, 0.0]), [[1.0]], [[[0.1]]], 9.0)
+    assert compared.likelihood[0, 0, 0] == 0 and np.isfinite(compared.S).all()
 
 
 @given(st.integers(0, 10_000))

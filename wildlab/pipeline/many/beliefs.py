@@ -47,7 +47,8 @@ _WORDS = {
 _HULLS = {
     "rough_m": "which part of a hull is seen, SD of each axis, by kind",
     "along_m": "the same along its heading",
-    "near_side_m": "how far on this side of its middle a hull is seen, by kind",
+    "near_side_m": "how far on this side of its middle a hull is seen from its side, by kind",
+    "near_end_m": "the same of a hull that heads here or away, by kind",
 }
 
 
@@ -101,10 +102,18 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     )
     told: dict[str, Any] = {name: one(name) for name in _WORDS}
     told["hits"] = int(told["hits"])
+    if told["birth"] <= told["forgotten"]:
+        raise WildlabError(
+            f"a new target exists with {told['birth']:g}, and one that exists with {told['forgotten']:g} or "
+            "less is given up: no track would ever last",
+            "state a birth that is above forgotten",
+            field="targets.many.birth",
+        )
     targets = TargetBeliefs(hulls, following.density, following.start_speed_m_s, **told)
     sensors = []
+    farthest = max((float(looks.distances().max(initial=0.0)) for looks in places), default=0.0)
     for looks in places:
-        found, more = _of_sensor(settings, looks, len(hulls))
+        found, more = _of_sensor(settings, looks, len(hulls), farthest)
         sensors.append(found)
         said += more
     return Told(targets, sensors, said)
@@ -114,7 +123,10 @@ def _hull(part: HullPart) -> Hull:
     return Hull(part.name, part.length_m, part.beam_m, part.share)
 
 
-def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBeliefs, list[Said]]:
+def _of_sensor(
+    settings: Settings, looks: Places, kinds: int, farthest: float
+) -> tuple[SensorBeliefs, list[Said]]:
+    """``farthest``: m, the farthest detection of any sensor, for one that knows no distances."""
     part = settings.sensors.get(looks.sensor)
     stated = None if part is None else part.many
     said: list[Said] = []
@@ -127,13 +139,12 @@ def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBel
 
     distance = looks.distances()
     near = one("near_m", "distance below which it sees nothing", " m", 0.0, ASSUMED)
-    far = one(
-        "far_m", "distance above which it sees nothing", " m", BEYOND * float(distance.max(initial=1.0)), HERE
-    )
+    reach = farthest if looks.bearings else float(distance.max(initial=1.0))
+    far = one("far_m", "distance above which it sees nothing", " m", BEYOND * reach, HERE)
     # What is left over if every scan had one target: a guess that is too high where there are many.
-    each = len(distance) / max(len(looks.scans), 1)
-    area = looks.area(far)
-    clutter = max(each - 1.0, LEAST_FALSE) / area
+    each = sum(len(look.z) for look in looks.scans) / max(len(looks.scans), 1)
+    over = 2 * np.pi if looks.bearings else looks.area(far)
+    clutter = max(each - 1.0, LEAST_FALSE) / over
     if near >= far:
         raise WildlabError(
             f"the sensor {looks.sensor!r} sees nothing nearer than {near:g} m or farther than {far:g} m",
@@ -142,10 +153,17 @@ def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBel
         )
     interval = looks.interval_s
     hull_values = {name: getattr(stated, name, ()) or (0.0,) * kinds for name in _HULLS}
+    hull_values["near_end_m"] = getattr(stated, "near_end_m", ()) or hull_values["near_side_m"]
     found = SensorBeliefs(
         looks.sensor,
         one("detection", "probability that what is in view is detected", "", DETECTION, ASSUMED),
-        one("clutter_per_m2", "false detections in a look on a square metre", "", clutter, HERE),
+        one(
+            "clutter_per_rad" if looks.bearings else "clutter_per_m2",
+            f"false detections in a look {'within a radian' if looks.bearings else 'on a square metre'}",
+            "",
+            clutter,
+            HERE,
+        ),
         near,
         far,
         one(
@@ -159,6 +177,8 @@ def _of_sensor(settings: Settings, looks: Places, kinds: int) -> tuple[SensorBel
         hull_values["along_m"],
         hull_values["near_side_m"],
         bool(stated is not None and stated.several),
+        looks.bearings,
+        hull_values["near_end_m"],
     )
     for name, what in _HULLS.items():
         own = stated is not None and bool(getattr(stated, name))

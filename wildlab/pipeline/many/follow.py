@@ -17,7 +17,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
-from wildlab.pipeline.many.places import Places, places_of
+from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
 
@@ -100,8 +100,8 @@ def follow_all(
     places: dict[str, Places] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
-        if looks.kind in ("bearing", "velocity") and not sensors:
-            notes.append(f"{name} was left out: what it detects ({looks.kind}) tells no place alone.")
+        if looks.kind not in ABLE and not sensors:
+            notes.append(f"{name} was left out: what it detects ({looks.kind}) tells nothing of a place.")
             continue
         belief, more = of_sensor(flight, looks, told)
         if belief.offset_s:
@@ -110,12 +110,22 @@ def follow_all(
         if any(one.what.startswith("considered") for one in more):
             notes.append(f"Errors of {name} that last are not considered where many targets are followed.")
         notes += order_notes(looks)
-        places[name] = found = places_of(flight, looks, belief, len(places), source)
+        found = places_of(flight, looks, belief, len(places), source)
+        if found.bearings and np.isfinite(belief.thinning_s):
+            kept = thinned(found, belief.thinning_s)
+            if len(kept.scans) < len(found.scans):
+                notes.append(
+                    f"Of {len(found.scans)} looks of {name} {len(kept.scans)} are used, "
+                    f"{belief.thinning_s:.3g} s apart: errors of bearings last."
+                )
+            found = kept
+        places[name] = found
         if found.without:
             notes.append(f"{found.without} detections of {name} have no place on the ground.")
-    if not places:
+    if all(one.bearings for one in places.values()):
         raise WildlabError(
-            "no sensor detects places", "follow one target by its bearings: wildlab track without --many",
+            "no sensor detects places: bearings alone begin no track",
+            "follow one target by its bearings: wildlab track without --many",
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
     beliefs = of_many(told, following, list(places.values()))
@@ -141,25 +151,41 @@ def follow_all(
 
 
 def known_looks(followed: Followed) -> NDArray[np.bool_]:
+    """(N,) looks at which any target's true place is known: elsewhere nothing is judged."""
+    return _true_places(followed).any(axis=0)
+
+
+def complete_looks(followed: Followed) -> NDArray[np.bool_]:
     """(N,) looks at which every target's true place is known: elsewhere no track is false."""
-    known = np.ones(len(followed.scans), bool)
-    for way in followed.truth.values():
-        known &= np.isfinite(way).all(axis=1)
-    return known
+    return known_looks(followed) & _true_places(followed).all(axis=0)
 
 
-def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Identities | None:
+def _true_places(followed: Followed) -> NDArray[np.bool_]:
+    """(M, N) where they are known."""
+    ways = [np.isfinite(way).all(axis=1) for way in followed.truth.values()]
+    return np.array(ways, bool).reshape(-1, len(followed.scans))
+
+
+def judged(
+    followed: Followed, reach: Mapping[str, float] | None = None, at: Sequence[str] = ()
+) -> Identities | None:
     """Tracks against the true targets at the looks of `known_looks`; None where there are none, or no truth.
 
     A target can be seen where a detection names it, and where it lies in the camera's view, or within reach
-    of any of the sensors. One that cannot costs nothing, with a track or without.
+    of any of the sensors. One that cannot costs nothing, with a track or without. Where not every true place
+    is known, tracks on none of the known targets are not judged.
 
     Parameters
     ----------
     reach
         Metres by target's name, in place of the sensors' own.
+    at
+        Names of the sensors at whose looks it is judged; all where none is named.
     """
-    known = known_looks(followed)
+    known, complete = known_looks(followed), complete_looks(followed)
+    if at:
+        names_of = [one.name for one in followed.sensors]
+        known &= np.array([names_of[scan.sensor] in at for scan in followed.scans], bool)
     if not followed.truth or not known.any():
         return None
     far = max(one.far_m for one in followed.sensors)
@@ -167,13 +193,13 @@ def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Iden
     for row, (scan, shown) in enumerate(zip(followed.scans, followed.shown, strict=True)):
         if not known[row]:
             continue
-        names = list(followed.truth)
-        at = np.array([followed.truth[name][row] for name in names]).reshape(-1, 2)
-        distance = np.linalg.norm(at - scan.platform, axis=1)
+        names = [name for name, way in followed.truth.items() if np.isfinite(way[row]).all()]
+        places = np.array([followed.truth[name][row] for name in names])
+        distance = np.linalg.norm(places - scan.platform, axis=1)
         limit = np.array([far if reach is None else reach[name] for name in names])
         visible = distance <= limit
         if scan.sees is not None:
-            visible &= scan.sees(at)
+            visible &= scan.sees(places)
         visible |= np.array([name in followed.named[row] for name in names])
         compared.append(
             Compared(
@@ -181,10 +207,11 @@ def judged(followed: Followed, reach: Mapping[str, float] | None = None) -> Iden
                 shown.x[:, :2],
                 shown.P[:, :2, :2],
                 shown.identity.tolist(),
-                at,
+                places,
                 names,
                 visible,
                 np.zeros(len(names), bool),
+                bool(complete[row]),
             )
         )
     return compare_identities(compared, CUTOFF_M)

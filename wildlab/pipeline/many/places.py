@@ -14,13 +14,15 @@ from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
 from wildlab.pipeline.scans import Scans
+from wildlab.tracking.coloured import thin
 from wildlab.tracking.many import Scan
 from wildlab.tracking.many.beliefs import Sees
 
 Array = NDArray[np.float64]
 
-#: Kinds of detections that tell a place.
-ABLE = ("position", "range-bearing", "pixel")
+#: Kinds of detections that tell a place, and what tells of the place of a target that is known already.
+PLACED = ("position", "range-bearing", "pixel")
+ABLE = (*PLACED, "bearing")
 #: Looks, and places about the platform, by which it is found how much of the ground an image shows.
 MOST_LOOKS, PLACES = 50, 4000
 
@@ -59,8 +61,15 @@ class Places(NamedTuple):
     interval_s: float
     without: int
 
+    @property
+    def bearings(self) -> bool:
+        """Whether it measures bearings, which tell no place alone."""
+        return self.kind not in PLACED
+
     def distances(self) -> Array:
-        """(D,) m of all detections from the platform."""
+        """(D,) m of all detections from the platform; none of bearings."""
+        if self.bearings:
+            return np.zeros(0)
         return np.concatenate(
             [np.zeros(0), *(np.linalg.norm(one.z - one.platform, axis=1) for one in self.scans)]
         )
@@ -92,11 +101,11 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
     Raises
     ------
     WildlabError
-        Where its detections tell no place.
+        Where its detections tell nothing of a place.
     """
     if scans.kind not in ABLE:
         raise WildlabError(
-            f"the sensor {scans.sensor!r} detects {scans.kind!r}, which tells no place alone",
+            f"the sensor {scans.sensor!r} detects {scans.kind!r}, which tells nothing of a place",
             f"follow many targets by sensors that detect {', '.join(ABLE)}; name them with --sensor",
             file=flight.folder,
             field="detections.kind",
@@ -106,6 +115,9 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
     elif scans.kind == "position":
         z = scans.detections
         R = np.broadcast_to(np.diag(beliefs.noise**2), (*z.shape, 2))
+    elif scans.kind == "bearing":
+        z = scans.detections[..., :1]
+        R = np.broadcast_to(np.diag(beliefs.noise[:1] ** 2), (*z.shape, 1))
     else:
         z, R = _of_ranges(scans, beliefs)
     usable = np.isfinite(scans.platform).all(axis=1)
@@ -119,6 +131,14 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
         named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
     return Places(scans.sensor, scans.kind, looks, named, scans.interval_s, without)
+
+
+def thinned(places: Places, apart_s: float) -> Places:
+    """Only looks at least so far apart, see `wildlab.tracking.coloured.thin`."""
+    kept = np.flatnonzero(thin([scan.time for scan in places.scans], apart_s))
+    return places._replace(
+        scans=[places.scans[row] for row in kept], named=[places.named[row] for row in kept]
+    )
 
 
 def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:

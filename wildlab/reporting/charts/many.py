@@ -121,8 +121,17 @@ def wrong_shown(followed: Followed, lives: Identities) -> Shown:
     axes[0].set_title(f"{distance.mean():.1f} m in the mean")
     missed = np.array([one.n_missed for one in lives.gospa])
     false = np.array([one.n_false for one in lives.gospa])
-    axes[1].step(times, missed, where="mid", color=SENSOR_COLOURS[0], lw=1.4, label="targets missed")
-    axes[1].step(times, -false, where="mid", color=VERMILLION, lw=1.4, label="tracks on nothing")
+    pause = PAUSE * float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    # Over a pause no line says what nobody looked at.
+    after = np.flatnonzero(np.diff(times) > pause) + 1
+    for values, tint, what in (
+        (missed, SENSOR_COLOURS[0], "targets missed"), (-false, VERMILLION, "tracks on nothing")
+    ):  # fmt: skip
+        axes[1].step(
+            np.insert(times, after, times[after]),
+            np.insert(values.astype(float), after, np.nan),
+            where="mid", color=tint, lw=1.4, label=what,
+        )  # fmt: skip
     axes[1].set_ylabel("how many")
     axes[1].set_xlabel("time since the first look (s)")
     most = max(int(missed.max()), int(false.max()), 1)
@@ -130,9 +139,13 @@ def wrong_shown(followed: Followed, lives: Identities) -> Shown:
     axes[1].yaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes[1].yaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")
     fig.legend(loc="outside lower center", ncols=2)
-    mark_gaps(axes[0], times, PAUSE * float(np.median(np.diff(times))) if len(times) > 1 else 1.0)
+    mark_gaps(axes[0], times, pause)
     alt = (
         f"GOSPA with a cut-off of {CUTOFF_M:g} m at {len(times)} looks, {distance.mean():.1f} m in the mean; "
         f"targets missed at {int((missed > 0).sum())} looks, tracks on nothing at {int((false > 0).sum())}."
     )
-    return fig, "gospa", alt, "Dashed: the mean. Below: targets missed upwards, tracks on nothing downwards."
+    caption = "Dashed: the mean. Below: targets missed upwards, tracks on nothing downwards."
+    if len(after):
+        caption += " Grey: nobody looked, or no true place is known."
+        alt += f" {_many(len(after), 'pause')}, the longest of {np.diff(times).max():.0f} s."
+    return fig, "gospa", alt, caption

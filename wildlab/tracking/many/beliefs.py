@@ -40,7 +40,7 @@ class SensorBeliefs(NamedTuple):
     detection
         Probability that a target that is visible is detected in a scan.
     clutter
-        False measurements for each square metre and scan, above zero.
+        False measurements for each square metre and scan, or each radian where it has bearings, above zero.
     near_m, far_m
         Between which distances it sees; measurements from elsewhere are not used, and targets there are not
         missed.
@@ -52,9 +52,13 @@ class SensorBeliefs(NamedTuple):
     along_m
         (K,) the same along the hull, which points where it goes.
     near_side_m
-        (K,) how far on this side of the hull's middle the part lies that is seen.
+        (K,) how far on this side of the hull's middle the part lies that is seen, of one seen from its side.
     several
         Whether one hull may give several measurements in a scan.
+    bearings
+        Whether it measures bearings: these move tracks, and neither begin, confirm, prolong nor end one.
+    near_end_m
+        (K,) as ``near_side_m``, of a hull that heads for the platform or away from it; empty: the same.
     """
 
     name: str
@@ -67,6 +71,8 @@ class SensorBeliefs(NamedTuple):
     along_m: tuple[float, ...]
     near_side_m: tuple[float, ...]
     several: bool = False
+    bearings: bool = False
+    near_end_m: tuple[float, ...] = ()
 
 
 class TargetBeliefs(NamedTuple):
@@ -137,7 +143,8 @@ class Scan(NamedTuple):
     platform
         (2,) north, east in n, m.
     z, R
-        (M, 2) and (M, 2, 2): places in n with their covariances, m and m^2.
+        (M, 2) and (M, 2, 2): places in n with their covariances, m and m^2; or (M, 1) and (M, 1, 1): bearings
+        from north, rad and rad^2.
     sees
         Which of (N, 2) places a camera shows, (N,) bool; None: whatever is within reach is looked at.
     """

@@ -20,7 +20,10 @@ LEAST_KIND = 0.02
 
 
 def near_side(x: ArrayLike, platform: ArrayLike, sensor: SensorBeliefs) -> Array:
-    """Where on its hull a target is seen, from the hull's middle.
+    """Where on its hull a target is seen, from the hull's middle: the near side of an ellipse.
+
+    ``sensor.near_side_m`` is how far that is where the hull is seen from its side, ``near_end_m`` where it is
+    seen along its heading, and as often as not where nobody knows the heading (`STEERS_M_S`).
 
     Parameters
     ----------
@@ -35,7 +38,16 @@ def near_side(x: ArrayLike, platform: ArrayLike, sensor: SensorBeliefs) -> Array
     """
     to = np.asarray(platform, float) - np.asarray(x, float)[..., :2]
     distance = np.linalg.norm(to, axis=-1, keepdims=True)
-    length = np.minimum(np.asarray(sensor.near_side_m)[:, None], distance / 2)
+    side = np.asarray(sensor.near_side_m)[:, None]
+    end = np.asarray(sensor.near_end_m or sensor.near_side_m)[:, None]
+    v = np.asarray(x, float)[..., 2:]
+    square = (v**2).sum(axis=-1, keepdims=True)
+    course = (to * v).sum(axis=-1, keepdims=True) ** 2
+    # How much of the heading lies in the line of sight: the square of a cosine.
+    known = np.divide(course, square * distance**2, out=np.zeros_like(course), where=square * distance > 0)
+    steers = square / (square + STEERS_M_S**2)
+    along = steers * known + (1 - steers) / 2
+    length = np.minimum(np.sqrt(along * end**2 + (1 - along) * side**2), distance / 2)
     return np.asarray(np.divide(to, distance, out=np.zeros_like(to), where=distance > 0) * length)
 
 
@@ -77,7 +89,10 @@ def gather(
     sensor: SensorBeliefs,
     hulls: tuple[Hull, ...],
 ) -> Gathered:
-    """Merge the measurements of a scan that lie along one large hull to the middle of their extent.
+    """Merge the measurements of a scan that lie along one large hull to one of the part that is followed.
+
+    Each counts in the share in which it is of that part, by its likelihood: what a ship shows in every scan
+    keeps the track where it is, and its stern, seen now and then, does not pull it aft.
 
     Each measurement goes to the established track that it is likeliest of, or where no gate takes it, to the
     one whose hull it may lie on. Where one track has two and more, it is of the largest kind, or the others
@@ -120,7 +135,9 @@ def gather(
         kinds[track] /= kinds[track].sum()
         if kinds[track, largest] > 0.5:
             free[rows] = False
-            merged_z.append((low + high) / 2)
+            share = likelihood[track, largest, rows]
+            share = share / share.sum() if share.any() else np.full(len(rows), 1 / len(rows))
+            merged_z.append(share @ z[rows])
             merged_R.append(R[rows].mean(axis=0))
     if not merged_z:
         return Gathered(z, R, kinds)

@@ -24,7 +24,7 @@ from wildlab.tracking.many.tracks import (
     no_tracks,
     without_doubles,
 )
-from wildlab.tracking.many.update import Compared, compare, update
+from wildlab.tracking.many.update import Compared, compare, compare_bearings, update
 
 Array = NDArray[np.float64]
 
@@ -128,6 +128,8 @@ def step(
     watched, rest = tracks.only(rows), tracks.only(away)
     watched = watched._replace(existence=still_there(watched.existence, dt, targets.lifetime_s))
     watched, z, R, taken = _corrected(watched, z, R, scan, sensor, targets)
+    if sensor.bearings:
+        return alive(both(watched, rest), targets), first
     new = (taken < TAKEN) & ~_on_a_known_one(z, watched, targets)
     fresh = begin(z[new], R[new], scan.time, scan.platform, sensors, scan.sensor, targets, first)
     everyone = both(both(watched, rest), fresh)
@@ -142,7 +144,7 @@ def _corrected(
     if not tracks.number:
         return tracks, z, R, np.zeros(len(z))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
-    compared, near, likely = _compared(tracks, offset, noise, z, R, targets.gate)
+    compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
     gathered = gather(
@@ -150,7 +152,7 @@ def _corrected(
     )
     if len(gathered.z) != len(z):
         z, R = gathered.z, gathered.R
-        compared, near, likely = _compared(tracks, offset, noise, z, R, targets.gate)
+        compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
     kinds = gathered.kinds
     which = scan.sensor
     visible = visible_later(
@@ -161,9 +163,12 @@ def _corrected(
     p = association_probabilities(pairs, none)
     existence, visible, own = after_scan(tracks.existence, visible, sensor.detection, p)
     mine = np.where(near >= 0, np.take_along_axis(own, near + 1, axis=1), 0.0)
+    if sensor.bearings:
+        # Nobody knows where a camera looked that only tells bearings: what it did not see may be there.
+        existence, visible = tracks.existence, tracks.visible[:, which]
     x, P, kinds = update(tracks.x, tracks.P, kinds, np.concatenate([own[:, :1], mine], axis=1), compared)
     kinds = np.maximum(kinds, LEAST_KIND if kinds.shape[1] > 1 else 0.0)
-    seen = own[:, 1:].sum(axis=1) > 0.5
+    seen = (own[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
     all_visible[:, which], looked[:, which] = visible, scan.time
     existence, hits = np.minimum(existence, CERTAIN), tracks.hits + seen
@@ -189,7 +194,14 @@ def _corrected(
 
 
 def _compared(
-    tracks: Tracks, offset: Array, noise: Array, z: Array, R: Array, gate: float
+    tracks: Tracks,
+    offset: Array,
+    noise: Array,
+    z: Array,
+    R: Array,
+    scan: Scan,
+    sensor: SensorBeliefs,
+    gate: float,
 ) -> tuple[Compared, NDArray[np.intp], Array]:
     """Every track beside the G measurements that may lie in its gate: of thousands in a scan it is few.
 
@@ -198,6 +210,9 @@ def _compared(
     What is compared, (T, G) which measurements these are, -1 none, and (T, K, M) likelihoods of all.
     """
     T, K, M = tracks.number, tracks.x.shape[1], len(z)
+    if sensor.bearings:
+        found = compare_bearings(tracks.x, tracks.P, noise, scan.platform, z, R, gate)
+        return found, np.tile(np.arange(M), (T, 1)), found.likelihood
     if not M:
         nothing = compare(tracks.x, tracks.P, offset, noise, z, R, gate)
         return nothing, np.zeros((T, 0), np.intp), np.zeros((T, K, 0))
@@ -206,9 +221,9 @@ def _compared(
     seen = tracks.x[..., :2] + offset
     middle = seen.mean(axis=1)
     widest += np.linalg.norm(seen - middle[:, None], axis=2).max(axis=1)
-    found = cKDTree(z).query_ball_point(middle, widest, return_sorted=True)
-    near = np.full((T, max(map(len, found))), -1, np.intp)
-    for row, rows in enumerate(found):
+    within = cKDTree(z).query_ball_point(middle, widest, return_sorted=True)
+    near = np.full((T, max(map(len, within))), -1, np.intp)
+    for row, rows in enumerate(within):
         near[row, : len(rows)] = rows
     compared = compare(tracks.x, tracks.P, offset, noise, z[near], R[near], gate)
     likelihood = np.where((near >= 0)[:, None], compared.likelihood, 0.0)
@@ -219,7 +234,11 @@ def _compared(
 
 
 def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:
-    z, R = np.asarray(scan.z, float).reshape(-1, 2), np.asarray(scan.R, float).reshape(-1, 2, 2)
+    size = 1 if sensor.bearings else 2
+    z, R = np.asarray(scan.z, float).reshape(-1, size), np.asarray(scan.R, float).reshape(-1, size, size)
+    if sensor.bearings:
+        good = np.isfinite(z).all(axis=1)
+        return z[good], R[good]
     distance = np.linalg.norm(z - scan.platform, axis=1)
     good = np.isfinite(z).all(axis=1) & (distance > sensor.near_m) & (distance < sensor.far_m)
     return z[good], R[good]

@@ -9,17 +9,21 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+#: A target this near to the platform, m, is in no direction.
+NEAREST_M = 1.0
+
 
 class Compared(NamedTuple):
-    """T tracks of K kinds beside M measurements of places.
+    """T tracks of K kinds beside M measurements of m elements: two of a place, one of a bearing.
 
-    ``innovation`` (T, K, M, 2), its covariance ``S`` (T, K, M, 2, 2), and ``likelihood`` (T, K, M), 1/m^2:
-    zero outside of the gate.
+    ``innovation`` (T, K, M, m), its covariance ``S`` (T, K, M, m, m), ``likelihood`` (T, K, M), 1/m^2 or
+    1/rad, zero outside of the gate, and ``H`` (T, K, m, 2) of a place.
     """
 
     innovation: Array
     S: Array
     likelihood: Array
+    H: Array
 
 
 def compare(
@@ -48,7 +52,53 @@ def compare(
     a, b = innovation[..., 0], innovation[..., 1]
     square = (S[..., 1, 1] * a**2 - 2 * S[..., 0, 1] * a * b + S[..., 0, 0] * b**2) / det
     likelihood = np.exp(-square / 2) / (2 * np.pi * np.sqrt(det))
-    return Compared(innovation, S, np.where(square < gate**2, likelihood, 0.0))
+    H = np.broadcast_to(np.eye(2), (*x.shape[:2], 2, 2))
+    return Compared(innovation, S, np.where(square < gate**2, likelihood, 0.0), H)
+
+
+def compare_bearings(
+    x: ArrayLike, P: ArrayLike, noise: ArrayLike, platform: ArrayLike, z: ArrayLike, R: ArrayLike, gate: float
+) -> Compared:
+    """The same of M bearings from north, to first order at each track's own place.
+
+    Which part of a hull is seen counts as the angle under which it appears; what lies towards the platform
+    changes no bearing. A place within `NEAREST_M` of the platform has none.
+
+    Parameters
+    ----------
+    x, P, noise, gate
+        As in `compare`.
+    platform
+        (2,) where they are measured from.
+    z, R
+        (M, 1) rad, and (M, 1, 1) rad^2.
+    """
+    x, P = np.asarray(x, float), np.asarray(P, float)
+    to = x[..., :2] - np.asarray(platform, float)
+    square = (to**2).sum(axis=-1)
+    far = square > NEAREST_M**2
+    north, east = to[..., 0], to[..., 1]
+    H = np.stack([-east, north], axis=-1)[..., None, :] / np.where(far, square, 1.0)[..., None, None]
+    H = np.where(far[..., None, None], H, 0.0)
+    bearing = np.asarray(z, float).reshape(-1)
+    gap = bearing - np.arctan2(east, north)[..., None]
+    innovation = (gap + np.pi) % (2 * np.pi) - np.pi
+    own = (H @ (P[..., :2, :2] + np.asarray(noise, float)) @ np.swapaxes(H, -1, -2))[..., 0, 0]
+    S = own[..., None] + np.asarray(R, float).reshape(-1)
+    likelihood = np.exp(-(innovation**2) / S / 2) / np.sqrt(2 * np.pi * S)
+    inside = (innovation**2 < gate**2 * S) & far[..., None]
+    return Compared(innovation[..., None], S[..., None, None], np.where(inside, likelihood, 0.0), H)
+
+
+def _inverse(S: Array) -> Array:
+    """Of covariances of one or two elements."""
+    if S.shape[-1] == 1:
+        return np.asarray(1 / S)
+    det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] ** 2
+    inverse = np.empty_like(S)
+    inverse[..., 0, 0], inverse[..., 1, 1] = S[..., 1, 1] / det, S[..., 0, 0] / det
+    inverse[..., 0, 1] = inverse[..., 1, 0] = -S[..., 0, 1] / det
+    return inverse
 
 
 class Updated(NamedTuple):
@@ -70,18 +120,14 @@ def update(x: ArrayLike, P: ArrayLike, kinds: ArrayLike, own: ArrayLike, compare
         (T, 1 + M) of `wildlab.tracking.many.existence.after_scan`.
     """
     mean, cov, before = np.asarray(x, float), np.asarray(P, float), np.asarray(kinds, float)
-    whose, (innovation, S, likelihood) = np.asarray(own, float), compared
+    whose, (innovation, S, likelihood, H) = np.asarray(own, float), compared
     mixed = np.einsum("tk,tkm->tm", before, likelihood)[:, None]
     # Of a measurement that is the target's, the share of each kind: how likely that kind makes it.
     share = np.divide(likelihood, mixed, out=np.zeros_like(likelihood), where=mixed > 0) * whose[:, None, 1:]
     weight = whose[:, None, 0] + share.sum(axis=-1)
     beta = np.divide(share, weight[..., None], out=np.zeros_like(share), where=weight[..., None] > 0)
-    PH = cov[..., :2]
-    det = S[..., 0, 0] * S[..., 1, 1] - S[..., 0, 1] ** 2
-    inverse = np.empty_like(S)
-    inverse[..., 0, 0], inverse[..., 1, 1] = S[..., 1, 1] / det, S[..., 0, 0] / det
-    inverse[..., 0, 1] = inverse[..., 1, 0] = -S[..., 0, 1] / det
-    gain = np.einsum("tkij,tkmjl->tkmil", PH, inverse)
+    PH = cov[..., :2] @ np.swapaxes(H, -1, -2)
+    gain = np.einsum("tkij,tkmjl->tkmil", PH, _inverse(S))
     step = np.einsum("tkmij,tkmj->tkmi", gain, innovation)
     moved = np.einsum("tkm,tkmi->tki", beta, step)
     shrunk = np.einsum("tkm,tkmij,tklj->tkil", beta, gain, PH)
