@@ -244,5 +244,6 @@ METHOD = (
     "(`wildlab.studies.autoferry_many.tuning.draw`), and for each way to look the one is taken that has the "
     "smallest mean GOSPA on the first scenario, of those whose mean NEES / 2 there lies between "
     f"{SMALLEST:g} and {LARGEST:g}, if any does: GOSPA alone prefers tracks that are too sure. Scales are "
-    "drawn evenly over their logarithm. Stamps are moved by what the study `autoferry` finds on the same scenario."
+    "drawn evenly over their logarithm. Stamps are moved by what the study `autoferry` finds on the same "
+    "scenario."
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -46,6 +46,17 @@ FASTEST_M_S = 10.0
 Drawn = Callable[[float, float], float]
 
 
+class Ranked(Protocol):
+    """A draw, ours or another tracker's, and how it did where it was tuned."""
+
+    @property
+    def number(self) -> int: ...
+    @property
+    def gospa(self) -> float: ...
+    @property
+    def anees(self) -> float: ...
+
+
 class Tuned(NamedTuple):
     """One draw, and where it was tuned the mean GOSPA that it has, m, and the mean NEES / 2 of its tracks."""
 
@@ -53,11 +64,6 @@ class Tuned(NamedTuple):
     settings: Settings
     gospa: float
     anees: float
-
-    @property
-    def fits(self) -> bool:
-        """Whether errors are as large as the tracks say, within a factor of their squares."""
-        return SMALLEST <= self.anees <= LARGEST
 
 
 def reach_of(flight: Flight, mode: str) -> dict[str, float]:
@@ -221,6 +227,6 @@ def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
     return {mode: sorted(tuned, key=order) for mode, tuned in found.items()}
 
 
-def order(one: Tuned) -> tuple[bool, float, int]:
-    """What `tune` sorts by."""
-    return not one.fits, one.gospa, one.number
+def order(one: Ranked) -> tuple[bool, float, int]:
+    """What draws are sorted by: first those whose errors are as large as the tracks say, then by GOSPA."""
+    return not SMALLEST <= one.anees <= LARGEST, one.gospa, one.number

@@ -1,0 +1,266 @@
+"""Stone Soup's JPDA is given what our tracker is given, judged as it is, and spoken of by its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.errors import WildlabError
+from wildlab.pipeline.many.follow import Followed, judged
+from wildlab.studies.autoferry_many import beside, stone_soup
+from wildlab.studies.autoferry_many.judged import HEADINGS
+from wildlab.studies.autoferry_many.stone_soup import Choice, Eye, draw_choice, run_stone_soup
+from wildlab.tracking.kalman import predict, update
+from wildlab.tracking.many import Scan, SensorBeliefs, Shown
+from wildlab.tracking.maritime import white_acceleration
+
+R = np.full((1, 2, 2), np.nan)  # of a scan: never used, since noise is one of the choices
+
+
+def choice(**changes: object) -> Choice:
+    eyes = {"lidar": Eye(0.8, 1 - 1e-12, 1e-12, 0.0, 500.0), "radar": Eye(3.0, 1 - 1e-12, 1e-12, 0.0, 500.0)}
+    base = Choice(
+        eyes=eyes, density=0.3, start_speed_m_s=3.0, gate=8.0, hits=2, held_s=10.0, patience_s=10.0,
+        lost_m=500.0, moves_m=0.0, over_s=10.0,
+    )  # fmt: skip
+    return base._replace(**changes)
+
+
+def one_boat(count: int = 30) -> list[Scan]:
+    """One target by two sensors in turn, at uneven times, without clutter."""
+    rng = np.random.default_rng(5)
+    scans, time = [], 100.0
+    for row in range(count):
+        time += float(rng.integers(0, 2500)) / 1000  # stamps of Stone Soup are whole microseconds
+        sensor = int(rng.integers(2))
+        z = np.array([[20 + 2 * (time - 100), 5 - (time - 100)]]) + rng.normal(0, (0.8, 3.0)[sensor], (1, 2))
+        scans.append(Scan(time, sensor, np.zeros(2), z, R))
+        if row == 10:
+            scans.append(Scan(time, 1 - sensor, np.zeros(2), z + 0.5, R))  # two looks at one time
+    return scans
+
+
+def test_one_target_without_clutter_is_kalmans() -> None:
+    pytest.importorskip("stonesoup")
+    scans, given = one_boat(), choice()
+    shown = run_stone_soup(scans, ["lidar", "radar"], given)
+    noise = [given.eyes[name].noise_m ** 2 * np.eye(2) for name in ("lidar", "radar")]
+    x, P = np.array([*scans[0].z[0], 0, 0]), np.diag([0, 0, 9.0, 9.0])
+    P[:2, :2] = noise[scans[0].sensor]
+    assert len(shown) == len(scans) and not len(shown[0].x)
+    for before, scan, found in zip(scans[:-1], scans[1:], shown[1:], strict=True):
+        x, P = predict(x, P, *white_acceleration(scan.time - before.time, given.density))
+        x, P = update(x, P, scan.z[0], np.eye(2, 4), noise[scan.sensor])[:2]
+        assert found.identity.tolist() == [0] and (found.time, found.sensor) == (scan.time, scan.sensor)
+        assert np.allclose(found.x[0], x, atol=1e-6) and np.allclose(found.P[0], P, atol=1e-6)
+
+
+def harbour() -> list[Scan]:
+    """Two boats side by side, clutter, and every fifth look empty."""
+    rng = np.random.default_rng(2)
+    scans = []
+    for row in range(40):
+        boats = np.array([[30 + row, 10.0], [30 + row, 16.0]]) + rng.normal(0, 0.8, (2, 2))
+        z = np.concatenate([boats, rng.uniform(-80, 80, (3, 2))])
+        scans.append(Scan(float(row), row % 2, np.zeros(2), np.zeros((0, 2)) if row % 5 == 4 else z, R))
+    return scans
+
+
+def dense() -> Choice:
+    eyes = {name: Eye(1.5, 0.8, 1e-4, 0.0, 60.0) for name in ("lidar", "radar")}
+    return choice(eyes=eyes, gate=3.0, held_s=3.0, patience_s=4.0, lost_m=20.0)
+
+
+def test_the_same_draw_gives_the_same_bytes_and_looks_out_no_farther_than_told() -> None:
+    pytest.importorskip("stonesoup")
+    one, other = (run_stone_soup(harbour(), ["lidar", "radar"], dense()) for _ in range(2))
+    for a, b in zip(one, other, strict=True):
+        assert a.identity.tolist() == b.identity.tolist()
+        assert a.x.tobytes() == b.x.tobytes() and a.P.tobytes() == b.P.tobytes()
+    assert max(len(look.x) for look in one) >= 2
+    assert all(np.linalg.norm(look.x[:, :2], axis=1).max(initial=0) < 60 for look in one)
+    # The boats are past 60 m from the 30th look on, and four seconds later nothing is left of them.
+    near = [np.abs(look.x[:, 1] - 13).min(initial=np.inf) for look in one]
+    assert max(near[8:26]) < 6 and min(near[36:]) > 6
+
+
+def test_flights_of_empty_looks_have_no_tracks() -> None:
+    pytest.importorskip("stonesoup")
+    empty = [Scan(float(row), 0, np.zeros(2), np.zeros((0, 2)), R[:0]) for row in range(4)]
+    assert [len(one.x) for one in run_stone_soup(empty, ["lidar"], dense())] == [0, 0, 0, 0]
+    assert run_stone_soup([], ["lidar"], dense()) == []
+
+
+def test_what_stays_is_shown_only_where_a_draw_asks_for_no_move() -> None:
+    pytest.importorskip("stonesoup")
+    buoy = [Scan(float(row), 0, np.zeros(2), np.array([[20.0, 20.0]]), R) for row in range(20)]
+    still, moved = (run_stone_soup(buoy, ["lidar"], choice(moves_m=m)) for m in (0.0, 5.0))
+    assert [len(one.x) for one in still[1:]] == [1] * 19 and all(not len(one.x) for one in moved)
+    boat = [one._replace(z=one.z + np.array([2 * one.time, 0])) for one in buoy]
+    shown = [len(one.x) for one in run_stone_soup(boat, ["lidar"], choice(moves_m=5.0))]
+    assert shown[:3] == [0, 0, 0] and shown[6:] == [1] * 14
+
+
+def followed(scans: list[Scan], shown: list[Shown]) -> Followed:
+    truth = {"Havfruen": np.array([[30 + one.time, 10.0] for one in scans])}
+    truth["Havfruen"][3] = np.nan
+    sensors = [SensorBeliefs(name, 0.9, 1e-5, 0, 60, 4, (0,), (0,), (0,)) for name in ("lidar", "radar")]
+    return Followed(scans, [frozenset()] * len(scans), shown, {}, sensors, None, truth, [], [])
+
+
+def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch: pytest.MonkeyPatch) -> None:
+    scans = harbour()
+    none = [
+        Shown(one.time, one.sensor, np.zeros(0, int), np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros(0),
+              np.zeros((0, 1)))
+        for one in scans
+    ]  # fmt: skip
+    true = [
+        Shown(one.time, one.sensor, np.array([7]), np.array([[30 + one.time, 10.0, 1, 0]]), np.eye(4)[None],
+              np.ones(1), np.ones((1, 1)))
+        for one in scans
+    ]  # fmt: skip
+    given = []
+
+    def run(*args: object) -> list[Shown]:
+        given.append(args)
+        return true
+
+    monkeypatch.setattr(beside, "run_stone_soup", run)
+    ours = followed(scans, none)
+    theirs = beside.follow_beside(ours, dense())
+    assert given == [(scans, ["lidar", "radar"], dense())] and given[0][0] is ours.scans
+    assert theirs._replace(shown=ours.shown) == ours
+    lives, other = judged(ours, {"Havfruen": 55.0}), judged(theirs, {"Havfruen": 55.0})
+    assert lives is not None and other is not None
+    assert len(lives.gospa) == len(other.gospa) == len(scans) - 1
+    assert lives.targets["Havfruen"].visible == other.targets["Havfruen"].visible > 0
+    assert lives.targets["Havfruen"].tracked == 0 and other.targets["Havfruen"].tracked == 1
+
+
+def table(values: dict[str, tuple[float, ...]], spread: float = 1.0) -> pd.DataFrame:
+    """Four scenarios, two draws; the first is what was tuned on."""
+    return pd.DataFrame(
+        {
+            "case": f"scenario-{n}",
+            "mode": mode,
+            "rank": rank,
+            "draw": rank,
+            "gospa": value + spread * (rank - 1),
+        }
+        for mode, several in values.items()
+        for rank in (1, 2)
+        for n, value in zip((2, 3, 5, 13), several, strict=True)
+    )
+
+
+def test_sentences_turn_with_the_numbers() -> None:
+    one = table({"radar": (1, 7, 8, 9), "lidar": (9, 3, 3, 3)})
+    two = table({"radar": (9, 9, 9, 8), "lidar": (1, 3.01, 2, 3)})
+    said = beside.sentences(beside.compared(one, two, "scenario-2"))[0]
+    assert "by radar alone 1.0 m smaller (8.0 and 9.0 m), smaller in 2 of 3 scenarios" in said
+    assert "by lidar alone as large to a tenth of a metre (3.0 and 3.0 m), smaller in 1 of 3" in said
+    turned = beside.sentences(beside.compared(two, one, "scenario-2"))[0]
+    assert "by radar alone 1.0 m larger (9.0 and 8.0 m), smaller in 1 of 3 scenarios" in turned
+    assert beside.sentences(beside.compared(one, two[two["case"] == "scenario-2"], "scenario-2")) == []
+
+
+def test_ranges_of_the_best_draws_overlap_or_not() -> None:
+    far = beside.compared(table({"radar": (1, 2, 2, 2)}), table({"radar": (1, 5, 5, 5)}), "scenario-2")
+    said = (
+        "By radar alone, the medians of the best 2 draws of ours and of the best 2 draws of Stone Soup's JPDA"
+    )
+    assert beside.spread(far) == [f"{said} lie apart."]
+    near = beside.compared(table({"radar": (1, 2, 2, 2)}, 4), table({"radar": (1, 5, 5, 5)}), "scenario-2")
+    assert beside.spread(near) == [f"{said} overlap."]
+    single = table({"radar": (1, 5, 5, 5)})
+    single = beside.compared(table({"radar": (1, 2, 2, 2)}, 4), single[single["rank"] == 1], "scenario-2")
+    assert "and of the best draw of Stone" in beside.spread(single)[0]
+    row = beside._medians_table(single).iloc[0]
+    assert row["ours (m)"] == "2.00 (2.00 to 6.00)" and row["Stone Soup's JPDA (m)"] == "5.00"
+    assert f"ours by 60 random draws, Stone Soup's JPDA by {beside.MOST_DRAWS}." in beside.tuning(60)
+    assert "ours by 5 random draws, Stone Soup's JPDA by 5." in beside.tuning(5)
+
+
+def test_the_chart_has_every_draw_that_the_tables_have() -> None:
+    one, two = table({"radar": (1, 7, 8, 9), "lidar": (9, 3, 3, 3)}), table({"radar": (9, 9, 9, 8)})
+    fig, name, alt, caption = beside.chart(one, two, "scenario-2")
+    assert len(fig.axes) == 1 and "in 4 scenarios, by radar alone." in alt and name == "beside"
+    drawn = [line.get_xdata() for line in fig.axes[0].get_lines()]
+    assert [1.0, 2.0] in [list(map(float, one)) for one in drawn]
+    assert [9.0] in [
+        list(map(float, one)) for one in drawn
+    ] and "the best 2 of ours and 2 of Stone" in caption
+
+
+def test_what_others_reached_is_said_of_their_scenarios_alone() -> None:
+    found = beside.compared(table({"radar": (1, 2, 2, 2)}), table({"radar": (1, 5, 5, 5)}), "scenario-2")
+    assert "by radar alone 9.0 m, here 4.0 m smaller." in beside.elsewhere(found, beside.ELSEWHERE_ON)
+    assert "here 6.0 m larger" in beside.elsewhere(found.assign(theirs=15.0), beside.ELSEWHERE_ON)
+    assert beside.elsewhere(found, frozenset({"scenario-3"})) == ""
+
+
+def test_its_gospa_stands_after_ours_and_with_its_own_scenario() -> None:
+    ours, other = table({"radar": (1, 2, 3, 4)}), table({"radar": (5, 6, 7, 8)}).iloc[::-1]
+    joined, headings = beside.with_theirs(ours[ours["rank"] == 1], other)
+    assert joined["theirs"].tolist() == [5, 6, 7, 8]
+    assert list(headings)[2:4] == ["gospa", "theirs"] and set(headings) == {*HEADINGS, "theirs"}
+
+
+def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
+    one, same, other = (draw_choice(np.random.default_rng(n), beside.FAR_M) for n in (1, 1, 2))
+    assert one == same != other
+    for seed in range(50):
+        drawn = draw_choice(np.random.default_rng(seed), beside.FAR_M)
+        assert 105 <= drawn.eyes["lidar"].far_m <= 140 and drawn.eyes["radar"].far_m == 200
+        assert 2 <= drawn.hits <= 6 and (drawn.moves_m == 0 or 4 <= drawn.moves_m <= 12)
+
+
+def test_without_the_library_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stone_soup.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(WildlabError, match=r"Stone Soup is not installed here. Install it: .*\[oracles\]"):
+        run_stone_soup([], [], dense())
+    none = beside.judge_beside({}, {}, 40, 1)
+    ours = table({"radar": (1, 2, 3, 4)})
+    assert not len(none) and beside.with_theirs(ours, none) == (ours, HEADINGS)
+    assert beside.sentences(beside.compared(ours, none, "scenario-2")) == []
+    said = []
+
+    class Page:
+        def section(self, title: str, intro: str) -> None:
+            said.append((title, intro))
+
+    beside.show(Page(), ours, none, "scenario-2", 40)
+    assert said == [("Beside Stone Soup's JPDA", beside.MISSING)]
+    assert "not installed" in beside.MISSING and "pip install '.[oracles]'" in beside.MISSING
+
+
+@pytest.mark.slow
+def test_the_draws_are_ordered_by_the_first_scenario_alone(shared_data, tmp_path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    pytest.importorskip("stonesoup")
+    from wildlab.flight.recipe.importing import import_flight
+    from wildlab.paths import DATA
+    from wildlab.pipeline.many.follow import follow_all
+    from wildlab.studies.autoferry_many.tuning import MODES, clocks_of, draw, gospa_of, reach_of
+
+    raw = shared_data("tracking", "autoferry")
+    flights = {
+        f"scenario-{n}": import_flight(DATA / "recipes" / f"autoferry-{n}.toml", raw, tmp_path / str(n))
+        for n in (2, 17)
+    }
+    monkeypatch.setattr(beside, "FOR_EACH", 1)
+    settings = draw(np.random.default_rng(1), clocks_of(flights["scenario-2"]))
+    rows = beside.judge_beside(flights, dict.fromkeys(MODES, settings), 2, 1)
+    assert rows["mode"].unique().tolist() == beside.modes_beside() and len(rows) == 2 * 2 * 3
+    first = rows[rows["case"] == "scenario-2"]
+    assert (first["gospa"] == first["tuned_gospa"]).all()
+    for _, own in first.groupby("mode"):
+        assert own["gospa"].is_monotonic_increasing and sorted(own["draw"]) == [1, 2]
+    # One of them by hand, from the flight on.
+    row = rows[(rows["case"] == "scenario-17") & (rows["mode"] == "radar") & (rows["rank"] == 2)].iloc[0]
+    drawn = draw_choice(np.random.default_rng(1).spawn(2)[row["draw"] - 1], beside.FAR_M)
+    given = follow_all(flights["scenario-17"], settings=settings, sensors=["radar"])
+    shown = run_stone_soup(given.scans, ["radar"], drawn)
+    lives = judged(given._replace(shown=shown), reach_of(flights["scenario-17"], "radar"))
+    assert gospa_of(lives) == row["gospa"]
