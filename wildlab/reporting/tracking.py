@@ -22,6 +22,7 @@ from wildlab.pipeline.following.judged import (
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import NOTHING
+from wildlab.reporting.tracking_anew import summary_sentences
 
 #: Errors nearer to what is stated than by this factor are "about as large".
 ALIKE = 1.2
@@ -118,6 +119,7 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
     unseen = [group for group in pairs_of if not (group["detections"] > 0).any()]
     never = [f"{group['target'].iloc[0]} by {group['sensor'].iloc[0]}" for group in unseen]
+    said += summary_sentences(rows) if "anew" in rows else []
     if never:
         said.append(f"Never followed: {', '.join(never)}.")
     if tuned is not None:
@@ -423,9 +425,12 @@ def record(report: Report, rows: pd.DataFrame) -> None:
             ("fraction_nees_inside", "1", "inside_low", "inside_high", "compared"),
             ("lag1_autocorrelation", "1", None, None, "detections"),
             ("share_followed", "1", None, None, None),
+            ("started_anew", "1", None, None, None),
+            ("looks_without_track", "1", None, None, "spanned"),
         ):
             column = {"fraction_nees_inside": "inside", "lag1_autocorrelation": "lag1",
-                      "share_followed": "followed"}.get(name, name)  # fmt: skip
+                      "share_followed": "followed", "started_anew": "anew",
+                      "looks_without_track": "gone"}.get(name, name)  # fmt: skip
             if not np.isfinite(row[column]):
                 continue
             if name in ("nees", "nis"):

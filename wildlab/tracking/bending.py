@@ -11,9 +11,10 @@ and what was left out with it: its posterior states the measurement's noise N an
 than N in some direction, the error that nobody states is larger than the one that is stated, and a new start
 on the measurement is nearer to the truth than the update.
 
-For a camera at the distance d over its target, focal length f, and a standard deviation s of the position
-across the line of sight, B is about ``(f s^2 / d^2)^2``: with a noise of n pixels the bound is
-``s = d sqrt(n / f)``, the geometric mean of the distance and what the noise is on the ground.
+A camera at the distance d, with the focal length f in pixels and its axis off the plumb line by a, leaves out
+about ``f s^2 sin(a) / d^2`` for a standard deviation s of the position: with a noise of n pixels the bound is
+``s = d sqrt(n / (f sin(a)))``, near the geometric mean of the distance and what the noise is on the ground.
+Straight down over level ground nothing is bent.
 """
 
 from __future__ import annotations

@@ -155,6 +155,7 @@ def follow(
     # What names its target finds it again, however long that was out of view.
     patience = np.inf if scans.labelled else targets.patience_s
     last = last_row(scans.times, first.used, pieces[0].begin.time, patience, targets.patience_s)
+    last = min(last, pieces[-1].last)
     first, own = ended(first, own, last)
     begun, starts = begun_of(scans.times, pieces), starts_of(scans.times, pieces)
     found = []
