@@ -34,7 +34,8 @@ def summary_sentences(rows: pd.DataFrame) -> list[str]:
     if not len(again):
         return []
     times = int(again["anew"].sum())
-    who, it = ("The track", "it") if len(mine) == 1 else (f"{len(again)} of the {len(mine)} tracks", "they")
+    some = f"All {len(mine)}" if len(again) == len(mine) else f"{len(again)} of the {len(mine)}"
+    who, it = ("The track", "it") if len(mine) == 1 else (f"{some} tracks", "they")
     often = "once" if times == 1 else f"{times} times" + (" in all" if len(again) > 1 else "")
     gone, looks, seen = (int(mine[name].sum()) for name in ("gone", "spanned", "gone_seen"))
     return [
