@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from tests.pipeline.robots import KNOWN, robot_flight
+from tests.pipeline.robots import KNOWN, robot_flight, rows_of
 from wildlab.flight.following import parse_settings
+from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import euler_to_matrix
@@ -152,3 +154,31 @@ def test_positions_and_bearings_alone_do_not_end_so(kind: str) -> None:
     near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
     one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
     assert len(one.starts) == 1 and not one.without.any()
+
+
+def paused(sensor: str, seed: int) -> Flight:
+    """A boat by ranges and bearings that are precise, out of sight for a minute and a half."""
+    flight = robot_flight(seed, sensor=sensor, range_sd=0.1, bearing_sd_deg=0.1, seconds=180.0)
+    detections, frames = flight.tables["detections"], flight.tables["frames"]
+    names = frames["frame_id"][(frames["time_s"] < 40) | (frames["time_s"] > 130)]
+    flight.tables["detections"] = detections[detections["frame_id"].isin(names)].reset_index(drop=True)
+    return flight
+
+
+def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track() -> None:
+    one, other = paused("radar", 1), paused("lidar", 2)
+    tables = {
+        name: pd.concat([one.tables[name], other.tables[name]], ignore_index=True)
+        for name in ("frames", "detections")
+    }
+    flight = Flight(one.manifest, one.nav, {**one.tables, **tables})
+    noise = "".join(f"[sensors.{n}.noise]\nrange_m = 0.1\nazimuth_deg = 0.1\n" for n in ("radar", "lidar"))
+    settings = parse_settings(noise + "[targets]\nacceleration_m_s_sqrt_s = 0.5\nstart_speed_m_s = 2.0\n")
+    found = follow_targets(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
+    rows = rows_of(found, "together")
+    assert set(rows.index) == {"ekf", "ekf-smoothed", "ukf", "ukf-smoothed", "imm"}
+    assert (rows["anew"] == 1).all() and (rows["gone"] > 0).all() and (rows["gone_seen"] == 0).all()
+    assert (rows["compared"] + rows["without"] + rows["gone"] == rows["spanned"]).all()
+    assert (rows["rmse"] < 0.5).all()
+    for mine in (track for track in found.tracks if track.sensor == "together"):
+        assert mine.times[mine.starts[1]] > 130

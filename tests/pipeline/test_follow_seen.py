@@ -37,7 +37,8 @@ def test_errors_of_a_long_wait_are_not_those_of_the_track_that_is_seen() -> None
     assert row["without"] + row["gone"] == 101 and row["gone"] > 0 and row["anew"] == 1
     assert row["wait"] == pytest.approx(51.0, abs=1.1)
     said, _ = words.summary(judged(followed), [], None)
-    assert f"where the target is seen, at {row['compared']} of {row['compared'] + row['without']} looks" in said[0]
+    looks = row["compared"] + row["without"]
+    assert f"where the target is seen, at {row['compared']} of {looks} looks" in said[0]
     assert said[1].startswith("Where it is not seen, it is off by")
 
 

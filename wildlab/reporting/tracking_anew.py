@@ -18,12 +18,10 @@ METHOD = (
     "larger than all that a detection may be wrong by, noise and considered errors together. For a camera "
     "whose axis is off the plumb line by an angle a, that is a standard deviation of the position of about "
     "the distance times the square root of the noise in pixels over f sin(a), f being the focal length in "
-    "pixels; "
-    "straight down over level ground nothing is bent. Where the look that sees the target again is from "
-    "nearer or flatter, its geometry counts too. The next detection starts a new track, in the same way as "
-    "the first, H 3.4. The filter with white noise decides this for all filters. Positions are not bent, and "
-    "one bearing says no place to start on: tracks by these do not end so, nor do those of all sensors "
-    "together."
+    "pixels; straight down over level ground nothing is bent. Where the look that sees the target again is "
+    "from nearer or flatter, its geometry counts too. The next detection starts a new track, in the same way "
+    "as the first, H 3.4. The filter with white noise decides this for all filters. Positions are not bent, "
+    "and one bearing says no place to start on: tracks by these alone do not end so."
 )
 
 

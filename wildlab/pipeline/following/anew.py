@@ -12,6 +12,7 @@ decides too. The filter with white noise decides for all, as it chooses the dete
 compared over the same looks.
 
 Positions are not bent. One bearing says no place to start on, and a track by bearings alone does not end so.
+Of several sensors together, that which saw the target last and that which sees it again decide.
 """
 
 from __future__ import annotations
@@ -46,6 +47,46 @@ class Piece(NamedTuple):
         return slice(self.first, self.last)
 
 
+class Geometry(NamedTuple):
+    """How a sensor's looks bend, and all that its detections may be wrong by.
+
+    ``at``: a look and a place (2,) to second derivatives (m, 2, 2) and noise (m, m). ``now``: the same of a
+    look at the place that its one detection says; None where there is none, or several: it is not known which
+    is the target's own.
+    """
+
+    at: Callable[[int, Array], tuple[Array, Array]]
+    now: Callable[[int], tuple[Array, Array] | None]
+
+
+def geometry_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Geometry | None:
+    """Of a sensor whose detections ``seen`` (N, K, m) may be of the target; None where nothing is bent, or a
+    detection says no place to start on."""
+    alone = scans.kind == "bearing" and len(scans.elements) == 1
+    if scans.kind in ("position", "velocity") or alone:
+        return None
+    sensor = sensor_of(scans, np.zeros_like(scans.platform))
+    errors = errors_of(scans, beliefs)
+    slots = [] if errors is None else [SLOTS[scans.kind].index(name) for name in errors.names]
+    there = np.isfinite(seen).all(axis=-1)
+
+    def at(row: int, place: Array) -> tuple[Array, Array]:
+        state = np.append(place, [0.0, 0.0])
+        noise = np.diag(beliefs.white**2)
+        if errors is not None and np.isfinite(errors.covariance[row]).all():
+            G = sensor.predict(row, state).H_pose[:, slots]
+            noise = noise + G @ errors.covariance[row] @ G.T
+        return second_derivatives(sensor, row, state), noise
+
+    def now(row: int) -> tuple[Array, Array] | None:
+        if there[row].sum() != 1:
+            return None
+        place = place_of(scans, row, seen[row, int(np.argmax(there[row]))], beliefs)
+        return None if place is None else at(row, place[0])
+
+    return Geometry(at, now)
+
+
 def ends_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Ends | None:
     """When a track by this sensor ends, for `run_filter`; None for a sensor by which it never does.
 
@@ -54,36 +95,28 @@ def ends_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Ends | None:
     seen
         (N, K, m) detections that may be of the target.
     """
-    alone = scans.kind == "bearing" and len(scans.elements) == 1
-    if scans.kind in ("position", "velocity") or alone:
+    geometry = geometry_of(scans, seen, beliefs)
+    if geometry is None:
         return None
-    sensor = sensor_of(scans, np.zeros_like(scans.platform))
-    errors = errors_of(scans, beliefs)
-    slots = [] if errors is None else [SLOTS[scans.kind].index(name) for name in errors.names]
-    known: dict[tuple[int, bool], tuple[Array, Array]] = {}
-    there = np.isfinite(seen).all(axis=-1)
+    return ends_by(scans.times, beliefs.longest_gap_s, lambda row: (geometry, row))
 
-    def geometry(row: int, place: Array) -> tuple[Array, Array]:
-        """Second derivatives, and all that a detection may be wrong by."""
-        state = np.append(place, [0.0, 0.0])
-        noise = np.diag(beliefs.white**2)
-        if errors is not None and np.isfinite(errors.covariance[row]).all():
-            G = sensor.predict(row, state).H_pose[:, slots]
-            noise = noise + G @ errors.covariance[row] @ G.T
-        return second_derivatives(sensor, row, state), noise
+
+def ends_by(times: Array, gap_s: float, look: Callable[[int], tuple[Geometry | None, int]]) -> Ends:
+    """The same for looks of any sensors: ``look`` gives a row's sensor, and the row among that one's own."""
+    known: dict[int, tuple[Array, Array]] = {}
 
     def ends(row: int, last: int, x_last: Array, P: Array) -> bool:
-        if scans.times[row] - scans.times[last] <= beliefs.longest_gap_s:
+        if times[row] - times[last] <= gap_s:
             return False
-        if (last, True) not in known:
-            known[last, True] = geometry(last, x_last[:2])
-        if share_left_out(P[:2, :2], *known[last, True]) > 1:
-            return True
-        # Of several detections it is not known which is its own, nor from where it would be seen.
-        if there[row].sum() != 1:
-            return False
-        place = place_of(scans, row, seen[row, int(np.argmax(there[row]))], beliefs)
-        return place is not None and share_left_out(P[:2, :2], *geometry(row, place[0])) > 1
+        seen_last, own_last = look(last)
+        if seen_last is not None:
+            if last not in known:
+                known[last] = seen_last.at(own_last, x_last[:2])
+            if share_left_out(P[:2, :2], *known[last]) > 1:
+                return True
+        seen_now, own_now = look(row)
+        here = None if seen_now is None else seen_now.now(own_now)
+        return here is not None and share_left_out(P[:2, :2], *here) > 1
 
     return ends
 
