@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.pipeline.following.beliefs import ROUGH, Said
-from wildlab.pipeline.following.follow import TOGETHER, Followed
+from wildlab.pipeline.following.follow import TOGETHER
 from wildlab.pipeline.following.judged import (
     CAUTIOUS,
     CONSISTENT,
@@ -119,7 +119,7 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
     unseen = [group for group in pairs_of if not (group["detections"] > 0).any()]
     never = [f"{group['target'].iloc[0]} by {group['sensor'].iloc[0]}" for group in unseen]
-    said += summary_sentences(rows) if "anew" in rows else []
+    said += summary_sentences(rows)
     if never:
         said.append(f"Never followed: {', '.join(never)}.")
     if tuned is not None:
@@ -425,12 +425,9 @@ def record(report: Report, rows: pd.DataFrame) -> None:
             ("fraction_nees_inside", "1", "inside_low", "inside_high", "compared"),
             ("lag1_autocorrelation", "1", None, None, "detections"),
             ("share_followed", "1", None, None, None),
-            ("started_anew", "1", None, None, None),
-            ("looks_without_track", "1", None, None, "spanned"),
         ):
             column = {"fraction_nees_inside": "inside", "lag1_autocorrelation": "lag1",
-                      "share_followed": "followed", "started_anew": "anew",
-                      "looks_without_track": "gone"}.get(name, name)  # fmt: skip
+                      "share_followed": "followed"}.get(name, name)  # fmt: skip
             if not np.isfinite(row[column]):
                 continue
             if name in ("nees", "nis"):
@@ -447,8 +444,3 @@ def record(report: Report, rows: pd.DataFrame) -> None:
                 low=None if low is None else float(row[low]),
                 high=None if high is None else float(row[high]),
             )
-
-
-def notes_of(followed: Followed) -> list[str]:
-    """What was done to the measurements."""
-    return list(followed.notes)

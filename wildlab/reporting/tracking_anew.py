@@ -7,6 +7,7 @@ import pandas as pd
 
 from wildlab.pipeline.following.beliefs import LONGEST_GAP_LOOKS, LONGEST_GAP_S
 from wildlab.pipeline.following.follow import Followed
+from wildlab.reporting.report import Report
 
 #: So many times of new starts are listed; the rest is counted.
 MOST_TIMES = 8
@@ -27,6 +28,8 @@ METHOD = (
 
 def summary_sentences(rows: pd.DataFrame) -> list[str]:
     """How often tracks started anew, and over how many looks there was none; nothing where none did."""
+    if "anew" not in rows:
+        return []
     mine = _pairs(rows)
     again = mine[mine["anew"] > 0]
     if not len(again):
@@ -74,6 +77,14 @@ HEADINGS = {
     "seen": "of them in sight",
     "ended": "longest without (s)",
 }
+
+
+def record(report: Report, rows: pd.DataFrame) -> None:
+    """How often each track started anew and over how many looks there was none, for ``metrics.json``."""
+    for _, row in rows[rows["spanned"] > 0].iterrows():
+        subject = f"{row['sensor']}/{row['target']}/{row['filter']}".replace(" ", "-")
+        report.metric("started_anew", subject, int(row["anew"]), "1")
+        report.metric("looks_without_track", subject, int(row["gone"]), "1", n=int(row["spanned"]))
 
 
 def _pairs(rows: pd.DataFrame) -> pd.DataFrame:

@@ -63,6 +63,7 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
         "innovations from one detection to the next, of the element where it is largest; near zero is right. "
         f"Used: detections.{truth}",
     )
+    anew.record(report, rows)
     again = anew.anew_table(followed, rows)
     if len(again):
         report.text(

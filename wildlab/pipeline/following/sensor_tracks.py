@@ -6,8 +6,8 @@ nearest first. What differs is what they believe of the errors, see `wildlab.pip
 Detections that name their target are its own. Where none does, a track starts on the first detection near the
 target's true position, and nearer to it than to another target; from there on the truth is not looked at.
 Without truth all are of one target, whose track starts on the first. A track ends where nothing falls into
-its gate for as long as its patience lasts; and where it is too uncertain for a linearisation, to start anew in
-the same way on the next detection, see `wildlab.pipeline.following.anew`.
+its gate for as long as its patience lasts; and where it is too uncertain for a linearisation: then the next
+detection starts another in the same way, see `wildlab.pipeline.following.anew`.
 """
 
 from __future__ import annotations
