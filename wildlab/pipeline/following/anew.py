@@ -18,7 +18,7 @@ Of several sensors together, that which saw the target last and that which sees 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ def geometry_of(scans: Scans, seen: Array, beliefs: Beliefs) -> Geometry | None:
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     errors = errors_of(scans, beliefs)
     slots = [] if errors is None else [SLOTS[scans.kind].index(name) for name in errors.names]
-    there = np.isfinite(seen).all(axis=-1)
+    there: NDArray[np.bool_] = np.asarray(np.isfinite(seen).all(axis=-1))
 
     def at(row: int, place: Array) -> tuple[Array, Array]:
         state = np.append(place, [0.0, 0.0])
@@ -126,7 +126,7 @@ def part_of(scans: Scans, rows: slice) -> Scans:
     if rows == slice(0, len(scans.times)):
         return scans
     n = len(scans.times)
-    cut = {
+    cut: dict[str, Any] = {
         name: value[rows]
         for name, value in scans._asdict().items()
         if isinstance(value, np.ndarray) and len(value) == n
@@ -167,7 +167,7 @@ def one_after_another(
         alive = np.flatnonzero(np.isfinite(track.x).all(axis=1))
         stopped = int(alive[-1]) + 1 if len(alive) else count - at
         pieces.append(Piece(at, at + stopped, start))
-        tracks.append(Track(*(part[:stopped] for part in track)))
+        tracks.append(Track._make(part[:stopped] for part in track))
         at += stopped
         start = again(at) if at < count else None
     return pieces, joined(tracks, pieces, count)
@@ -179,12 +179,12 @@ def joined(tracks: Sequence[Track], pieces: Sequence[Piece], count: int) -> Trac
         return tracks[0]
     whole = []
     for parts in zip(*tracks, strict=True):
-        empty = {"b": False, "i": -1}.get(parts[0].dtype.kind, np.nan)
+        empty: float = {"b": False, "i": -1}.get(parts[0].dtype.kind, np.nan)
         one = np.full((count, *parts[0].shape[1:]), empty, parts[0].dtype)
         for part, piece in zip(parts, pieces, strict=True):
             one[piece.rows] = part
         whole.append(one)
-    return Track(*whole)
+    return Track._make(whole)
 
 
 def begun_of(times: Array, pieces: Sequence[Piece]) -> NDArray[np.bool_]:

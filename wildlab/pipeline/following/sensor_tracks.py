@@ -86,10 +86,10 @@ class SensorTrack(NamedTuple):
     @property
     def without(self) -> NDArray[np.bool_]:
         """(N,) looks at which there is no track, from the first start to where the last track ends."""
-        gone = ~np.isfinite(self.estimate).all(axis=1)
+        gone: NDArray[np.bool_] = np.asarray(~np.isfinite(self.estimate).all(axis=1))
         gone[self.last :] = False
         gone[: self.starts[0] if len(self.starts) else None] = False
-        return np.asarray(gone)
+        return gone
 
     @property
     def dof(self) -> float:
@@ -165,7 +165,7 @@ def follow(
         tracks = [
             follow_with(
                 filtered, part_of(scans, one.rows), own[one.rows],
-                Track(*(part[one.rows] for part in first)), beliefs, targets, one.begin,
+                Track._make(part[one.rows] for part in first), beliefs, targets, one.begin,
             )
             for one in pieces
         ]  # fmt: skip

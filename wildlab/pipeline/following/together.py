@@ -82,7 +82,7 @@ def follow_together(
             merged.times, later, merged.R, merged.sensor, motion_of(targets), _shifted(start, at),
             gate_probability=1.0 if labelled else targets.gate_probability, ends=ends,
         )  # fmt: skip
-        return Track(*(part[at:] for part in track))
+        return Track._make(part[at:] for part in track)
 
     def again(at: int) -> Start | None:
         later = {}
@@ -121,7 +121,7 @@ def follow_together(
             taken = np.where(inside[:, None], own, np.nan)
             track = _run(name, mine, merged, taken, mine_only, targets, _shifted(piece.begin, piece.first))
             if track is not None:
-                tracks.append(Track(*(part[piece.rows] for part in track)))
+                tracks.append(Track._make(part[piece.rows] for part in track))
         if tracks:
             one = scored(looks, truth, name, joined(tracks, pieces, count), begun, last, targets, ids)
             found.append(one._replace(sizes=sizes, starts=starts[starts < last], last=last))
