@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.pipeline.following.beliefs import ROUGH, Said
-from wildlab.pipeline.following.follow import TOGETHER, Followed
+from wildlab.pipeline.following.follow import TOGETHER
 from wildlab.pipeline.following.judged import (
     CAUTIOUS,
     CONSISTENT,
@@ -22,6 +22,7 @@ from wildlab.pipeline.following.judged import (
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting.report import Report
 from wildlab.reporting.text import NOTHING
+from wildlab.reporting.tracking_anew import summary_sentences
 
 #: Errors nearer to what is stated than by this factor are "about as large".
 ALIKE = 1.2
@@ -118,6 +119,7 @@ def summary(rows: pd.DataFrame, pairs: Sequence[Apart], tuned: Tuned | None) -> 
     pairs_of = [group for _, group in rows.groupby(["sensor", "target"], sort=False)]
     unseen = [group for group in pairs_of if not (group["detections"] > 0).any()]
     never = [f"{group['target'].iloc[0]} by {group['sensor'].iloc[0]}" for group in unseen]
+    said += summary_sentences(rows)
     if never:
         said.append(f"Never followed: {', '.join(never)}.")
     if tuned is not None:
@@ -442,8 +444,3 @@ def record(report: Report, rows: pd.DataFrame) -> None:
                 low=None if low is None else float(row[low]),
                 high=None if high is None else float(row[high]),
             )
-
-
-def notes_of(followed: Followed) -> list[str]:
-    """What was done to the measurements."""
-    return list(followed.notes)

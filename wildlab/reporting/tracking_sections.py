@@ -10,6 +10,7 @@ from wildlab.pipeline.following.follow import Followed
 from wildlab.pipeline.following.judged import Apart, verdict
 from wildlab.pipeline.following.tuned import Tuned
 from wildlab.reporting import tracking as words
+from wildlab.reporting import tracking_anew as anew
 from wildlab.reporting.charts import following as charts
 from wildlab.reporting.charts.beside import beside_plain_shown
 from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
@@ -62,6 +63,20 @@ def tracks_section(report: Report, followed: Followed, rows: pd.DataFrame) -> No
         "innovations from one detection to the next, of the element where it is largest; near zero is right. "
         f"Used: detections.{truth}",
     )
+    anew.record(report, rows)
+    again = anew.anew_table(followed, rows)
+    if len(again):
+        report.text(
+            "Tracks that became too uncertain ended, and the next detection started another. All filters of "
+            "a target start anew together."
+        )
+        report.table(
+            again,
+            columns=anew.HEADINGS,
+            digits={"anew": 0, "seen": 0, "ended": 1},
+            caption="Looks without a track: from the first start to the end of the last track; they are in "
+            "no error, NEES or NIS. In sight: looks at which the target was seen all the same.",
+        )
 
 
 def pictures_section(
@@ -164,7 +179,7 @@ def end_section(report: Report, followed: Followed) -> None:
         "gate; without truth and names all are of one target. The extended filter (EKF) takes errors for "
         "new at every look, H (3.5) and (3.7); the one for coloured noise works on differences of "
         "positions, H 7.2.2; the Schmidt filter considers errors that last without estimating them, H "
-        "7.4. Smoothed estimates know later detections too.\n\n"
+        f"7.4. Smoothed estimates know later detections too.\n\n{anew.METHOD}\n\n"
         "Errors are judged at looks at which the target was seen: where a detection is its own by name, "
         "lies within reach of its true place, or was taken. The others say how fast a track strays; their "
         "error is a number of its own. Fewer than five detections are not judged. NEES is of the position, "

@@ -97,12 +97,15 @@ def predict_by_motion(motion: Motion) -> PredictTo:
 
 
 def step_through(
-    given: FilterInputs, start: Start, predict_to: PredictTo, step: Callable[[int, State, Track], State]
+    given: FilterInputs,
+    start: Start,
+    predict_to: PredictTo,
+    step: Callable[[int, State, Track], State | None],
 ) -> Track:
     """Apply a filter's ``step`` to the rows in order, and predict to the requested times in between.
 
     ``predict_to`` gives estimate and covariance at a later time; ``step`` gives the state after a row, and
-    may leave it at an earlier time.
+    may leave it at an earlier time. None ends the track: it has no estimates from that row on.
     """
     N, _, m = given.z.shape
     M, n = len(given.output_times), len(start.x)
@@ -132,8 +135,12 @@ def step_through(
 
     for row in range(first, N):
         out = write_until(given.times[row], out)
-        state = step(row, state, track)
-    write_until(np.inf, out)
+        after = step(row, state, track)
+        if after is None:
+            break
+        state = after
+    else:
+        write_until(np.inf, out)
     if given.sizes is not None:  # what a row does not measure was told and not seen
         absent = np.arange(m) >= given.sizes[:, None]
         track.innovation[absent] = np.nan

@@ -7,6 +7,7 @@ every row, also to rows without a usable measurement; see `wildlab.tracking.moti
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,10 @@ from wildlab.tracking.records import State, predict_by_motion, record, step_thro
 from wildlab.tracking.records import Track as Track
 from wildlab.tracking.sensors import Sensor, angles_at, check_states, on_state
 from wildlab.tracking.starts import start_from_first as start_from_first
+
+#: Row, the row of the detection that was used last, the estimate then, covariance now -> whether the track
+#: ends here, before anything of this row is used.
+Ends = Callable[[int, int, Array, Array], bool]
 
 
 class Step(NamedTuple):
@@ -56,6 +61,7 @@ def run_filter(
     pose: Considers | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
+    ends: Ends | None = None,
 ) -> Track:
     """Kalman filter on positions; extended filter on pixels, bearings, ranges; Schmidt filter with ``pose``.
 
@@ -85,6 +91,9 @@ def run_filter(
         region is not used. In (0, 1]; 1 is no gate.
     output_times
         (M,) s, in order; the measurements' own when not given.
+    ends
+        When the track ends: asked at every row behind the start, see `Ends`. From there on there are no
+        estimates. None: never.
 
     Returns
     -------
@@ -113,7 +122,7 @@ def run_filter(
     """
     return filter_in_steps(
         times, measurements, R, sensor, motion, start, pose=pose, gate_probability=gate_probability,
-        output_times=output_times,
+        output_times=output_times, ends=ends,
     )[0]  # fmt: skip
 
 
@@ -128,6 +137,7 @@ def filter_in_steps(
     pose: Considers | None = None,
     gate_probability: float = 1.0,
     output_times: ArrayLike | None = None,
+    ends: Ends | None = None,
 ) -> tuple[Track, list[Step], Errors | None]:
     """`run_filter`, with what it did at every row, and the considered errors as it worked with them."""
     given = checked(times, measurements, R, gate_probability, output_times, sensor.sizes)
@@ -138,12 +148,16 @@ def filter_in_steps(
     n, steps = len(start.x), list[Step]()
     C = check_cross(start, n, errors.k) if errors is not None else np.zeros((n, 0))
 
-    def step(row: int, state: State, track: Track) -> State:
-        nonlocal C
+    last, x_last = _first_row(start, given.times), np.asarray(start.x, float)
+
+    def step(row: int, state: State, track: Track) -> State | None:
+        nonlocal C, last, x_last
         then, x, P = state
         now, dt = float(given.times[row]), given.times[row] - then
         F, Q = motion(dt)
         x, P = predict(x, P, F, Q)
+        if ends is not None and ends(row, last, x_last, P):
+            return None
         C = C if errors is None else errors.carry(C, F, row, dt)
         done = Step(row, now, F, Q, x, P, C, x, P, C)
         steps.append(done)
@@ -179,7 +193,13 @@ def filter_in_steps(
         else:
             considered = schmidt.update_schmidt(x, P, C, P_pose, best.innovation, H, H_errors, noise)
             x, P, C, gain = considered.x, considered.P, considered.C, considered.gain
+        last, x_last = row, x
         steps[-1] = done._replace(x=x, P=P, C=C, gain=gain, H=H, H_errors=H_errors, R=noise)
         return now, x, P
 
     return step_through(given, start, predict_by_motion(motion), step), steps, errors
+
+
+def _first_row(start: Start, times: Array) -> int:
+    """The row that a start was made from, or the first that is not before it."""
+    return start.row if start.row >= 0 else min(int(np.searchsorted(times, start.time)), len(times) - 1)

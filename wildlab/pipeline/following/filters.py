@@ -29,7 +29,7 @@ from wildlab.tracking.coloured import run_coloured, thin
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.motion import Motion
-from wildlab.tracking.run import Start, Track, run_filter
+from wildlab.tracking.run import Ends, Start, Track, run_filter
 from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
 
@@ -67,13 +67,23 @@ def white_noise(scans: Scans, sds: Array) -> Array:
 
 
 def choose(
-    scans: Scans, seen: Array, beliefs: Beliefs, targets: TargetBeliefs, begin: Start, *, gate: bool = True
+    scans: Scans,
+    seen: Array,
+    beliefs: Beliefs,
+    targets: TargetBeliefs,
+    begin: Start,
+    *,
+    gate: bool = True,
+    ends: Ends | None = None,
 ) -> Track:
-    """The filter with white noise, which chooses the nearest of ``seen`` (N, K, m), in its gate or of all."""
+    """The filter with white noise, which chooses the nearest of ``seen`` (N, K, m), in its gate or of all.
+
+    ``ends`` as in `run_filter`.
+    """
     sensor = sensor_of(scans, np.zeros_like(scans.platform))
     return run_filter(
         scans.times, seen, white_noise(scans, beliefs.white), sensor, motion_of(targets), begin,
-        gate_probability=targets.gate_probability if gate else 1.0,
+        gate_probability=targets.gate_probability if gate else 1.0, ends=ends,
     )  # fmt: skip
 
 

@@ -81,7 +81,9 @@ def judged(followed: Followed) -> pd.DataFrame:
     ``inside_low``, ``inside_high``; the same of ``nis``, its degrees of freedom ``dof`` and ``nis_verdict``;
     ``lag1``: the largest autocorrelation of an element of the whitened innovations from one detection to the
     next, with ``lag1_bound``, what white noise stays below; ``followed``: the share of looks with truth that
-    have a track.
+    have a track; ``anew``: how often a track ended and another started, and ``gone``: looks
+    without a track, of ``spanned`` from the first start to the end of the last, ``gone_seen`` of them with
+    the target in sight.
     """
     return pd.DataFrame([_row(one, kind_of(followed, one.sensor)) for one in followed.tracks])
 
@@ -114,6 +116,10 @@ def _row(one: SensorTrack, kind: str) -> dict[str, object]:
         "filter": one.filter,
         "detections": int(np.isfinite(one.nis).sum()),
         "used": int(used.sum()),
+        "anew": max(len(one.starts) - 1, 0),
+        "gone": int(one.without.sum()),
+        "spanned": int(one.last - one.starts[0]) if len(one.starts) else 0,
+        "gone_seen": int((one.without & looked).sum()),
         "wait": float(np.diff(one.times[used]).max()) if used.sum() > 1 else np.nan,
         "compared": of_nees.n,
         "rmse": summary.rmse,

@@ -12,10 +12,11 @@ from wildlab.errors import WildlabError
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.anew import part_of
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.expected import sensor_of
-from wildlab.pipeline.following.filters import choose, motion_of, white_noise
-from wildlab.pipeline.following.sensor_tracks import begin_of_target
+from wildlab.pipeline.following.filters import motion_of, white_noise
+from wildlab.pipeline.following.sensor_tracks import choose_in_pieces
 from wildlab.pipeline.following.sensor_tuning import FEWEST, SensorTuning
 from wildlab.pipeline.following.whose import identified, targets_of
 from wildlab.pipeline.scans import Scans, scans_of
@@ -110,14 +111,15 @@ def _cases(
     truths = targets_of(flight, looks)
     for truth in truths:
         others = [one for one in truths if one.target != truth.target]
-        seen, begin = begin_of_target(looks, truth, beliefs, targets, others)
-        if begin is None:
+        seen, pieces, first = choose_in_pieces(looks, truth, beliefs, targets, others)
+        if first is None:
             continue
-        first = choose(looks, seen, beliefs, targets, begin, gate=not looks.labelled)
         rows = np.arange(len(seen))
         own = np.where(first.used[:, None], seen[rows, np.maximum(first.chosen, 0)], np.nan)
         own[MOST_LOOKS:] = np.nan
-        found.append(_Case(sensor, looks, own, beliefs, begin))
+        found += [
+            _Case(sensor, part_of(looks, one.rows), own[one.rows], beliefs, one.begin) for one in pieces
+        ]
     return found
 
 

@@ -6,7 +6,8 @@ nearest first. What differs is what they believe of the errors, see `wildlab.pip
 Detections that name their target are its own. Where none does, a track starts on the first detection near the
 target's true position, and nearer to it than to another target; from there on the truth is not looked at.
 Without truth all are of one target, whose track starts on the first. A track ends where nothing falls into
-its gate for as long as its patience lasts.
+its gate for as long as its patience lasts; and where it is too uncertain for a linearisation: then the next
+detection starts another in the same way, see `wildlab.pipeline.following.anew`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,16 @@ from wildlab.evaluation.consistency import average, chi_square_interval, positio
 from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.evaluation.whiteness import autocorrelation, effective_sample_size
 from wildlab.flight.store import Flight
+from wildlab.pipeline.following.anew import (
+    Piece,
+    begun_of,
+    ends_of,
+    joined,
+    one_after_another,
+    part_of,
+    starts_of,
+    truth_of,
+)
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs, from_tuning
 from wildlab.pipeline.following.expected import errors_near
 from wildlab.pipeline.following.filters import choose, follow_with
@@ -50,7 +61,8 @@ class SensorTrack(NamedTuple):
     ``near`` (N,): where the sensor saw something within reach of the target's true place, or its label.
     ``covariance`` (N, 4, 4) of the estimate, ``S`` (N, m, m) of the innovation, ``detection`` (N,) the name
     of the one that was used, "" none. ``sizes`` (N,) how many elements its detection has, where looks are of
-    several sensors.
+    several sensors. ``starts`` (T,) the looks at which a track of the target starts, and ``last``, at which
+    the last of them is over.
     """
 
     sensor: str
@@ -68,6 +80,16 @@ class SensorTrack(NamedTuple):
     S: Array = np.empty((0, 0, 0))
     detection: NDArray[np.object_] = np.empty(0, object)
     sizes: NDArray[np.int64] = np.empty(0, np.int64)
+    starts: NDArray[np.int64] = np.empty(0, np.int64)
+    last: int = 0
+
+    @property
+    def without(self) -> NDArray[np.bool_]:
+        """(N,) looks at which there is no track, from the first start to where the last track ends."""
+        gone: NDArray[np.bool_] = np.asarray(~np.isfinite(self.estimate).all(axis=1))
+        gone[self.last :] = False
+        gone[: self.starts[0] if len(self.starts) else None] = False
+        return gone
 
     @property
     def dof(self) -> float:
@@ -121,28 +143,69 @@ def follow(
     WildlabError
         Where the detections cannot go through one of the filters.
     """
-    seen, begin = begin_of_target(scans, truth, beliefs, targets, others)
-    if begin is None:
+    seen, pieces, first = choose_in_pieces(scans, truth, beliefs, targets, others)
+    if first is None:
         return [no_track(scans, truth, name, targets) for name in filters]
-    # What names its target needs no gate to be told apart.
-    first = choose(scans, seen, beliefs, targets, begin, gate=not scans.labelled)
     # From here on one detection a scan: the same for all.
     rows = np.arange(len(seen))
     chosen = first.chosen.copy()
-    if begin.row >= 0:
-        chosen[begin.row] = int(np.argmax(np.isfinite(seen[begin.row]).all(axis=-1)))
+    for row in [piece.first + piece.begin.row for piece in pieces if piece.begin.row >= 0]:
+        chosen[row] = int(np.argmax(np.isfinite(seen[row]).all(axis=-1)))
     own = np.where(first.used[:, None], seen[rows, np.maximum(chosen, 0)], np.nan)
     ids = np.where(first.used, scans.ids[rows, np.maximum(chosen, 0)], "")
     # What names its target finds it again, however long that was out of view.
     patience = np.inf if scans.labelled else targets.patience_s
-    last = last_row(scans.times, first.used, begin.time, patience, targets.patience_s)
-    begun = scans.times > begin.time
+    last = last_row(scans.times, first.used, pieces[0].begin.time, patience, targets.patience_s)
+    last = min(last, pieces[-1].last)
     first, own = ended(first, own, last)
+    begun, starts = begun_of(scans.times, pieces), starts_of(scans.times, pieces)
     found = []
     for name in filters:
-        track = follow_with("ekf" if name == "kf" else name, scans, own, first, beliefs, targets, begin)
-        found.append(scored(scans, truth, name, track, begun, last, targets, ids))
+        filtered = "ekf" if name == "kf" else name
+        tracks = [
+            follow_with(
+                filtered, part_of(scans, one.rows), own[one.rows],
+                Track._make(part[one.rows] for part in first), beliefs, targets, one.begin,
+            )
+            for one in pieces
+        ]  # fmt: skip
+        track = scored(scans, truth, name, joined(tracks, pieces, len(seen)), begun, last, targets, ids)
+        found.append(track._replace(starts=starts[starts < last], last=last))
     return found
+
+
+def choose_in_pieces(
+    scans: Scans,
+    truth: Truth,
+    beliefs: Beliefs,
+    targets: TargetBeliefs,
+    others: Sequence[Truth] = (),
+) -> tuple[Array, list[Piece], Track | None]:
+    """The filter with white noise, which chooses detections and says when a track ends.
+
+    Returns
+    -------
+    Detections (N, K, m) that may be of the target; the tracks' looks, and all tracks as one: none and None
+    where nothing starts one.
+    """
+    count = len(scans.times)
+    seen, begin = begin_of_target(scans, truth, beliefs, targets, others)
+    if begin is None:
+        return seen, [], None
+
+    def choose_from(at: int, start: Start) -> Track:
+        rows = slice(at, count)
+        part = part_of(scans, rows)
+        ends = ends_of(part, seen[rows], beliefs)
+        # What names its target needs no gate to be told apart.
+        return choose(part, seen[rows], beliefs, targets, start, gate=not scans.labelled, ends=ends)
+
+    def again(at: int) -> Start | None:
+        rows = slice(at, count)
+        rivals = [truth_of(one, rows) for one in others]
+        return begin_of_target(part_of(scans, rows), truth_of(truth, rows), beliefs, targets, rivals)[1]
+
+    return seen, *one_after_another(begin, count, choose_from, again)
 
 
 def begin_of_target(

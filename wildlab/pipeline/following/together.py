@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array
+from wildlab.pipeline.following.anew import ends_by, geometry_of, joined, one_after_another, starts_of
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import sensor_of
@@ -38,7 +39,7 @@ from wildlab.tracking.considered import Considered, consider_all
 from wildlab.tracking.considering import renamed
 from wildlab.tracking.imm import run_imm
 from wildlab.tracking.records import Start, Track
-from wildlab.tracking.run import run_filter
+from wildlab.tracking.run import Ends, run_filter
 from wildlab.tracking.sensors import Sensor
 from wildlab.tracking.smoothing import run_smoothed, smooth
 from wildlab.tracking.unscented import run_unscented
@@ -71,28 +72,74 @@ def follow_together(
     if begin is None:
         return [no_track(looks, truth, name, targets)._replace(sizes=sizes) for name in filters]
     labelled = any(part[0].labelled for part in mine.values())
-    first = run_filter(
-        merged.times, merged.measurements, merged.R, merged.sensor, motion_of(targets), begin,
-        gate_probability=1.0 if labelled else targets.gate_probability,
-    )  # fmt: skip
-    rows = np.arange(len(merged.times))
-    chosen = np.maximum(first.chosen, 0)
+    rows, count = np.arange(len(merged.times)), len(merged.times)
     z = merged.measurements if merged.measurements.ndim == 3 else merged.measurements[:, None]
-    if begin.row >= 0:
-        chosen[begin.row] = int(np.argmax(np.isfinite(z[begin.row]).any(axis=-1)))
+    ends = _ends(mine, merged, seen)
+
+    def choose_from(at: int, start: Start) -> Track:
+        later = np.where((rows >= at)[:, None, None], z, np.nan)
+        track = run_filter(
+            merged.times, later, merged.R, merged.sensor, motion_of(targets), _shifted(start, at),
+            gate_probability=1.0 if labelled else targets.gate_probability, ends=ends,
+        )  # fmt: skip
+        return Track._make(part[at:] for part in track)
+
+    def again(at: int) -> Start | None:
+        later = {}
+        for i, (name, (scans, beliefs, truths)) in enumerate(mine.items()):
+            cut = scans.detections.copy()
+            cut[merged.rows[:at][merged.which[:at] == i]] = np.nan
+            own_truth = next(one for one in truths if one.target == target)
+            others = [one for one in truths if one.target != target]
+            left = scans._replace(detections=cut)
+            later[name] = begin_of_target(left, own_truth, beliefs, targets, others)[1]
+        found = _begin(mine, merged, later)
+        return None if found is None else _shifted(found, -at)
+
+    pieces, first = one_after_another(begin, count, choose_from, again)
+    chosen = np.maximum(first.chosen, 0)
+    for row in [piece.first + piece.begin.row for piece in pieces if piece.begin.row >= 0]:
+        chosen[row] = int(np.argmax(np.isfinite(z[row]).any(axis=-1)))
     own = np.where(first.used[:, None], z[rows, chosen], np.nan)
     ids = np.where(first.used, looks.ids[rows, chosen], "")
     patience = np.inf if labelled else targets.patience_s
     last = last_row(merged.times, first.used, begin.time, patience, targets.patience_s)
+    last = min(last, pieces[-1].last)
     first, own = ended(first, own, last)
-    begun = rows > begin.row if begin.row >= 0 else merged.times > begin.time
+    starts = starts_of(merged.times, pieces)
+    begun = np.zeros(count, bool)
+    for piece in pieces:
+        at, start = piece.first, piece.begin
+        behind = rows > at + start.row if start.row >= 0 else merged.times > start.time
+        begun[piece.rows] = behind[piece.rows]
     found = []
     for name in filters:
-        track = _run(name, mine, merged, own, first, targets, begin)
-        if track is not None:
-            one = scored(looks, truth, name, track, begun, last, targets, ids)
-            found.append(one._replace(sizes=sizes))
+        tracks = []
+        for piece in pieces:
+            inside = (rows >= piece.first) & (rows < piece.last)
+            mine_only = first._replace(x=np.where(inside[:, None], first.x, np.nan))
+            taken = np.where(inside[:, None], own, np.nan)
+            track = _run(name, mine, merged, taken, mine_only, targets, _shifted(piece.begin, piece.first))
+            if track is not None:
+                tracks.append(Track._make(part[piece.rows] for part in track))
+        if tracks:
+            one = scored(looks, truth, name, joined(tracks, pieces, count), begun, last, targets, ids)
+            found.append(one._replace(sizes=sizes, starts=starts[starts < last], last=last))
     return found
+
+
+def _shifted(start: Start, by: int) -> Start:
+    """The start with its row counted from elsewhere."""
+    return start._replace(row=start.row + by) if start.row >= 0 else start
+
+
+def _ends(mine: Parts, merged: Merged, seen: Mapping[str, Array]) -> Ends | None:
+    """When a track of all sensors ends; None where none of them bends."""
+    shapes = [geometry_of(scans, seen[name], beliefs) for name, (scans, beliefs, _) in mine.items()]
+    if all(one is None for one in shapes):
+        return None
+    gap = max(beliefs.longest_gap_s for _, beliefs, _ in mine.values())
+    return ends_by(merged.times, gap, lambda row: (shapes[merged.which[row]], int(merged.rows[row])))
 
 
 def _merged(mine: Parts, seen: Mapping[str, Array], drift: Mapping[str, Array], white: bool) -> Merged:

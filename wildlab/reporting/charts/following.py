@@ -112,15 +112,15 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
         there = np.isfinite(values)
         if not there.any():
             continue
-        keep = thinned(int(there.sum()))
+        t, y = _lines(one, values)
+        y = np.maximum(y, 1e-4)
         look = {"color": colour(one.filter.removesuffix(SMOOTHED)), "label": filter_words(one.filter)}
         dashes = "--" if one.filter.endswith(SMOOTHED) else "-"
-        t, y = one.times[there][keep], np.maximum(values[there][keep], 1e-4)
         if what == "nees":
             ax.plot(t, y, lw=1.4, ls=dashes, **look)
         else:
             ax.plot(t, y, ".", ms=3.5, alpha=0.6, mec="none", **look)
-        highest, lowest = max(highest, float(y.max())), min(lowest, float(y.min()))
+        highest, lowest = max(highest, float(np.nanmax(y))), min(lowest, float(np.nanmin(y)))
         said.append(f"{filter_words(one.filter)} {mine.loc[one.filter, what]:.2f}")
         brief.append(f"{short_words(one.filter)} {mine.loc[one.filter, what]:.2f}")
     low, high = chi_square_interval(dof)
@@ -140,6 +140,14 @@ def squares_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame, what: str) 
     return fig, slug(what, first.sensor, first.target), alt, f"Means: {words}; {dof:g} is ideal."
 
 
+def _lines(one: SensorTrack, values: Array) -> tuple[Array, Array]:
+    """Times and values (K,) of the looks that have one, thinned; NaN between one track and the next."""
+    rows = np.flatnonzero(np.isfinite(values))
+    rows = rows[thinned(len(rows))]
+    new = np.flatnonzero(np.diff(np.searchsorted(one.starts, rows, side="right"))) + 1
+    return np.insert(one.times[rows], new, np.nan), np.insert(values[rows], new, np.nan)
+
+
 def few(brief: Sequence[str]) -> str:
     """No more than fit into a title."""
     return " · ".join(brief[:3]) + (" …" if len(brief) > 3 else "")
@@ -157,17 +165,10 @@ def errors_shown(tracks: Sequence[SensorTrack], rows: pd.DataFrame) -> Shown:
         there = np.isfinite(away)
         if not there.any():
             continue
-        keep = thinned(int(there.sum()))
         stated = np.sqrt(np.trace(one.covariance[:, :2, :2], axis1=1, axis2=2))
         tint = colour(one.filter.removesuffix(SMOOTHED))
-        ax.plot(one.times[there][keep], away[there][keep], color=tint, lw=1.5, label=filter_words(one.filter))
-        ax.plot(
-            one.times[there][keep],
-            stated[there][keep],
-            color=tint,
-            lw=1.0,
-            ls=":",
-        )
+        ax.plot(*_lines(one, away), color=tint, lw=1.5, label=filter_words(one.filter))
+        ax.plot(*_lines(one, np.where(there, stated, np.nan)), color=tint, lw=1.0, ls=":")
         far = length(float(mine["rmse"].to_dict()[one.filter]))
         said.append(f"{filter_words(one.filter)} {far}")
         brief.append(f"{short_words(one.filter)} {far}")

@@ -1,0 +1,184 @@
+"""A target out of sight for long: its track ends when it is too uncertain, and another finds it again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.pipeline.robots import KNOWN, robot_flight, rows_of
+from wildlab.flight.following import parse_settings
+from wildlab.flight.store import Flight
+from wildlab.geometry.camera import Camera
+from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.frames import euler_to_matrix
+from wildlab.geometry.georeference import ground_to_pixel
+from wildlab.geometry.mount import Mount
+from wildlab.pipeline.following import sensor_tracks
+from wildlab.pipeline.following.anew import part_of
+from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.follow import Followed, follow_targets
+from wildlab.pipeline.following.judged import judged, seen_of
+from wildlab.pipeline.following.sensor_tracks import SensorTrack
+from wildlab.pipeline.scans import Scans, Truth
+from wildlab.reporting import tracking as words
+from wildlab.reporting.tracking_anew import anew_table
+
+CAMERA = Camera(640, 512, 1100.0, 1100.0, 320.0, 256.0)
+HEIGHT, TILT, NOISE_PX = 60.0, 0.6, 2.0
+TARGETS = TargetBeliefs(0.5, 5.0, 0.99, 10.0, 20.0, 0.1, float("nan"), None)
+FILTERS = ("ekf", "ukf", "imm", "coloured")
+
+
+def watched(*, pause_s: float = 200.0, seed: int = 0, rate_hz: float = 5.0) -> tuple[Scans, Truth]:
+    """A hovering camera sees an animal that wanders for ten seconds, and again after a pause."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, 20.0 + pause_s, 1 / rate_hz)
+    middle = np.array([0.0, -HEIGHT * np.tan(TILT)])
+    place = middle + np.column_stack([3 * np.sin(times / 5), 2 * np.cos(times / 7)])
+    velocity = np.column_stack([0.6 * np.cos(times / 5), -2 / 7 * np.sin(times / 7)])
+    n = len(times)
+    R_nb = np.tile(euler_to_matrix(TILT, 0.0, 0.0), (n, 1, 1))
+    poses = CameraPoses(CAMERA, Mount(), np.tile([0.0, 0.0, -HEIGHT], (n, 1)), R_nb)
+    uv = ground_to_pixel(CAMERA, np.column_stack([place, np.zeros(n)]), poses.p_nc, poses.R_nc)
+    assert np.isfinite(uv).all()
+    uv += rng.normal(0, NOISE_PX, uv.shape)
+    uv[(times > 10) & (times < 10 + pause_s)] = np.nan
+    labels = np.where(np.isfinite(uv[:, :1]), "deer", "").astype(object)
+    ids = np.array([[f"d{k}"] for k in range(n)], object)
+    still = np.zeros((n, 2))
+    scans = Scans(
+        "camera", "pixel", times, uv[:, None], still, still, ("u", "v"), labels, ids,
+        drop=np.full(n, HEIGHT), plane_down=np.zeros(n), poses=poses,
+    )  # fmt: skip
+    return scans, Truth("deer", place, velocity, 0.0)
+
+
+def beliefs(scans: Scans) -> Beliefs:
+    nan, sd = float("nan"), np.full(2, NOISE_PX)
+    return Beliefs("camera", scans.kind, 0.0, sd, sd, (), 0.0, 1.0, nan, nan, nan, scans.interval_s)
+
+
+def follow(pause_s: float = 200.0, **more: int) -> list[SensorTrack]:
+    scans, truth = watched(pause_s=pause_s, **more)
+    return sensor_tracks.follow(scans, truth, beliefs(scans), TARGETS, FILTERS)
+
+
+def followed(tracks: list[SensorTrack]) -> Followed:
+    scans, _ = watched()
+    return Followed(tracks, {"camera": scans}, {"camera": beliefs(scans)}, TARGETS, [], [], True)
+
+
+def off_after(one: SensorTrack) -> float:
+    """Root mean square distance where the target is seen again, m."""
+    again = seen_of(one) & (one.times > 100)
+    return float(np.sqrt(np.mean(np.sum(one.error[again, :2] ** 2, axis=1))))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_track_through_a_long_gap_finds_its_target_again(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on_ground = NOISE_PX / CAMERA.fx * HEIGHT / np.cos(TILT) ** 2
+    tracks = follow(seed=seed)
+    for one in tracks:
+        assert len(one.starts) == 2 and one.times[one.starts[1]] == pytest.approx(210.0)
+        assert off_after(one) < 2 * np.sqrt(2) * on_ground
+    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    without = follow(seed=seed)
+    assert len(without[0].starts) == 1
+    assert off_after(without[0]) > 10 * off_after(tracks[0])
+
+
+def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silently() -> None:
+    tracks = follow()
+    rows = judged(followed(tracks))
+    first = tracks[0]
+    for one in tracks:
+        assert (np.isfinite(one.estimate) == np.isfinite(first.estimate)).all()
+        assert (one.starts == first.starts).all() and (one.detection == first.detection).all()
+    for _, row in rows.iterrows():
+        assert row["anew"] == 1 and row["gone_seen"] == 0
+        assert row["compared"] + row["without"] + row["gone"] == row["spanned"]
+        assert row["compared"] == seen_of(first).sum() == row["used"]
+        assert row["detections"] == row["used"] - 2  # the two that tracks were put on
+    # The track ends within the pause, and not at once.
+    ended = first.times[np.flatnonzero(first.without)[0]]
+    assert 11.0 < ended < 60.0 and first.without.sum() > 0.7 * 5 * 200
+
+
+def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with_ends = follow(0.0)
+    monkeypatch.setattr(sensor_tracks, "ends_of", lambda *given: None)
+    for one, other in zip(with_ends, follow(0.0), strict=True):
+        assert len(one.starts) == 1 and not one.without.any()
+        for name in ("estimate", "covariance", "innovation", "S", "nis", "nees"):
+            assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+
+
+def test_a_new_track_is_the_same_as_one_of_a_flight_that_begins_there() -> None:
+    scans, truth = watched()
+    tracks = follow()
+    rows = slice(int(tracks[0].starts[1]), len(scans.times))
+    later = truth._replace(position=truth.position[rows], velocity=truth.velocity[rows])
+    alone = sensor_tracks.follow(part_of(scans, rows), later, beliefs(scans), TARGETS, FILTERS)
+    for one, other in zip(tracks, alone, strict=True):
+        assert np.array_equal(one.estimate[rows], other.estimate, equal_nan=True)
+        assert np.array_equal(one.nis[rows], other.nis, equal_nan=True)
+
+
+def test_the_page_says_how_often_and_when() -> None:
+    found = followed(follow())
+    rows = judged(found)
+    gone, spanned = rows["gone"].iloc[0], rows["spanned"].iloc[0]
+    said, _ = words.summary(rows, [], None)
+    assert (
+        "The track became too uncertain to take a detection, and it ended and started anew once. From the "
+        f"first start to the last end {gone} of {spanned} looks have no track and count in no error; the "
+        "target is in sight at none of them."
+    ) in said
+    table = anew_table(found, rows).iloc[0]
+    assert (table["anew"], table["when"], table["gone"]) == (1, "210", f"{gone} of {spanned}")
+    assert not any("anew" in one for one in words.summary(judged(followed(follow(0.0))), [], None)[0])
+
+
+@pytest.mark.parametrize("kind", ["position", "bearing"])
+def test_positions_and_bearings_alone_do_not_end_so(kind: str) -> None:
+    flight = robot_flight(1, kind=kind)
+    detections = flight.tables["detections"]
+    t = flight.tables["frames"]["time_s"].to_numpy()
+    names = flight.tables["frames"]["frame_id"][(t < 40) | (t > 90)]
+    flight.tables["detections"] = detections[detections["frame_id"].isin(names)].reset_index(drop=True)
+    near = "[sensors.radar]\nrange_m = 90.0\nrange_sd_m = 30.0\n"
+    one = follow_targets(flight, settings=parse_settings(near + KNOWN)).tracks[0]
+    assert len(one.starts) == 1 and not one.without.any()
+
+
+def paused(sensor: str, seed: int) -> Flight:
+    """A boat by ranges and bearings that are precise, out of sight for a minute and a half."""
+    flight = robot_flight(seed, sensor=sensor, range_sd=0.1, bearing_sd_deg=0.1, seconds=180.0)
+    detections, frames = flight.tables["detections"], flight.tables["frames"]
+    names = frames["frame_id"][(frames["time_s"] < 40) | (frames["time_s"] > 130)]
+    flight.tables["detections"] = detections[detections["frame_id"].isin(names)].reset_index(drop=True)
+    return flight
+
+
+def test_sensors_together_start_anew_too_and_a_smoother_stays_within_each_track() -> None:
+    one, other = paused("radar", 1), paused("lidar", 2)
+    tables = {
+        name: pd.concat([one.tables[name], other.tables[name]], ignore_index=True)
+        for name in ("frames", "detections")
+    }
+    flight = Flight(one.manifest, one.nav, {**one.tables, **tables})
+    noise = "".join(f"[sensors.{n}.noise]\nrange_m = 0.1\nazimuth_deg = 0.1\n" for n in ("radar", "lidar"))
+    settings = parse_settings(noise + "[targets]\nacceleration_m_s_sqrt_s = 0.5\nstart_speed_m_s = 2.0\n")
+    found = follow_targets(flight, settings=settings, filters=["ekf", "ukf", "imm"], smooth=True)
+    rows = rows_of(found, "together")
+    assert set(rows.index) == {"ekf", "ekf-smoothed", "ukf", "ukf-smoothed", "imm"}
+    assert (rows["anew"] == 1).all() and (rows["gone"] > 0).all() and (rows["gone_seen"] == 0).all()
+    assert (rows["compared"] + rows["without"] + rows["gone"] == rows["spanned"]).all()
+    assert (rows["rmse"] < 0.5).all()
+    for mine in (track for track in found.tracks if track.sensor == "together"):
+        assert mine.times[mine.starts[1]] > 130

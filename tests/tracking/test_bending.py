@@ -1,0 +1,128 @@
+"""What a linearisation leaves out, beside sampled truth: where a track is too uncertain, where not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from tests.tracking.poses import CAMERA, CROOKED, PIXEL, POSE, posed
+from wildlab.geometry.georeference import georeference_pixels
+from wildlab.tracking.bending import left_out, second_derivatives, share_left_out
+from wildlab.tracking.kalman import correct
+from wildlab.tracking.measurement import pixels, positions, ranges_bearings
+from wildlab.tracking.sensors import Sensor
+
+SHAPE = np.array([[1.0, 0.3], [0.3, 0.6]])
+NOISE_PX = 3.0
+
+
+def tilted(tilt: float, height: float = 60.0) -> tuple[Sensor, np.ndarray]:
+    """A camera that is rolled off the plumb line, and where its axis meets the ground."""
+    poses = posed((0.0, 0.0, height, tilt, 0.0, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    sensor = pixels(poses, 0.0)
+    return sensor, georeference_pixels(poses, np.array([CAMERA.cx, CAMERA.cy]), 0.0)[:2]
+
+
+@given(POSE, PIXEL)
+def test_second_derivatives_are_those_of_the_pixels(pose: tuple, share: tuple) -> None:
+    poses = posed(pose, CROOKED)
+    place = georeference_pixels(poses, np.array(share) * [640, 512], 0.0)
+    assume(np.isfinite(place).all() and np.hypot(*place[:2] - poses.p_nc[:2]) < 600)
+    sensor, h = pixels(poses, 0.0), 0.3
+
+    def z(north: float, east: float) -> np.ndarray:
+        return sensor.predict(0, place[:2] + np.array([north, east])).z
+
+    found = second_derivatives(sensor, 0, place[:2])
+    sampled = np.empty_like(found)
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        a, b = h * np.eye(2)[i], h * np.eye(2)[j]
+        sampled[:, i, j] = (z(*(a + b)) - z(*(a - b)) - z(*(b - a)) + z(*(-a - b))) / (4 * h * h)
+    assert found == pytest.approx(sampled, rel=2e-3, abs=2e-3 * np.abs(found).max() + 1e-6)
+
+
+def test_a_tilted_camera_bends_by_its_tilt_and_one_that_looks_down_does_not() -> None:
+    """Closed form on the axis: u = f x / (d + y sin a), v = f y cos a / (d + y sin a)."""
+    tilt, s = 0.5, 4.0
+    sensor, place = tilted(tilt)
+    d, P = 60.0 / np.cos(tilt), s * s * np.eye(2)
+    B = left_out(P, second_derivatives(sensor, 0, place))
+    by_u, by_v = CAMERA.fx * np.sin(tilt) / d**2, CAMERA.fy * np.sin(tilt) / d**2 * np.cos(tilt)
+    spread = sorted(np.sqrt(np.diag(B)))
+    # Across the tilt one product of two coordinates; along it a square, whose mean counts too.
+    assert sorted([s * s * by_u, s * s * np.sqrt(3) * by_v]) == pytest.approx(spread, rel=0.03)
+    assert left_out(1e6 * P, second_derivatives(*tilted(0.0)[:1], 0, tilted(0.0)[1])) == pytest.approx(0.0)
+
+
+def test_left_out_is_the_second_moment_of_the_second_order_part() -> None:
+    rng = np.random.default_rng(1)
+    D = second_derivatives(ranges_bearings([0.0, 0.0], 0.0), 0, [40.0, 30.0])
+    e = rng.multivariate_normal([0, 0], SHAPE, 400_000)
+    part = np.einsum("na,iab,nb->ni", e, D, e) / 2
+    B = left_out(SHAPE, D)
+    size = np.sqrt(np.outer(np.diag(B), np.diag(B)))  # range and bearing: metres and radians
+    assert B / size == pytest.approx(part.T @ part / len(e) / size, abs=0.02)
+
+
+def test_positions_are_never_too_uncertain() -> None:
+    D = second_derivatives(positions(), 0, [1.0, 2.0])
+    assert share_left_out(1e12 * SHAPE, D, np.eye(2)) == 0.0
+
+
+def sampled(sensor: Sensor, place: np.ndarray, P: np.ndarray, n: int = 4000) -> tuple[float, float, float]:
+    """Mean NEES of the extended filter's posterior, its mean squared error, and that of a new start."""
+    rng = np.random.default_rng(5)
+    seen = sensor.predict(0, place)
+    R = NOISE_PX**2 * np.eye(2)
+    nees, own, new = [], [], []
+    for e in rng.multivariate_normal([0, 0], P, n):
+        z = sensor.predict(0, place + e).z + rng.normal(0, NOISE_PX, 2)
+        if not np.isfinite(z).all():
+            continue  # behind the camera: nothing is detected
+        done = correct(place, P, z - seen.z, seen.H_position, R)
+        error = place + e - done.x
+        nees.append(error @ np.linalg.solve(done.P, error))
+        own.append(error @ error)
+        assert sensor.locate is not None
+        new.append(float(np.sum((place + e - sensor.locate(0, z)) ** 2)))
+    return float(np.mean(nees)), float(np.mean(own)), float(np.mean(new))
+
+
+def scaled(sensor: Sensor, place: np.ndarray, share: float) -> np.ndarray:
+    """The covariance of `SHAPE` for which so large a share is left out."""
+    D = second_derivatives(sensor, 0, place)
+    one = share_left_out(SHAPE, D, NOISE_PX**2 * np.eye(2))
+    return SHAPE * np.sqrt(share / one)
+
+
+@pytest.mark.parametrize("tilt", [0.3, 0.7])
+@pytest.mark.parametrize("share", [0.01, 0.3, 1.0])
+def test_within_the_bound_the_posterior_is_right_up_to_what_is_left_out(tilt: float, share: float) -> None:
+    """NEES of two, and no more than the share for each element; a tenth for higher orders and chance."""
+    sensor, place = tilted(tilt)
+    nees, _, _ = sampled(sensor, place, scaled(sensor, place, share))
+    assert 1.8 < nees < 1.1 * (2 + 2 * share)
+
+
+@pytest.mark.parametrize("tilt", [0.3, 0.7])
+@pytest.mark.parametrize("share", [3.0, 30.0])
+def test_beyond_the_bound_the_posterior_is_wrong_and_a_new_start_is_nearer(tilt: float, share: float) -> None:
+    sensor, place = tilted(tilt)
+    nees, own, new = sampled(sensor, place, scaled(sensor, place, share))
+    assert nees > 2 + share  # far outside of what chance makes of a mean of thousands
+    assert own > 1.5 * new
+
+
+@given(st.floats(1.1, 50.0))
+def test_the_share_grows_with_the_square_of_the_variance(factor: float) -> None:
+    sensor, place = tilted(0.5)
+    D, N = second_derivatives(sensor, 0, place), np.diag([4.0, 9.0])
+    assert share_left_out(factor * SHAPE, D, N) == pytest.approx(factor**2 * share_left_out(SHAPE, D, N))
+
+
+def test_of_a_target_that_is_not_seen_nothing_is_said() -> None:
+    sensor, _ = tilted(0.3)
+    behind = second_derivatives(sensor, 0, [0.0, 1e5]), second_derivatives(sensor, 0, [0.0, -1e5])
+    assert np.isnan([share_left_out(SHAPE, D, np.eye(2)) for D in behind]).sum() == 1
