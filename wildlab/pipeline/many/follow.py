@@ -152,7 +152,7 @@ def follow_all(
 
 def known_looks(followed: Followed) -> NDArray[np.bool_]:
     """(N,) looks at which any target's true place is known: elsewhere nothing is judged."""
-    return _true_places(followed).any(axis=0)
+    return np.asarray(_true_places(followed).any(axis=0))
 
 
 def complete_looks(followed: Followed) -> NDArray[np.bool_]:
