@@ -74,6 +74,16 @@ def test_noise_is_found_from_how_rough_detections_are():
     np.testing.assert_allclose(np.mean(found, axis=0), [0.7, np.radians(0.5)], rtol=0.12)
 
 
+@pytest.mark.parametrize(("kind", "clutter"), [("range-bearing", 0), ("range-bearing", 4), ("position", 4)])
+def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind: str, clutter: int):
+    """With as many false detections as four targets have, and no names: as with names and without any."""
+    found, known = (
+        [roughness(scans_of(robot_flight(seed, kind=kind, **one), "radar")) for seed in range(8)]
+        for one in ({"labelled": False, "clutter": clutter}, {})
+    )
+    np.testing.assert_allclose(np.mean(found, axis=0), np.mean(known, axis=0), rtol=0.15)
+
+
 def test_noise_that_nobody_knows_is_asked_for():
     flight = robot_flight(seconds=1.6)
     with pytest.raises(WildlabError, match=r"how noisy 'range' .* \[sensors.radar.noise\]"):

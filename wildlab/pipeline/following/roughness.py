@@ -3,32 +3,41 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from wildlab.geometry.frames import Array, wrap
 from wildlab.pipeline.scans import Scans
 
 #: Median of the size of a standard normal number.
 MEDIAN_OF_NORMAL = 0.6744897501960817
+#: A quarter of all are smaller than this.
+QUARTER_OF_NORMAL = 0.3186393639643751
 #: Looks further apart than this many usual intervals are no neighbours.
 NEIGHBOURS = 1.5
+#: A triple that is so many standard deviations off the line is of no target.
+FAR_OFF = 4.0
 
 
 def roughness(scans: Scans) -> Array:
     """(m,) standard deviation of white noise that would make detections as rough as they are.
 
-    Of three successive looks, the middle one less the mean of the others, of the same label or else each
-    nearest to the last; by the median, which a few wrong ones do not move. What bends in the way of a target
-    between looks counts as noise, what lasts does not. NaN where there are no three looks in a row.
+    Of three successive looks, the middle one less the mean of the others, of the same label, or without
+    labels of detections that are nearest to each other from look to look; by the median, which a few wrong
+    ones do not move. What bends in the way of a target between looks counts as noise, what lasts does not.
+    NaN where there are no three looks in a row.
     """
+    if not any(str(one) for one in scans.labels.ravel()):
+        return _unnamed(scans)
     times, z = scans.times, scans.detections
     gap = NEIGHBOURS * scans.interval_s
     found: list[Array] = []
-    names = sorted({str(one) for one in scans.labels.ravel() if one}) or [""]
+    names = sorted({str(one) for one in scans.labels.ravel() if one})
     angles = np.array(scans.angles)
     for name in names:
         last: list[tuple[float, Array]] = []
         for row in range(len(times)):
-            here = z[row][np.isfinite(z[row]).all(axis=-1) & ((scans.labels[row] == name) | (name == ""))]
+            here = z[row][np.isfinite(z[row]).all(axis=-1) & (scans.labels[row] == name)]
             if not len(here):
                 continue
             if last and times[row] - last[-1][0] > gap:
@@ -46,4 +55,69 @@ def roughness(scans: Scans) -> Array:
                     found.append((z1 - (1 - share) * z0 - share * z2) / np.sqrt(weight))
     if not found:
         return np.full(z.shape[-1], np.nan)
-    return np.asarray(np.median(np.abs(np.stack(found)), axis=0) / MEDIAN_OF_NORMAL)
+    return _spread(np.stack(found))
+
+
+def _spread(values: Array) -> Array:
+    """(m,) standard deviations of (N, m) by their medians."""
+    return np.asarray(np.median(np.abs(values), axis=0) / MEDIAN_OF_NORMAL)
+
+
+def _unnamed(scans: Scans) -> Array:
+    """`roughness` where nobody says which detections are of one target, and some may be of none.
+
+    Two of successive looks go together where each is the other's nearest. Triples of clutter lie much farther
+    off the line than those of a target: they are left out by and by, until none is beyond `FAR_OFF`.
+    """
+    gap = NEIGHBOURS * scans.interval_s
+    found: list[Array] = []
+    before: list[tuple[float, Array, Array]] = []
+    last = np.zeros(0, np.intp)
+    for time, z in zip(scans.times, scans.detections, strict=True):
+        here = z[np.isfinite(z).all(axis=-1)]
+        if not len(here):
+            continue
+        if before and time - before[-1][0] > gap:
+            before = []
+        before = [*before[-2:], (float(time), here, _metric(scans, here))]
+        # Of each detection of this look, the one of the look before that it goes together with, or -1.
+        own = _mutual(before[-2][2], before[-1][2]) if len(before) > 1 else np.full(len(here), -1)
+        if len(before) == 3 and before[2][0] > before[0][0]:
+            (t0, z0, _), (t1, z1, _), (t2, z2, _) = before
+            third = np.flatnonzero(own >= 0)
+            third = third[last[own[third]] >= 0]
+            second = own[third]
+            first = last[second]
+            share = (t1 - t0) / (t2 - t0)
+            angles = np.array(scans.angles)
+            ahead, behind = z2[third] - z1[second], z0[first] - z1[second]
+            ahead, behind = (np.where(angles, wrap(one), one) for one in (ahead, behind))
+            weight = 1 + share**2 + (1 - share) ** 2
+            found.append(-((1 - share) * behind + share * ahead) / np.sqrt(weight))
+        last = own
+    if not any(map(len, found)):
+        return np.full(scans.detections.shape[-1], np.nan)
+    values = np.concatenate(found)
+    # Half of all may be clutter: it starts from those that lie best in line.
+    sd = np.quantile(np.abs(values), 0.25, axis=0) / QUARTER_OF_NORMAL
+    while True:
+        values = values[(np.abs(values) <= FAR_OFF * sd).all(axis=1)]
+        if not len(values):
+            return np.full(scans.detections.shape[-1], np.nan)
+        before_sd, sd = sd, _spread(values)
+        if (sd >= before_sd).all():
+            return sd
+
+
+def _metric(scans: Scans, z: Array) -> Array:
+    """Detections where they may be compared: ranges and bearings as places."""
+    if scans.kind != "range-bearing":
+        return z
+    return np.asarray(z[:, :1] * np.stack([np.cos(z[:, 1]), np.sin(z[:, 1])], axis=-1))
+
+
+def _mutual(before: Array, here: Array) -> NDArray[np.intp]:
+    """(M,) of each detection of a look its nearest of the look before, where it is that one's nearest too."""
+    back = cKDTree(before).query(here)[1]
+    forth = cKDTree(here).query(before)[1]
+    return np.where(forth[back] == np.arange(len(here)), back, -1)

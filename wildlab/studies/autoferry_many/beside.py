@@ -115,8 +115,7 @@ def judge_beside(
                 own = case == first
                 lives = one.lives if own else judged(follow_beside(given[case], one.choice), reach[case])
                 rows.append(
-                    row_of(lives, case, mode)
-                    | {"rank": rank, "draw": one.number, "tuned_gospa": one.gospa}
+                    row_of(lives, case, mode) | {"rank": rank, "draw": one.number, "tuned_gospa": one.gospa}
                 )
         print(flush=True)
     return pd.DataFrame(rows)
