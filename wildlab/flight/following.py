@@ -30,12 +30,19 @@ Lengths = tuple[Annotated[float, Field(ge=0, le=1000)], ...]
 
 
 class HullPart(Strict):
-    """A kind of target by its size: how long and broad it is, and how many of all targets are so."""
+    """A kind of target by its size: how long and broad it is, and how many targets are so,
+    beside the shares of the other kinds."""
 
     name: Annotated[str, Field(min_length=1, max_length=40)]
     length_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
     beam_m: Annotated[float, Field(ge=0, le=1000)] = 0.0
     share: Above = 1.0
+
+    @model_validator(mode="after")
+    def _longer_than_broad(self) -> HullPart:
+        if self.beam_m > self.length_m:
+            raise ValueError(f"beam_m = {self.beam_m:g} is above length_m = {self.length_m:g}")
+        return self
 
 
 class ManyTargetsPart(Strict):

@@ -15,7 +15,8 @@ from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS, REPORTS
 from wildlab.pipeline.following.beliefs import of_flight
 from wildlab.pipeline.following.follow import refuse_unusable
-from wildlab.pipeline.many.beliefs import refuse_unfit_hulls
+from wildlab.pipeline.many.beliefs import refuse_unfit as refuse_unfit_settings
+from wildlab.pipeline.scans import sensors_of
 from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job
@@ -72,7 +73,14 @@ def track_many(
     flight = load_flight(folder)
     stated = None if settings is None else read_settings(settings)
     refuse_unusable(flight, stated, (), (), sensors, source)
-    refuse_unfit_hulls(of_flight(flight, stated))
+    told = of_flight(flight, stated)
+    refuse_unfit_settings(told)
+    unknown = sorted(set(told.sensors) - set(sensors_of(flight)))
+    if unknown and console is not None:
+        text = (
+            f"note: the settings speak of {', '.join(map(repr, unknown))}, which this flight does not have."
+        )
+        console.print(text, markup=False, highlight=False)
     studies = load_studies(notebooks / "studies.toml")
     place = place_of(flight, folder, "many", into, reports, studies)
     parameters: dict[str, Any] = {

@@ -93,6 +93,14 @@ def test_a_birth_that_nothing_survives_is_refused() -> None:
     assert caught.value.field == "targets.many.birth"
 
 
+def test_two_hulls_of_one_name_are_refused() -> None:
+    settings = parse_settings("[[targets.many.hulls]]\nname = 'a'\n[[targets.many.hulls]]\nname = 'a'\n")
+    with pytest.raises(WildlabError, match="two kinds of hulls are called 'a'"):
+        follow_all(robot_flight(kind="position"), settings=settings)
+    with pytest.raises(WildlabError, match=r"beam_m = 9 is above length_m = 6"):
+        parse_settings("[[targets.many.hulls]]\nname = 'a'\nlength_m = 6.0\nbeam_m = 9.0\n")
+
+
 def test_numbers_for_hulls_that_there_are_not() -> None:
     words = "rough_m of the sensor 'radar' has 2 values, and kinds of hulls there are 1"
     settings = parse_settings("[sensors.radar.many]\nrough_m = [1.0, 2.0]\n")

@@ -77,11 +77,8 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     WildlabError
         Where a sensor has another number of values for the hulls than there are hulls, or sees nothing.
     """
-    refuse_unfit_hulls(settings)
-    stated = settings.targets.many or ManyTargetsPart()
-    usual = read_settings(DATA / "settings" / "many.toml").targets.many
-    if usual is None:
-        raise WildlabError("data/settings/many.toml lacks [targets.many]", "get it from the project again")
+    refuse_unfit(settings)
+    stated, usual = settings.targets.many or ManyTargetsPart(), _usual()
     said: list[Said] = []
 
     def one(name: str) -> float:
@@ -102,13 +99,6 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     )
     told: dict[str, Any] = {name: one(name) for name in _WORDS}
     told["hits"] = int(told["hits"])
-    if told["birth"] <= told["forgotten"]:
-        raise WildlabError(
-            f"a new target exists with {told['birth']:g}, and one that exists with {told['forgotten']:g} or "
-            "less is given up: no track would ever last",
-            "state a birth that is above forgotten",
-            field="targets.many.birth",
-        )
     targets = TargetBeliefs(hulls, following.density, following.start_speed_m_s, **told)
     sensors = []
     farthest = max((float(looks.distances().max(initial=0.0)) for looks in places), default=0.0)
@@ -195,15 +185,42 @@ def _of_sensor(
     return found, said
 
 
-def refuse_unfit_hulls(settings: Settings) -> None:
-    """Refuse numbers for kinds of hulls that there are not.
+def _usual() -> ManyTargetsPart:
+    """What is assumed where nobody says anything."""
+    usual = read_settings(DATA / "settings" / "many.toml").targets.many
+    if usual is None:
+        raise WildlabError("data/settings/many.toml lacks [targets.many]", "get it from the project again")
+    return usual
+
+
+def refuse_unfit(settings: Settings) -> None:
+    """Refuse what can follow nothing: births that nothing survives, numbers for hulls that there are not.
 
     Raises
     ------
     WildlabError
-        Where a sensor has another number of values for the hulls than there are hulls.
+        Where a new target exists with no more than one that is given up, two kinds of hulls have one name, or
+        a sensor has another number of values for the hulls than there are hulls.
     """
     many = settings.targets.many
+    usual = _usual()
+    birth, forgotten = (
+        getattr(usual if many is None or getattr(many, name) is None else many, name)
+        for name in ("birth", "forgotten")
+    )
+    if birth <= forgotten:
+        raise WildlabError(
+            f"a new target exists with probability {birth:g}, and one that exists with {forgotten:g} or less "
+            "is given up: no track would ever last",
+            "state a birth that is above forgotten",
+            field="targets.many.birth",
+        )
+    names = [hull.name for hull in many.hulls] if many is not None else []
+    if twice := next((one for one in names if names.count(one) > 1), None):
+        raise WildlabError(
+            f"two kinds of hulls are called {twice!r}", "give each a name of its own",
+            field="targets.many.hulls.name",
+        )  # fmt: skip
     kinds = max(len(many.hulls), 1) if many is not None else 1
     for sensor, part in settings.sensors.items():
         for name in _HULLS:

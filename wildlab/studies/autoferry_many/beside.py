@@ -336,5 +336,6 @@ METHOD = (
     "positions with normal errors, exact joint probabilities, tracks that begin after some measurements and "
     "end by time or covariance. It is given the same scans in the order of time, stamps moved alike, "
     "and uses them as far out. Where a draw says so, its tracks are shown once they have moved, by the rule "
-    "of ours. They are judged as ours are. It has no existence, no visibility and no hulls."
+    "of ours. They are judged as ours are. It has no existence, no visibility and no hulls, and takes no "
+    "bearings."
 )

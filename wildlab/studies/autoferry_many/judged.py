@@ -95,11 +95,9 @@ def cameras(rows: pd.DataFrame, first: str) -> str:
         return ""
     change = own["with"] - own["without"]
     middle = float(change.median())
-    # Beyond what the table shows there is no change to speak of.
+    # Less than a tenth of a metre is no change to speak of.
     word = (
-        "no larger or smaller"
-        if abs(middle) < 0.05
-        else f"{abs(middle):.1f} m {'larger' if middle > 0 else 'smaller'}"
+        f"{abs(middle):.1f} m {'larger' if middle > 0 else 'smaller'}" if abs(middle) >= 0.05 else "the same"
     )
     return (
         f"With the cameras' bearings and the same settings GOSPA is smaller in {int((change < 0).sum())} of "
@@ -134,7 +132,7 @@ def spread_table(rows: pd.DataFrame, first: str) -> pd.DataFrame:
     for (mode, rank), own in rows.groupby(["mode", "rank"], sort=False):
         del rank
         one = own.iloc[0]
-        row = {"by": mode, "draw": int(one["draw"]), f"{first} (tuned here)": one["tuned_gospa"]}
+        row = {"by": mode, "draw": str(int(one["draw"])), f"{first} (tuned here)": one["tuned_gospa"]}
         found.append(
             row
             | {case: value for case, value in zip(own["case"], own["gospa"], strict=True) if case != first}
@@ -179,8 +177,19 @@ def headline(rows: pd.DataFrame, middle: pd.DataFrame, first: str) -> list[str]:
         f"{'time' if swaps == 1 else 'times'}, and a boat got a new track {breaks} "
         f"{'time' if breaks == 1 else 'times'}."
     )
-    said.append(fusion(own))
+    said += [followed_share(own), fusion(own)]
     return [one for one in said if one]
+
+
+def followed_share(own: pd.DataFrame) -> str:
+    """How much of the time boats have a track at all, with both sensors; "" without that mode."""
+    share = own.loc[own["mode"] == "both", "tracked"].dropna()
+    if not len(share):
+        return ""
+    return (
+        f"With both sensors boats have a track at {share.min():.0f} to {share.max():.0f} % of the looks at "
+        f"which they are within reach, over {len(share)} scenarios."
+    )
 
 
 def fusion(own: pd.DataFrame) -> str:
