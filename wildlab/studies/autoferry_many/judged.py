@@ -235,8 +235,8 @@ def caption() -> str:
 def caption_of_spread(first: str) -> str:
     """What the table of the best draws shows."""
     return (
-        f"Mean GOSPA (m) with each of the draws that are best on {first}: first those whose errors are there as "
-        "large as the tracks say, then by GOSPA."
+        f"Mean GOSPA (m) with each of the draws that are best on {first}: first those whose errors are "
+        "there as large as the tracks say, then by GOSPA."
     )
 
 
