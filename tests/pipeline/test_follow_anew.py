@@ -17,6 +17,7 @@ from wildlab.geometry.mount import Mount
 from wildlab.pipeline.following import sensor_tracks
 from wildlab.pipeline.following.anew import part_of
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
+from wildlab.pipeline.following.estimates import estimates_table
 from wildlab.pipeline.following.follow import Followed, follow_targets
 from wildlab.pipeline.following.judged import judged, seen_of
 from wildlab.pipeline.following.sensor_tracks import SensorTrack
@@ -102,6 +103,11 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
         assert row["compared"] + row["without"] + row["gone"] == row["spanned"]
         assert row["compared"] == seen_of(first).sum() == row["used"]
         assert row["detections"] == row["used"] - 2  # the two that tracks were put on
+        # The table says which of the two a row is of.
+        table = estimates_table([one], {"camera": watched()[0]})
+        times = one.times[one.starts]
+        right = 1 + (table["time_s"] >= times[1]).to_numpy(int)
+        assert (table["track"] == right).all() and set(right) == {1, 2}
     # The track ends within the pause, and not at once.
     ended = first.times[np.flatnonzero(first.without)[0]]
     assert 11.0 < ended < 60.0 and first.without.sum() > 0.7 * 5 * 200

@@ -56,7 +56,8 @@ def track(
     they are; estimates.parquet and .csv beside it have states, covariances and innovations.
 
     With --many nobody says whose a detection is: tracks begin and end by themselves, and where true places
-    are known the report says which targets were lost or mixed up.
+    are known the report says which targets were lost or mixed up. Bearings move tracks that another sensor
+    began.
 
     \b
     Examples:

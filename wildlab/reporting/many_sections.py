@@ -83,6 +83,10 @@ def end_section(report: Report, followed: Followed) -> None:
             "Errors of the pose are taken for new at every detection, also where all targets of an image "
             "share them; and what an image shows is told by the same poses."
         )
+    if "bearing" in kinds:
+        poses.append(
+            "A bearing moves a track that another sensor began; it begins, confirms, prolongs and ends none."
+        )
     if kinds - {"pixel"}:
         poses.append("Errors of the platform's position and heading that last are in no covariance here.")
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."

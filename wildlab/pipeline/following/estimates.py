@@ -39,7 +39,8 @@ def estimates_table(tracks: Sequence[SensorTrack], scans: dict[str, Scans]) -> p
     Returns
     -------
     DataFrame
-        ``sensor``, ``target``, ``filter``, ``time_s``; the state, metres and m/s in n; ``p_ij`` its
+        ``sensor``, ``target``, ``filter``, ``time_s``; ``track``, which of the target's tracks it is, from 1:
+        between two there is none; the state, metres and m/s in n; ``p_ij`` its
         covariance, the upper triangle; ``detection`` that was used, "" none; ``innovation_...`` in the unit
         of each element, ``s_ij`` their covariance, in the order of the elements; ``nis``; and
         ``error_north_m``, ``error_east_m`` (truth minus estimate) and ``nees`` where the truth is known.
@@ -55,6 +56,7 @@ def _of(one: SensorTrack, scans: dict[str, Scans]) -> pd.DataFrame:
         "target": np.full(n, one.target, object),
         "filter": np.full(n, one.filter, object),
         "time_s": one.times[rows],
+        "track": np.maximum(np.searchsorted(one.starts, np.flatnonzero(rows), side="right"), 1),
     }
     columns |= dict(zip(STATE, one.estimate[rows].T, strict=True))
     for i in range(4):
