@@ -118,6 +118,6 @@ def _metric(scans: Scans, z: Array) -> Array:
 
 def _mutual(before: Array, here: Array) -> NDArray[np.intp]:
     """(M,) of each detection of a look its nearest of the look before, where it is that one's nearest too."""
-    back = cKDTree(before).query(here)[1]
-    forth = cKDTree(here).query(before)[1]
+    back = np.asarray(cKDTree(before).query(here)[1], np.intp)
+    forth = np.asarray(cKDTree(here).query(before)[1], np.intp)
     return np.where(forth[back] == np.arange(len(here)), back, -1)
