@@ -95,6 +95,7 @@ def end_section(report: Report, followed: Followed) -> None:
             f"A track farther than {CUTOFF_M:g} m from every target is on nothing here, also where it "
             "follows one whose places are that far off.",
             "Where the truth has no standard deviation of its own, its error counts as the tracks'.",
+            "A target that comes back after its track ended has another one: tracks are no count of targets.",
             "Other things that move are tracks on nothing here, unless their true place is known too.",
             *poses,
         ]
