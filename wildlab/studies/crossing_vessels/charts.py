@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Shown = tuple[Figure, str, str, str]
 #: Tracks by the vessel whose detections started them, as in H figure 6.21.
 _COLOURS = (BLUE, ORANGE)
+#: Of the height of a map, left free below everything on it for the scale bar.
+FREE = 0.3
 _AXES = {"size": "ln of the size in m²", "intensity": "intensity (counts)", "hu": "ln of Hu's first moment"}
 
 
@@ -50,6 +52,8 @@ def tracks_shown(flown: Flown) -> Shown:
         words = outcome_words(crossing, rule, flown)
         ax.set_title(f"{name}: {words}")
         said.append(f"{'with' if rule == FEATURES else 'without'} features {words}")
+        low, high = ax.get_ylim()
+        ax.set_ylim(low - FREE * (high - low), high)
         map_axes(ax, scale_bar=ax is axes[-1])
     axes[0].set_xlabel("")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -113,12 +117,13 @@ def curve_shown(spread: pd.DataFrame) -> Shown:
     _level(top, spread[FEATURES, "wrong"].median(), VERMILLION)
     _level(low, 100 * spread[FEATURES, "swapped"].mean(), VERMILLION, "as rendered")
     top.set_yscale("symlog", linthresh=1)
-    top.set(ylabel="wrong", ylim=(0, None))
+    # None wrong lies a little above the axis, where its line is seen.
+    top.set(ylabel="wrong", ylim=(-0.4, None))
     low.set(ylabel="swapped (%)", ylim=(-3, 103), xticks=SEPARATIONS)
     low.set_xlabel("difference of the two (spreads of the feature)")
     at = {separation: value for separation, value in zip(SEPARATIONS, middle, strict=True)}
     most = max(SEPARATIONS)
-    top.set_title(f"Wrong: {at[0]:.0f} at no spread, {at[most]:.0f} at {most}")
+    top.set_title(f"Wrong: {at[0]:.0f} at no difference, {at[most]:.0f} at {most} spreads")
     fig.legend(*low.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     said = "; ".join(
         f"{separation}: {value:.0f} wrong, {part:.0f} % swapped"
