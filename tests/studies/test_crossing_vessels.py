@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from wildlab.geometry.validation import gate_threshold
 from wildlab.pipeline.georeference import observe
 from wildlab.reporting.published import load_claims, load_published
+from wildlab.reporting.spread import share_below
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import STUDY, charts, text
 from wildlab.studies.crossing_vessels import trial as study
@@ -293,22 +295,34 @@ def test_words_turn_with_the_numbers(numbers):
     first = text.summary(good)
     assert "swapped on 20 of 20 flights" in first[0]
     assert "look like, on 0 of 20 flights" in first[0]
-    assert "1800 go to the wrong track" in first[1] and "features 5" in first[1]
+    assert "by distance alone 1800 on each of 20 flights" in first[1]
+    assert "features 5 on each of 20 flights. Published" in first[1]
     worst = pd.concat([good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
-    assert "at most 455. Published" in text.summary(worst)[1]
+    assert "features 5 in the median (5 to 455 on 21 flights). Published" in text.summary(worst)[1]
+    hidden = pd.concat([good, good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
+    assert "(5 to 5 on nine flights of ten, at most 455). Published" in text.summary(hidden)[1]
+    assert "features 5. Published" in text.summary(good[:1])[1]
     assert "at most" not in text.summary(good[:1])[1]
     assert "80.0 %" in first[2] and "20.0 %" in text.summary(bad)[2]
+    assert "1. Of these 1 ends with" in text.end_words(good[:1])
     assert "20. Of these 20 end" in text.end_words(good)
     assert "nothing to recover" in text.end_words(bad)
     assert "Size tells them apart best" in text.looks_words(good)
     assert "Hu's first moment tells them apart best" in text.looks_words(bad)
     words = text.curve_words(good)
     assert "At a difference of 1 and more no flight of 20 is swapped" in words
-    assert "does harm cannot be told: 20 flights swapped with it, 20 without" in words
+    assert "makes more flights swap cannot be told: 20 flights swapped with it, 20 without" in words
+    assert "1500 with it, 1800 without (medians); more on 0 of 20 flights, fewer on 20. As" in words
+    assert "cannot be told: 1 flight swapped with it, 1 without" in text.curve_words(good[:1])
+    assert "fewer on 1, which chance may have done too. As" in text.curve_words(good[:1])
     assert "are reached at 6 (median" in words
     worse = text.curve_words(bad)
     assert "At 6 spreads 20 of 20 flights are still swapped" in worse
-    assert "does harm: 20 flights swapped with it, 0 without" in worse
+    assert "nothing makes more flights swap: 20 flights swapped with it, 0 without" in worse
+    assert "1500 with it, 5 without (medians); more on 20 of 20 flights, fewer on 0. As" in worse
+    even = spread_of(numbers, GOOD | {(DISTANCE, "wrong"): 9.0} | curve((9,) * 6, (0,) * 6), 20)
+    assert "as many on every flight, 9 with it, 9 without" in text.curve_words(even)
+    assert "makes fewer flights swap: 0 flights swapped with it, 20 without" in text.curve_words(even)
     assert "at none of these" in worse
     assert "at all of these" in text.as_published_words(spread_of(numbers, curve((3,) * 6, (0,) * 6)))
     gap = text.curve_words(spread_of(numbers, GOOD | curve((9,) * 6, (1, 0, 1, 0, 0, 0)), 20))
@@ -324,6 +338,37 @@ def test_words_on_the_veto(numbers, wrong, said):
     )
     assert said in text.veto_words(spread)
     assert "70 detections go to no track" in text.veto_words(spread)
+
+
+def test_ties_with_the_print_are_told_where_there_are_any(numbers):
+    spread = spread_of(numbers, GOOD, 3)
+    printed = {"wrong_rate_boat_1": 0.0033, "wrong_rate_boat_2": 0.0}
+    told = text.ties_words(spread, printed)
+    assert "counts half. Equal to it: boat 2, 3 of 3." in told and "boat 1" not in told
+    # What is said is what the column is computed by: all equal are half below.
+    assert share_below(spread[FEATURES, "wrong_rate_boat_2"], 0.0) == 0.5
+    assert text.ties_words(spread, printed | {"wrong_rate_boat_2": 0.1}).endswith("counts half.")
+    assert text.ties_words(spread[:1], printed) == ""
+
+
+def test_levels_of_none_are_seen_and_the_scale_bar_lies_free(flown, numbers):
+    spread = spread_of(numbers, GOOD | {(FEATURES, "wrong"): 0.0} | curve((353, 9, 6, 5, 2, 0), (0,) * 6), 3)
+    fig, _, _, _ = charts.curve_shown(spread)
+    fig.canvas.draw()
+    top = fig.axes[0]
+    assert top.get_title(loc="left") == "Wrong: 353 at no difference, 0 at 6 spreads"
+    none = top.transData.transform((0, 0))[1]
+    assert none > top.bbox.y0 + 5
+    fig, _, _, _ = charts.tracks_shown(flown)
+    fig.canvas.draw()
+    ax = fig.axes[1]
+    (bar,) = [one for one in ax.artists if isinstance(one, AnchoredSizeBar)]
+    box = bar.get_window_extent(fig.canvas.get_renderer())
+    for line in ax.lines:
+        # Between two points, too: a track may jump.
+        points = ax.transData.transform(np.asarray(line.get_xydata(), float))
+        steps = points[:-1, None] + np.linspace(0, 1, 20)[:, None] * np.diff(points, axis=0)[:, None]
+        assert not box.padded(2).count_contains(steps.reshape(-1, 2))
 
 
 def test_the_table_has_a_row_for_each_rule(numbers):

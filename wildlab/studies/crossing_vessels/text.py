@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from wildlab.evaluation.runs import share_interval
-from wildlab.reporting.spread import range_clause
+from wildlab.reporting.spread import bounds_of, range_clause, range_words, spread_words
 from wildlab.reporting.text import percent
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
@@ -90,18 +91,27 @@ def summary(spread: pd.DataFrame) -> list[str]:
     near = spread[FEATURES, "near_share"]
     wrong = {subject: spread[subject, "wrong"] for subject in (DISTANCE, FEATURES)}
     of = spread[LOOKS, "detections"].median()
-    # A range of nine in ten may hide the one flight on which it all went wrong.
-    most = f", at most {wrong[FEATURES].max():.0f}" if len(spread) > 1 else ""
     return [
         f"By distance alone the tracks of two vessels that cross are swapped on "
         f"{swap_words(spread, DISTANCE)}; with what the vessels look like, on "
         f"{swap_words(spread, FEATURES)}.",
-        f"Of {of:.0f} detections {wrong[DISTANCE].median():.0f} go to the wrong track by distance alone"
-        f"{range_clause(wrong[DISTANCE], 0)}; with features {wrong[FEATURES].median():.0f}"
-        f"{range_clause(wrong[FEATURES], 0)}{most}. Published are {PUBLISHED_WRONG}, on one flight.",
+        f"Of {of:.0f} detections so many go to the wrong track: by distance alone "
+        f"{_counted(wrong[DISTANCE])}; with features {_counted(wrong[FEATURES])}. Published are "
+        f"{PUBLISHED_WRONG}, on one flight.",
         f"With features the vessel that is followed worse is within {NEAR_M:.0f} m of its track for "
         f"{percent(near.median())} of the images since that began, in the median{_percent_range(near)}.",
     ]
+
+
+def _counted(values: pd.Series) -> str:
+    """A count of each flight: the median and the range, or the one number that all flights have."""
+    n, same = len(values), values.min() == values.max()
+    if n == 1 or same:
+        return f"{values.iloc[0]:.0f}" + (f" on each of {n} flights" if n > 1 else "")
+    # A range of nine in ten may hide the one flight on which it all went wrong.
+    hidden = values.max() > bounds_of(values)[1]
+    most = f", at most {values.max():.0f}" if hidden else ""
+    return f"{values.median():.0f} in the median ({range_words(values, 0)} {spread_words(n).on}{most})"
 
 
 def _percent_range(values: pd.Series) -> str:
@@ -133,12 +143,13 @@ OUTCOME_COLUMNS = {
     "breaks": "breaks",
     "mae": "off (m)",
     "gospa": "GOSPA (m)",
-    "anees": "ANEES",
+    "anees": "ANEES (2 is honest)",
 }
 OUTCOME_CAPTION = (
     "Medians over flights. Swaps count each track that goes to another vessel, breaks a vessel that gets a "
     "new track; off is the mean distance of a vessel from the first track that it started; GOSPA has a "
-    "cut-off of 35 m and counts vessels in the image; ANEES of a position is 2 where the filter is honest."
+    "cut-off of 35 m and counts vessels in the image. ANEES is of both coordinates of a position together, "
+    "so that 2 is honest and more is too sure of itself; half of it, NEES / 2, is honest at 1."
 )
 
 
@@ -183,12 +194,10 @@ def curve_words(spread: pd.DataFrame) -> str:
         if none
         else f"At {max(SEPARATIONS)} spreads {counts[max(SEPARATIONS)]} of {n} flights are still swapped."
     )
-    harm = _harm_words(
-        spread[curve_subject(0), "swapped"].to_numpy(bool), spread[DISTANCE, "swapped"].to_numpy(bool)
-    )
     return (
         "One feature, made up, normal and new in each image, with a known difference between the two vessels "
-        f"in units of its spread. Flights swapped: {parts}. {first} {harm} {as_published_words(spread)}"
+        f"in units of its spread. Flights swapped: {parts}. {first} {_harm_words(spread)} "
+        f"{as_published_words(spread)}"
     )
 
 
@@ -200,18 +209,49 @@ def joint_words(spread: pd.DataFrame) -> str:
         f"Shared by probability, detections leave the tracks swapped on {swap_words(spread, JOINT)}, given "
         f"to one track each on {swap_words(spread, DISTANCE)}"
     )
-    if more + fewer and binomtest(more, more + fewer).pvalue < 0.05:
+    if beyond_chance(more, fewer):
         return f"{counts}: on {'more' if more > fewer else 'fewer'} of them, beyond chance."
-    return f"{counts}; that one is better than the other cannot be told."
+    return f"{counts}; that one swaps fewer than the other cannot be told."
 
 
-def _harm_words(useless: NDArray[np.bool_], alone: NDArray[np.bool_]) -> str:
-    """What a feature that tells nothing does, on the same flights: by those that differ (exact sign test)."""
+def _flights(count: int) -> str:
+    return "1 flight" if count == 1 else f"{count} flights"
+
+
+def _harm_words(spread: pd.DataFrame) -> str:
+    """What a feature that tells nothing does to swaps and to detections, on the same flights (sign tests)."""
+    useless, alone = (spread[one, "swapped"].to_numpy(bool) for one in (curve_subject(0), DISTANCE))
     worse, better = int((useless & ~alone).sum()), int((alone & ~useless).sum())
-    counts = f"{int(useless.sum())} flights swapped with it, {int(alone.sum())} without"
-    if worse + better and binomtest(worse, worse + better).pvalue < 0.05:
-        return f"A feature that tells nothing does {'harm' if worse > better else 'good'}: {counts}."
-    return f"Whether a feature that tells nothing does harm cannot be told: {counts}."
+    counts = f"{_flights(int(useless.sum()))} swapped with it, {int(alone.sum())} without"
+    if beyond_chance(worse, better):
+        said = f"A feature that tells nothing makes {'more' if worse > better else 'fewer'} flights swap"
+    else:
+        said = "Whether a feature that tells nothing makes more flights swap cannot be told"
+    return f"{said}: {counts}. {_stray_words(spread)}"
+
+
+def _stray_words(spread: pd.DataFrame) -> str:
+    """Of how many detections such a feature makes more go to the wrong track, by the flights that differ."""
+    useless, alone = (spread[one, "wrong"].to_numpy(float) for one in (curve_subject(0), DISTANCE))
+    more, fewer, n = int((useless > alone).sum()), int((useless < alone).sum()), len(spread)
+    medians = f"{np.median(useless):.0f} with it, {np.median(alone):.0f} without (medians)"
+    if not more + fewer:
+        return f"Detections that go to the wrong track: as many on every flight, {medians}."
+    told = "" if beyond_chance(more, fewer) else ", which chance may have done too"
+    on = f"more on {more} of {_flights(n)}, fewer on {fewer}{told}"
+    return f"Detections that go to the wrong track: {medians}; {on}."
+
+
+def beyond_chance(one_way: int, other_way: int) -> bool:
+    """Whether flights that differ do so more one way than a fair coin would have it, by 5 % (sign test).
+
+    Examples
+    --------
+    >>> beyond_chance(3, 0), beyond_chance(6, 0), beyond_chance(0, 0)
+    (False, True, False)
+    """
+    either = one_way + other_way
+    return bool(either) and bool(binomtest(one_way, either).pvalue < 0.05)
 
 
 def as_published_words(spread: pd.DataFrame) -> str:
@@ -231,9 +271,31 @@ def end_words(spread: pd.DataFrame) -> str:
         return "On no flight are the tracks swapped by distance alone, so there is nothing to recover from."
     lasting = int((swapped & (spread[DISTANCE, "swapped_at_end"] > 0)).sum())
     return (
-        f"Flights on which distance alone swaps the tracks: {int(swapped.sum())}. Of these {lasting} end "
-        "with them swapped."
+        f"Flights on which distance alone swaps the tracks: {int(swapped.sum())}. Of these {lasting} "
+        f"{'ends' if lasting == 1 else 'end'} with them swapped."
     )
+
+
+def ties_words(spread: pd.DataFrame, printed: Mapping[str, float]) -> str:
+    """How flights that are equal to a printed number count to those below it; empty for one flight.
+
+    Parameters
+    ----------
+    spread
+        One row for each flight.
+    printed
+        By the name of a quantity of `FEATURES`.
+    """
+    if len(spread) < 2:
+        return ""
+    ties = {name: int((spread[FEATURES, name] == value).sum()) for name, value in printed.items()}
+    parts = [
+        f"{name.removeprefix('wrong_rate_').replace('_', ' ')}, {count} of {len(spread)}"
+        for name, count in ties.items()
+        if count
+    ]
+    equal = f" Equal to it: {'; '.join(parts)}." if parts else ""
+    return f" Flights below the print: one that is equal to it counts half.{equal}"
 
 
 def drawn_words(seed: int) -> str:
