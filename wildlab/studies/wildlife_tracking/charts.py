@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wildlab.evaluation.runs import mean_interval
@@ -38,8 +41,8 @@ HELD = 0.95
 #: So many images after a visit has found its animal is the last of the maps of it.
 AFTER = 60
 KEY = (
-    f"Dots: animals, hollow where none was detected yet. Ellipses: the tracks, {100 * HELD:.0f} % of each "
-    "covariance."
+    "Dots: where animals truly are, hollow for those not detected yet. Ellipses: where their tracks have "
+    f"them, {100 * HELD:.0f} % of each covariance."
 )
 
 
@@ -65,7 +68,7 @@ def map_shown(
     seed
         Of the world.
     """
-    fig, ax = new_figure(5.9, 4.2)
+    fig, ax = new_figure(5.9, 5.2)
     times = world.images.times
     known = _at(followed.known, times, share * world.lap)
     seen = {one.animal for one in followed.found if one.image <= known.image}
@@ -74,6 +77,7 @@ def map_shown(
     _animals(ax, world.images.truth[known.image], seen)
     _tracks(ax, known)
     _fit(ax, world, way)
+    _explain(fig)
     said = f"{len(seen)} of {world.images.truth.shape[1]} animals found, {len(known.identity)} tracks"
     ax.set_title(f"{what}: {said}")
     return (
@@ -93,6 +97,28 @@ def _ground(ax: Axes, world: World, way: Array) -> None:
     ax.plot(way[:, 1], way[:, 0], color=GREY, lw=1.0)
     ax.plot(way[-1, 1], way[-1, 0], "^", color=INK, ms=7)
     ax.grid(False)
+
+
+def _explain(fig: Figure, *, animals: bool = True) -> None:
+    """What lines and signs of a map are, below it."""
+    ground = [
+        Line2D([], [], color=INK, lw=1.2, label="fence of an enclosure"),
+        Line2D([], [], color=GREY, lw=1.0, label="way flown so far"),
+        Line2D([], [], color=INK, marker="^", ms=7, lw=0, label="the camera now"),
+    ]
+    if animals:
+        dot: dict[str, Any] = {"marker": "o", "ms": 4.5, "mec": INK, "mew": 0.9, "lw": 0}
+        ground += [
+            Line2D([], [], color=BLUE, lw=1.3, label="track of an animal"),
+            Line2D([], [], mfc=VERMILLION, label="animal, detected", **dot),
+            Line2D([], [], mfc="none", label="animal, not yet", **dot),
+        ]
+    else:
+        ground += [
+            Line2D([], [], color=VERMILLION, lw=2.0, label="track of the animal visited"),
+            Line2D([], [], color=BLUE, lw=1.2, label="other tracks"),
+        ]
+    fig.legend(handles=ground, loc="outside lower center", ncols=2)
 
 
 def _animals(ax: Axes, places: Array, seen: set[int]) -> None:
@@ -139,7 +165,7 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
     track = int(flown.goal[found])
     later = min(found + AFTER, len(flown.times) - 1)
     waited = f"{flown.times[later] - flown.times[found]:.0f} s later"
-    fig, axes = new_figure(5.9, 8.2, rows=3)
+    fig, axes = new_figure(5.9, 9.0, rows=3)
     said, sizes = [], []
     middle = flown.known[found].mean[flown.known[found].identity == track][0]
     for ax, row, what in zip(
@@ -160,10 +186,12 @@ def visit_shown(world: World, flown: Patrolled) -> Shown | None:
         ax.set_xlabel("east (m)" if ax is axes[-1] else "")
         ax.set_title(f"{what}: known to {sd:.1f} m each way")
         said.append(f"{what.lower()} {sd:.1f} m")
+    _explain(fig, animals=False)
     return (
         fig, "fig-7-14", f"Three maps of a visit; the animal is known each way to: {', '.join(said)}.",
-        f"Of all visits the one after which the covariance fell furthest. Red: the animal visited, "
-        f"{', '.join(said)}. Blue: other tracks; grey: the way. Counterpart of F figures 5.4 and 7.14.",
+        f"Of all visits the one after which the covariance fell furthest. The animal visited is known each "
+        f"way to: {', '.join(said)}. Ellipses: {100 * HELD:.0f} % of each covariance. Counterpart of F "
+        "figures 5.4 and 7.14.",
     )  # fmt: skip
 
 
