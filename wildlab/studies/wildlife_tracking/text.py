@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
+from wildlab.evaluation.runs import Interval, share_interval
+from wildlab.evaluation.shares import Check
 from wildlab.pipeline.animals.follow import STATION_S
 from wildlab.pipeline.animals.measures import OUT_OF_SIGHT
-from wildlab.reporting.text import NOTHING, number, percent
+from wildlab.reporting.text import percent
+from wildlab.studies.wildlife_tracking.intervals import (
+    changed_words,
+    mean_share_words,
+    positive_interval,
+    positive_words,
+)
 from wildlab.studies.wildlife_tracking.timing import middle_ratio
 from wildlab.studies.wildlife_tracking.trial import (
     EVERY,
@@ -21,8 +31,6 @@ from wildlab.studies.wildlife_tracking.trial import (
     PATROL_S,
     POSITIVE,
     RATES,
-    REVISITS,
-    ROWS,
     UAV,
     VISITS,
     World,
@@ -36,7 +44,6 @@ NAMES = {
     POSITIVE: "particle filter, detections alone",
     KALMAN: "Kalman filter",
 }
-SEARCHES = {REVISITS: "rows and visits", ROWS: "rows alone"}
 
 METHOD = rf"""Each world is drawn from its seed: land of the size and relief of F's map, and the twin's
 five enclosures with five animals in each, which walk as F (4.5) has it, a velocity drawn anew each second,
@@ -101,29 +108,6 @@ def walk_limit(world: World) -> str:
     )
 
 
-def _mean(values: pd.Series, digits: int = 1) -> str:
-    """A mean over worlds with its interval; of fewer than two known ones without."""
-    known = values[np.isfinite(values)].to_numpy(float)
-    if not len(known):
-        return NOTHING
-    if len(known) < 2:
-        return f"{known[0]:.{digits}f}" + (f" (1 of {len(values)} worlds)" if len(values) > 1 else "")
-    found = mean_interval(known)
-    middle, low, high = (number(one, digits) for one in (found.estimate, found.low, found.high))
-    return f"{middle} ({low} to {high})"
-
-
-def _mean_share(values: pd.Series) -> str:
-    """A mean of shares in per cent, with an interval that ends at none and at all."""
-    known = values[np.isfinite(values)].to_numpy(float)
-    if not len(known):
-        return NOTHING
-    if len(known) < 2:
-        return f"{100 * known[0]:.0f} %"
-    found = mean_share_interval(known)
-    return f"{100 * found.estimate:.0f} ({100 * found.low:.0f} to {100 * found.high:.0f}) %"
-
-
 def right_share(spread: pd.DataFrame, subject: str) -> Interval | None:
     """Share of the animals detected in both laps that got their track back; None where none was seen."""
     later = int(spread[subject, "later"].sum())
@@ -146,54 +130,19 @@ def right_words(spread: pd.DataFrame, subject: str) -> str:
     return f"{right} of {later} ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
 
 
-def difference(spread: pd.DataFrame, name: str, first: str, second: str) -> Interval | None:
-    """Mean over worlds of the first less the second, with its interval; None of fewer than two known."""
-    both = (spread[first, name] - spread[second, name]).to_numpy(float)
-    both = both[np.isfinite(both)]
-    return mean_interval(both) if len(both) > 1 else None
-
-
-def changed_words(spread: pd.DataFrame, name: str, first: str, second: str) -> str:
-    """By how much a number of metres differs, and whether that is more than chance.
-
-    Examples
-    --------
-    >>> table = pd.DataFrame({("a", "sd"): [9.0, 9.5, 8.7], ("b", "sd"): [10.0, 10.4, 9.8]})
-    >>> changed_words(table, "sd", "a", "b")
-    'lower by 1.00 m (0.75 to 1.25)'
-    """
-    found = difference(spread, name, first, second)
-    if found is None:
-        known = (spread[first, name] - spread[second, name]).dropna()
-        if not len(known):
-            return "not known in any world"
-        value = float(known.iloc[0])
-        if number(value, 2) == "0.00":
-            return "the same in the one world"
-        return f"{'lower' if value < 0 else 'higher'} by {abs(value):.2f} m in the one world"
-    if number(found.low, 2) == number(found.high, 2) == "0.00":
-        return "the same to a centimetre"
-    if found.low > 0 or found.high < 0:
-        low, high = sorted((abs(found.low), abs(found.high)))
-        way = "lower" if found.high < 0 else "higher"
-        return f"{way} by {abs(found.estimate):.2f} m ({low:.2f} to {high:.2f})"
-    return (
-        f"changed by {number(found.estimate, 2)} m, which chance may have done too "
-        f"({number(found.low, 2)} to {number(found.high, 2)})"
-    )
-
-
 def summary(spread: pd.DataFrame) -> list[str]:
     """Three sentences on what the worlds gave."""
-    ours = {one: f"{one}-{NEGATIVE}" for one in PLATFORMS}
+
+    def off(platform: str, name: str) -> str:
+        return positive_words(spread[f"{platform}-{NEGATIVE}", name], 0, "m")
+
     shown = "; ".join(_seen_words(spread, one) for one in PLATFORMS)
     return [
         f"In a lap {shown}.",
-        f"Animals that were detected and are out of sight are known to "
-        f"{_mean(spread[ours[GONDOLA], 'rmse'], 0)} m from the gondola and to "
-        f"{_mean(spread[ours[UAV], 'rmse'], 0)} m from the multicopter (RMS distance, mean over worlds); by "
-        f"tracks that had not taken another animal's detection to "
-        f"{_mean(spread[ours[GONDOLA], 'rmse_own'], 0)} m and {_mean(spread[ours[UAV], 'rmse_own'], 0)} m.",
+        f"Once animals are out of sight, their tracks are off by {off(GONDOLA, 'rmse')} where the gondola "
+        f"looks and by {off(UAV, 'rmse')} where the multicopter does (RMS distance, mean over worlds); "
+        f"tracks that had not taken another animal's detection by {off(GONDOLA, 'rmse_own')} and "
+        f"{off(UAV, 'rmse_own')}.",
         " ".join(_back_words(spread, one) for one in PLATFORMS),
     ]
 
@@ -219,35 +168,55 @@ COLUMNS = {
     "filter": "by",
     "rmse": "off (m)",
     "sd": "said (m)",
-    "anees": "ANEES",
+    "anees": "ANEES (2 is right)",
     "beyond": "outside the 95 % ellipse",
-    "rmse_own": "off, own tracks (m)",
-    "anees_own": "ANEES, own tracks",
-    "own_share": "own tracks",
     "right": "track back in the next lap",
     "tracks": "tracks",
 }
 CAPTION = (
     "Means over worlds with their 95 % intervals, of animals that were detected and are out of sight. Off: "
     "RMS distance of the track from the animal. Said: standard deviation that the track states, each way; "
-    "off is expected to be 1.4 times of it. ANEES: 2 where the covariance is right. Own tracks: those that "
-    "had not taken another animal's detection by then. Track back: animals of all worlds together."
+    "off is expected to be 1.4 times of it. ANEES is of both coordinates together: 2 where the covariance is "
+    "right, more where tracks are too sure; half of it, NEES / 2, is right at 1. Track back: animals of all "
+    "worlds together."
 )
+OWN_COLUMNS = {
+    "platform": "from",
+    "filter": "by",
+    "own_share": "own tracks",
+    "rmse_own": "off (m)",
+    "anees_own": "ANEES (2 is right)",
+}
+OWN_CAPTION = (
+    "The same of own tracks alone: those that had not taken another animal's detection by then, and which "
+    "share of all they are."
+)
+
+
+def _by_filter(spread: pd.DataFrame, names: Mapping[str, Callable[[pd.Series], str]]) -> pd.DataFrame:
+    return pd.DataFrame(
+        {"platform": words, "filter": NAMES[one]}
+        | {name: say(spread[f"{platform}-{one}", name]) for name, say in names.items()}
+        for platform, words in PLATFORMS.items()
+        for one in FILTERS
+    )
 
 
 def table(spread: pd.DataFrame) -> pd.DataFrame:
     """One row for each platform and filter."""
-    rows = []
-    for platform, words in PLATFORMS.items():
-        for one in FILTERS:
-            subject = f"{platform}-{one}"
-            rows.append(
-                {"platform": words, "filter": NAMES[one]}
-                | {k: _mean(spread[subject, k]) for k in ("rmse", "sd", "anees", "rmse_own", "anees_own")}
-                | {k: _mean_share(spread[subject, k]) for k in ("beyond", "own_share")}
-                | {"right": right_words(spread, subject), "tracks": _mean(spread[subject, "tracks"])}
-            )
-    return pd.DataFrame(rows)
+    found = _by_filter(
+        spread,
+        dict.fromkeys(("rmse", "sd", "anees", "tracks"), positive_words) | {"beyond": mean_share_words},
+    )
+    found["right"] = [right_words(spread, f"{platform}-{one}") for platform in PLATFORMS for one in FILTERS]
+    return found[list(COLUMNS)]
+
+
+def own_table(spread: pd.DataFrame) -> pd.DataFrame:
+    """The same of tracks that had not taken another animal's detection."""
+    return _by_filter(
+        spread, {"own_share": mean_share_words, "rmse_own": positive_words, "anees_own": positive_words}
+    )
 
 
 def consistency_words(spread: pd.DataFrame) -> str:
@@ -255,18 +224,19 @@ def consistency_words(spread: pd.DataFrame) -> str:
     said = []
     for platform, words in PLATFORMS.items():
         subject = f"{platform}-{NEGATIVE}"
-        every, own = (spread[subject, name].dropna() for name in ("anees", "anees_own"))
-        if len(every) < 2 or len(own) < 2:
+        every, own = (spread[subject, name] for name in ("anees", "anees_own"))
+        of_every, of_own = positive_interval(every), positive_interval(own)
+        if of_every is None or of_own is None:
             continue
         said.append(
-            f"From the {words} the ANEES is {_mean(every)}, {_verdict(every)}; of tracks that had not taken "
-            f"another animal's detection {_mean(own)}, {_verdict(own)}."
+            f"From the {words} the ANEES, which is 2 where tracks are as far off as they say, is "
+            f"{positive_words(every)}, {_verdict(of_every)}; of tracks that had not taken another animal's "
+            f"detection {positive_words(own)}, {_verdict(of_own)}."
         )
     return " ".join(said) or "So few worlds say nothing of whether tracks are as far off as they say."
 
 
-def _verdict(values: pd.Series) -> str:
-    found = mean_interval(values.to_numpy(float))
+def _verdict(found: Interval) -> str:
     if found.low > 2:
         return f"{found.estimate / 2:.1f} times what it should be: too sure of itself"
     if found.high < 2:
@@ -300,73 +270,34 @@ def later_words(spread: pd.DataFrame, platform: str) -> str:
     )
 
 
-SEARCH_COLUMNS = {
-    "search": "search",
-    "minutes": "time (min)",
-    "turns": "turns to an animal",
-    "visits": "found by that",
-    "given_up": "given up",
-    "rmse": "off (m)",
-    "sd": "said (m)",
-    "done": "enclosures called done",
-    "found": "animals found",
-}
-SEARCH_CAPTION = (
-    "Means over worlds with their 95 % intervals. Off and said are of animals out of sight while their "
-    "enclosure is searched, up to when the shorter search ended. A search ends when all enclosures are "
-    "called done, all rows are flown, or after the time of two laps."
-)
+def rule_words(checks: Mapping[str, Check], claims: Sequence[Mapping[str, Any]]) -> str:
+    """By which rule claims are decided that count animals of all worlds together; empty where none does.
 
-
-def search_table(spread: pd.DataFrame) -> pd.DataFrame:
-    """One row for each kind of search."""
-    rows = []
-    for subject, words in SEARCHES.items():
-        rows.append(
-            {"search": words}
-            | {k: _mean(spread[subject, k]) for k in ("minutes", "turns", "visits", "given_up", "rmse", "sd")}
-            | {
-                "done": _mean_share(spread[subject, "done"]),
-                "found": _mean_share(spread[subject, "animals_share"]),
-            }
+    Parameters
+    ----------
+    checks
+        By the claim's id.
+    claims
+        With their ``id`` and ``threshold``.
+    """
+    said = []
+    for above, side, other in ((True, "above", "below"), (False, "below", "above")):
+        pooled = [
+            one
+            for one in claims
+            if one["id"] in checks and checks[one["id"]].pooled and checks[one["id"]].above == above
+        ]
+        if not pooled:
+            continue
+        units = " and ".join(dict.fromkeys(checks[one["id"]].unit for one in pooled))
+        limits = " and ".join(dict.fromkeys(percent(float(one["threshold"]), 0) for one in pooled))
+        said.append(
+            f"Claims under which {units} are counted, of all worlds together, are decided by another rule: "
+            f"such a claim holds where the 95 % interval of their share lies wholly {side} its threshold, "
+            f"{limits}, does not hold where it lies wholly {other}, and is undecided where the threshold is "
+            "in it. It may hold though most of them are not so."
         )
-    return pd.DataFrame(rows)
-
-
-def search_words(spread: pd.DataFrame) -> str:
-    """What visits change."""
-    longer = (spread[REVISITS, "minutes"] - spread[ROWS, "minutes"]).to_numpy(float)
-    time = ""
-    if len(longer) > 1:
-        found = mean_interval(longer)
-        sure = found.low > 0 or found.high < 0
-        low, high = sorted((abs(found.low), abs(found.high)))
-        time = (
-            f" The search takes {abs(found.estimate):.1f} min {'longer' if found.estimate > 0 else 'less'} "
-            f"({low:.1f} to {high:.1f})."
-            if sure
-            else f" That the search takes another time is not certain ({number(found.low, 2)} to "
-            f"{number(found.high, 2)} min)."
-        )
-    return (
-        f"While an enclosure is searched, with visits the RMS distance of its animals out of sight is "
-        f"{changed_words(spread, 'rmse', REVISITS, ROWS)}, and the stated standard deviation is "
-        f"{changed_words(spread, 'sd', REVISITS, ROWS)}.{time}{_early_words(spread)}"
-    )
-
-
-def _early_words(spread: pd.DataFrame) -> str:
-    """Whether animals were missed where every enclosure was called done: that is of counting by tracks."""
-    whole = spread[REVISITS, "done"] == 1
-    if not whole.any():
-        return ""
-    missed = 1 - float(spread[REVISITS, "animals_share"].to_numpy(float)[whole.to_numpy()].mean())
-    if not missed > 0:
-        return ""
-    return (
-        f" In the worlds where all enclosures were called done ({int(whole.sum())} of {len(spread)}), "
-        f"{percent(missed)} of the animals had not been found by then: two tracks of one animal count as two."
-    )
+    return " ".join(said)
 
 
 def cost_words(cost: pd.DataFrame, spread: pd.DataFrame) -> str:
