@@ -111,7 +111,7 @@ def _explain(fig: Figure, *, animals: bool = True) -> None:
         ground += [
             Line2D([], [], color=BLUE, lw=1.3, label="track of an animal"),
             Line2D([], [], mfc=VERMILLION, label="animal, detected", **dot),
-            Line2D([], [], mfc="none", label="animal, not yet", **dot),
+            Line2D([], [], mfc="none", label="animal, not detected yet", **dot),
         ]
     else:
         ground += [

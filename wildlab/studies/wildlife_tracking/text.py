@@ -14,6 +14,7 @@ from wildlab.pipeline.animals.follow import STATION_S
 from wildlab.pipeline.animals.measures import OUT_OF_SIGHT
 from wildlab.reporting.text import percent
 from wildlab.studies.wildlife_tracking.intervals import (
+    FEWEST,
     changed_words,
     mean_share_words,
     positive_interval,
@@ -82,7 +83,11 @@ visit once the trace of its covariance is beyond {VISITS.worth_m2:g} m². An ani
 {VISITS.patience:g} s of scanning from where it should be do not find is lost. An enclosure is done as soon as
 it has as many tracks as animals live there, which F takes as known; its rows are then left out, and its
 animals are not visited any more. So animals count in the comparison only while their enclosure is searched,
-and only up to when the shorter of the two searches ended."""
+and only up to when the shorter of the two searches ended.
+
+Intervals are of 95 %, by Student's distribution over worlds. Means of what cannot be negative have theirs on
+the logarithm of the mean, so that they end above zero: of three worlds they are wide, of fewer than {FEWEST}
+there are none. Differences between two filters or searches can be negative, and are taken world by world."""
 
 LIMITS = [
     "The thesis prints no result of its simulations of tracking. F's figure 7.13 is planned while it flies; "
@@ -229,11 +234,12 @@ def consistency_words(spread: pd.DataFrame) -> str:
         if of_every is None or of_own is None:
             continue
         said.append(
-            f"From the {words} the ANEES, which is 2 where tracks are as far off as they say, is "
-            f"{positive_words(every)}, {_verdict(of_every)}; of tracks that had not taken another animal's "
-            f"detection {positive_words(own)}, {_verdict(of_own)}."
+            f"From the {words} it is {positive_words(every)}, {_verdict(of_every)}; of tracks that had not "
+            f"taken another animal's detection {positive_words(own)}, {_verdict(of_own)}."
         )
-    return " ".join(said) or "So few worlds say nothing of whether tracks are as far off as they say."
+    if not said:
+        return "So few worlds say nothing of whether tracks are as far off as they say."
+    return f"ANEES is 2 where tracks are as far off as they say. {' '.join(said)}"
 
 
 def _verdict(found: Interval) -> str:
