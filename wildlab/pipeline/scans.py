@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.clocks import frame_times, gimbal_angles, poses_at, truth_at
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera_poses import CameraPoses
@@ -148,8 +149,8 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
     Raises
     ------
     WildlabError
-        Where there is no such sensor, it detects nothing or things of several kinds, or the flight has no
-        poses.
+        Where there is no such sensor, it detects nothing or things of several kinds, its detections are in
+        looks of another one, or the flight has no poses.
     """
     known = sensors_of(flight)
     if sensor not in known:
@@ -166,8 +167,27 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
     chosen = chosen[np.argsort(logged[chosen], kind="stable")]
     frame_ids, stamps = frames["frame_id"].iloc[chosen], logged[chosen]
     seen = flight.table("detections")
-    seen = seen[(seen["source"] == sensor) & seen["frame_id"].isin(frame_ids)]
-    kinds = sorted(set(seen["kind"]))
+    others = looks_of_others(frames, seen)
+    stray = others[others["source"] == sensor]
+    if len(stray):
+        looked_by = " and ".join(repr(name) if name else "no sensor" for name in sorted(set(stray["sensor"])))
+        raise WildlabError(
+            f"{len(stray)} detections of the source {sensor!r} are in looks of {looked_by}",
+            "give the detections of each sensor a source of its name, or name in frames.sensor who looked",
+            file=flight.folder,
+            field="detections.source",
+        )
+    own_looks = seen["frame_id"].isin(frame_ids)
+    kinds = sorted(set(seen.loc[own_looks & (seen["source"] == sensor), "kind"]))
+    if not kinds and own_looks.any():
+        sources = " and ".join(repr(name) for name in sorted(set(seen.loc[own_looks, "source"])))
+        raise WildlabError(
+            f"no detection has the source {sensor!r}; those in its looks have the source {sources}",
+            f"give what {sensor!r} saw the source of its name, or name in frames.sensor who looked",
+            file=flight.folder,
+            field="detections.source",
+        )
+    seen = seen[own_looks & (seen["source"] == sensor)]
     if len(kinds) != 1:
         raise WildlabError(
             f"the sensor {sensor!r} detects {' and '.join(kinds) or 'nothing'}",

@@ -13,6 +13,7 @@ from wildlab.flight.checks import inertial as findings_inertial
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.checks.sense.sense import sense
+from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
@@ -66,6 +67,7 @@ def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
         *findings.overlap(flight),
         *findings_seen.truth_place(flight),
         *findings_seen.identity(flight),
+        *sensors(flight),
         *findings_seen.image(flight),
         *findings_inertial.inertial(flight),
         *terrain_findings(flight),
