@@ -261,8 +261,8 @@ RECIPE = (DATA / "recipes" / "autoferry-2.toml").read_text(encoding="utf-8")
         ('sensor = "sensor"\n', "", "there are images, and no camera"),
         (
             'azimuth = { column = "bearing", unit = "rad" }',
-            'azimuth = { column = "bearing", unit = "rad" }\nrange = { value = 9.0, unit = "m" }',
-            "or azimuth, elevation and range",
+            'range = { value = 9.0, unit = "m" }',
+            "an azimuth with or without elevation and range",
         ),
         ('sensor = "sensor"\n', 'sensor = "sonar"\n', "sonar (in [frames.sensor])"),
     ],

@@ -208,6 +208,77 @@ def test_other_kinds_of_detections(raw: Any) -> None:
     assert list(detections["frame_id"].iloc[3:]) == [""] * 6
 
 
+def test_a_range_needs_no_elevation(raw: Any) -> None:
+    """A plain radar measures on the level: range and bearing are all there is."""
+    angle = {"value": 90.0, "unit": "deg"}
+    radar = {"source": "radar", "file": "clicks.csv", "azimuth": angle, "range": {"value": 2.0, "unit": "km"}}
+    raw.recipe["detections"] += [radar]
+    detections = raw.run().table("detections")
+    assert list(detections["kind"]) == ["pixel"] * 3 + ["range-bearing"] * 3
+    assert detections["range_m"].iloc[3] == 2000.0
+    assert "elevation_rad" not in detections
+
+
+def _head_up(raw: Any, yaws_deg: list[float], bearings: list[float]) -> list[dict[str, Any]]:
+    """A radar whose bearings are relative to the bow, on a platform that leans and turns."""
+    nav = "time,lat,lon,height,qw,qx,qy,qz\n"
+    for second, yaw in enumerate(yaws_deg):
+        x, y, z, w = Rotation.from_euler("ZYX", [yaw, 7.0, -4.0], degrees=True).as_quat().tolist()
+        nav += f"2024-06-12T09:30:0{second}Z,63.44,10.4,140,{w!r},{x!r},{y!r},{z!r}\n"
+    raw.tables["nav.csv"] = nav
+    photos = zip("ABC", bearings, strict=True)
+    raw.tables["hits.csv"] = "photo,bearing\n" + "".join(f"{one},{bearing}\n" for one, bearing in photos)
+    return [
+        {
+            "source": "radar",
+            "file": "hits.csv",
+            "frame": "photo",
+            "azimuth": {"column": "bearing", "unit": "deg"},
+            "range": {"value": 2.0, "unit": "km"},
+            "counts_from": "bow",
+        }
+    ]
+
+
+def test_bearings_from_the_bow_have_the_yaw_added(raw: Any) -> None:
+    # Photos at 1.5, 2 and 3 s; the shortest turn goes through north.
+    raw.recipe["detections"] = _head_up(raw, [300, 350, 10, 100, 100], [10.0, -30.0, 170.0])
+    azimuth = raw.run().table("detections")["azimuth_rad"]
+    np.testing.assert_allclose(np.degrees(azimuth.iloc[1:]), [-20.0, -90.0], atol=1e-9)
+    # Half way between two attitudes that lean alike the yaw is half way too, but for a second-order rest.
+    assert np.degrees(azimuth.iloc[0]) == pytest.approx(10.0, abs=0.2)
+
+
+def test_a_bow_whose_heading_is_not_known_is_refused(raw: Any) -> None:
+    raw.recipe["detections"] = _head_up(raw, [0, 0, 0], [1.0, 2.0, 3.0])
+    with pytest.raises(
+        WildlabError, match=r"line 4.*counts from the bow, and no pose says .* in frame 'C': 1 of 3"
+    ):
+        raw.run()
+    del raw.recipe["detections"][0]["frame"]
+    with pytest.raises(WildlabError, match="nothing says when they were taken"):
+        raw.run()
+
+
+def test_only_an_azimuth_counts_from_the_bow(raw: Any) -> None:
+    raw.set("detections.0.counts_from", "bow")
+    with pytest.raises(WildlabError, match="only an azimuth counts from the bow"):
+        raw.run()
+
+
+def test_detections_of_one_sensor_in_looks_of_another_are_refused(raw: Any) -> None:
+    looks = raw.tables["photos.csv"].splitlines()
+    raw.tables["photos.csv"] = "\n".join(
+        f"{look},{who}" for look, who in zip(looks, ["who", "click", "click", "lidar"], strict=True)
+    )
+    raw.set("frames.sensor", "who")
+    with pytest.raises(
+        WildlabError, match=r"of the source 'click' are in looks of the sensor 'lidar'"
+    ) as caught:
+        raw.run()
+    assert caught.value.file is not None and "clicks.csv" in str(caught.value.file)
+
+
 def test_groups_by_edges(raw: Any) -> None:
     raw.tables["photos.csv"] = (
         "photo,time,h\nA,2024-06-12T09:30:01Z,10\nB,2024-06-12T09:30:02Z,30\nC,2024-06-12T09:30:03Z,52\n"

@@ -50,7 +50,7 @@ def sensors(flight: Flight) -> Iterator[Finding]:
                 "detections",
                 "source",
                 f"frames.sensor and detections.source contradict each other: {said}",
-                "give the detections of each sensor a source of its name (in a recipe, a [[detections]] each, "
+                "give the detections of each sensor a source of its name (in a recipe a [[detections]] each, "
                 "with a file or a `where` of its own), or name in frames.sensor who looked; where all are of "
                 "one sensor, frames need no sensor",
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -89,7 +89,8 @@ class Ground(Strict):
 
 class Detections(Series):
     """Detections of one source. One of pixel, position, or azimuth says what was measured; with an elevation
-    where the sensor has one, and with a range."""
+    where the sensor has one, and with a range. `counts_from`: whether the azimuth is zero towards north, or
+    ahead of the platform, as of a radar whose picture is head up; it grows clockwise either way."""
 
     source: str
     id: str | None = None
@@ -99,20 +100,22 @@ class Detections(Series):
     pixel: PixelPart | None = None
     position: Position | None = None
     azimuth: Angle | None = None
+    counts_from: Literal["north", "bow"] = "north"
     elevation: Angle | None = None
     range: Length | None = None
     ground: Ground | None = None
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        bearing = self.azimuth is not None and (self.elevation is not None or self.range is None)
+        bearing = self.azimuth is not None
         partly = any(part is not None for part in (self.azimuth, self.elevation, self.range))
         if (self.pixel is not None) + (self.position is not None) + partly != 1 or partly != bearing:
             raise ValueError(
-                "a detection is a pixel, a position, an azimuth (with or without elevation), or azimuth, "
-                "elevation and range; "
+                "a detection is a pixel, a position, or an azimuth with or without elevation and range; "
                 "give one of these"
             )
+        if self.counts_from == "bow" and not bearing:
+            raise ValueError("only an azimuth counts from the bow; leave counts_from out")
         if self.prefix and self.id is not None:
             raise ValueError("a prefix is for detections without an id; leave it out")
         return self

@@ -138,10 +138,12 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
     manifest = _manifest(recipe, raw, camera, places, epoch, " ".join(filter(None, notes)))
     if recipe.detections:
         _refuse_problems(Flight(manifest, nav, tables), recipe, raw.folder)
-        of_frame = pd.DataFrame(np.full((len(frames.table), 3), np.nan), index=frames.table["frame_id"])
+        of_frame = pd.DataFrame(np.nan, frames.table["frame_id"], ["north", "east", "down", "heading"])
         if nav:
-            lens, _, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
-            of_frame = pd.DataFrame(lens, index=frames.table["frame_id"])
+            lens, R, _ = poses_at(next(iter(nav.values())), flight_time, frames.table["frame_id"], math.inf)
+            of_frame[["north", "east", "down"]] = lens
+            # The horizontal direction of the axis ahead: the yaw, whatever roll and pitch are.
+            of_frame["heading"] = np.arctan2(R[:, 1, 0], R[:, 0, 0])
         image = (math.nan, math.nan) if camera is None else (float(camera.width_px), float(camera.height_px))
         detections = [
             read_detections(one, raw, recipe, f"detections[{i}]", frames, places, image, of_frame)

@@ -22,7 +22,7 @@ from wildlab.flight.recipe.raw import (
     times,
 )
 from wildlab.flight.recipe.series import Block
-from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic
+from wildlab.geometry.frames import geodetic_to_ned, ned_to_geodetic, wrap
 
 
 @dataclass(frozen=True)
@@ -140,12 +140,13 @@ def read_detections(
     image
         Width and height in pixels.
     lens
-        Position of the platform (north, east, down) by frame_id.
+        Position of the platform (north, east, down, m) and its heading (rad) by frame_id.
 
     Raises
     ------
     WildlabError
-        Where a column is missing or a cell cannot be read, or pixels belong to no frame.
+        Where a column is missing or a cell cannot be read, pixels belong to no frame, or bearings count from
+        the bow and it is not known where that points.
     """
     rows = raw.series(block, part)
     frame = frames_of_rows(frames, recipe, block, block.frame, rows, part)
@@ -172,14 +173,42 @@ def read_detections(
         columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
     elif block.azimuth is not None:
         columns["azimuth_rad"] = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
+        if block.counts_from == "bow":
+            columns["azimuth_rad"] = wrap(columns["azimuth_rad"] + _headings(rows, frame, lens, part))
         if block.elevation is not None:
             columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
         if block.range is not None:
             columns["range_m"] = numbers(rows, block.range, "length", f"{part}.range")
     if block.ground is not None:
-        under = np.full((len(rows), 3), np.nan) if frame is None else lens.reindex(frame).to_numpy()
+        under = np.full((len(rows), 3), np.nan)
+        if frame is not None:
+            under = lens[["north", "east", "down"]].reindex(frame).to_numpy()
         columns["plane_down_m"] = _ground(rows, block.ground, f"{part}.ground", places, under)
     return pd.DataFrame(columns)
+
+
+def _headings(rows: RawTable, frame: Text | None, lens: pd.DataFrame, part: str) -> Array:
+    """Where the bow points at each detection, rad from north towards east."""
+    if frame is None:
+        raise rows.fail(
+            "these bearings count from the bow, and nothing says when they were taken",
+            "name the column of the frame, and give the frames a time",
+            "frame",
+            part,
+        )
+    heading = lens["heading"].reindex(frame).to_numpy()
+    unknown = ~np.isfinite(heading)
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise rows.fail(
+            f"this bearing counts from the bow, and no pose says where that points in frame {frame[row]!r}: "
+            f"{int(unknown.sum())} of {len(frame)} are so",
+            "give poses for as long as anything is detected, or leave these rows out with `where`",
+            "counts_from",
+            part,
+            row,
+        )
+    return np.asarray(heading, np.float64)
 
 
 def _ground(rows: RawTable, ground: Ground, part: str, places: Places, under: Array) -> Array:

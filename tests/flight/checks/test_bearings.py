@@ -1,0 +1,66 @@
+"""What a radar's bearings count from, told from the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.store import Flight
+
+
+def radar_flight(
+    make: Callable[..., Flight], reads: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> Flight:
+    """A boat that turns by 150 deg and sees a buoy and clutter; ``reads``: of true bearing and yaw, rad."""
+    rng = np.random.default_rng(4)
+    t = np.arange(0.0, 100.0)
+    yaw = np.radians(20 + 1.5 * t)
+    nav = pd.DataFrame(
+        {"time_s": t, "north_m": 2.0 * t, "east_m": 0.0, "down_m": 0.0, "q_x": 0.0, "q_y": 0.0}
+    )
+    flight = make()
+    flight.nav.clear()
+    flight.nav["gps"] = nav.assign(q_w=np.cos(yaw / 2), q_z=np.sin(yaw / 2))
+    flight.tables["frames"] = pd.DataFrame({"frame_id": [f"l{k}" for k in range(100)], "time_s": t})
+    flight.tables["truth"] = pd.DataFrame(
+        {"target_id": ["buoy"], "time_s": [np.nan], "north_m": 100.0, "east_m": 300.0, "down_m": 0.0}
+    )
+    to_buoy = np.arctan2(300.0, 100.0 - 2.0 * t) + rng.normal(0, np.radians(0.3), 100)
+    seen = [
+        pd.DataFrame({"frame_id": flight.tables["frames"]["frame_id"], "azimuth_rad": reads(bearing, yaw)})
+        for bearing in (to_buoy, rng.uniform(-np.pi, np.pi, 100))
+    ]
+    detections = pd.concat(seen, ignore_index=True)
+    flight.tables["detections"] = detections.assign(
+        detection_id=[str(k) for k in range(200)], source="radar", kind="range-bearing", range_m=300.0
+    )
+    return flight
+
+
+def said(flight: Flight) -> list[str]:
+    return [f"{one.sentence} {one.fix}" for one in check_flight(flight) if one.field == "azimuth_rad"]
+
+
+@pytest.mark.parametrize(
+    ("reads", "cause"),
+    [
+        (lambda bearing, yaw: bearing - yaw, 'counts_from = "bow"'),
+        (lambda bearing, yaw: bearing - np.pi / 2, "it counts from east"),
+    ],
+)
+def test_what_bearings_count_from_is_named(
+    make_flight: Callable[..., Flight],
+    reads: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    cause: str,
+) -> None:
+    (sentence,) = said(radar_flight(make_flight, reads))
+    assert cause in sentence
+    assert "; then it is 5" in sentence  # half are clutter
+
+
+def test_true_bearings_are_no_finding(make_flight: Callable[..., Flight]) -> None:
+    assert said(radar_flight(make_flight, lambda bearing, yaw: bearing)) == []
