@@ -87,7 +87,7 @@ def test_every_unit_is_in_the_readme() -> None:
 def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say() -> None:
     """All of them put behind the example make a recipe."""
     parts = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
-    assert len(parts) == 6
+    assert len(parts) == 7
     data = tomllib.loads("\n".join(parts))
     data["time"]["epoch"] = datetime(2024, 6, 12, tzinfo=UTC)  # since the times of the parts count from it
     recipe = check_model(Recipe, data, None)
@@ -98,6 +98,7 @@ def test_the_other_parts_of_the_readme_are_what_a_recipe_may_say() -> None:
     assert recipe.magnetometer is not None
     assert recipe.magnetometer.field.z.unit == "mG"
     assert set(recipe.tables) == {"log", "gps"}
+    assert recipe.detections[-1].counts_from == "bow"
 
 
 def test_the_vertical_part_of_the_readme_is_toml() -> None:
