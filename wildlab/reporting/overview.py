@@ -139,7 +139,10 @@ def record(report: Report, overview: Overview, gains: Sequence[Gain], counts: Ma
     seen, images, placed = overview.detections
     if seen:
         note("detections", seen, "1", seen)
-        note("detections_placed", placed, "1", seen)
+        in_images = overview.detections_in_images
+        note("detections_in_images", in_images, "1", seen)
+        if in_images:
+            note("detections_placed", placed, "1", seen)
         if frames is not None and len(frames):
             note("images_with_detections", images, "1", len(frames))
         things = things_named(overview)

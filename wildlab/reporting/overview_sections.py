@@ -28,7 +28,9 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
     if np.isfinite(way) and overview.path is not None:
         found.append((words.length_words(way), f"path of {charts.path_name(overview.path)}"))
     if overview.above is not None and np.isfinite(overview.above[0]).any():
-        found.append((f"{np.nanmedian(overview.above[0]):.0f} m", f"median height above {overview.above[1]}"))
+        median = float(np.nanmedian(overview.above[0]))
+        if height := words.height_words(median, median):
+            found.append((height, f"median height above {overview.above[1]}"))
     frames = overview.flight.frames
     if frames is not None and len(frames):
         without = next((one.lost for one in overview.lost if one.key == "images_without_pose"), 0)
@@ -37,7 +39,10 @@ def tiles(overview: Overview) -> list[tuple[str, str]]:
     if overview.coverage is not None and overview.coverage.placed.any():
         found.append((words.area_words(overview.coverage.area_m2), "ground in at least one image"))
     if overview.detections[0]:
-        found.append((f"{overview.detections[2]} / {overview.detections[0]}", "detections on the ground"))
+        pixels = overview.detections_in_images
+        on_ground = (f"{overview.detections[2]} / {pixels}", "detections on the ground")
+        # A radar's are put nowhere by a camera's ray: that none is on the ground would say nothing.
+        found.append(on_ground if pixels else (str(overview.detections[0]), "detections"))
     if overview.vibration is not None:
         found.append((f"{number(overview.vibration[0].worst.max())} m/s²", "strongest shaking above 5 Hz"))
     return found or [("none", "numbers: there are no stamps and no poses")]

@@ -292,10 +292,16 @@ def subtitle(overview: Overview) -> str:
         parts.append(length_words(way))
     if overview.above is not None:
         low, high = np.nanquantile(overview.above[0], [0.05, 0.95]) if _any(overview.above[0]) else (0, 0)
-        if _any(overview.above[0]):
-            parts.append(f"mostly {low:.0f} to {high:.0f} m above {overview.above[1]}")
+        if height := height_words(low, high):
+            parts.append(f"mostly {height} above {overview.above[1]}")
     parts.append(f"poses: {overview.source}" if overview.source else "no poses")
     return ", ".join(parts)
+
+
+def height_words(low: float, high: float) -> str:
+    """Between which heights (m): ``"59 to 61 m"``, ``"60 m"``; nothing where it never left the ground."""
+    below, above = round(low), round(high)
+    return f"{below} to {above} m" if below != above else f"{above} m" if above else ""
 
 
 def _any(values: np.ndarray) -> bool:

@@ -95,8 +95,14 @@ def test_tracks_of_the_filter_that_is_spoken_of() -> None:
         **track("b", "schmidt", 6.0, 20.0),
     })  # fmt: skip
     facts = facts_of(flight(overview(), tracking))
-    assert (facts.tracks, facts.track_error) == (2, 4.0)
+    assert (facts.tracks, facts.track_error, facts.track_worst) == (2, 4.0, 6.0)
     assert facts.track_sure == pytest.approx((0.5 + 5.0) / 2)
+
+
+@pytest.mark.parametrize(("pictured", "others"), [({"value": 0}, True), ({"value": 7}, False), (None, False)])
+def test_whether_a_camera_detected_anything(pictured: dict[str, int] | None, others: bool) -> None:
+    more = {} if pictured is None else {"detections_in_images": pictured}
+    assert facts_of(flight(overview(detections={"value": 60}, **more))).other_sensors is others
 
 
 @pytest.mark.parametrize("off_deg", [2.0, 0.0])

@@ -16,7 +16,7 @@ from tests.sharing.edition.flights import EMPTY, WHOLE
 from wildlab.reporting.page import POLICY
 from wildlab.sharing.edition import edition
 from wildlab.sharing.edition.edition import Place, edition_html
-from wildlab.sharing.edition.facts import Alarm
+from wildlab.sharing.edition.facts import Alarm, Facts
 from wildlab.sharing.edition.language import Language, languages, load_language
 from wildlab.sharing.edition.picture import MapPicture
 from wildlab.sharing.edition.said import Day, Said, length, number
@@ -191,6 +191,18 @@ def test_what_is_not_translated_is_said(tmp_path: Path) -> None:
     assert '<html lang="sw">' in html and "Rekebisha" in html
     assert f"{lacking} texts are not translated yet" in html
     assert "not translated" not in edition_html(WHOLE, name="f", place=Place("withheld"))
+
+
+@pytest.mark.parametrize("code", languages())
+def test_what_a_step_is_is_said_where_there_are_steps(code: str) -> None:
+    def page(facts: Facts, picture: MapPicture | None) -> str:
+        return edition_html(facts, name="f", place=Place("withheld"), picture=picture, language=code)
+
+    tracked = EMPTY._replace(tracks=1, track_error=1.3)
+    assert "75 cm" in page(WHOLE, MAP)  # in the sentence on places
+    assert "75 cm" in page(tracked, None)  # at the bar of the drawing
+    assert "75 cm" not in page(tracked, MAP)
+    assert "75 cm" not in page(EMPTY, None)
 
 
 def test_a_twin_is_said_to_be_one() -> None:

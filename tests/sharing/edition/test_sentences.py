@@ -78,6 +78,40 @@ def test_without_truth_sightings_are_held_against_each_other() -> None:
     assert "unknown.error" in keys(story.unknown) and story.why.key == "why.sound_unmeasured"
 
 
+RADAR = EMPTY._replace(
+    verdict="look closer", seen=1832.0, pictured=0.0, tracks=5, track_error=1.345, track_worst=10.83
+)
+
+
+@pytest.mark.parametrize("code", languages())
+def test_without_a_camera_no_picture_is_spoken_of(code: str) -> None:
+    story, words = tell(RADAR), load_language(code)
+    said = " ".join(say(words, one) for one in said_of(story)).lower()
+    assert not words.missing
+    for word in ("picture", "camera", "bild", "kamera"):
+        assert word not in said
+    assert "do.known_tracks" in keys(tell(RADAR._replace(tracks=0)).advice)
+    # A look of the camera is a picture all the same where a radar is beside it.
+    assert "unknown.hidden" in keys(tell(RADAR._replace(pictured=900.0)).unknown)
+
+
+def test_tracks_against_true_places_are_no_ignorance() -> None:
+    """How far off the followed are is said with the worst of them; only of the rest it is not known."""
+    story, english = tell(RADAR), load_language()
+    (value, label), *_ = story.tiles
+    assert "1.3" in say(english, value) and "11 metres" in say(english, label).replace("\u00a0", " ")
+    assert "about 1.3 metres, the worst by 11 metres" in say(english, story.measured[0]).replace(
+        "\u00a0", " "
+    )
+    assert keys(story.measured) == ["measured.tracks", "measured.detected"]
+    assert "unknown.error" not in keys(story.unknown) and "unknown.error_sightings" in keys(story.unknown)
+    assert "do.known_places" not in keys(story.advice) and "do.known_tracks" not in keys(story.advice)
+    assert "unknown.error" in keys(tell(RADAR._replace(tracks=0)).unknown)
+    # One track is its own worst.
+    alone = tell(RADAR._replace(tracks=1, track_worst=1.345))
+    assert alone.tiles[0][1].key == "tile.track" and alone.measured[0].key == "measured.track"
+
+
 def test_what_does_not_fit_is_counted() -> None:
     alarms = tuple(Alarm(what, 9.0, 1) for what in ALARMS)
     story = tell(WHOLE._replace(verdict="went wrong", alarms=alarms, gains=(), troubles=()))
@@ -177,6 +211,7 @@ facts = st.builds(
     possible=st.one_of(st.none(), gains.filter(lambda one: one.value == one.value)),
     failed=st.lists(st.sampled_from(["overview", *PARTS]), unique=True).map(tuple), lacking=st.just(()),
     doubted=st.lists(st.sampled_from(["tracking", "navigation"]), unique=True).map(tuple),
+    pictured=st.one_of(maybe, st.just(0.0)), track_worst=maybe,
 )  # fmt: skip
 
 

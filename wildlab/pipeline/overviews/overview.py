@@ -124,6 +124,12 @@ class Overview:
     problems: int
     warnings: int
 
+    @property
+    def detections_in_images(self) -> int:
+        """How many detections are pixels: no other can be put on the ground by a camera's ray."""
+        found = self.flight.detections
+        return 0 if found is None else int((found["kind"] == "pixel").sum())
+
 
 def troubled_for(overview: Overview, share: float) -> list[Trouble]:
     """Troubles that last for a share of the flight or more, longest first.

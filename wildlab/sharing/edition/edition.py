@@ -11,7 +11,7 @@ from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts
 from wildlab.sharing.edition.language import Language, load_language, say
-from wildlab.sharing.edition.picture import ImagePicture, MapPicture, picture_html
+from wildlab.sharing.edition.picture import IN_STEPS, ImagePicture, MapPicture, picture_html
 from wildlab.sharing.edition.said import Day, Said, Value, length
 from wildlab.sharing.edition.sentences import Story, tell
 from wildlab.sharing.edition.style import STYLE
@@ -89,6 +89,10 @@ def edition_html(
 
     kicker = [said(Said("page.kicker")), escape(name), *([said(day)] if day is not None else [])]
     drawn = picture_html(picture, facts, words)
+    # What a step is taken as is said where steps are.
+    told = [value for one in story.measured for value in one.values.values() if isinstance(value, Said)]
+    steps = IN_STEPS in drawn or any(value.key.startswith("steps.") for value in told)
+    footer = f"{said(Said('page.footer'))} {said(Said('page.footer_steps')) if steps else ''}"
     body = [
         f'<header><p class="kicker">{" · ".join(kicker)}</p>',
         f"<h1>{said(Said('page.question'))}</h1></header>",
@@ -106,7 +110,7 @@ def edition_html(
         "</div>",
         f'<p class="place">{_place(place, words, said)}</p>',
         "</main>",
-        f"<footer><p>{said(Said('page.footer'))} {_untranslated(words, said)}</p></footer>",
+        f"<footer><p>{footer} {_untranslated(words, said)}</p></footer>",
     ]
     title = escape(say(words, Said("page.title", {"name": name})))
     return (

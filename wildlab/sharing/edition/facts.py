@@ -57,14 +57,17 @@ class Facts(NamedTuple):
     seen, things
         Detections; different things that they name, NaN where not all name one.
     placed
-        Detections with a place on the ground.
+        Detections with a place on the ground; NaN where none is in an image, so that none could have one.
+    pictured
+        Detections in images; NaN where that was not recorded, and then all are taken to be.
     error_median, error_p90, compared
         Distance from where things were said to be to where they were, m, and of how many points.
     scatter, sightings
         How far apart sightings of the same thing lie, m, each axis, where no true place is known.
-    tracks, track_error, track_sure
-        How many tracks were held against the truth; the median of their root mean square errors, m; that of
-        the mean squared error over the highest that chance allows for what the tracks say of themselves.
+    tracks, track_error, track_worst, track_sure
+        How many tracks were held against the truth; the median and the largest of their root mean square
+        errors, m; the median of the mean squared error over the highest that chance allows for what the
+        tracks say of themselves.
     alarms, troubles, gains
         Worst first; trouble and its seconds, longest first; by share.
     possible
@@ -99,6 +102,13 @@ class Facts(NamedTuple):
     failed: tuple[str, ...]
     lacking: tuple[str, ...]
     doubted: tuple[str, ...] = ()
+    pictured: float = NAN
+    track_worst: float = NAN
+
+    @property
+    def other_sensors(self) -> bool:
+        """Whether all that was detected was so by other sensors than a camera, as a radar."""
+        return self.seen > 0 and self.pictured == 0
 
 
 def facts_of(flight: OwnFlight) -> Facts:
@@ -139,6 +149,7 @@ def facts_of(flight: OwnFlight) -> Facts:
         seen=value("detections"),
         things=value("things_named"),
         placed=value("detections_placed"),
+        pictured=value("detections_in_images"),
         error_median=value("horizontal_error_median", "logged-pose"),
         error_p90=value("horizontal_error_p90", "logged-pose"),
         compared=count("horizontal_error_median", "logged-pose"),
@@ -146,6 +157,7 @@ def facts_of(flight: OwnFlight) -> Facts:
         sightings=count("sighting_spread", "logged-pose"),
         tracks=len(tracks),
         track_error=_median([error for error, _ in tracks]),
+        track_worst=max((error for error, _ in tracks), default=NAN),
         track_sure=_median([sure for _, sure in tracks]),
         alarms=tuple(one for one in alarms if math.isfinite(one.size)),
         troubles=tuple(sorted(troubles.items(), key=lambda one: -one[1])),

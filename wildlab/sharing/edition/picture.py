@@ -27,6 +27,8 @@ WIDTH, HEIGHT, MARGIN = 480.0, 360.0, 26.0
 FOOT = 46.0
 #: More points of a line, and more dots, than can be told apart at this size.
 MOST_POINTS, MOST_DOTS = 600, 400
+#: Marks a text of the drawing that counts in steps.
+IN_STEPS = 'class="steps"'
 #: First bytes of the kinds of images that a page may hold.
 KINDS = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpeg", b"RIFF": "webp", b"<svg": "svg+xml", b"<?xm": "svg+xml"}
 
@@ -158,7 +160,12 @@ def _map(picture: MapPicture, language: Language) -> str:
     drawn.append(_north())
     drawn.append(_bar(scale, language))
     wide = length(float(size[1]))
-    alt = say(language, Said("picture.map_alt", {"way": wide, "seen": number(len(seen))}))
+    alt = say(
+        language,
+        Said("picture.map_alt", {"way": wide, "seen": number(len(seen))})
+        if len(seen)
+        else Said("picture.map_alt_way", {"way": wide}),
+    )
     keys = [("way", "path"), ("start", "start")] * bool(len(begin)) + [("seen", "seen")] * bool(len(seen))
     keys += [("true", "truth")] * bool(true)
     legend = "".join(
@@ -210,11 +217,13 @@ def _bar(scale: float, language: Language, steps: bool = False) -> str:
     x, y, wide = MARGIN, HEIGHT - 24.0, metres * scale
     said = say(language, length(metres))
     count = round(metres / STEP_M)
+    shows = ""
     if steps and 1 <= count <= 200:
         said += f" ({say(language, Said('steps.some', {}, count))})"
+        shows = f" {IN_STEPS}"
     return (
         f'<path class="scale" d="M{x:g} {y - 6:g}v12M{x:g} {y:g}h{wide:.1f}M{x + wide:.1f} {y - 6:g}v12"/>'
-        f'<text x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(said)}</text>'
+        f'<text{shows} x="{x + wide + 10:.1f}" y="{y + 5:g}">{escape(said)}</text>'
     )
 
 

@@ -162,9 +162,12 @@ def _tiles(facts: Facts) -> tuple[tuple[Value, Said], ...]:
     if facts.compared >= FEW and math.isfinite(facts.error_median):
         found.append((length(facts.error_median), Said("tile.error")))
     elif facts.tracks and math.isfinite(facts.track_error):
-        found.append((length(facts.track_error), Said("tile.track")))
+        worst: dict[str, Value] = {"worst": length(facts.track_worst)}
+        label = Said("tile.tracks", worst) if _unlike(facts) else Said("tile.track")
+        found.append((length(facts.track_error), label))
     if facts.seen > 0:
-        found.append((number(facts.seen), Said("tile.seen")))
+        pictured = not math.isfinite(facts.pictured) or facts.pictured == facts.seen
+        found.append((number(facts.seen), Said("tile.seen" if pictured else "tile.detected")))
     if math.isfinite(facts.length_s):
         found.append((duration(facts.length_s), Said("tile.length")))
     if math.isfinite(facts.area_m2):
@@ -187,8 +190,18 @@ def _measured(facts: Facts) -> tuple[Said, ...]:
         apart = length(MEDIAN_DISTANCE * facts.scatter)
         found.append(Said("measured.scatter", {"apart": apart, "sightings": number(facts.sightings)}))
     if facts.tracks and math.isfinite(facts.track_error):
-        found.append(Said("measured.track", {"error": length(facts.track_error)}, facts.tracks))
-    if facts.seen > 0 and math.isfinite(facts.placed):
+        off: dict[str, Value] = {"error": length(facts.track_error)}
+        if _unlike(facts):
+            off |= {"n": number(facts.tracks), "worst": length(facts.track_worst)}
+            found.append(Said("measured.tracks", off))
+        else:
+            found.append(Said("measured.track", off, facts.tracks))
+    if facts.other_sensors:
+        if math.isfinite(facts.things):
+            found.append(Said("measured.things_detected", {"seen": number(facts.seen)}, int(facts.things)))
+        else:
+            found.append(Said("measured.detected", {}, int(facts.seen)))
+    elif facts.seen > 0 and math.isfinite(facts.placed):
         if math.isfinite(facts.things):
             seen: dict[str, Value] = {"seen": number(facts.seen), "placed": number(facts.placed)}
             found.append(Said("measured.things", seen, int(facts.things)))
@@ -198,6 +211,16 @@ def _measured(facts: Facts) -> tuple[Said, ...]:
         found.append(Said("measured.area", {"area": Quantity("area", facts.area_m2),
                                             "height": length(round(facts.height_m))}))  # fmt: skip
     return tuple(found) or (Said("measured.nothing"),)
+
+
+def _unlike(facts: Facts) -> bool:
+    """Whether some track was farther off than is typical: then the worst is said too."""
+    return facts.tracks > 1 and facts.track_worst > facts.track_error
+
+
+def _followed_alone(facts: Facts) -> bool:
+    """Whether tracks were held against true places, and single sightings of other sensors never are."""
+    return facts.other_sensors and facts.tracks > 0 and math.isfinite(facts.track_error)
 
 
 def _alarm(alarm: Alarm) -> Said:
@@ -287,7 +310,8 @@ def _advice(facts: Facts) -> tuple[Said, ...]:
     if facts.possible is not None:
         found.append(Said("do.possible", {"gain": length(facts.possible.value)}))
     if not facts.compared and "georeferencing" not in facts.failed:
-        found.append(Said("do.known_places"))
+        if not _followed_alone(facts):
+            found.append(Said("do.known_tracks" if facts.other_sensors else "do.known_places"))
     elif facts.compared < FEW and facts.compared:
         found.append(Said("do.more_places", {"few": number(FEW)}))
     if facts.failed:
@@ -314,7 +338,8 @@ def _do(gain: Gain) -> Said:
 def _unknown(facts: Facts) -> tuple[Said, ...]:
     found = [Said(f"unknown.failed_{part}") for part in facts.failed]
     if not facts.compared and "georeferencing" not in facts.failed:
-        found.append(Said("unknown.error"))
+        tracked = facts.tracks > 0 and math.isfinite(facts.track_error)
+        found.append(Said("unknown.error_sightings" if tracked else "unknown.error"))
     elif 0 < facts.compared < FEW:
         values: dict[str, Value] = {"median": length(facts.error_median)}
         found.append(Said("unknown.few", values, facts.compared))
@@ -322,6 +347,7 @@ def _unknown(facts: Facts) -> tuple[Said, ...]:
         found.append(Said("unknown.seen"))
     elif not math.isfinite(facts.things):
         found.append(Said("unknown.things"))
-    found += [Said("unknown.hidden")] if facts.seen > 0 else []
+    if facts.seen > 0:
+        found.append(Said("unknown.hidden_detected" if facts.other_sensors else "unknown.hidden"))
     found += [Said("unknown.another_day")] if facts.compared >= FEW else []
     return tuple(found)
