@@ -25,6 +25,7 @@ from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
+from wildlab.runner.typed import other_reports, typed
 
 #: Files of a flight that two flights may have in common.
 _SHARED = ("flight", "truth", "terrain", "calibration")
@@ -98,21 +99,28 @@ def evaluate_flight(
         )
 
     places = uses["georeferencing accuracy"]
-    again = f"wildlab evaluate {flight.name}"
+    out = other_reports(reports)
+    again = typed("wildlab evaluate", folder, out=out)
+    again_source = typed("wildlab evaluate", folder, source=source, out=out)
     if places.usable:
         found, _ = flight.pose_source(source)
-        parameters, again_with = {"source": found}, f"{again} --source {found}"
+        parameters = {"source": found}
+        again_with = typed("wildlab evaluate", folder, source=found, calibration=calibration, out=out)
         applied = calibration or flight.calibration
         if applied is not None:
             learnt = read_learnt(applied)
             refuse_other_camera(flight.manifest, learnt)
             # Its text, not its path: the report can be made again without the file, and names no folder.
             parameters["calibration"] = learnt_toml(learnt)
-            again_with += f" --calibration {calibration.name}" if calibration else ""
         prepare(flight.name, "georeferencing.ipynb", parameters, again_with)
     elif lacks_only_truth(flight) and calibration is None:
         found, _ = flight.pose_source(source)
-        prepare(flight.name, "repeat-sightings.ipynb", {"source": found}, f"{again} --source {found}")
+        prepare(
+            flight.name,
+            "repeat-sightings.ipynb",
+            {"source": found},
+            typed("wildlab evaluate", folder, source=found, out=out),
+        )
     elif calibration is not None:
         raise WildlabError(
             f"a calibration is named, and the georeferencing cannot be judged: {places.why}",
@@ -129,14 +137,14 @@ def evaluate_flight(
         skipped.append(Outcome(f"{flight.name}-navigation", "skipped", 0.0, lacking))
     untracked = lacking_for_tracking(flight, uses["tracking"], source)
     if not untracked:
-        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": source or ""}, again)
+        prepare(f"{flight.name}-tracking", "tracking.ipynb", {"source": source or ""}, again_source)
     # The last to be run, since it lists what the others measured, and the first to be read.
     beside = [job.name for job in jobs]
     reasons = [] if beside[:1] == [flight.name] else [f"georeferencing ({places.why})"]
     reasons += [f"navigation ({lacking})"] if lacking else []
     reasons += [f"tracking ({untracked})"] if untracked else []
     about: dict[str, Any] = {"beside": beside, "lacking": reasons, "source": source or ""}
-    prepare(f"{flight.name}-overview", "overview.ipynb", about, again)
+    prepare(f"{flight.name}-overview", "overview.ipynb", about, again_source)
     passes = [longest_first(jobs[:-1]), jobs[-1:]]
     outcomes = run_all(passes, skipped, studies, reports, console, parallel=cores())
     order = [jobs[-1].name, *beside]

@@ -29,6 +29,7 @@ from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.seeds.fingerprint import code_key, page_key
 from wildlab.runner.seeds.kept import SeedWork, make_work
+from wildlab.runner.typed import other_reports, typed
 
 
 def make_job(
@@ -68,15 +69,19 @@ def make_job(
     notebook = notebooks / study.notebook
     parameters = plain_parameters(study.parameters)
     flight_name = "" if flight is None else _flight_name(flight)
-    again = again or f"wildlab run {study.name}" + (f" --flight {flight_name}" if flight_name else "")
     reductions = study.reductions() if first_look and seeds is None else {}
     if study.seeds is not None:
         parameters["seeds"] = study.seeds if seeds is None else seeds
         if seeds is not None and seeds < study.seeds:
             # Whoever asks for fewer flights gets a first look as well: the page and the ledger say so.
             reductions = {"seeds": (seeds, study.seeds)}
-        else:
-            again += "" if seeds is None else f" --seeds {seeds}"
+    if again is None:
+        # A first look says it in a report that is passed on: it has the flight's name, and no folder.
+        where: Any = flight_name if reductions else flight
+        more = str(seeds) if seeds is not None and "seeds" not in reductions else None
+        own_seed = None if seed is None or seed == study.seed else str(seed)
+        out = None if reductions else other_reports(reports)
+        again = typed("wildlab run", study.name, flight=where, seeds=more, seed=own_seed, out=out)
     parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])

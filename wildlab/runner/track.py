@@ -22,6 +22,7 @@ from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome, run_jobs
 from wildlab.runner.run import make_job, run_all
+from wildlab.runner.typed import other_reports, typed
 
 NOTEBOOK = "tracking.ipynb"
 
@@ -104,6 +105,19 @@ def track_flight(
         sensors=sensors,
         source=source,
         smooth=smooth,
+        again=typed(
+            "wildlab track",
+            folder,
+            tune=tune,
+            against=against,
+            filter=filters,
+            target=targets,
+            sensor=sensors,
+            settings=settings,
+            smooth=smooth,
+            source=source,
+            into=into or (other_reports(reports) and place),
+        ),
     )
     return run_alone(job, studies, place.parent, console, listed=into is None)
 
@@ -158,6 +172,7 @@ def tracking_job(
     source: str | None = None,
     smooth: bool = False,
     timeout_s: float | None = None,
+    again: str | None = None,
 ) -> Job:
     """The notebook on a flight's tracks; its parameters are texts, not paths, and name no folder."""
     parameters: dict[str, Any] = {
@@ -169,11 +184,6 @@ def tracking_job(
         "source": source or "",
         "smooth": smooth,
     }
-    options = [f"--filter {one}" for one in filters] + [f"--target {one}" for one in targets]
-    options += [f"--sensor {one}" for one in sensors] + (["--smooth"] if smooth else [])
-    options += [f"--source {source}"] if source else []
-    options += [f"--tune {tuned.flight}"] if tuned is not None else []
-    options += ["--settings settings.toml"] if settings is not None else []
     study = StudyEntry(name="evaluate", title=f"Tracks of {flight.name}", notebook=NOTEBOOK,
                        parameters=parameters)  # fmt: skip
     return make_job(
@@ -183,5 +193,5 @@ def tracking_job(
         notebooks=notebooks,
         timeout_s=timeout_s,
         name=name,
-        again=" ".join(["wildlab track", flight.name, *options]),
+        again=again,
     )

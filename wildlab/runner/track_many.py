@@ -21,6 +21,7 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job
 from wildlab.runner.track import place_of, run_alone
+from wildlab.runner.typed import other_reports, typed
 
 NOTEBOOK = "tracking-many.ipynb"
 
@@ -88,8 +89,6 @@ def track_many(
         "sensors": list(sensors),
         "source": source or "",
     }
-    options = [f"--sensor {one}" for one in sensors] + ([f"--source {source}"] if source else [])
-    options += ["--settings settings.toml"] if settings is not None else []
     study = StudyEntry(
         name="evaluate", title=f"All targets of {flight.name}", notebook=NOTEBOOK, parameters=parameters
     )
@@ -100,6 +99,14 @@ def track_many(
         notebooks=notebooks,
         timeout_s=None,
         name=place.name,
-        again=" ".join(["wildlab track", flight.name, "--many", *options]),
+        again=typed(
+            "wildlab track",
+            folder,
+            many=True,
+            sensor=sensors,
+            settings=settings,
+            source=source,
+            into=into or (other_reports(reports) and place),
+        ),
     )
     return run_alone(job, studies, place.parent, console, listed=into is None)

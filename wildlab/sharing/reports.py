@@ -14,6 +14,7 @@ from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.beside import state_of
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.typed import typed
 from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.
@@ -70,7 +71,9 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
     folder = path.parent if path.name == "report.html" else path
     if not folder.is_dir():
         fix = "name the folder of a report, reports/NAME, or the folder of all of them"
-        raise WildlabError("there is no such report", fix, file=path)
+        # A flight without pixels has no report that is called as it is.
+        there = _made(folder.parent, folder.name)
+        raise WildlabError("there is no such report", _instead(there) if there else fix, file=path)
     if (folder / "report.html").is_file():
         source = _source(folder, studies)
         return [_with_siblings(source, folder.parent, studies) if source.logged else source], []
@@ -113,13 +116,24 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
         return Source(folder.name, (folder,), False, {}, parameters)
     name = str(flight.get("name", ""))
     if folder.name not in {f"{name}{end}" for end in ABOUT}:
+        there = _made(folder.parent, name)
         raise WildlabError(
             "this report on a flight is not one that `wildlab evaluate` makes, so it cannot be drawn again "
             "from generalised data",
-            f"share the reports that it makes: wildlab evaluate, then wildlab share reports/{name}",
+            _instead(there) if there else "evaluate the flight (wildlab evaluate), and share what that makes",
             file=folder,
         )
     return Source(name, (folder,), True, flight, parameters)
+
+
+def _made(reports: Path, name: str) -> list[Path]:
+    """The reports of `wildlab evaluate` that there are on a flight of this name, and are done."""
+    found = (reports / f"{name}{end}" for end in ENDS)
+    return [one for one in found if (one / "report.html").is_file() and state_of(one).get("state") == "done"]
+
+
+def _instead(there: Sequence[Path]) -> str:
+    return f"share one that is there, and all on the flight go with it: {typed('wildlab share', there[0])}"
 
 
 def of_a_study(flight: dict[str, Any], reports: Path) -> bool:
@@ -197,7 +211,7 @@ def flight_folder(source: Source, given: Path | None, around: Iterable[Path] = (
     WildlabError
         Where none is found, or the one given is another, with what to type.
     """
-    again = f"wildlab share {source.folders[0]} --flight FOLDER"
+    again = f"{typed('wildlab share', source.folders[0])} --flight FOLDER"
     if given is not None:
         if not (given / FILE_NAME).is_file():
             raise WildlabError(

@@ -8,6 +8,7 @@ import re
 import zipfile
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -148,3 +149,15 @@ def test_what_is_not_looked_for_is_said() -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(WildlabError, match="there is no such file"):
         scan([tmp_path / "none"], secrets())
+
+
+def test_of_many_words_that_are_not_looked_for_there_is_one_line() -> None:
+    """A list of a thousand lines hides the one that matters; that one comes first."""
+    numbers = [f"{n:04d}" for n in range(1046)]
+    lines = not_searched(replace(secrets(), words=("boat", *numbers)))
+    about = [line for line in lines if "not looked for" in line]
+    assert len(about) == 2 and about[0].startswith("'boat' is not looked for")
+    assert about[1].startswith("1046 names are not looked for, '0000', '0001', '0002' and so on")
+    assert "short number" in about[1]
+    few = not_searched(replace(secrets(), words=tuple(numbers[:3])))
+    assert [line.split(" ")[0] for line in few[:3]] == ["'0000'", "'0001'", "'0002'"]

@@ -17,6 +17,8 @@ from wildlab.sharing.scan.hits import Hit
 LONG = 4
 #: At most so many of one word are listed.
 MOST = 20
+#: Up to so many words that cannot be looked for, for one reason, are told one by one; of more these.
+MOST_TOLD, TOLD_OF_MANY = 12, 3
 #: Shorter than this, or of digits only, they are everywhere.
 SHORTEST = 3
 #: Up to so many are looked for one by one.
@@ -36,7 +38,8 @@ class Needles(NamedTuple):
     phrases
         Words in lower case, in their parts: ``("nordre", "fjell")``.
     skipped
-        Words that cannot be looked for, and why, as sentences.
+        Words that cannot be looked for, and why, as sentences: for each reason those that are few by
+        themselves, and of many how many they are. What is rarest comes first.
     """
 
     phrases: tuple[tuple[str, ...], ...]
@@ -81,7 +84,7 @@ def needles_of(words: Iterable[str]) -> Needles:
         Names as they are: paths are taken apart, and so are names with blanks, - and _.
     """
     wanted: dict[tuple[str, ...], None] = {}
-    skipped = []
+    skipped: dict[str, dict[str, None]] = {}
     for word in dict.fromkeys(words):
         for piece in dict.fromkeys(piece for piece in re.split(r"[/\\]", word) if piece.strip()):
             stem = piece.rpartition(".")[0] or piece
@@ -91,11 +94,20 @@ def needles_of(words: Iterable[str]) -> Needles:
                 if not reason:
                     wanted[phrase] = None
                 elif one == piece and phrase:
-                    skipped.append(f"{one!r} is not looked for: {reason}")
+                    skipped.setdefault(reason, {})[one] = None
             known = own_words()
             telling = [part for part in parts_of(stem) if len(part) >= LONG and not part.isdigit()]
             wanted.update({(part,): None for part in telling if part not in known})
-    return Needles(tuple(wanted), tuple(dict.fromkeys(skipped)))
+    rare = sorted(skipped.items(), key=lambda one: len(one[1]))
+    return Needles(tuple(wanted), tuple(line for reason, ones in rare for line in _told(reason, list(ones))))
+
+
+def _told(reason: str, words: list[str]) -> list[str]:
+    """Which words are not looked for; of very many how many, with the first of them."""
+    if len(words) <= MOST_TOLD:
+        return [f"{one!r} is not looked for: {reason}" for one in words]
+    some = ", ".join(repr(one) for one in words[:TOLD_OF_MANY])
+    return [f"{len(words)} names are not looked for, {some} and so on; of each: {reason}"]
 
 
 def _useless(phrase: tuple[str, ...]) -> str:

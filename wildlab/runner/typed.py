@@ -1,0 +1,48 @@
+"""A command as somebody types it again, in the folder where it was typed first."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from wildlab.paths import REPORTS
+
+
+def typed(command: str, *arguments: str | Path, **options: str | Path | bool | Sequence[str] | None) -> str:
+    """A command line for a shell, with quotes where names have blanks.
+
+    Parameters
+    ----------
+    command
+        As ``wildlab track``, taken as it is.
+    arguments
+        What follows. Paths are written from the folder that this is run in where they lie below it.
+    options
+        By name without dashes: a value, several, or True; what is None, False or empty is left out.
+
+    Examples
+    --------
+    >>> typed("wildlab track", "my flight", filter=("ekf", "ukf"), smooth=True, source=None)
+    "wildlab track 'my flight' --filter ekf --filter ukf --smooth"
+    """
+    words = [shlex.quote(_written(one)) for one in arguments]
+    for name, value in options.items():
+        if value is True:
+            words.append(f"--{name}")
+        elif value:
+            several = [value] if isinstance(value, str | Path) else list(value) if value else []
+            words += [f"--{name} {shlex.quote(_written(one))}" for one in several]
+    return " ".join([command, *words])
+
+
+def other_reports(reports: Path) -> Path | None:
+    """The folder of reports where it is not the usual one, and so has to be typed."""
+    return None if reports.resolve() == REPORTS.resolve() else reports
+
+
+def _written(one: str | Path) -> str:
+    if not isinstance(one, Path):
+        return one
+    whole, here = one.resolve(), Path.cwd()
+    return str(whole.relative_to(here)) if whole.is_relative_to(here) and whole != here else str(whole)
