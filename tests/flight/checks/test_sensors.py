@@ -12,6 +12,7 @@ from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sensors import looks_of_others, sensors
+from wildlab.flight.manifest import make_manifest, replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.pipeline.scans import scans_of
 
@@ -94,3 +95,43 @@ def test_what_agrees_or_is_not_said_is_no_finding(make_flight: Callable[..., Fli
     # Images of a camera beside: their detections are no sensor's.
     assert said(detected(make_flight, ["", "radar"], [(0, "click"), (1, "radar")])) == []
     assert said(detected(make_flight, LOOKS, [(0, "radar"), (1, "radar")], named=False)) == []
+
+
+def all_said(flight: Flight) -> str:
+    return " ".join(f"{one.sentence} {one.fix}" for one in check_flight(flight))
+
+
+def test_two_sensors_may_look_at_once_and_one_may_not_look_twice(make_flight: Callable[..., Flight]) -> None:
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
+    flight.tables["frames"]["time_s"] = [1.0, 1.0, 2.0, 2.0]
+    assert "the same time as the one before" not in all_said(flight)
+    flight.tables["frames"]["time_s"] = [1.0, 1.0, 1.0, 2.0]
+    assert "1 frames have the same time as the one before of their sensor" in all_said(flight)
+    flight.tables["frames"] = (
+        flight.tables["frames"].drop(columns="sensor").assign(time_s=[1.0, 1.0, 2.0, 2.0])
+    )
+    assert "2 frames have the same time as the one before." in all_said(flight)
+
+
+def test_without_a_camera_it_is_the_sensors_whose_clocks_are_taken_to_agree(
+    make_flight: Callable[..., Flight],
+) -> None:
+    flight = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar")])
+    assert "the clock of the camera" in all_said(flight)
+    without = make_manifest(flight.manifest.model_dump(exclude={"camera"}))
+    flight = Flight(without, flight.nav, flight.tables)
+    said = all_said(flight)
+    assert "camera" not in said and "wildlab clock" not in said
+    assert "the clocks of 'lidar' and 'radar' are taken to agree with that of the poses" in said
+    manifest = replace_in_manifest(without, {"sensors": {"radar": {"clock_offset_s": 0.0}}})
+    assert "the clock of 'lidar' is taken to agree" in all_said(Flight(manifest, flight.nav, flight.tables))
+    both = {name: {"clock_offset_s": -0.5} for name in ("radar", "lidar")}
+    manifest = replace_in_manifest(without, {"sensors": both})
+    assert "taken to agree" not in all_said(Flight(manifest, flight.nav, flight.tables))
+
+
+def test_one_truth_runs_and_the_poses_run(make_flight: Callable[..., Flight]) -> None:
+    flight = make_flight()
+    flight.tables["frames"]["time_s"] = [1.0, 2.25, 20.0]
+    assert "the truth of 'boat' runs from 0.000 s" in all_said(flight)
+    assert "the poses run from 0.000 s" in all_said(flight)

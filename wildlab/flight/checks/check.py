@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from wildlab.flight.checks import camera as findings_seen
 from wildlab.flight.checks import findings
@@ -249,13 +250,16 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "import with times if the photos have any",
         )
     elif manifest.clocks.camera_offset_s == 0 and _interpolated(flight) and manifest.kind == "logged":
-        yield Finding(
-            "note",
-            "flight.toml",
-            "clocks.camera_offset_s",
-            "the clock of the camera is taken to agree with that of the poses",
-            "let `wildlab clock` estimate the offset: at 20 m/s a tenth of a second is 2 m",
-        )
+        if manifest.camera is None:
+            yield from _clocks_of_sensors(flight)
+        else:
+            yield Finding(
+                "note",
+                "flight.toml",
+                "clocks.camera_offset_s",
+                "the clock of the camera is taken to agree with that of the poses",
+                "let `wildlab clock` estimate the offset: at 20 m/s a tenth of a second is 2 m",
+            )
     if manifest.mount.poses and manifest.mount.poses not in flight.nav:
         yield Finding(
             "problem",
@@ -273,6 +277,28 @@ def _clocks(flight: Flight) -> Iterator[Finding]:
             "vertical.reference",
             f"heights are said to be {manifest.vertical.reference!r}, and nothing was taken off them",
             "state correction_m in the recipe and import again: inside, heights are ellipsoidal",
+        )
+
+
+def _clocks_of_sensors(flight: Flight) -> Iterator[Finding]:
+    """Of a flight without a camera: the sensors of whose stamps nothing is said."""
+    frames, detections = flight.frames, flight.detections
+    named = frames["sensor"] if frames is not None and "sensor" in frames else None
+    names = named if named is not None else detections["source"] if detections is not None else pd.Series()
+    stated = {
+        name for name, one in flight.manifest.sensors.items() if "clock_offset_s" in one.model_fields_set
+    }
+    silent = sorted({str(name) for name in names if name} - stated)
+    if silent:
+        clocks, are = ("the clock of", "is") if len(silent) == 1 else ("the clocks of", "are")
+        listed = _and([repr(name) for name in silent])
+        yield Finding(
+            "note",
+            "flight.toml",
+            "sensors",
+            f"{clocks} {listed} {are} taken to agree with that of the poses",
+            "state clock_offset_s in [sensors.NAME] where it is known, or let `wildlab track --tune` learn "
+            "it from another flight",
         )
 
 

@@ -146,14 +146,21 @@ def order(flight: Flight) -> Iterator[Finding]:
         step = np.diff(flight.frames["time_s"].to_numpy())
         if (step < 0).any():
             yield from _increasing("frames", flight.frames["time_s"], "")
-        elif (step == 0).any():
+        elif again := _same_time(flight.frames):
             yield Finding(
                 "warning",
                 "frames",
                 "time_s",
-                f"{int((step == 0).sum())} frames have the same time as the one before",
+                f"{again} frames have the same time as the one before"
+                + (" of their sensor" if "sensor" in flight.frames else ""),
                 "use stamps with fractions of a second; at 20 m/s half a second is 10 m",
             )
+
+
+def _same_time(frames: pd.DataFrame) -> int:
+    """How many frames have the time of the one before, of the same sensor: two may look at once."""
+    looks = [rows for _, rows in frames.groupby("sensor", sort=False)] if "sensor" in frames else [frames]
+    return sum(int((np.diff(rows["time_s"].to_numpy()) == 0).sum()) for rows in looks)
 
 
 def _increasing(name: str, times: pd.Series, whose: str) -> Iterator[Finding]:
@@ -207,11 +214,12 @@ def _within(table: str, what: str, times: np.ndarray, stamps: np.ndarray, of: st
     outside = ~((times >= low) & (times <= high))
     if outside.any():
         few = outside.mean() < FEW_OUTSIDE
+        runs = "run" if what == "poses" else "runs"
         yield Finding(
             "problem" if outside.all() else "note" if few else "warning",
             table,
             "time_s",
-            f"the {what} run from {low:.3f} s to {high:.3f} s, the {of} from {np.nanmin(times):.3f} s to "
+            f"the {what} {runs} from {low:.3f} s to {high:.3f} s, the {of} from {np.nanmin(times):.3f} s to "
             f"{np.nanmax(times):.3f} s: "
             + ("they do not overlap in time" if outside.all() else f"{count(outside, 'frame')} outside"),
             "check the time zone, the format and the unit of the stamps of both, and [clocks]"
