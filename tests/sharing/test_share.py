@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import stat
 import zipfile
 from dataclasses import replace
@@ -313,24 +312,6 @@ def test_a_report_that_is_not_of_evaluate_is_refused(made: Path) -> None:
     (made / "reports" / "kifaru-ridge").rename(made / "reports" / "found")
     with pytest.raises(WildlabError, match="not one that `wildlab evaluate` makes"):
         share(made / "reports" / "found")
-
-
-def test_only_reports_that_are_there_are_advised(made: Path) -> None:
-    reports = made / "reports"
-    shutil.copytree(reports / "kifaru-ridge", reports / "kifaru-ridge-many")
-
-    def advice(name: str) -> str:
-        with pytest.raises(WildlabError) as caught:
-            share(reports / name)
-        return caught.value.fix
-
-    assert advice("kifaru-ridge-many").endswith("wildlab share reports/kifaru-ridge")
-    (reports / "kifaru-ridge").rename(reports / "kifaru-ridge-overview")
-    for name in ("kifaru-ridge-many", "kifaru-ridge"):
-        assert advice(name).endswith("wildlab share reports/kifaru-ridge-overview")
-    write_json(reports / "kifaru-ridge-overview" / "status.json", {"state": "failed"})
-    assert "wildlab evaluate" in advice("kifaru-ridge-many")
-    assert "wildlab share" not in advice("kifaru-ridge-many") + advice("kifaru-ridge")
 
 
 def test_an_ending_that_is_not_that_of_the_copy_is_refused(made: Path) -> None:

@@ -172,9 +172,10 @@ def read_detections(
         position = places.ned(read_position(rows, block.position, f"{part}.position"), "positions")
         columns |= dict(zip(("north_m", "east_m", "down_m"), position.T, strict=True))
     elif block.azimuth is not None:
-        columns["azimuth_rad"] = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
+        azimuth = numbers(rows, block.azimuth, "angle", f"{part}.azimuth")
         if block.counts_from == "bow":
-            columns["azimuth_rad"] = wrap(columns["azimuth_rad"] + _headings(rows, frame, lens, part))
+            azimuth = np.asarray(wrap(azimuth + _headings(rows, frame, lens, part)), np.float64)
+        columns["azimuth_rad"] = azimuth
         if block.elevation is not None:
             columns["elevation_rad"] = numbers(rows, block.elevation, "angle", f"{part}.elevation")
         if block.range is not None:
