@@ -81,11 +81,20 @@ def test_where_not_all_targets_are_known_no_track_is_false():
     assert whole.tracks[2].false and whole.false_tracks_per_minute == pytest.approx(1 / 3)
     scans[1] = scans[1]._replace(complete=False)
     found = compare_identities(scans, CUTOFF)
-    assert 2 not in found.tracks and found.incomplete == 1 and found.tracks[1].scans == 4
+    assert found.tracks[2] == (0, 0, pytest.approx(np.nan, nan_ok=True), False) and found.incomplete == 1
+    assert found.tracks[1].scans == 3 == found.tracks[1].on_target
     assert found.gospa[1].distance == 0 < whole.gospa[1].distance
-    # Where a track is false, it is so over the minutes that are judged.
+    # Where a track is false, it is so over the minutes that are judged: of four, one is about t = 60.
     late = scan(240, tracks, {"A": (0, 0)})
-    assert compare_identities([*scans, late], CUTOFF).false_tracks_per_minute == pytest.approx(1 / 2)
+    assert compare_identities([*scans, late], CUTOFF).false_tracks_per_minute == pytest.approx(1 / 3)
+
+
+def test_a_look_without_tracks_makes_no_swap():
+    """Two tracks are nearer to each other's target, before and after a look that shows none."""
+    targets = {"A": (0, 0), "B": (6, 0)}
+    right, wrong = scan(0, {1: (0, 0), 2: (6, 0)}, targets), scan(1, {1: (6, 0), 2: (0, 0)}, targets)
+    none = scan(2, {}, targets)
+    assert compare_identities([right, wrong, none, wrong._replace(time=3.0)], CUTOFF).swaps == 0
 
 
 def test_a_break_is_a_new_identity_on_the_same_target():

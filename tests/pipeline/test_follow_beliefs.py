@@ -9,6 +9,7 @@ from tests.pipeline.robots import KNOWN, robot_flight, rows_of
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import manifest_toml, parse_manifest
+from wildlab.geometry.frames import wrap
 from wildlab.pipeline.following.beliefs import ASSUMED, ROUGH, STATED, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.roughness import roughness
@@ -82,6 +83,24 @@ def test_clutter_that_nobody_tells_from_a_target_makes_nothing_rough(kind: str, 
         for one in ({"labelled": False, "clutter": clutter}, {})
     )
     np.testing.assert_allclose(np.mean(found, axis=0), np.mean(known, axis=0), rtol=0.15)
+
+
+@pytest.mark.parametrize("kind", ["range-bearing", "position", "bearing"])
+def test_clutter_alone_says_nothing_of_noise(kind: str):
+    for seed in range(5):
+        scans = scans_of(robot_flight(seed, kind=kind, labelled=False, clutter=4), "radar")
+        nobody = scans._replace(detections=scans.detections[:, 1:], labels=scans.labels[:, 1:])
+        assert np.isnan(roughness(nobody)).all()
+
+
+def test_bearings_near_south_are_neighbours():
+    rng = np.random.default_rng(2)
+    scans = scans_of(robot_flight(kind="bearing", labelled=False), "radar")
+    azimuth = wrap(np.pi + rng.normal(0, 0.02, (len(scans.times), 1, 1)))
+    clutter = rng.uniform(-np.pi, np.pi, (len(scans.times), 3, 1))
+    both = np.concatenate([azimuth, clutter], axis=1)
+    found = roughness(scans._replace(detections=both, labels=np.full(both.shape[:2], "", object)))
+    assert found[0] == pytest.approx(0.02, rel=0.5)
 
 
 def test_noise_that_nobody_knows_is_asked_for():

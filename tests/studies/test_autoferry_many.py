@@ -89,7 +89,7 @@ def test_cameras_are_judged_with_the_settings_of_those_without() -> None:
     worse = table.rename(columns={"with": "without", "without": "with"})
     assert "smaller in 1 of 3 pairs" in words.cameras(worse, "s1")
     assert "1.0 m larger" in words.cameras(worse, "s1")
-    assert "in the median the same (" in words.cameras(table.assign(without=table["with"]), "s1")
+    assert "in the median no different (" in words.cameras(table.assign(without=table["with"]), "s1")
     assert words.cameras(table, "none of them") and not words.cameras(table[:1], "s1")
 
 

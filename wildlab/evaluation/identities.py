@@ -12,7 +12,6 @@ three kinds at a scan:
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -92,7 +91,7 @@ class TrackLife(NamedTuple):
     Attributes
     ----------
     scans
-        At which it was there, and judged.
+        At which it was there, of those that are complete.
     on_target
         Of them, those at which it followed a target, of any kind.
     anees
@@ -124,7 +123,7 @@ class Identities(NamedTuple):
         Times a target's track is another one than its last, without the swaps: the new one was on no other
         target before, or comes back.
     false_tracks_per_minute
-        Tracks that are false, over the minutes between scans that are complete; NaN where no time passes.
+        Tracks that are false, over the minutes of the scans that are complete; NaN where no time passes.
     targets, tracks
         By name and by identity, in the order of their first scan.
     incomplete
@@ -186,10 +185,11 @@ def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0)
     """What became of tracks and targets over scans in the order of time.
 
     Who follows whom is settled with the memory of CLEAR MOT (Bernardin and Stiefelhagen 2008), for a moment's
-    noise beside another target is no swap: GOSPA's assignment, in which a pair of the scan before costs less
+    noise beside another target is no swap: GOSPA's assignment, in which the last pair of a track costs less
     by half of the cut-off to the power ``order``. So two tracks that exchange their targets swap at the scan
-    at which these are half the cut-off apart. CLEAR MOT keeps a pair up to the cut-off itself, also where the
-    track is on another target by then, whose own track is left with what remains; GOSPA has no memory.
+    at which these are half the cut-off apart, and never while they are nearer. CLEAR MOT keeps a pair up to
+    the cut-off itself, also where the track is on another target by then, whose own track is left with what
+    remains; GOSPA has no memory.
 
     Parameters
     ----------
@@ -231,11 +231,12 @@ def compare_identities(scans: Sequence[Scan], cutoff: float, order: float = 2.0)
     for one in given:
         found = _follow(one, before, cutoff, order)
         pairs.append(found)
-        before = {one.identities[row]: one.names[column] for row, column in found}
+        before |= {one.identities[row]: one.names[column] for row, column in found}
     swaps, breaks = _changes(given, pairs)
     tracks = _track_lives(given, pairs)
-    both = [one.complete and other.complete for one, other in pairwise(given)]
-    minutes = float(np.diff(times)[both].sum()) / 60
+    # Each scan has half of the time to either neighbour.
+    shares = (np.diff(times, prepend=times[0]) + np.diff(times, append=times[-1])) / 2
+    minutes = float(shares[[one.complete for one in given]].sum()) / 60
     n_false = sum(track.false for track in tracks.values())
     return Identities(
         [_gospa(one, cutoff, order) for one in given],
@@ -372,12 +373,11 @@ def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hash
     on: dict[Hashable, int] = {}
     errors: dict[Hashable, list[tuple[Array, Array]]] = {}
     for one, found in zip(given, pairs, strict=True):
-        judged = set(range(len(one.x))) if one.complete else {row for row, _ in found}
-        for row in judged:
-            scans[one.identities[row]] = scans.get(one.identities[row], 0) + 1
+        for identity in one.identities:
+            scans[identity] = scans.get(identity, 0) + one.complete
         for row, column in found:
             identity = one.identities[row]
-            on[identity] = on.get(identity, 0) + 1
+            on[identity] = on.get(identity, 0) + one.complete
             if not one.ignored[column]:
                 error = one.truth[column] - one.x[row]
                 errors.setdefault(identity, []).append((error, one.P[row]))

@@ -85,7 +85,8 @@ def end_section(report: Report, followed: Followed) -> None:
         )
     if "bearing" in kinds:
         poses.append(
-            "A bearing moves a track that another sensor began; it begins, confirms, prolongs and ends none."
+            "A bearing moves a track that another sensor began; it begins and confirms none, and is no "
+            "sighting that a track is shown for. One whose place bearings keep known is not given up."
         )
     if kinds - {"pixel"}:
         poses.append("Errors of the platform's position and heading that last are in no covariance here.")

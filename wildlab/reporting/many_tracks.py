@@ -216,7 +216,7 @@ def tracks_table(followed: Followed, lives: Identities | None) -> pd.DataFrame:
         if lives is not None:
             # One that was there only while a true place was not known is not judged.
             life = lives.tracks.get(identity)
-            row["on"] = 100 * life.on_target / life.scans if life else np.nan
+            row["on"] = 100 * life.on_target / life.scans if life and life.scans else np.nan
             row["nees"] = life.anees / 2 if life else np.nan
         rows.append(row)
     return pd.DataFrame(rows)

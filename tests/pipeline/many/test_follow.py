@@ -67,6 +67,9 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
     assert errors[0] < errors[1]
     told = {one.what: one.value for one in with_eye.said if one.subject == "eye"}
     assert "false detections in a look within a radian" in told
+    several = parse_settings("[sensors.eye.many]\nseveral = true\n")
+    with pytest.raises(WildlabError, match="several of one hull cannot be told as one"):
+        follow_all(joined, settings=several)
     with pytest.raises(WildlabError, match="bearings alone begin no track"):
         follow_all(bearings)
 

@@ -67,6 +67,8 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
     found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls)
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.75]]) and len(found.R) == 2
+    spread = 0.75 * np.outer([5, 0.25], [5, 0.25]) + 0.25 * np.outer([-15, -0.75], [-15, -0.75])
+    assert np.allclose(found.R[1], np.eye(2) + spread)
     # What no gate takes is of the hull all the same, each part alike.
     z[1] = [-10.0, 0.0]
     found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls)

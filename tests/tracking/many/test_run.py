@@ -112,6 +112,24 @@ def test_what_is_not_in_view_is_not_missed() -> None:
     assert existence[0][-1] == pytest.approx(existence[0][14]) and existence[1][-1] < 0.9
 
 
+def test_a_sensor_that_cannot_see_a_target_keeps_none_alive() -> None:
+    """A slow radar loses its target; looks of another sensor, which reaches less far, change nothing."""
+    radar = looks(lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 40), np.random.default_rng(3))[::2]
+    radar = [one if one.time < 20 else one._replace(z=one.z[:0], R=one.R[:0]) for one in radar]
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
+    other = [Scan(t, 1, np.array([0.0, -500.0]), *nothing) for t in np.arange(0.1, 39, 0.1)]
+    targets, eyes = POINTS._replace(lifetime_s=20.0), [EYE, EYE._replace(far_m=10.0)]
+    alone, beside = (
+        [
+            tracks.existence.max(initial=0)
+            for tracks, one in follow_many(scans, eyes, targets)
+            if one.sensor == 0
+        ]
+        for scans in (radar, [*radar, *other])
+    )
+    assert np.allclose(alone, beside, atol=0.01) and alone[12] < 0.9
+
+
 def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> None:
     """A slow sensor saw it; a fast one with little patience, which cannot, does not make it flicker."""
     slow = looks(lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 12), np.random.default_rng(7))

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wildlab.tracking.bending import left_out
 from wildlab.tracking.kalman import update as kalman_update
 from wildlab.tracking.many.update import compare, compare_bearings, update
 
@@ -35,7 +36,7 @@ def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
     """Its Jacobian by central differences of the direction from the platform, hull's noise included."""
     rng = np.random.default_rng(seed)
     x, P, noise = 20 * rng.normal(size=(1, 1, 4)), spread(rng, 1, 1, 4), spread(rng, 1, 1, 2)
-    platform, R = x[0, 0, :2] + rng.uniform(5, 50) * np.array([np.cos(seed), np.sin(seed)]), 0.02**2
+    platform, R = x[0, 0, :2] + rng.uniform(5, 150) * np.array([np.cos(seed), np.sin(seed)]), 0.02**2
 
     def direction(state: np.ndarray) -> float:
         to = state[:2] - platform
@@ -46,9 +47,22 @@ def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
     J = np.angle(turn)[None] / 2e-4
     z = direction(x[0, 0]) + rng.normal(0, 0.02) + 2 * np.pi * rng.integers(-1, 2)
     compared = compare_bearings(x, P, noise, platform, [[z]], [[[R]]], 1e9)
-    found = update(x, P, [[1.0]], [[0.0, 1.0]], compared)
     gap = np.angle(np.exp(1j * (z - direction(x[0, 0]))))
-    own = R + (J[:, :2] @ noise[0, 0] @ J[:, :2].T)
+    # What first order leaves out is noise too: from second derivatives by differences.
+    h = 1e-2 * np.eye(2)
+    at = x[0, 0, :2]
+
+    def slope(place: np.ndarray) -> np.ndarray:
+        to = place - platform
+        return np.array([-to[1], to[0]]) / (to @ to)
+
+    D = np.array([(slope(at + one) - slope(at - one)) / 2e-2 for one in h])
+    bent = float(left_out(P[0, 0, :2, :2] + noise[0, 0], D[None])[0, 0])
+    if bent > R:
+        assert compared.likelihood[0, 0, 0] == 0
+        return
+    own = R + J[:, :2] @ noise[0, 0] @ J[:, :2].T + bent
+    found = update(x, P, [[1.0]], [[0.0, 1.0]], compared)
     right = kalman_update(x[0, 0], P[0, 0], J @ x[0, 0] + gap, J, own)
     assert np.allclose(found.x[0, 0], right.x, atol=1e-5) and np.allclose(found.P[0, 0], right.P, atol=1e-5)
     S = float((J @ P[0, 0] @ J.T + own)[0, 0])
@@ -56,6 +70,26 @@ def test_a_bearing_is_the_extended_kalman_filter(seed: int) -> None:
         np.exp(-(gap**2) / S / 2) / np.sqrt(2 * np.pi * S), rel=1e-5
     )
     assert compare_bearings(x, P, noise, platform, [[z + 1.0]], [[[R]]], 1e-3).likelihood[0, 0, 0] == 0
+
+
+@pytest.mark.parametrize("distance", [60.0, 15.0, 8.0, 5.0])
+def test_a_bearing_from_near_makes_no_track_too_sure(distance: float) -> None:
+    """Places known to 5 m, bearings to 3 deg; to first order alone NEES / 2 would be 33 at 8 m."""
+    rng = np.random.default_rng(5)
+    values = []
+    P = np.diag([25.0, 25.0, 1.0, 1.0])[None, None]
+    for _ in range(2000):
+        true = np.array([distance, 0.0, 0.0, 0.0])
+        x = (true + rng.normal(size=4) * np.sqrt(np.diag(P[0, 0])))[None, None]
+        z = rng.normal(0, np.radians(3.0))
+        compared = compare_bearings(
+            x, P, np.zeros((1, 1, 2, 2)), np.zeros(2), [[z]], [[[np.radians(3.0) ** 2]]], 1e9
+        )
+        taken = float(compared.likelihood[0, 0, 0] > 0)
+        after = update(x, P, [[1.0]], [[1 - taken, taken]], compared)
+        off = true[:2] - after.x[0, 0, :2]
+        values.append(off @ np.linalg.solve(after.P[0, 0, :2, :2], off) / 2)
+    assert np.mean(values) < 1.2
 
 
 def test_what_is_at_the_platform_is_in_no_direction() -> None:

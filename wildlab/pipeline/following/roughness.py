@@ -17,6 +17,10 @@ QUARTER_OF_NORMAL = 0.3186393639643751
 NEIGHBOURS = 1.5
 #: A triple that is so many standard deviations off the line is of no target.
 FAR_OFF = 4.0
+#: By so much each look is turned more than the last to see what chance makes of it, rad: no turn comes back.
+TURN = np.pi * (3 - np.sqrt(5))
+#: What is of targets lies nearer to a line than so many times what chance makes.
+NEARER = 0.5
 
 
 def roughness(scans: Scans) -> Array:
@@ -25,7 +29,8 @@ def roughness(scans: Scans) -> Array:
     Of three successive looks, the middle one less the mean of the others, of the same label, or without
     labels of detections that are nearest to each other from look to look; by the median, which a few wrong
     ones do not move. What bends in the way of a target between looks counts as noise, what lasts does not.
-    NaN where there are no three looks in a row.
+    NaN where there are no three looks in a row, or
+    nothing in them lies better in line than chance makes it.
     """
     if not any(str(one) for one in scans.labels.ravel()):
         return _unnamed(scans)
@@ -67,53 +72,74 @@ def _unnamed(scans: Scans) -> Array:
     """`roughness` where nobody says which detections are of one target, and some may be of none.
 
     Two of successive looks go together where each is the other's nearest. Triples of clutter lie much farther
-    off the line than those of a target: they are left out by and by, until none is beyond `FAR_OFF`.
+    off the line than those of a target: they are left out by and by, until none is beyond `FAR_OFF`. What is
+    left must lie nearer to a line than the same detections do when every look is turned by another angle,
+    where nothing is of one target any more: else it is clutter itself, and NaN.
     """
+    nothing = np.full(scans.detections.shape[-1], np.nan)
+    values, off = _triples(scans, 0.0)
+    if not len(values):
+        return nothing
+    # Half of all may be clutter: it starts from those that lie best in line.
+    sd = np.quantile(np.abs(values), 0.25, axis=0) / QUARTER_OF_NORMAL
+    while True:
+        good = (np.abs(values) <= FAR_OFF * sd).all(axis=1)
+        values, off = values[good], off[good]
+        if not len(values):
+            return nothing
+        before_sd, sd = sd, _spread(values)
+        if (sd >= before_sd).all():
+            break
+    _, by_chance = _triples(scans, TURN)
+    alike = len(by_chance) and np.median(off) > NEARER * np.median(by_chance)
+    return nothing if alike else sd
+
+
+def _triples(scans: Scans, turn: float) -> tuple[Array, Array]:
+    """(N, m) of three looks' detections that go together the middle one less the mean of the others, and (N,)
+    how far that is where they are compared. Each look is turned by ``turn`` (rad) more than the last."""
     gap = NEIGHBOURS * scans.interval_s
-    found: list[Array] = []
+    values = [np.zeros((0, scans.detections.shape[-1]))]
+    off = [np.zeros(0)]
     before: list[tuple[float, Array, Array]] = []
     last = np.zeros(0, np.intp)
-    for time, z in zip(scans.times, scans.detections, strict=True):
+    for row, (time, z) in enumerate(zip(scans.times, scans.detections, strict=True)):
         here = z[np.isfinite(z).all(axis=-1)]
         if not len(here):
             continue
         if before and time - before[-1][0] > gap:
             before = []
-        before = [*before[-2:], (float(time), here, _metric(scans, here))]
+        before = [*before[-2:], (float(time), here, _metric(scans, here, row, row * turn))]
         # Of each detection of this look, the one of the look before that it goes together with, or -1.
         own = _mutual(before[-2][2], before[-1][2]) if len(before) > 1 else np.full(len(here), -1)
         if len(before) == 3 and before[2][0] > before[0][0]:
-            (t0, z0, _), (t1, z1, _), (t2, z2, _) = before
+            (t0, z0, x0), (t1, z1, x1), (t2, z2, x2) = before
             third = np.flatnonzero(own >= 0)
             third = third[last[own[third]] >= 0]
             second = own[third]
             first = last[second]
             share = (t1 - t0) / (t2 - t0)
-            angles = np.array(scans.angles)
             ahead, behind = z2[third] - z1[second], z0[first] - z1[second]
-            ahead, behind = (np.where(angles, wrap(one), one) for one in (ahead, behind))
+            ahead, behind = (np.where(np.array(scans.angles), wrap(one), one) for one in (ahead, behind))
             weight = 1 + share**2 + (1 - share) ** 2
-            found.append(-((1 - share) * behind + share * ahead) / np.sqrt(weight))
+            values.append(-((1 - share) * behind + share * ahead) / np.sqrt(weight))
+            off.append(np.linalg.norm(x1[second] - (1 - share) * x0[first] - share * x2[third], axis=1))
         last = own
-    if not any(map(len, found)):
-        return np.full(scans.detections.shape[-1], np.nan)
-    values = np.concatenate(found)
-    # Half of all may be clutter: it starts from those that lie best in line.
-    sd = np.quantile(np.abs(values), 0.25, axis=0) / QUARTER_OF_NORMAL
-    while True:
-        values = values[(np.abs(values) <= FAR_OFF * sd).all(axis=1)]
-        if not len(values):
-            return np.full(scans.detections.shape[-1], np.nan)
-        before_sd, sd = sd, _spread(values)
-        if (sd >= before_sd).all():
-            return sd
+    return np.concatenate(values), np.concatenate(off)
 
 
-def _metric(scans: Scans, z: Array) -> Array:
-    """Detections where they may be compared: ranges and bearings as places."""
-    if scans.kind != "range-bearing":
-        return z
-    return np.asarray(z[:, :1] * np.stack([np.cos(z[:, 1]), np.sin(z[:, 1])], axis=-1))
+def _metric(scans: Scans, z: Array, row: int, turn: float) -> Array:
+    """Detections of a look where they may be compared, turned by an angle: ranges and bearings as places,
+    bearings on a circle."""
+    if scans.kind == "bearing":
+        azimuth = z[:, 0] + turn
+        return np.column_stack([np.cos(azimuth), np.sin(azimuth), z[:, 1:]])
+    if scans.kind == "range-bearing":
+        azimuth = z[:, 1] + turn
+        return np.asarray(z[:, :1] * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1))
+    c, s = np.cos(turn), np.sin(turn)
+    centre = np.nan_to_num(scans.platform[row]) if scans.kind == "position" else np.zeros(2)
+    return np.asarray((z[:, :2] - centre) @ np.array([[c, s], [-s, c]]) + centre)
 
 
 def _mutual(before: Array, here: Array) -> NDArray[np.intp]:

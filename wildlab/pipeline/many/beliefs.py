@@ -127,6 +127,12 @@ def _of_sensor(
         said.append(Said(looks.sensor, what, f"{value:.3g}{unit}", source if own is None else STATED))
         return value
 
+    if looks.bearings and stated is not None and stated.several:
+        raise WildlabError(
+            f"the sensor {looks.sensor!r} has bearings, and several of one hull cannot be told as one",
+            "leave out several",
+            field=f"sensors.{looks.sensor}.many.several",
+        )
     distance = looks.distances()
     near = one("near_m", "distance below which it sees nothing", " m", 0.0, ASSUMED)
     reach = farthest if looks.bearings else float(distance.max(initial=1.0))

@@ -95,13 +95,15 @@ def cameras(rows: pd.DataFrame, first: str) -> str:
         return ""
     change = own["with"] - own["without"]
     middle = float(change.median())
-    # Less than a tenth of a metre is no change to speak of.
     word = (
-        f"{abs(middle):.1f} m {'larger' if middle > 0 else 'smaller'}" if abs(middle) >= 0.05 else "the same"
+        f"{abs(middle):.1f} m {'larger' if middle > 0 else 'smaller'}"
+        if abs(middle) >= 0.05
+        else "no different"
     )
     return (
         f"With the cameras' bearings and the same settings GOSPA is smaller in {int((change < 0).sum())} of "
-        f"{len(own)} pairs of a scenario and one of the best draws, and in the median {word} "
+        f"{len(own)} pairs of one of {own['case'].nunique()} scenarios and one of the best draws, and in the "
+        f"median {word} "
         f"({change.min():+.1f} to {change.max():+.1f} m)."
     )
 
@@ -169,7 +171,8 @@ def headline(rows: pd.DataFrame, middle: pd.DataFrame, first: str) -> list[str]:
     own = rows[(rows["rank"] == 1) & (rows["case"] != first)]
     said = [
         f"Tuned on {first} alone, the tracker's GOSPA on {middle['of'].max():.0f} other scenarios is, in the "
-        f"median, {'; '.join(parts)}."
+        f"median, {'; '.join(parts)}. By lidar alone it is asked for the boats in its reach only, else for "
+        f"all within {RADAR_REACH_M:g} m."
     ]
     swaps, breaks = int(own["swaps"].sum()), int(own["breaks"].sum())
     said.append(

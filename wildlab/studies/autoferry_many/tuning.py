@@ -196,7 +196,7 @@ def anees_of(lives: Identities | None) -> float:
     """Mean NEES / 2 over tracks, each in as many looks as it was on a target; NaN where there is none."""
     on = [one for one in (lives.tracks.values() if lives else ()) if np.isfinite(one.anees)]
     return (
-        float(np.average([one.anees / 2 for one in on], weights=[one.on_target for one in on]))
+        float(np.average([one.anees / 2 for one in on], weights=[max(one.on_target, 1) for one in on]))
         if on
         else np.nan
     )

@@ -56,7 +56,8 @@ class SensorBeliefs(NamedTuple):
     several
         Whether one hull may give several measurements in a scan.
     bearings
-        Whether it measures bearings: these move tracks, and neither begin, confirm, prolong nor end one.
+        Whether it measures bearings: these move tracks, and neither begin nor confirm one; nor are they
+        sightings that one is shown for.
     near_end_m
         (K,) as ``near_side_m``, of a hull that heads for the platform or away from it; empty: the same.
     """

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 
-def still_there(existence: ArrayLike, dt: float, lifetime: float) -> Array:
+def still_there(existence: ArrayLike, dt: ArrayLike, lifetime: float) -> Array:
     """Probability of existence ``dt`` s later, of targets that are there for ``lifetime`` s in the mean."""
-    return np.asarray(np.asarray(existence, float) * np.exp(-dt / lifetime))
+    return np.asarray(np.asarray(existence, float) * np.exp(-np.asarray(dt, float) / lifetime))
 
 
 def visible_later(visible: ArrayLike, dt: ArrayLike, visible_s: float, hidden_s: float) -> Array:

@@ -92,7 +92,8 @@ def gather(
     """Merge the measurements of a scan that lie along one large hull to one of the part that is followed.
 
     Each counts in the share in which it is of that part, by its likelihood: what a ship shows in every scan
-    keeps the track where it is, and its stern, seen now and then, does not pull it aft.
+    keeps the track where it is, and its stern, seen now and then, pulls it less. How far the parts lie from
+    each other is noise of what they are merged to.
 
     Each measurement goes to the established track that it is likeliest of, or where no gate takes it, to the
     one whose hull it may lie on. Where one track has two and more, it is of the largest kind, or the others
@@ -137,8 +138,10 @@ def gather(
             free[rows] = False
             share = likelihood[track, largest, rows]
             share = share / share.sum() if share.any() else np.full(len(rows), 1 / len(rows))
-            merged_z.append(share @ z[rows])
-            merged_R.append(R[rows].mean(axis=0))
+            middle = share @ z[rows]
+            merged_z.append(middle)
+            off = z[rows] - middle
+            merged_R.append(R[rows].mean(axis=0) + (share[:, None] * off).T @ off)
     if not merged_z:
         return Gathered(z, R, kinds)
     return Gathered(

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from wildlab.errors import WildlabError
 from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
-from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
+from wildlab.tracking.many.hulls import LEAST_KIND, Gathered, gather, hull_noise, near_side
 from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.tracks import (
     Tracks,
@@ -103,10 +103,13 @@ def follow_many(
                 f"a scan is of sensor {scan.sensor}, and there are {len(eyes)}", "name them all"
             )
     tracks, first, before = no_tracks(len(targets.hulls), len(eyes)), 0, None
+    looked: dict[int, float] = {}
     for scan in sorted(scans, key=lambda one: one.time):
         dt = 0.0 if before is None else scan.time - before
         before = scan.time
-        tracks, first = step(tracks, scan, dt, eyes, targets, first)
+        own_dt = scan.time - looked.get(scan.sensor, scan.time)
+        looked[scan.sensor] = scan.time
+        tracks, first = step(tracks, scan, dt, own_dt, eyes, targets, first)
         yield tracks, _shown(tracks, scan, eyes, targets)
 
 
@@ -114,11 +117,13 @@ def step(
     tracks: Tracks,
     scan: Scan,
     dt: float,
+    own_dt: float,
     sensors: tuple[SensorBeliefs, ...],
     targets: TargetBeliefs,
     first: int,
 ) -> tuple[Tracks, int]:
-    """Tracks after a scan that comes ``dt`` s after the one before, and the next free identity."""
+    """Tracks after a scan that comes ``dt`` s after the one before, and ``own_dt`` s after the one before of
+    its sensor, and the next free identity."""
     sensor = sensors[scan.sensor]
     tracks = later(tracks, dt, targets.density)
     z, R = _within_reach(scan, sensor)
@@ -126,7 +131,9 @@ def step(
     inside = _sees(mean[:, :2], scan, sensor)
     rows, away = np.flatnonzero(inside), np.flatnonzero(~inside)
     watched, rest = tracks.only(rows), tracks.only(away)
-    watched = watched._replace(existence=still_there(watched.existence, dt, targets.lifetime_s))
+    # A target gets older while it is looked at: since any sensor did, or this one could have.
+    aged = np.minimum(scan.time - watched.looked.max(axis=1, initial=-np.inf), own_dt)
+    watched = watched._replace(existence=still_there(watched.existence, aged, targets.lifetime_s))
     watched, z, R, taken = _corrected(watched, z, R, scan, sensor, targets)
     if sensor.bearings:
         return alive(both(watched, rest), targets), first
@@ -147,8 +154,10 @@ def _corrected(
     compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
-    gathered = gather(
-        z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
+    gathered = (
+        Gathered(z, R, tracks.kinds)
+        if sensor.bearings
+        else gather(z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls)
     )
     if len(gathered.z) != len(z):
         z, R = gathered.z, gathered.R

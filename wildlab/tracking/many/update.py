@@ -62,7 +62,9 @@ def compare_bearings(
     """The same of M bearings from north, to first order at each track's own place.
 
     Which part of a hull is seen counts as the angle under which it appears; what lies towards the platform
-    changes no bearing. A place within `NEAREST_M` of the platform has none.
+    changes no bearing. What first order leaves out, which is most where a target is near and its place known
+    badly, counts as noise (`wildlab.tracking.bending`); where it is more than the bearing's own, no bearing
+    is of that track. A place within `NEAREST_M` of the platform has none.
 
     Parameters
     ----------
@@ -83,10 +85,22 @@ def compare_bearings(
     bearing = np.asarray(z, float).reshape(-1)
     gap = bearing - np.arctan2(east, north)[..., None]
     innovation = (gap + np.pi) % (2 * np.pi) - np.pi
-    own = (H @ (P[..., :2, :2] + np.asarray(noise, float)) @ np.swapaxes(H, -1, -2))[..., 0, 0]
-    S = own[..., None] + np.asarray(R, float).reshape(-1)
+    spread = P[..., :2, :2] + np.asarray(noise, float)
+    own = (H @ spread @ np.swapaxes(H, -1, -2))[..., 0, 0]
+    D = np.stack(
+        [
+            np.stack([2 * north * east, east**2 - north**2], axis=-1),
+            np.stack([east**2 - north**2, -2 * north * east], axis=-1),
+        ],
+        axis=-2,
+    )
+    bent = D / np.where(far, square, 1.0)[..., None, None] ** 2 @ spread
+    trace = np.trace(bent, axis1=-2, axis2=-1)
+    left_out = (trace**2 + 2 * np.einsum("tkab,tkba->tk", bent, bent))[..., None] / 4
+    variance = np.asarray(R, float).reshape(-1)
+    S = own[..., None] + left_out + variance
     likelihood = np.exp(-(innovation**2) / S / 2) / np.sqrt(2 * np.pi * S)
-    inside = (innovation**2 < gate**2 * S) & far[..., None]
+    inside = (innovation**2 < gate**2 * S) & far[..., None] & (left_out <= variance)
     return Compared(innovation[..., None], S[..., None, None], np.where(inside, likelihood, 0.0), H)
 
 
