@@ -100,12 +100,12 @@ def evaluate_flight(
 
     places = uses["georeferencing accuracy"]
     out = other_reports(reports)
-    again = typed("wildlab evaluate", folder, out=out)
-    again_source = typed("wildlab evaluate", folder, source=source, out=out)
+    again = typed("wildlab evaluate", flight.name, out=out)
+    again_source = typed("wildlab evaluate", flight.name, source=source, out=out)
     if places.usable:
         found, _ = flight.pose_source(source)
         parameters = {"source": found}
-        again_with = typed("wildlab evaluate", folder, source=found, calibration=calibration, out=out)
+        again_with = typed("wildlab evaluate", flight.name, source=found, calibration=calibration, out=out)
         applied = calibration or flight.calibration
         if applied is not None:
             learnt = read_learnt(applied)
@@ -119,7 +119,7 @@ def evaluate_flight(
             flight.name,
             "repeat-sightings.ipynb",
             {"source": found},
-            typed("wildlab evaluate", folder, source=found, out=out),
+            typed("wildlab evaluate", flight.name, source=found, out=out),
         )
     elif calibration is not None:
         raise WildlabError(

@@ -76,12 +76,10 @@ def make_job(
             # Whoever asks for fewer flights gets a first look as well: the page and the ledger say so.
             reductions = {"seeds": (seeds, study.seeds)}
     if again is None:
-        # A first look says it in a report that is passed on: it has the flight's name, and no folder.
-        where: Any = flight_name if reductions else flight
         more = str(seeds) if seeds is not None and "seeds" not in reductions else None
         own_seed = None if seed is None or seed == study.seed else str(seed)
         out = None if reductions else other_reports(reports)
-        again = typed("wildlab run", study.name, flight=where, seeds=more, seed=own_seed, out=out)
+        again = typed("wildlab run", study.name, flight=flight_name, seeds=more, seed=own_seed, out=out)
     parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])

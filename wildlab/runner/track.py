@@ -107,7 +107,7 @@ def track_flight(
         smooth=smooth,
         again=typed(
             "wildlab track",
-            folder,
+            flight.name,
             tune=tune,
             against=against,
             filter=filters,

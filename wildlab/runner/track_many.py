@@ -101,7 +101,7 @@ def track_many(
         name=place.name,
         again=typed(
             "wildlab track",
-            folder,
+            flight.name,
             many=True,
             sensor=sensors,
             settings=settings,

@@ -1,4 +1,4 @@
-"""A command as somebody types it again, in the folder where it was typed first."""
+"""A command as somebody types it again; it names no folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def typed(command: str, *arguments: str | Path, **options: str | Path | bool | S
     command
         As ``wildlab track``, taken as it is.
     arguments
-        What follows. Paths are written from the folder that this is run in where they lie below it.
+        What follows. Of paths only the last name is written: a report names no folder of this machine.
     options
         By name without dashes: a value, several, or True; what is None, False or empty is left out.
 
@@ -42,7 +42,5 @@ def other_reports(reports: Path) -> Path | None:
 
 
 def _written(one: str | Path) -> str:
-    if not isinstance(one, Path):
-        return one
-    whole, here = one.resolve(), Path.cwd()
-    return str(whole.relative_to(here)) if whole.is_relative_to(here) and whole != here else str(whole)
+    # A report names no folder: it may be passed on.
+    return one.name if isinstance(one, Path) else one
