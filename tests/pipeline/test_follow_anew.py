@@ -15,7 +15,7 @@ from wildlab.geometry.frames import euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import Mount
 from wildlab.pipeline.following import sensor_tracks
-from wildlab.pipeline.following.anew import part_of
+from wildlab.pipeline.following.anew import Geometry, ends_by, part_of
 from wildlab.pipeline.following.beliefs import Beliefs, TargetBeliefs
 from wildlab.pipeline.following.estimates import estimates_table
 from wildlab.pipeline.following.follow import Followed, follow_targets
@@ -111,6 +111,25 @@ def test_all_filters_are_compared_over_the_same_looks_and_none_is_dropped_silent
     # The track ends within the pause, and not at once.
     ended = first.times[np.flatnonzero(first.without)[0]]
     assert 11.0 < ended < 60.0 and first.without.sum() > 0.7 * 5 * 200
+
+
+@pytest.mark.parametrize(
+    ("share", "gap_s", "right"), [(1.02, 11.0, True), (0.98, 11.0, False), (9.0, 9.0, False)]
+)
+@pytest.mark.parametrize("where", ["then", "now"])
+def test_a_track_ends_where_more_is_left_out_than_stated_and_not_before_a_gap(
+    share: float, gap_s: float, right: bool, where: str
+) -> None:
+    """Of a range of 100 m: 3 s^4 / (4 d^2) is left out for a spread s across the line of sight."""
+    D, s = np.array([[[0.0, 0.0], [0.0, 0.01]]]), 8.0
+    bent = D, np.array([[3 * s**4 / (4 * 100.0**2)]]) / share
+    flat = D, np.array([[1e6]])
+    shape = Geometry(
+        lambda row, place: bent if where == "then" else flat, lambda row: bent if where == "now" else None
+    )
+    ends = ends_by(np.array([0.0, gap_s]), 10.0, lambda row: (shape, row))
+    P = np.diag([0.0, s**2, 1.0, 1.0])
+    assert ends(1, 0, np.array([100.0, 0.0, 0.0, 0.0]), P) is right
 
 
 def test_a_flight_without_a_gap_is_followed_as_if_no_track_ever_ended(

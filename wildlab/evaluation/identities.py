@@ -307,7 +307,7 @@ def _assign(
 
 
 def _follow(one: _Checked, before: dict[Hashable, Hashable], cutoff: float, order: float) -> Pairs:
-    """The best pairs, those of the scan before being worth more."""
+    """The best pairs, the last one of each track being worth more."""
     kept = np.zeros((len(one.x), len(one.truth)), bool)
     for row, identity in enumerate(one.identities):
         if identity in before:

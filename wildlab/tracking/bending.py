@@ -74,22 +74,23 @@ def left_out(P: ArrayLike, D: ArrayLike) -> Array:
     Parameters
     ----------
     P
-        (2, 2) m^2, of the position.
+        (..., 2, 2) m^2, of the position.
     D
-        (m, 2, 2) from `second_derivatives`.
+        (..., m, 2, 2) from `second_derivatives`.
 
     Returns
     -------
-    (m, m), in the measurement's units squared.
+    (..., m, m), in the measurement's units squared.
 
     Examples
     --------
     >>> left_out(np.eye(2), [[[0.0, 0.0], [0.0, 2.0]]]).tolist()
     [[3.0]]
     """
-    bent = np.asarray(D, float) @ np.asarray(P, float)
+    bent = np.asarray(D, float) @ np.asarray(P, float)[..., None, :, :]
     traces = np.trace(bent, axis1=-2, axis2=-1)
-    return np.asarray((np.outer(traces, traces) + 2 * np.einsum("iab,jba->ij", bent, bent)) / 4)
+    both = traces[..., :, None] * traces[..., None, :]
+    return np.asarray((both + 2 * np.einsum("...iab,...jba->...ij", bent, bent)) / 4)
 
 
 def share_left_out(P: ArrayLike, D: ArrayLike, noise: ArrayLike) -> float:

@@ -11,7 +11,8 @@ import pytest
 from tests.pipeline.robots import boat, robot_flight
 from wildlab.errors import WildlabError
 from wildlab.flight.following import parse_settings, settings_over
-from wildlab.pipeline.many.follow import follow_all, judged, known_looks, tracks_table
+from wildlab.pipeline.many.beliefs import LEAST_FALSE
+from wildlab.pipeline.many.follow import complete_looks, follow_all, judged, known_looks, tracks_table
 
 
 def test_a_boat_among_clutter_is_found_without_its_name() -> None:
@@ -66,7 +67,10 @@ def test_bearings_help_where_places_are_known_and_begin_nothing_alone() -> None:
         assert len(lives.tracks) == 1
     assert errors[0] < errors[1]
     told = {one.what: one.value for one in with_eye.said if one.subject == "eye"}
-    assert "false detections in a look within a radian" in told
+    # One detection in every look, none of them false: the least that is taken, over a full turn.
+    assert float(told["false detections in a look within a radian"]) == pytest.approx(
+        LEAST_FALSE / (2 * np.pi), rel=0.01
+    )
     several = parse_settings("[sensors.eye.many]\nseveral = true\n")
     with pytest.raises(WildlabError, match="several of one hull cannot be told as one"):
         follow_all(joined, settings=several)
@@ -142,6 +146,18 @@ def test_where_a_true_place_is_not_known_nothing_is_judged() -> None:
     lives, known = judged(followed), known_looks(followed)
     assert lives is not None and 0.3 < known.mean() < 0.7 and len(lives.gospa) == known.sum()
     assert lives.false_tracks_per_minute == 0 and not any(one.n_false for one in lives.gospa)
+
+
+def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> None:
+    """Another boat's truth is known for half of the time: a track may be on it for the rest."""
+    flight = robot_flight(kind="position", seconds=100.0)
+    truth = flight.table("truth")
+    other = truth[truth["time_s"] < truth["time_s"].min() + 50].assign(target_id="other", north_m=900.0)
+    both = pd.concat([truth, other], ignore_index=True)
+    followed = follow_all(replace(flight, tables={**flight.tables, "truth": both}))
+    lives, whole = judged(followed), complete_looks(followed)
+    assert lives is not None and 0.3 < whole.mean() < 0.7
+    assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
 
 
 def test_what_settings_say_in_vain_is_said() -> None:

@@ -75,6 +75,15 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.5]])
 
 
+def test_bearings_of_one_hull_are_not_merged() -> None:
+    """The mean of two on either side of south would be north."""
+    z, R = np.array([[np.pi - 0.01], [0.01 - np.pi]]), np.full((2, 1, 1), 1e-4)
+    kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
+    sensor = LONG._replace(several=True, bearings=True)
+    found = gather(z, R, np.zeros((1, 2)), kinds, sure, np.ones((1, 2, 2)), sensor, BOTH.hulls)
+    assert np.array_equal(found.z, z) and np.array_equal(found.kinds, kinds)
+
+
 def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
     z, R, platform = (
         np.array([[60.0, 5.0], [-20.0, 80.0]]),

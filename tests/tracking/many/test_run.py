@@ -11,6 +11,7 @@ from wildlab.errors import WildlabError
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.many.tracks import moves
 from wildlab.tracking.maritime import white_acceleration
 
 EYE = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
@@ -128,6 +129,66 @@ def test_a_sensor_that_cannot_see_a_target_keeps_none_alive() -> None:
         for scans in (radar, [*radar, *other])
     )
     assert np.allclose(alone, beside, atol=0.01) and alone[12] < 0.9
+
+
+def test_a_target_gets_older_by_the_time_that_it_is_looked_at() -> None:
+    """Two sensors that look in turn make it no older than one; the time that nobody looked does not count."""
+    targets = POINTS._replace(lifetime_s=20.0, hidden_s=1e-9)
+    places = lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 12)
+    seen = looks(places, np.random.default_rng(3))
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
+
+    def after(times: list[float], eyes: int, hidden: tuple[float, float] = (0.0, 0.0)) -> float:
+        blind = [
+            Scan(t, n % eyes, np.array([0.0, -500.0]), *nothing,
+                 (lambda at: np.zeros(len(at), bool)) if hidden[0] < t < hidden[1] else None)
+            for n, t in enumerate(times)
+        ]  # fmt: skip
+        # A sensor that hardly ever detects: what is left of existence is its age.
+        rarely = EYE._replace(detection=1e-9)
+        both = [EYE, *[rarely] * eyes]
+        moved = [one._replace(sensor=one.sensor + 1) for one in blind]
+        return float(
+            [tracks.existence.max() for tracks, _ in follow_many([*seen, *moved], both, targets)][-1]
+        )
+
+    start = after([12.0], 1)
+    alone = after([float(t) for t in range(12, 22)], 1)
+    assert alone == pytest.approx(start * np.exp(-9 / 20), rel=1e-6)
+    assert after([float(t) for t in range(12, 22)], 2) == pytest.approx(alone, rel=1e-6)
+    # Nobody looks at it from 13 s to 20 s: one look in sight before, one after, 1 s each.
+    away = after([float(t) for t in range(12, 22)], 1, (12.5, 20.5))
+    assert away == pytest.approx(start * np.exp(-1 / 20), rel=1e-6)
+
+
+def test_bearings_neither_confirm_nor_end_a_track() -> None:
+    """Two sightings of three that are asked for: bearings add none, and without them none is missed."""
+    platform = np.array([0.0, -500.0])
+    seen = looks(lines(np.array([[0.0, 0.0]]), np.array([[0.5, 0.0]]), 2), np.random.default_rng(3))
+    eyes = [EYE, EYE._replace(bearings=True, clutter=1e-3)]
+    one, none = (np.array([[np.pi / 2]]), np.full((1, 1, 1), 1e-4)), (np.zeros((0, 1)), np.zeros((0, 1, 1)))
+    times, across = np.arange(1.1, 3.0, 0.1), []
+    for z, R in (one, none):
+        scans = [*seen, *(Scan(float(t), 1, platform, z, R) for t in times)]
+        steps = [(tracks, shown) for tracks, shown in follow_many(scans, eyes, POINTS)]
+        before = steps[1][0].existence[0]
+        aged = before * np.exp(-(times[-1] - 1.0) / POINTS.lifetime_s)
+        assert steps[-1][0].existence[0] == pytest.approx(aged, rel=1e-3)
+        assert steps[-1][0].hits[0] == 2 and not len(steps[-1][1].identity)
+        across.append(steps[-1][0].P[0, 0, 0, 0])
+    assert across[0] < across[1] / 2, "bearings tell where it is across the line of sight"
+
+
+@pytest.mark.parametrize(
+    ("gone", "lasted", "before", "right"),
+    [(9.0, 12.0, False, False), (11.0, 12.0, False, True), (7.0, 12.0, True, True), (5.0, 12.0, True, False),
+     (5.0, 6.0, True, True), (11.0, 30.0, False, False), (5.0, 12.0, False, False)],
+)  # fmt: skip
+def test_what_moves(gone: float, lasted: float, before: bool, right: bool) -> None:
+    """10 m within 14 s; slower than half a metre a second it stays; in between it does as before."""
+    trail = np.array([[0.0, 0.0, 0.0], [lasted, 0.0, gone]])
+    assert moves(trail, before, 10.0, 14.0) is right
+    assert moves(trail[:1], before, 10.0, 14.0) is before
 
 
 def test_a_track_is_shown_as_long_as_the_sensor_that_saw_it_has_patience() -> None:

@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
+from wildlab.studies.autoferry_many.drawing import even, scale
 from wildlab.tracking.many import Scan, Shown
+from wildlab.tracking.many.run import in_reach
+from wildlab.tracking.many.tracks import moves
 
 Array = NDArray[np.float64]
 
 #: A track is followed as north, its velocity, east, its velocity; these are in our order of a state.
 _OURS = np.array([0, 2, 1, 3])
 _EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
-#: Slower than this over the time it is watched, m/s, a track stays where it is: as in our tracker.
-STAYS_M_S = 0.5
 
 
 class Eye(NamedTuple):
@@ -112,7 +113,7 @@ def run_stone_soup(scans: Sequence[Scan], names: Sequence[str], choice: Choice) 
     eyes = [choice.eyes[name] for name in names]
     shown: list[Shown] = []
     known: dict[Any, int] = {}
-    trails: dict[Any, list[tuple[float, Array]]] = {}
+    trails: dict[Any, Array] = {}
     moving: dict[Any, bool] = {}
     for scan, tracks in _followed(scans, eyes, choice):
         # Sets have no order: new tracks are numbered from south to north.
@@ -121,24 +122,14 @@ def run_stone_soup(scans: Sequence[Scan], names: Sequence[str], choice: Choice) 
         rows, mine = [], sorted(tracks, key=known.__getitem__)
         for one in mine:
             at = np.asarray(one.state_vector, float).ravel()[[0, 2]]
-            trail = trails[one] = [*trails.get(one, []), (scan.time, at)]
-            moving[one] = _moves(trail, moving.get(one, False), choice)
+            trail = np.concatenate([trails.get(one, np.zeros((0, 3))), [[scan.time, *at]]])
+            trails[one] = trail = trail[trail[:, 0] > scan.time - choice.over_s]
+            moving[one] = moves(trail, moving.get(one, False), choice.moves_m, choice.over_s)
             inside = np.linalg.norm(at - scan.platform) < max(eye.far_m for eye in eyes)
             if inside and (moving[one] or choice.moves_m <= 0):
                 rows.append(one)
         shown.append(_shown(scan, rows, [known[one] for one in rows]))
     return shown
-
-
-def _moves(trail: list[tuple[float, Array]], before: bool, choice: Choice) -> bool:
-    """Whether a track moves: the rule by which ours are shown. The trail is cut to what it asks for."""
-    while trail[0][0] <= trail[-1][0] - choice.over_s:
-        del trail[0]
-    gone = float(np.linalg.norm(trail[-1][1] - trail[0][1]))
-    lasted = trail[-1][0] - trail[0][0]
-    if gone > choice.moves_m and gone > STAYS_M_S * lasted:
-        return True
-    return before and not (lasted > 0.8 * choice.over_s and gone < 0.6 * choice.moves_m)
 
 
 def _place(one: Any) -> tuple[float, ...]:
@@ -246,9 +237,7 @@ def _followed(scans: Sequence[Scan], eyes: Sequence[Eye], choice: Choice) -> Ite
 def _within_reach(scan: Scan, eye: Eye) -> Array:
     """(M, 2) what it uses of a scan: as our tracker does."""
     z = np.asarray(scan.z, float).reshape(-1, 2)
-    distance = np.linalg.norm(z - scan.platform, axis=1)
-    good = np.isfinite(z).all(axis=1) & (distance > eye.near_m) & (distance < eye.far_m)
-    return np.asarray(z[good])
+    return np.asarray(z[in_reach(z, scan.platform, eye.near_m, eye.far_m)])
 
 
 def draw_choice(rng: np.random.Generator, far_m: Mapping[str, tuple[float, float]]) -> Choice:
@@ -261,31 +250,24 @@ def draw_choice(rng: np.random.Generator, far_m: Mapping[str, tuple[float, float
     far_m
         By sensor, between which distances it may see no farther, m.
     """
-
-    def scale(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-    def even(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
     return Choice(
         eyes={
             name: Eye(
-                noise_m=scale(0.7, 8),
-                detection=even(0.5, 0.95),
-                clutter_per_m2=scale(5e-7, 1e-3),
-                near_m=even(5, 20),
-                far_m=even(*far),
+                noise_m=scale(rng, 0.7, 8),
+                detection=even(rng, 0.5, 0.95),
+                clutter_per_m2=scale(rng, 5e-7, 1e-3),
+                near_m=even(rng, 5, 20),
+                far_m=even(rng, *far),
             )
             for name, far in far_m.items()
         },
-        density=float(np.sqrt(scale(0.01, 0.3))),
-        start_speed_m_s=even(2, 5),
-        gate=even(2.0, 4.5),
+        density=float(np.sqrt(scale(rng, 0.01, 0.3))),
+        start_speed_m_s=even(rng, 2, 5),
+        gate=even(rng, 2.0, 4.5),
         hits=int(rng.integers(2, 7)),
-        held_s=scale(1.5, 10),
-        patience_s=scale(2, 20),
-        lost_m=scale(5, 30),
-        moves_m=float(rng.choice([0.0, even(4, 12)])),
-        over_s=even(8, 20),
+        held_s=scale(rng, 1.5, 10),
+        patience_s=scale(rng, 2, 20),
+        lost_m=scale(rng, 5, 30),
+        moves_m=float(rng.choice([0.0, even(rng, 4, 12)])),
+        over_s=even(rng, 8, 20),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -21,6 +21,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.many.follow import follow_all, judged
 from wildlab.reporting.many_tracks import LARGEST, SMALLEST
 from wildlab.studies.autoferry.boats import tune_sensor
+from wildlab.studies.autoferry_many.drawing import even, scale
 
 #: The ways to look: by one sensor, by both, and with the cameras too.
 MODES: dict[str, tuple[str, ...]] = {
@@ -40,10 +41,6 @@ USUAL_REACH_M = 105.0
 BOAT_LENGTH_M, BOAT_BEAM_M, SHIP_LENGTH_M, SHIP_BEAM_M = 6.0, 2.5, 28.0, 8.0
 #: Nothing in a harbour is faster, m/s.
 FASTEST_M_S = 10.0
-
-
-#: A number between two others, drawn.
-Drawn = Callable[[float, float], float]
 
 
 class Ranked(Protocol):
@@ -93,70 +90,63 @@ def draw(rng: np.random.Generator, clocks: Mapping[str, float]) -> Settings:
     clocks
         From `clocks_of`.
     """
-
-    def scale(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-    def even(low: float, high: float) -> float:
-        return float(rng.uniform(low, high))
-
     targets = ManyTargetsPart(
         hulls=(
             HullPart(name="boat", length_m=BOAT_LENGTH_M, beam_m=BOAT_BEAM_M, share=0.6),
             HullPart(name="ship", length_m=SHIP_LENGTH_M, beam_m=SHIP_BEAM_M, share=0.4),
         ),
-        lifetime_s=scale(20, 200),
-        birth=scale(0.03, 0.3),
-        visible_s=scale(5, 60),
-        hidden_s=scale(3, 40),
-        gate=even(2.5, 4.5),
+        lifetime_s=scale(rng, 20, 200),
+        birth=scale(rng, 0.03, 0.3),
+        visible_s=scale(rng, 5, 60),
+        hidden_s=scale(rng, 3, 40),
+        gate=even(rng, 2.5, 4.5),
         confirmed=float(rng.choice([0.9, 0.95, 0.98, 0.99])),
         hits=int(rng.choice([3, 4, 5])),
-        shown=even(0.2, 0.9),
+        shown=even(rng, 0.2, 0.9),
         forgotten=0.02,
         lost_m=SHIP_LENGTH_M,
         fastest_m_s=FASTEST_M_S,
-        moves_m=even(4, 12),
-        over_s=even(8, 20),
+        moves_m=even(rng, 4, 12),
+        over_s=even(rng, 8, 20),
         apart_m=5.0,
     )
-    side = scale(0.3, 2.5), scale(1, 7)
+    side = scale(rng, 0.3, 2.5), scale(rng, 1, 7)
     lidar = ManySensorPart(
-        detection=even(0.6, 0.9),
-        clutter_per_m2=scale(5e-7, 2e-5),
-        near_m=even(5, 20),
-        far_m=even(105, 140),
-        patience_s=even(3, 9),
+        detection=even(rng, 0.6, 0.9),
+        clutter_per_m2=scale(rng, 5e-7, 2e-5),
+        near_m=even(rng, 5, 20),
+        far_m=even(rng, 105, 140),
+        patience_s=even(rng, 3, 9),
         several=True,
-        rough_m=(0.0, scale(0.7, 4)),
-        along_m=(0.0, scale(3, 9)),
+        rough_m=(0.0, scale(rng, 0.7, 4)),
+        along_m=(0.0, scale(rng, 3, 9)),
         near_side_m=side,
-        near_end_m=(side[0] * even(1, 3), side[1] * even(1, 4)),
+        near_end_m=(side[0] * even(rng, 1, 3), side[1] * even(rng, 1, 4)),
     )
     radar = ManySensorPart(
-        detection=even(0.75, 0.95),
-        clutter_per_m2=scale(2e-6, 5e-5),
-        near_m=even(5, 20),
+        detection=even(rng, 0.75, 0.95),
+        clutter_per_m2=scale(rng, 2e-6, 5e-5),
+        near_m=even(rng, 5, 20),
         far_m=RADAR_REACH_M,
-        patience_s=even(4, 10),
-        rough_m=(0.0, scale(0.7, 4)),
-        along_m=(0.0, scale(1, 6)),
+        patience_s=even(rng, 4, 10),
+        rough_m=(0.0, scale(rng, 0.7, 4)),
+        along_m=(0.0, scale(rng, 1, 6)),
         near_side_m=(0.0, 0.0),
         near_end_m=(0.0, 0.0),
     )
     noise = {
-        "lidar": NoisePart(position_m=scale(0.7, 2.5)),
-        "radar": NoisePart(position_m=scale(1.5, 4)),
-        "ir": NoisePart(azimuth_deg=scale(1, 6)),
-        "eo": NoisePart(azimuth_deg=scale(1, 6)),
+        "lidar": NoisePart(position_m=scale(rng, 0.7, 2.5)),
+        "radar": NoisePart(position_m=scale(rng, 1.5, 4)),
+        "ir": NoisePart(azimuth_deg=scale(rng, 1, 6)),
+        "eo": NoisePart(azimuth_deg=scale(rng, 1, 6)),
     }
-    parts = {"lidar": lidar, "radar": radar, "ir": _camera(scale, even), "eo": _camera(scale, even)}
+    parts = {"lidar": lidar, "radar": radar, "ir": _camera(rng), "eo": _camera(rng)}
     # Errors of a bearing are those of the ship's heading and of the part of the hull that stands out.
-    thinning = {name: scale(0.5, 5) for name in ("ir", "eo")}
+    thinning = {name: scale(rng, 0.5, 5) for name in ("ir", "eo")}
     return Settings(
         targets=TargetsPart(
-            acceleration_m_s_sqrt_s=float(np.sqrt(scale(0.01, 0.3))),
-            start_speed_m_s=even(2, 5),
+            acceleration_m_s_sqrt_s=float(np.sqrt(scale(rng, 0.01, 0.3))),
+            start_speed_m_s=even(rng, 2, 5),
             many=targets,
         ),
         sensors={
@@ -168,15 +158,15 @@ def draw(rng: np.random.Generator, clocks: Mapping[str, float]) -> Settings:
     )
 
 
-def _camera(scale: Drawn, even: Drawn) -> ManySensorPart:
+def _camera(rng: np.random.Generator) -> ManySensorPart:
     """It sees all around, as far as the radar or less far."""
     return ManySensorPart(
-        detection=even(0.3, 0.9),
-        clutter_per_rad=scale(0.05, 3),
-        far_m=even(100, RADAR_REACH_M),
-        patience_s=even(3, 10),
-        rough_m=(0.0, scale(0.7, 4)),
-        along_m=(0.0, scale(3, 9)),
+        detection=even(rng, 0.3, 0.9),
+        clutter_per_rad=scale(rng, 0.05, 3),
+        far_m=even(rng, 100, RADAR_REACH_M),
+        patience_s=even(rng, 3, 10),
+        rough_m=(0.0, scale(rng, 0.7, 4)),
+        along_m=(0.0, scale(rng, 3, 9)),
     )
 
 

@@ -114,7 +114,8 @@ def gather(
     """
     largest = int(np.argmax([hull.length_m for hull in hulls]))
     hull = hulls[largest]
-    if not sensor.several or len(z) < 2 or not established.any() or hull.length_m <= 0:
+    one = sensor.bearings or not sensor.several
+    if one or len(z) < 2 or not established.any() or hull.length_m <= 0:
         return Gathered(z, R, kinds)
     kinds = kinds.copy()
     of_any = np.einsum("tk,tkm->tm", kinds, likelihood)

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from wildlab.errors import WildlabError
 from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
-from wildlab.tracking.many.hulls import LEAST_KIND, Gathered, gather, hull_noise, near_side
+from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
 from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.tracks import (
     Tracks,
@@ -107,7 +107,7 @@ def follow_many(
     for scan in sorted(scans, key=lambda one: one.time):
         dt = 0.0 if before is None else scan.time - before
         before = scan.time
-        own_dt = scan.time - looked.get(scan.sensor, scan.time)
+        own_dt = scan.time - looked.get(scan.sensor, -np.inf)
         looked[scan.sensor] = scan.time
         tracks, first = step(tracks, scan, dt, own_dt, eyes, targets, first)
         yield tracks, _shown(tracks, scan, eyes, targets)
@@ -154,10 +154,8 @@ def _corrected(
     compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
-    gathered = (
-        Gathered(z, R, tracks.kinds)
-        if sensor.bearings
-        else gather(z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls)
+    gathered = gather(
+        z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
     )
     if len(gathered.z) != len(z):
         z, R = gathered.z, gathered.R
@@ -246,11 +244,16 @@ def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:
     size = 1 if sensor.bearings else 2
     z, R = np.asarray(scan.z, float).reshape(-1, size), np.asarray(scan.R, float).reshape(-1, size, size)
     if sensor.bearings:
-        good = np.isfinite(z).all(axis=1)
-        return z[good], R[good]
-    distance = np.linalg.norm(z - scan.platform, axis=1)
-    good = np.isfinite(z).all(axis=1) & (distance > sensor.near_m) & (distance < sensor.far_m)
+        good = np.isfinite(z[:, 0])
+    else:
+        good = in_reach(z, scan.platform, sensor.near_m, sensor.far_m)
     return z[good], R[good]
+
+
+def in_reach(z: Array, platform: Array, near_m: float, far_m: float) -> NDArray[np.bool_]:
+    """Which of (M, 2) places lie between two distances from the platform; none that is not finite."""
+    distance = np.linalg.norm(z - platform, axis=1)
+    return np.asarray((distance > near_m) & (distance < far_m))
 
 
 def _sees(places: Array, scan: Scan, sensor: SensorBeliefs) -> NDArray[np.bool_]:

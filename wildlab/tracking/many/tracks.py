@@ -228,18 +228,30 @@ def _as_fast(x: Array, other: Array, P: Array) -> bool:
     return bool(v @ np.linalg.solve(P[2:, 2:], v) < SAME_VELOCITY)
 
 
+def moves(trail: Array, before: bool, moves_m: float, over_s: float) -> bool:
+    """Whether what went along ``trail`` (L, 3), times and places of the last ``over_s``, moves.
+
+    Parameters
+    ----------
+    before
+        Whether it did until now: in between, and where there is no way to judge by, it still does.
+    moves_m, over_s
+        As in `TargetBeliefs`.
+    """
+    if len(trail) < 2:
+        return before
+    gone = float(np.linalg.norm(trail[-1, 1:] - trail[0, 1:]))
+    lasted = float(trail[-1, 0] - trail[0, 0])
+    if gone > moves_m and gone > STAYS_M_S * lasted:
+        return True
+    return before and not (lasted > 0.8 * over_s and gone < 0.6 * moves_m)
+
+
 def judged_by_motion(tracks: Tracks, time: float, targets: TargetBeliefs) -> Tracks:
     """Which of them move: what stays is a buoy, a moored boat or the shore."""
     moving, trails = tracks.moving.copy(), []
     for row, trail in enumerate(tracks.trail):
         recent = trail[trail[:, 0] > time - targets.over_s]
         trails.append(recent)
-        if len(recent) < 2:
-            continue
-        gone = float(np.linalg.norm(recent[-1, 1:] - recent[0, 1:]))
-        lasted = float(recent[-1, 0] - recent[0, 0])
-        if gone > targets.moves_m and gone > STAYS_M_S * lasted:
-            moving[row] = True
-        elif lasted > 0.8 * targets.over_s and gone < 0.6 * targets.moves_m:
-            moving[row] = False
+        moving[row] = moves(recent, bool(moving[row]), targets.moves_m, targets.over_s)
     return tracks._replace(moving=moving, trail=tuple(trails))

@@ -7,6 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wildlab.geometry.frames import wrap
+from wildlab.tracking.bending import left_out
+
 Array = NDArray[np.float64]
 
 #: A target this near to the platform, m, is in no direction.
@@ -83,8 +86,7 @@ def compare_bearings(
     H = np.stack([-east, north], axis=-1)[..., None, :] / np.where(far, square, 1.0)[..., None, None]
     H = np.where(far[..., None, None], H, 0.0)
     bearing = np.asarray(z, float).reshape(-1)
-    gap = bearing - np.arctan2(east, north)[..., None]
-    innovation = (gap + np.pi) % (2 * np.pi) - np.pi
+    innovation = np.asarray(wrap(bearing - np.arctan2(east, north)[..., None]), float)
     spread = P[..., :2, :2] + np.asarray(noise, float)
     own = (H @ spread @ np.swapaxes(H, -1, -2))[..., 0, 0]
     D = np.stack(
@@ -94,13 +96,12 @@ def compare_bearings(
         ],
         axis=-2,
     )
-    bent = D / np.where(far, square, 1.0)[..., None, None] ** 2 @ spread
-    trace = np.trace(bent, axis1=-2, axis2=-1)
-    left_out = (trace**2 + 2 * np.einsum("tkab,tkba->tk", bent, bent))[..., None] / 4
+    D = D / np.where(far, square, 1.0)[..., None, None] ** 2
+    bent = left_out(spread, D[..., None, :, :])[..., 0]
     variance = np.asarray(R, float).reshape(-1)
-    S = own[..., None] + left_out + variance
+    S = own[..., None] + bent + variance
     likelihood = np.exp(-(innovation**2) / S / 2) / np.sqrt(2 * np.pi * S)
-    inside = (innovation**2 < gate**2 * S) & far[..., None] & (left_out <= variance)
+    inside = (innovation**2 < gate**2 * S) & far[..., None] & (bent <= variance)
     return Compared(innovation[..., None], S[..., None, None], np.where(inside, likelihood, 0.0), H)
 
 
