@@ -15,7 +15,7 @@ from wildlab.flight.store import save_flight
 from wildlab.paths import REPORTS
 from wildlab.runner import evaluate, track, track_many
 from wildlab.runner.processes.job import Job
-from wildlab.runner.typed import other_reports, typed
+from wildlab.runner.typed import other_reports, typed, typed_in_report
 
 
 @given(st.lists(st.text(min_size=1).filter(lambda one: "\0" not in one)))
@@ -25,15 +25,17 @@ def test_a_shell_reads_what_was_meant(words: list[str]) -> None:
     ]  # fmt: skip
 
 
-def test_of_paths_only_the_name_is_said_and_what_was_left_out_is_left_out(
+def test_paths_are_from_here_and_what_was_left_out_is_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     here = typed(
         "x", Path("my flights/one"), settings=tmp_path / "s.toml", source=None, smooth=False, filter=()
     )
-    assert here == "x one --settings s.toml"
-    assert typed("x", tmp_path / "a b") == "x 'a b'"
+    assert here == "x 'my flights/one' --settings s.toml"
+    assert typed("x", tmp_path.parent) == f"x {shlex.quote(str(tmp_path.parent))}"
+    told = typed_in_report("x", tmp_path / "a b", settings=tmp_path / "s.toml", against=[tmp_path / "c"])
+    assert told == "x 'a b' --settings s.toml --against c"
     assert other_reports(REPORTS) is None and other_reports(tmp_path) == tmp_path
 
 

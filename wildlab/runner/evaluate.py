@@ -25,7 +25,7 @@ from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import own_flights
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.typed import other_reports, typed
+from wildlab.runner.typed import other_reports, typed_in_report
 
 #: Files of a flight that two flights may have in common.
 _SHARED = ("flight", "truth", "terrain", "calibration")
@@ -100,12 +100,14 @@ def evaluate_flight(
 
     places = uses["georeferencing accuracy"]
     out = other_reports(reports)
-    again = typed("wildlab evaluate", flight.name, out=out)
-    again_source = typed("wildlab evaluate", flight.name, source=source, out=out)
+    again = typed_in_report("wildlab evaluate", flight.name, out=out)
+    again_source = typed_in_report("wildlab evaluate", flight.name, source=source, out=out)
     if places.usable:
         found, _ = flight.pose_source(source)
         parameters = {"source": found}
-        again_with = typed("wildlab evaluate", flight.name, source=found, calibration=calibration, out=out)
+        again_with = typed_in_report(
+            "wildlab evaluate", flight.name, source=found, calibration=calibration, out=out
+        )
         applied = calibration or flight.calibration
         if applied is not None:
             learnt = read_learnt(applied)
@@ -119,7 +121,7 @@ def evaluate_flight(
             flight.name,
             "repeat-sightings.ipynb",
             {"source": found},
-            typed("wildlab evaluate", flight.name, source=found, out=out),
+            typed_in_report("wildlab evaluate", flight.name, source=found, out=out),
         )
     elif calibration is not None:
         raise WildlabError(

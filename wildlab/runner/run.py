@@ -29,7 +29,7 @@ from wildlab.runner.processes.scheduling import Listener, Outcome, run_jobs
 from wildlab.runner.record.front_page import build_ledger
 from wildlab.runner.seeds.fingerprint import code_key, page_key
 from wildlab.runner.seeds.kept import SeedWork, make_work
-from wildlab.runner.typed import other_reports, typed
+from wildlab.runner.typed import other_reports, typed_in_report
 
 
 def make_job(
@@ -79,7 +79,9 @@ def make_job(
         more = str(seeds) if seeds is not None and "seeds" not in reductions else None
         own_seed = None if seed is None or seed == study.seed else str(seed)
         out = None if reductions else other_reports(reports)
-        again = typed("wildlab run", study.name, flight=flight_name, seeds=more, seed=own_seed, out=out)
+        again = typed_in_report(
+            "wildlab run", study.name, flight=flight_name, seeds=more, seed=own_seed, out=out
+        )
     parameters |= {parameter: few for parameter, (few, _) in reductions.items()}
     others = [OTHERS] if study.beside else []
     cells = check_notebook(notebook, [*STANDARD_PARAMETERS, *parameters, *others])

@@ -22,7 +22,7 @@ from wildlab.runner.processes.job import Job
 from wildlab.runner.processes.progress import shown
 from wildlab.runner.processes.scheduling import Outcome, run_jobs
 from wildlab.runner.run import make_job, run_all
-from wildlab.runner.typed import other_reports, typed
+from wildlab.runner.typed import other_reports, typed_in_report
 
 NOTEBOOK = "tracking.ipynb"
 
@@ -105,7 +105,7 @@ def track_flight(
         sensors=sensors,
         source=source,
         smooth=smooth,
-        again=typed(
+        again=typed_in_report(
             "wildlab track",
             flight.name,
             tune=tune,

@@ -21,7 +21,7 @@ from wildlab.runner.catalogue import StudyEntry, load_studies
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.run import make_job
 from wildlab.runner.track import place_of, run_alone
-from wildlab.runner.typed import other_reports, typed
+from wildlab.runner.typed import other_reports, typed_in_report
 
 NOTEBOOK = "tracking-many.ipynb"
 
@@ -99,7 +99,7 @@ def track_many(
         notebooks=notebooks,
         timeout_s=None,
         name=place.name,
-        again=typed(
+        again=typed_in_report(
             "wildlab track",
             flight.name,
             many=True,

@@ -1,10 +1,11 @@
-"""A command as somebody types it again; it names no folder."""
+"""A command as somebody types it again, in the folder where it was typed first."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from wildlab.paths import REPORTS
 
@@ -17,7 +18,7 @@ def typed(command: str, *arguments: str | Path, **options: str | Path | bool | S
     command
         As ``wildlab track``, taken as it is.
     arguments
-        What follows. Of paths only the last name is written: a report names no folder of this machine.
+        What follows. Paths are written from the folder that this is run in where they lie below it.
     options
         By name without dashes: a value, several, or True; what is None, False or empty is left out.
 
@@ -36,11 +37,32 @@ def typed(command: str, *arguments: str | Path, **options: str | Path | bool | S
     return " ".join([command, *words])
 
 
+def typed_in_report(
+    command: str, *arguments: str | Path, **options: str | Path | bool | Sequence[str | Path] | None
+) -> str:
+    """As `typed`, and of paths only the last name: a report may be passed on, and names no folder.
+
+    Examples
+    --------
+    >>> typed_in_report("wildlab track", "tuesday", settings=Path("/home/me/settings.toml"))
+    'wildlab track tuesday --settings settings.toml'
+    """
+
+    def named(value: Any) -> Any:
+        if isinstance(value, Path):
+            return value.name
+        return [named(one) for one in value] if isinstance(value, list | tuple) else value
+
+    return typed(command, *map(named, arguments), **{name: named(one) for name, one in options.items()})
+
+
 def other_reports(reports: Path) -> Path | None:
     """The folder of reports where it is not the usual one, and so has to be typed."""
     return None if reports.resolve() == REPORTS.resolve() else reports
 
 
 def _written(one: str | Path) -> str:
-    # A report names no folder: it may be passed on.
-    return one.name if isinstance(one, Path) else one
+    if not isinstance(one, Path):
+        return one
+    whole, here = one.resolve(), Path.cwd()
+    return str(whole.relative_to(here)) if whole.is_relative_to(here) and whole != here else str(whole)
