@@ -31,7 +31,11 @@ def made(
         at = np.array([ways[i, t] if i < targets else rng.normal(0, size, 2) for i in there]).reshape(-1, 2)
         x = np.concatenate([at, np.zeros((len(at), 2))], axis=1)
         P = np.tile(np.eye(4), (len(at), 1, 1))
-        shown.append(Shown(float(t), 0, there, x, P, np.ones(len(at)), np.ones((len(at), 1))))
+        shown.append(
+            Shown(
+                float(t), 0, there, x, P, np.ones(len(at)), np.ones((len(at), 1)), np.zeros((len(at), 4, 0))
+            )
+        )
         flags = np.ones(targets, bool)
         compared.append(
             Scan(float(t), at, P[:, :2, :2], there.tolist(), ways[:, t],

@@ -19,7 +19,7 @@ def followed(tracks: int = 2, looks: int = 61) -> Any:
     shown = [
         Shown(
             float(t), 0, np.arange(tracks), np.zeros((tracks, 4)), np.tile(np.eye(4), (tracks, 1, 1)),
-            np.ones(tracks), np.ones((tracks, 1)),
+            np.ones(tracks), np.ones((tracks, 1)), np.zeros((tracks, 4, 0)),
         )
         for t in range(looks)
     ]  # fmt: skip

@@ -113,12 +113,12 @@ def test_it_is_judged_at_our_looks_by_our_truths(monkeypatch: pytest.MonkeyPatch
     scans = harbour()
     none = [
         Shown(one.time, one.sensor, np.zeros(0, int), np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros(0),
-              np.zeros((0, 1)))
+              np.zeros((0, 1)), np.zeros((0, 4, 0)))
         for one in scans
     ]  # fmt: skip
     true = [
         Shown(one.time, one.sensor, np.array([7]), np.array([[30 + one.time, 10.0, 1, 0]]), np.eye(4)[None],
-              np.ones(1), np.ones((1, 1)))
+              np.ones(1), np.ones((1, 1)), np.zeros((1, 4, 0)))
         for one in scans
     ]  # fmt: skip
     given = []

@@ -6,6 +6,7 @@ from wildlab.evaluation.identities import Identities
 from wildlab.pipeline.many.follow import CUTOFF_M, Followed
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
+from wildlab.reporting.georeferencing_cause import listed
 from wildlab.reporting.metrics import VERDICT_LEVEL, VERDICT_LEVELS
 from wildlab.reporting.report import Report
 
@@ -80,16 +81,19 @@ def end_section(report: Report, followed: Followed) -> None:
     poses = []
     if "pixel" in kinds:
         poses.append(
-            "Errors of the pose are taken for new at every detection, also where all targets of an image "
-            "share them; and what an image shows is told by the same poses."
+            "Errors of the pose are those that all detections of an image share, considered and not "
+            "estimated; and what an image shows is told by the same poses."
         )
     if "bearing" in kinds:
         poses.append(
             "A bearing moves a track that another sensor began; it begins and confirms none, and is no "
             "sighting that a track is shown for. One whose place bearings keep known is not given up."
         )
-    if kinds - {"pixel"}:
-        poses.append("Errors of the platform's position and heading that last are in no covariance here.")
+    bare = [name for name, one in followed.places.items() if not one.errors.names]
+    if bare:
+        poses.append(
+            f"Errors of the platform's position and heading that last are in no covariance of {listed(bare)}."
+        )
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
     report.limits(
         [

@@ -161,10 +161,21 @@ def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> N
 
 
 def test_what_settings_say_in_vain_is_said() -> None:
-    text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
-    notes = follow_all(robot_flight(), settings=parse_settings(text)).notes
+    text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.clock]\nsd_s = 2.0\n"
+    text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
+    followed = follow_all(robot_flight(), settings=parse_settings(text))
+    notes, said = followed.notes, [one.what for one in followed.said]
     assert "The settings speak of a sensor 'rader', which this flight does not have." in notes
-    assert "Errors of radar that last are not considered where many targets are followed." in notes
+    assert "An error of the clock of radar is not considered where many targets are followed." in notes
+    assert "considered error: heading" in said and "considered error: clock" not in said
+    assert followed.lasting_s == (np.inf,)
+    bearings = robot_flight(kind="bearing", sensor="eye")
+    both = pd.concat([robot_flight().table("detections"), bearings.table("detections")], ignore_index=True)
+    frames = pd.concat([robot_flight().table("frames"), bearings.table("frames")], ignore_index=True)
+    joined = replace(bearings, tables={**bearings.tables, "detections": both, "frames": frames})
+    told = parse_settings("[sensors.eye.considered.heading]\nsd_deg = 2.0\n")
+    notes = follow_all(joined, settings=told).notes
+    assert "Errors of eye that last are not considered where many targets are followed." in notes
 
 
 def test_a_sensor_that_sees_nothing_is_refused() -> None:

@@ -65,13 +65,17 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     likely[0, 1] = [0.03, 0.01, 0.0]
     sensor = LONG._replace(several=True)
     kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
-    found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls)
+    found = gather(
+        z, R, np.zeros((len(z), 2, 0)), np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls
+    )
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.75]]) and len(found.R) == 2
     spread = 0.75 * np.outer([5, 0.25], [5, 0.25]) + 0.25 * np.outer([-15, -0.75], [-15, -0.75])
     assert np.allclose(found.R[1], np.eye(2) + spread)
     # What no gate takes is of the hull all the same, each part alike.
     z[1] = [-10.0, 0.0]
-    found = gather(z, R, np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls)
+    found = gather(
+        z, R, np.zeros((len(z), 2, 0)), np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls
+    )
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.5]])
 
 
@@ -80,7 +84,9 @@ def test_bearings_of_one_hull_are_not_merged() -> None:
     z, R = np.array([[np.pi - 0.01], [0.01 - np.pi]]), np.full((2, 1, 1), 1e-4)
     kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
     sensor = LONG._replace(several=True, bearings=True)
-    found = gather(z, R, np.zeros((1, 2)), kinds, sure, np.ones((1, 2, 2)), sensor, BOTH.hulls)
+    found = gather(
+        z, R, np.zeros((len(z), 2, 0)), np.zeros((1, 2)), kinds, sure, np.ones((1, 2, 2)), sensor, BOTH.hulls
+    )
     assert np.array_equal(found.z, z) and np.array_equal(found.kinds, kinds)
 
 
@@ -90,7 +96,7 @@ def test_a_new_track_is_where_its_measurement_would_be_seen() -> None:
         np.tile(np.eye(2), (2, 1, 1)),
         np.array([3.0, -9.0]),
     )
-    tracks = begin(z, R, 2.0, platform, (LONG,), 0, BOTH, 7)
+    tracks = begin(z, R, 2.0, platform, (LONG,), 0, BOTH, 7, np.zeros((2, 2, 0)))
     seen = tracks.x[..., :2] + near_side(tracks.x, platform, LONG)
     assert np.allclose(seen, z[:, None], atol=0.05) and not np.allclose(tracks.x[:, 1, :2], z, atol=1.0)
     assert tracks.identity.tolist() == [7, 8] and np.allclose(tracks.kinds, [0.6, 0.4])

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.tracking.many.test_together import OPEN, SURE, moved
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.beliefs import POINT, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.run import Shown, run_many
@@ -21,6 +22,7 @@ def shown(time: float, names: list[int], x: np.ndarray, P: np.ndarray) -> Shown:
     return Shown(
         time, 0, np.array(names, np.int64), np.asarray(x, float).reshape(count, 4),
         np.asarray(P, float).reshape(count, 4, 4), np.ones(count), np.ones((count, 1)),
+        np.zeros((count, 4, 0)),
     )  # fmt: skip
 
 
@@ -121,3 +123,25 @@ def test_smoothed_tracks_of_many_are_closer_to_the_truth() -> None:
             for name, at in (("filter", one.x[place, :2]), ("smoothed", x[place, :2])):
                 off[name].append(float(np.linalg.norm(truth[k] - at, axis=1).min()))
     assert np.mean(off["smoothed"]) < 0.75 * np.mean(off["filter"])
+
+
+@pytest.mark.parametrize("lasting", [0.0, 5.0, 40.0, np.inf])
+def test_errors_are_as_large_as_smoothed_tracks_say(lasting: float) -> None:
+    """Errors that measurements share are in the covariance, and what is learnt later lowers it."""
+    density, nees, lower = 0.3, [], []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        state, way = np.array([0.0, 0.0, *rng.normal(0, OPEN.start_speed_m_s, 2)]), []
+        F, Q = white_acceleration(1.0, density)
+        for _ in range(20):
+            way.append(state[:2])
+            state = F @ state + rng.multivariate_normal(np.zeros(4), Q)
+        scans = moved(np.array(way)[:, None], lasting, 2.0, 0.5, rng)
+        found = run_many(scans, [SURE], OPEN._replace(density=density, hits=1, confirmed=0.0), [lasting] * 2)
+        after = smooth_many(found, density, [lasting] * 2)
+        for k in range(2, 20, 6):
+            e, P = way[k] - after[k][0][0, :2], after[k][1][0, :2, :2]
+            nees.append(e @ np.linalg.solve(P, e) / 2)
+            lower.append(np.trace(P) / np.trace(found[k].P[0, :2, :2]))
+    assert 0.8 < np.mean(nees) < 1.2
+    assert np.mean(lower) < 0.985 and max(lower) < 1.001

@@ -17,6 +17,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
+from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out
 from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
@@ -45,6 +46,8 @@ class Followed(NamedTuple):
         What the tracker was told, and who says so.
     notes
         What was done to the detections, in sentences.
+    lasting_s
+        Of each error that the detections of a look share, for how long it lasts.
     """
 
     scans: list[Scan]
@@ -56,6 +59,7 @@ class Followed(NamedTuple):
     truth: dict[str, Array]
     said: list[Said]
     notes: list[str]
+    lasting_s: tuple[float, ...] = ()
 
     @property
     def minutes(self) -> float:
@@ -106,9 +110,14 @@ def follow_all(
         belief, more = of_sensor(flight, looks, told)
         if belief.offset_s:
             looks = scans_of(flight, name, belief.offset_s, source)
-        said += [one for one in dict.fromkeys(more) if not one.what.startswith("considered")]
-        if any(one.what.startswith("considered") for one in more):
-            notes.append(f"Errors of {name} that last are not considered where many targets are followed.")
+        bearing = looks.kind == "bearing"
+        unused = [one for one in dict.fromkeys(more) if one.what.startswith("considered")
+                  and (bearing or one.what.endswith(f": {UNKNOWN_EFFECT}"))]  # fmt: skip
+        said += [one for one in dict.fromkeys(more) if one not in unused]
+        if unused:
+            what = "Errors" if bearing else "An error of the clock"
+            which = "that last are" if bearing else "is"
+            notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
         notes += order_notes(looks)
         found = places_of(flight, looks, belief, len(places), source)
         if found.bearings and np.isfinite(belief.thinning_s):
@@ -129,10 +138,17 @@ def follow_all(
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
     beliefs = of_many(told, following, list(places.values()))
-    pairs = [pair for one in places.values() for pair in zip(one.scans, one.named, strict=True)]
+    lasting_s, shared = laid_out(
+        [(one.errors, [scan.shared for scan in one.scans]) for one in places.values()]
+    )
+    pairs = [
+        (scan._replace(shared=common) if len(common) else scan._replace(shared=None), names)
+        for one, looks_of in zip(places.values(), shared, strict=True)
+        for scan, names, common in zip(one.scans, one.named, looks_of, strict=True)
+    ]
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
-    shown = run_many(scans, beliefs.sensors, beliefs.targets)
+    shown = run_many(scans, beliefs.sensors, beliefs.targets, lasting_s)
     truth = {}
     if flight.truth is not None and len(flight.truth):
         times = np.array([scan.time for scan in scans])
@@ -147,6 +163,7 @@ def follow_all(
         truth,
         [*said, *beliefs.said],
         notes,
+        lasting_s,
     )
 
 
@@ -229,7 +246,7 @@ def tracks_table(followed: Followed) -> pd.DataFrame:
     """
     names = [one.name for one in followed.sensors]
     rows = []
-    after = smooth_many(followed.shown, followed.targets.density)
+    after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
     for shown, (later_x, later_P) in zip(followed.shown, after, strict=True):
         for i, identity in enumerate(shown.identity):
             row: dict[str, object] = {

@@ -13,6 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
+from wildlab.pipeline.many.errors import NO_ERRORS, Errors, of_elements, of_pixels
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.coloured import thin
 from wildlab.tracking.many import Scan
@@ -52,6 +53,8 @@ class Places(NamedTuple):
         The usual time between two.
     without
         How many detections have no place: rays that miss the ground, looks outside of the platform's log.
+    errors
+        What the detections of a look have in common, as ``shared`` of each look has it.
     """
 
     sensor: str
@@ -60,6 +63,7 @@ class Places(NamedTuple):
     named: list[frozenset[str]]
     interval_s: float
     without: int
+    errors: Errors = NO_ERRORS
 
     @property
     def bearings(self) -> bool:
@@ -87,12 +91,13 @@ class Places(NamedTuple):
 
 
 def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source: str | None) -> Places:
-    """The looks of a sensor as places with covariances.
+    """The looks of a sensor as places, what each is wrong by alone, and what they have in common.
 
     Parameters
     ----------
     scans, beliefs
-        Of the sensor; the noise is that of the filters of one target.
+        Of the sensor; noise and considered errors are those of the filters of one target. Bearings have none
+        that last.
     order
         Which of the sensors it is.
     source
@@ -110,8 +115,9 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
             file=flight.folder,
             field="detections.kind",
         )
+    shared, errors = np.zeros((*scans.detections.shape[:2], 2, 0)), NO_ERRORS
     if scans.kind == "pixel":
-        z, R = _of_pixels(flight, scans, source)
+        z, R, shared, errors = _of_pixels(flight, scans, beliefs, source)
     elif scans.kind == "position":
         z = scans.detections
         R = np.broadcast_to(np.diag(beliefs.noise**2), (*z.shape, 2))
@@ -120,17 +126,21 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
         R = np.broadcast_to(np.diag(beliefs.noise[:1] ** 2), (*z.shape, 1))
     else:
         z, R = _of_ranges(scans, beliefs)
+    if scans.kind in ("position", "range-bearing"):
+        shared, errors = of_elements(scans, beliefs, z)
     usable = np.isfinite(scans.platform).all(axis=1)
     looks, named, without = [], [], 0
     for row in np.flatnonzero(usable):
         there = np.isfinite(scans.detections[row]).all(axis=-1)
         good = there & np.isfinite(z[row]).all(axis=-1) & np.isfinite(R[row]).all(axis=(-2, -1))
+        good &= np.isfinite(shared[row]).all(axis=(-2, -1))
         without += int((there & ~good).sum())
         time, platform = float(scans.times[row]), scans.platform[row]
-        looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees_of(scans, int(row))))
+        sees, common = sees_of(scans, int(row)), shared[row][good] if errors.names else None
+        looks.append(Scan(time, order, platform, z[row][good], R[row][good], sees, common))
         named.append(frozenset(str(one) for one in scans.labels[row] if one))
     without += int(np.isfinite(scans.detections[~usable]).all(axis=-1).sum())
-    return Places(scans.sensor, scans.kind, looks, named, scans.interval_s, without)
+    return Places(scans.sensor, scans.kind, looks, named, scans.interval_s, without, errors)
 
 
 def thinned(places: Places, apart_s: float) -> Places:
@@ -156,17 +166,21 @@ def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
     return z, J @ np.diag(beliefs.noise[:2] ** 2) @ np.swapaxes(J, -1, -2)
 
 
-def _of_pixels(flight: Flight, scans: Scans, source: str | None) -> tuple[Array, Array]:
-    """Rays where they meet the ground, with the errors of the pose: taken for each detection by itself."""
-    observed = observe(flight, source)
+def _of_pixels(
+    flight: Flight, scans: Scans, beliefs: Beliefs, source: str | None
+) -> tuple[Array, Array, Array, Errors]:
+    """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
+    observed = observe(flight, source, clock_shift=beliefs.offset_s)
     points = georeference(flight, observed, np.random.default_rng(0))
-    points = points[points["source"] == scans.sensor] if "source" in points else points
-    points = points.drop_duplicates("detection_id").set_index("detection_id")
-    row = points.index.get_indexer(pd.Index(scans.ids.ravel()))
-    z = points[["north_m", "east_m"]].to_numpy(float)[row]
-    R = covariances_of(points.reset_index())[row]
-    z[row < 0], R[row < 0] = np.nan, np.nan
-    return z.reshape(*scans.ids.shape, 2), R.reshape(*scans.ids.shape, 2, 2)
+    own, shared, errors = of_pixels(flight, observed, covariances_of(points), beliefs)
+    ids = pd.Index(points["detection_id"])
+    row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
+    row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])
+    z = points[["north_m", "east_m"]].to_numpy(float)
+    found = [np.where((row < 0).reshape(-1, *[1] * (part.ndim - 1)), np.nan, part[row])
+             for part in (z, own, shared)]  # fmt: skip
+    z, own, shared = (part.reshape(*scans.ids.shape, *part.shape[1:]) for part in found)
+    return z, own, shared, errors
 
 
 def sees_of(scans: Scans, row: int) -> Sees | None:

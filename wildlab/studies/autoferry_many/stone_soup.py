@@ -141,9 +141,8 @@ def _shown(scan: Scan, tracks: Sequence[Any], identity: Sequence[int]) -> Shown:
     x = np.array([np.asarray(one.state_vector, float).ravel()[_OURS] for one in tracks]).reshape(-1, 4)
     P = np.array([np.asarray(one.covar, float)[np.ix_(_OURS, _OURS)] for one in tracks]).reshape(-1, 4, 4)
     count = len(tracks)
-    return Shown(
-        scan.time, scan.sensor, np.array(identity, np.int64), x, P, np.ones(count), np.ones((count, 1))
-    )
+    names, one, no_errors = np.array(identity, np.int64), np.ones(count), np.zeros((count, 4, 0))
+    return Shown(scan.time, scan.sensor, names, x, P, one, one[:, None], no_errors)
 
 
 def _followed(scans: Sequence[Scan], eyes: Sequence[Eye], choice: Choice) -> Iterator[tuple[Scan, set[Any]]]:

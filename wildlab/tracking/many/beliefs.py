@@ -148,6 +148,10 @@ class Scan(NamedTuple):
         from north, rad and rad^2.
     sees
         Which of (N, 2) places a camera shows, (N,) bool; None: whatever is within reach is looked at.
+    shared
+        (M, 2, k) of places: how far, m, each is moved by one standard deviation of each of k errors that all
+        measurements of the look have in common, such as those of the platform's pose. ``R`` is without them.
+        None: there are none.
     """
 
     time: float
@@ -156,6 +160,7 @@ class Scan(NamedTuple):
     z: Array
     R: Array
     sees: Sees | None = None
+    shared: Array | None = None
 
 
 #: One kind of target, as small as a point.

@@ -70,18 +70,20 @@ def hull_noise(x: ArrayLike, sensor: SensorBeliefs) -> Array:
 class Gathered(NamedTuple):
     """Measurements with those of one hull merged.
 
-    ``z`` (M', 2) and ``R`` (M', 2, 2); ``kinds`` (T, K) of the tracks, which several measurements tell
-    something of.
+    ``z`` (M', 2), ``R`` (M', 2, 2) and ``shared`` (M', 2, k); ``kinds`` (T, K) of the tracks, which several
+    measurements tell something of.
     """
 
     z: Array
     R: Array
+    shared: Array
     kinds: Array
 
 
 def gather(
     z: Array,
     R: Array,
+    shared: Array,
     mean: Array,
     kinds: Array,
     established: NDArray[np.bool_],
@@ -101,8 +103,8 @@ def gather(
 
     Parameters
     ----------
-    z, R
-        (M, 2) and (M, 2, 2).
+    z, R, shared
+        (M, 2), (M, 2, 2) and (M, 2, k).
     mean
         (T, 2) where tracks of the largest kind would be.
     kinds
@@ -116,13 +118,13 @@ def gather(
     hull = hulls[largest]
     one = sensor.bearings or not sensor.several
     if one or len(z) < 2 or not established.any() or hull.length_m <= 0:
-        return Gathered(z, R, kinds)
+        return Gathered(z, R, shared, kinds)
     kinds = kinds.copy()
     of_any = np.einsum("tk,tkm->tm", kinds, likelihood)
     whose = of_any.argmax(axis=0)
     taken = of_any.max(axis=0) > 0
     free = np.ones(len(z), bool)
-    merged_z, merged_R = [], []
+    merged_z, merged_R, merged_shared = [], [], []
     further = 1.0 / (hull.length_m * max(hull.beam_m, 1.0)) / sensor.clutter
     for track in np.flatnonzero(established):
         on_hull = np.linalg.norm(z - mean[track], axis=1) < 0.6 * hull.length_m
@@ -143,11 +145,12 @@ def gather(
             merged_z.append(middle)
             off = z[rows] - middle
             merged_R.append(R[rows].mean(axis=0) + (share[:, None] * off).T @ off)
+            merged_shared.append(np.einsum("m,mik->ik", share, shared[rows]))
     if not merged_z:
-        return Gathered(z, R, kinds)
-    return Gathered(
-        np.concatenate([z[free], np.array(merged_z)]), np.concatenate([R[free], np.array(merged_R)]), kinds
-    )
+        return Gathered(z, R, shared, kinds)
+    pairs = ((z, merged_z), (R, merged_R), (shared, merged_shared))
+    z, R, shared = (np.concatenate([alone[free], np.array(merged)]) for alone, merged in pairs)
+    return Gathered(z, R, shared, kinds)
 
 
 def on_one_hull(x: ArrayLike, other: ArrayLike, hull: Hull) -> bool:

@@ -14,6 +14,7 @@ from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
 from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.together import moved_together, of_all
 from wildlab.tracking.many.tracks import (
     Tracks,
     alive,
@@ -34,10 +35,20 @@ TAKEN = 0.3
 CERTAIN = 0.999
 
 
+class Measured(NamedTuple):
+    """M measurements of a look that are within reach: as in `Scan`, but (M, m, k) of errors that are shared
+    are always there."""
+
+    z: Array
+    R: Array
+    shared: Array
+
+
 class Shown(NamedTuple):
     """What is believed after a scan: N confirmed targets that move and were seen not long ago.
 
-    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K).
+    ``identity`` (N,), ``x`` (N, 4), ``P`` (N, 4, 4), ``existence`` (N,) and ``kinds`` (N, K); ``C`` (N, 4, k)
+    what each error has in common with the errors that measurements share, as in `Tracks`.
     """
 
     time: float
@@ -47,9 +58,15 @@ class Shown(NamedTuple):
     P: Array
     existence: Array
     kinds: Array
+    C: Array
 
 
-def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: TargetBeliefs) -> list[Shown]:
+def run_many(
+    scans: Sequence[Scan],
+    sensors: Sequence[SensorBeliefs],
+    targets: TargetBeliefs,
+    lasting_s: Sequence[float] = (),
+) -> list[Shown]:
     """Follow all targets of all sensors, by joint integrated data association with visibility and hulls.
 
     Parameters
@@ -60,6 +77,10 @@ def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: T
         S of them; `Scan.sensor` is a place among them.
     targets
         What is known of the targets.
+    lasting_s
+        (k,) of each error that measurements of a look share (`Scan.shared`), for how long it lasts: a
+        first-order process of that correlation time, of which zero is another error at each look, and
+        infinity one for the whole flight.
 
     Returns
     -------
@@ -69,19 +90,22 @@ def run_many(scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: T
     Raises
     ------
     WildlabError
-        Where a scan has no time, or is of a sensor that is not there.
+        Where a scan has no time, is of a sensor that is not there, or shares other errors than are told of.
     """
-    return [shown for _, shown in follow_many(scans, sensors, targets)]
+    return [shown for _, shown in follow_many(scans, sensors, targets, lasting_s)]
 
 
 def follow_many(
-    scans: Sequence[Scan], sensors: Sequence[SensorBeliefs], targets: TargetBeliefs
+    scans: Sequence[Scan],
+    sensors: Sequence[SensorBeliefs],
+    targets: TargetBeliefs,
+    lasting_s: Sequence[float] = (),
 ) -> Iterator[tuple[Tracks, Shown]]:
     """The same scan by scan, with all tracks: also those that are not believed yet.
 
     Parameters
     ----------
-    scans, sensors, targets
+    scans, sensors, targets, lasting_s
         As in `run_many`.
 
     Returns
@@ -102,14 +126,21 @@ def follow_many(
             raise WildlabError(
                 f"a scan is of sensor {scan.sensor}, and there are {len(eyes)}", "name them all"
             )
-    tracks, first, before = no_tracks(len(targets.hulls), len(eyes)), 0, None
+        if scan.shared is not None and scan.shared.shape != (*np.shape(scan.z), len(lasting_s)):
+            raise WildlabError(
+                f"shared errors of shape {scan.shared.shape} of {len(scan.z)} measurements of a scan",
+                f"give (M, 2, {len(lasting_s)}), and in lasting_s how long each lasts", field="shared",
+            )  # fmt: skip
+    if not all(one >= 0 for one in lasting_s):
+        raise WildlabError("a shared error lasts for less than nothing", "give seconds", field="lasting_s")
+    tracks, first, before = no_tracks(len(targets.hulls), len(eyes), len(lasting_s)), 0, None
     looked: dict[int, float] = {}
     for scan in sorted(scans, key=lambda one: one.time):
         dt = 0.0 if before is None else scan.time - before
         before = scan.time
         own_dt = scan.time - looked.get(scan.sensor, -np.inf)
         looked[scan.sensor] = scan.time
-        tracks, first = step(tracks, scan, dt, own_dt, eyes, targets, first)
+        tracks, first = step(tracks, scan, dt, own_dt, eyes, targets, first, lasting_s)
         yield tracks, _shown(tracks, scan, eyes, targets)
 
 
@@ -121,12 +152,13 @@ def step(
     sensors: tuple[SensorBeliefs, ...],
     targets: TargetBeliefs,
     first: int,
+    lasting_s: Sequence[float] = (),
 ) -> tuple[Tracks, int]:
     """Tracks after a scan that comes ``dt`` s after the one before, and ``own_dt`` s after the one before of
     its sensor, and the next free identity."""
     sensor = sensors[scan.sensor]
-    tracks = later(tracks, dt, targets.density)
-    z, R = _within_reach(scan, sensor)
+    tracks = later(tracks, dt, targets.density, lasting_s)
+    seen = _within_reach(scan, sensor, tracks.C.shape[-1])
     mean, _ = tracks.estimate()
     inside = _sees(mean[:, :2], scan, sensor)
     rows, away = np.flatnonzero(inside), np.flatnonzero(~inside)
@@ -134,78 +166,86 @@ def step(
     # A target gets older while it is looked at: since any sensor did, or this one could have.
     aged = np.minimum(scan.time - watched.looked.max(axis=1, initial=-np.inf), own_dt)
     watched = watched._replace(existence=still_there(watched.existence, aged, targets.lifetime_s))
-    watched, z, R, taken = _corrected(watched, z, R, scan, sensor, targets)
+    watched, seen, taken = _corrected(watched, seen, scan, sensor, targets)
     if sensor.bearings:
         return alive(both(watched, rest), targets), first
-    new = (taken < TAKEN) & ~_on_a_known_one(z, watched, targets)
-    fresh = begin(z[new], R[new], scan.time, scan.platform, sensors, scan.sensor, targets, first)
+    new = (taken < TAKEN) & ~_on_a_known_one(seen.z, watched, targets)
+    z, R, shared = (part[new] for part in seen)
+    fresh = begin(z, R, scan.time, scan.platform, sensors, scan.sensor, targets, first, shared)
     everyone = both(both(watched, rest), fresh)
     everyone = without_doubles(alive(everyone, targets), targets, sensor.several)
     return judged_by_motion(everyone, scan.time, targets), first + int(new.sum())
 
 
 def _corrected(
-    tracks: Tracks, z: Array, R: Array, scan: Scan, sensor: SensorBeliefs, targets: TargetBeliefs
-) -> tuple[Tracks, Array, Array, Array]:
+    tracks: Tracks, seen: Measured, scan: Scan, sensor: SensorBeliefs, targets: TargetBeliefs
+) -> tuple[Tracks, Measured, Array]:
     """Tracks after the measurements, these with those of one hull merged, and how much of each is taken."""
     if not tracks.number:
-        return tracks, z, R, np.zeros(len(z))
+        return tracks, seen, np.zeros(len(seen.z))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
-    compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
+    compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
     largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
     gathered = gather(
-        z, R, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
+        *seen, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
     )
-    if len(gathered.z) != len(z):
-        z, R = gathered.z, gathered.R
-        compared, near, likely = _compared(tracks, offset, noise, z, R, scan, sensor, targets.gate)
+    if len(gathered.z) != len(seen.z):
+        seen = Measured(gathered.z, gathered.R, gathered.shared)
+        compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
     kinds = gathered.kinds
     which = scan.sensor
     visible = visible_later(
         tracks.visible[:, which], scan.time - tracks.looked[:, which], targets.visible_s, targets.hidden_s
     )
-    likelihood = np.einsum("tk,tkm->tm", kinds, likely)
-    pairs, none = weights(tracks.existence, visible, sensor.detection, likelihood, sensor.clutter)
-    p = association_probabilities(pairs, none)
+
+    def probable(likely: Array) -> Array:
+        likelihood = np.einsum("tk,tkm->tm", kinds, likely)
+        pairs, none = weights(tracks.existence, visible, sensor.detection, likelihood, sensor.clutter)
+        return association_probabilities(pairs, none)
+
+    p = probable(likely)
+    if seen.shared.shape[-1] and not sensor.bearings:
+        compared, p = moved_together(compared, near, kinds, p, targets.gate, probable)
     existence, visible, own = after_scan(tracks.existence, visible, sensor.detection, p)
     mine = np.where(near >= 0, np.take_along_axis(own, near + 1, axis=1), 0.0)
     if sensor.bearings:
         # Nobody knows where a camera looked that only tells bearings: what it did not see may be there.
         existence, visible = tracks.existence, tracks.visible[:, which]
-    x, P, kinds = update(tracks.x, tracks.P, kinds, np.concatenate([own[:, :1], mine], axis=1), compared)
+    own_here = np.concatenate([own[:, :1], mine], axis=1)
+    x, P, kinds, C = update(tracks.x, tracks.P, kinds, own_here, compared, tracks.C)
     kinds = np.maximum(kinds, LEAST_KIND if kinds.shape[1] > 1 else 0.0)
-    seen = (own[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
+    hit = (own[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
     all_visible[:, which], looked[:, which] = visible, scan.time
-    existence, hits = np.minimum(existence, CERTAIN), tracks.hits + seen
+    existence, hits = np.minimum(existence, CERTAIN), tracks.hits + hit
     place = np.einsum("tk,tki->ti", kinds / kinds.sum(axis=1, keepdims=True), x)
     trail = tuple(
-        np.concatenate([old, [[scan.time, *place[row, :2]]]]) if seen[row] else old
+        np.concatenate([old, [[scan.time, *place[row, :2]]]]) if hit[row] else old
         for row, old in enumerate(tracks.trail)
     )
     tracks = tracks._replace(
         x=x,
         P=P,
+        C=C,
         kinds=kinds / kinds.sum(axis=1, keepdims=True),
         existence=existence,
         visible=all_visible,
         looked=looked,
         hits=hits,
-        last=np.where(seen, scan.time, tracks.last),
-        by=np.where(seen, which, tracks.by),
+        last=np.where(hit, scan.time, tracks.last),
+        by=np.where(hit, which, tracks.by),
         confirmed=tracks.confirmed | ((existence > targets.confirmed) & (hits >= targets.hits)),
         trail=trail,
     )
-    return tracks, z, R, p[:, 1:].sum(axis=0)
+    return tracks, seen, p[:, 1:].sum(axis=0)
 
 
 def _compared(
     tracks: Tracks,
     offset: Array,
     noise: Array,
-    z: Array,
-    R: Array,
+    seen: Measured,
     scan: Scan,
     sensor: SensorBeliefs,
     gate: float,
@@ -216,38 +256,41 @@ def _compared(
     -------
     What is compared, (T, G) which measurements these are, -1 none, and (T, K, M) likelihoods of all.
     """
+    z, R, shared = seen
     T, K, M = tracks.number, tracks.x.shape[1], len(z)
     if sensor.bearings:
-        found = compare_bearings(tracks.x, tracks.P, noise, scan.platform, z, R, gate)
+        found = compare_bearings(tracks.x, tracks.P, noise, scan.platform, z, R, gate, tracks.C)
         return found, np.tile(np.arange(M), (T, 1)), found.likelihood
     if not M:
-        nothing = compare(tracks.x, tracks.P, offset, noise, z, R, gate)
+        nothing = compare(tracks.x, tracks.P, offset, noise, z, R, gate, tracks.C, shared)
         return nothing, np.zeros((T, 0), np.intp), np.zeros((T, K, 0))
     spread = np.trace(tracks.P[..., :2, :2] + noise, axis1=-2, axis2=-1).max(axis=1)
-    widest = gate * np.sqrt(spread + np.trace(R, axis1=-2, axis2=-1).max())
-    seen = tracks.x[..., :2] + offset
-    middle = seen.mean(axis=1)
-    widest += np.linalg.norm(seen - middle[:, None], axis=2).max(axis=1)
+    # Of what track and look have in common no more than twice the sum of both can be in an innovation.
+    noises = np.trace(R, axis1=-2, axis2=-1) + 2 * (shared**2).sum(axis=(-2, -1))
+    widest = gate * np.sqrt((2 if shared.any() else 1) * spread + noises.max())
+    expected = tracks.x[..., :2] + offset
+    middle = expected.mean(axis=1)
+    widest += np.linalg.norm(expected - middle[:, None], axis=2).max(axis=1)
     within = cKDTree(z).query_ball_point(middle, widest, return_sorted=True)
     near = np.full((T, max(map(len, within))), -1, np.intp)
     for row, rows in enumerate(within):
         near[row, : len(rows)] = rows
-    compared = compare(tracks.x, tracks.P, offset, noise, z[near], R[near], gate)
-    likelihood = np.where((near >= 0)[:, None], compared.likelihood, 0.0)
-    dense = np.zeros((T, K, M))
-    track, place = np.nonzero(near >= 0)
-    dense[track, :, near[track, place]] = likelihood[track, :, place]
-    return compared._replace(likelihood=likelihood), near, dense
+    compared = compare(
+        tracks.x, tracks.P, offset, noise, z[near], R[near], gate, tracks.C, shared[near]
+    )  # fmt: skip
+    compared = compared._replace(likelihood=np.where((near >= 0)[:, None], compared.likelihood, 0.0))
+    return compared, near, of_all(compared.likelihood, near, M)
 
 
-def _within_reach(scan: Scan, sensor: SensorBeliefs) -> tuple[Array, Array]:
+def _within_reach(scan: Scan, sensor: SensorBeliefs, errors: int) -> Measured:
     size = 1 if sensor.bearings else 2
     z, R = np.asarray(scan.z, float).reshape(-1, size), np.asarray(scan.R, float).reshape(-1, size, size)
     if sensor.bearings:
         good = np.isfinite(z[:, 0])
     else:
         good = in_reach(z, scan.platform, sensor.near_m, sensor.far_m)
-    return z[good], R[good]
+    shared = np.zeros((len(z), size, errors)) if scan.shared is None else np.asarray(scan.shared, float)
+    return Measured(z[good], R[good], shared[good])
 
 
 def in_reach(z: Array, platform: Array, near_m: float, far_m: float) -> NDArray[np.bool_]:
@@ -285,4 +328,5 @@ def _shown(tracks: Tracks, scan: Scan, sensors: tuple[SensorBeliefs, ...], targe
     )
     mine = tracks.only(rows)
     x, P = mine.estimate()
-    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds)
+    C = np.einsum("tk,tkij->tij", mine.kinds, mine.C)
+    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds, C)

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.hulls import near_side, on_one_hull
 from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.schmidt import fade
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -33,6 +34,9 @@ class Tracks(NamedTuple):
     ----------
     x, P
         (T, K, 4) north, east and their velocities, and (T, K, 4, 4); m and s.
+    C
+        (T, K, 4, k) covariance of a track's error, truth minus estimate, with each of k errors of the sensors
+        that all measurements of a look share, in their standard deviations (`Scan.shared`).
     kinds
         (T, K) probabilities.
     existence
@@ -51,6 +55,7 @@ class Tracks(NamedTuple):
 
     x: Array
     P: Array
+    C: Array
     kinds: Array
     existence: Array
     visible: Array
@@ -81,13 +86,13 @@ class Tracks(NamedTuple):
         return mean, np.einsum("tk,tkij->tij", self.kinds, P)
 
 
-def no_tracks(kinds: int, sensors: int) -> Tracks:
-    """None yet."""
+def no_tracks(kinds: int, sensors: int, errors: int = 0) -> Tracks:
+    """None yet, of so many kinds of hull, seen by so many sensors that share so many errors."""
     whole, flag = np.zeros(0, np.int64), np.zeros(0, bool)
     one = np.zeros(0)
     of_kinds, of_sensors = np.zeros((0, kinds)), np.zeros((0, sensors))
-    x, P = np.zeros((0, kinds, 4)), np.zeros((0, kinds, 4, 4))
-    return Tracks(x, P, of_kinds, one, of_sensors, of_sensors, whole, whole, one, whole, flag, flag, ())
+    x, P, C = (np.zeros((0, kinds, 4, *more)) for more in ((), (4,), (errors,)))
+    return Tracks(x, P, C, of_kinds, one, of_sensors, of_sensors, whole, whole, one, whole, flag, flag, ())
 
 
 def both(tracks: Tracks, more: Tracks) -> Tracks:
@@ -96,10 +101,11 @@ def both(tracks: Tracks, more: Tracks) -> Tracks:
     return Tracks._make([*parts, tracks.trail + more.trail])
 
 
-def later(tracks: Tracks, dt: float, density: float) -> Tracks:
-    """Estimates ``dt`` s later, driven by white acceleration."""
+def later(tracks: Tracks, dt: float, density: float, lasting_s: ArrayLike = ()) -> Tracks:
+    """Estimates ``dt`` s later, driven by white acceleration; shared errors last for (k,) s in the mean."""
     F, Q = white_acceleration(dt, density)
-    return tracks._replace(x=tracks.x @ F.T, P=F @ tracks.P @ F.T + Q)
+    C = F @ tracks.C * [fade(dt, float(one)) for one in np.asarray(lasting_s, float)]
+    return tracks._replace(x=tracks.x @ F.T, P=F @ tracks.P @ F.T + Q, C=C)
 
 
 def begin(
@@ -111,8 +117,11 @@ def begin(
     sensor: int,
     targets: TargetBeliefs,
     first: int,
+    shared: Array,
 ) -> Tracks:
     """A track on each of M measurements (M, 2) with (M, 2, 2); identities from ``first`` on.
+
+    ``shared`` (M, 2, k) as in `Scan`: what moves a measurement moves its track, the other way than its error.
 
     It may go anywhere: which part of a hull is seen, and along which heading, is half known for each axis.
     """
@@ -121,8 +130,10 @@ def begin(
     at = np.concatenate([z, np.zeros((count, 2))], axis=1)[:, None].repeat(K, axis=1)
     at[..., :2] -= near_side(at, platform, mine)
     rough, along = np.asarray(mine.rough_m), np.asarray(mine.along_m)
-    P = np.zeros((count, K, 4, 4))
-    P[..., :2, :2] = R[:, None] + (rough**2 + along**2 / 2)[:, None, None] * np.eye(2)
+    P, C = np.zeros((count, K, 4, 4)), np.zeros((count, K, 4, shared.shape[-1]))
+    C[..., :2, :] = -shared[:, None]
+    whole = R + shared @ np.swapaxes(shared, -1, -2)
+    P[..., :2, :2] = whole[:, None] + (rough**2 + along**2 / 2)[:, None, None] * np.eye(2)
     P[..., [2, 3], [2, 3]] = targets.start_speed_m_s**2
     share = np.array([hull.share for hull in targets.hulls])
     lasting = targets.visible_s / (targets.visible_s + targets.hidden_s)
@@ -131,6 +142,7 @@ def begin(
     return Tracks(
         at,
         P,
+        C,
         np.tile(share / share.sum(), (count, 1)),
         np.full(count, targets.birth),
         visible,

@@ -1,0 +1,152 @@
+"""What detections of a look have in common: by moving the platform, by whole covariances, and end to end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.pipeline.robots import boat, robot_flight
+from wildlab.flight.following import Settings, parse_settings
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import rotation_vector_to_matrix
+from wildlab.pipeline.following.beliefs import of_flight, of_sensor
+from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe, pose_errors
+from wildlab.pipeline.many.errors import Errors, _pose_roots, laid_out, of_elements, of_pixels
+from wildlab.pipeline.many.follow import follow_all
+from wildlab.pipeline.many.places import Places, places_of
+from wildlab.pipeline.scans import scans_of
+from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.schmidt import transition_of_pose
+
+ALL = """
+[sensors.radar.considered.heading]
+sd_deg = 2.0
+correlation_time_s = 30.0
+[sensors.radar.considered.platform_north]
+sd_m = 3.0
+[sensors.radar.considered.platform_east]
+sd_m = 4.0
+[sensors.radar.considered.range_bias]
+sd_m = 5.0
+shared = false
+[sensors.radar.considered.clock]
+sd_s = 0.5
+"""
+
+
+def places(flight: Flight, settings: Settings) -> Places:
+    scans = scans_of(flight, "radar")
+    return places_of(flight, scans, of_sensor(flight, scans, settings)[0], 0, None)
+
+
+def test_a_place_moves_as_what_it_was_computed_from() -> None:
+    """Each error undone by hand: the place moves by what one standard deviation of it is said to do."""
+    flight = robot_flight(seconds=20.0)
+    found = places(flight, parse_settings(ALL))
+    names = ("platform_north", "platform_east", "heading", "radar: range_bias")
+    assert set(found.errors.names) == set(names) and len(found.errors.names) == 4
+    assert dict(zip(*found.errors, strict=True))["heading"] == 30.0
+    scans = scans_of(flight, "radar")
+    for row, scan in enumerate(found.scans):
+        r, azimuth = scans.detections[row, 0]
+        toward = np.array([np.cos(azimuth), np.sin(azimuth)])
+        across = np.array([-np.sin(azimuth), np.cos(azimuth)])
+        # What is added to the known value for the true one comes off the place; a bias was measured too.
+        expected = {"platform_north": [-3.0, 0.0], "platform_east": [0.0, -4.0],
+                    "heading": -r * across * np.radians(2.0), "radar: range_bias": 5.0 * toward}  # fmt: skip
+        for i, name in enumerate(found.errors.names):
+            assert np.allclose(scan.shared[0, :, i], expected[name]), name
+
+
+def test_all_errors_of_a_look_move_its_detections_alike() -> None:
+    flight = robot_flight(kind="position", clutter=3, seconds=20.0, labelled=False)
+    text = "[sensors.radar.considered.platform_north]\nsd_m = 3.0\n"
+    for scan in places(flight, parse_settings(text)).scans:
+        assert scan.shared.shape == (4, 2, 1)
+        assert np.allclose(np.abs(scan.shared[:, 0, 0]), 3.0) and np.allclose(scan.shared[:, 1], 0.0)
+        assert len(np.unique(np.sign(scan.shared[:, 0, 0]))) == 1
+    scans = scans_of(flight, "radar")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    assert of_elements(scans, belief, scans.detections)[0].shape[-1] == 0
+
+
+def _pixels(seed: int = 3) -> tuple[Flight, Observations]:
+    flight = simulate_twin("static-antenna", seed)
+    return flight, observe(flight, "autopilot")
+
+
+@pytest.mark.slow
+def test_alone_and_in_common_are_the_whole() -> None:
+    """Of every georeferenced pixel, also where its covariance comes from samples."""
+    flight, observed = _pixels()
+    points = georeference(flight, observed, np.random.default_rng(0))
+    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    R, shared, errors = of_pixels(flight, observed, covariances_of(points), belief)
+    known = np.isfinite(covariances_of(points)).all(axis=(1, 2)) & np.isfinite(shared).all(axis=(1, 2))
+    assert known.sum() > 100 and shared.shape[-1] == len(errors.names) == 10
+    whole = R + shared @ np.swapaxes(shared, 1, 2)
+    assert np.allclose(whole[known], covariances_of(points)[known], rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_an_error_stays_itself_along_the_flight() -> None:
+    """From one look to the next as the Schmidt filter carries it; and a roll moves places as rays say."""
+    flight, observed = _pixels()
+    rows = np.flatnonzero(np.isfinite(observed.poses.p_nb).all(axis=1))[:300]
+    some = np.zeros(len(observed.uv), bool)
+    some[rows] = True
+    observed = observed.take(some)
+    errors = pose_errors(flight, observed)
+    roots = _pose_roots(observed, errors)
+    assert np.allclose(roots @ np.swapaxes(roots, 1, 2), errors.pose, atol=1e-12)
+    order = np.argsort(observed.table["time_s"].to_numpy(float), kind="stable")
+    for a, b in zip(order[:-1:20], order[1::20], strict=False):
+        phi = transition_of_pose(errors.pose[a], errors.pose[b], "bias")
+        assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
+    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    points = georeference(flight, observed, np.random.default_rng(0))
+    linear = points["ellipse"].to_numpy(str) == "linear"
+    _, shared, _ = of_pixels(flight, observed, covariances_of(points), belief)
+    small = 1e-4
+    for i in (0, 4, 5):
+        turn = rotation_vector_to_matrix(small * roots[:, 3:, i])
+        poses = replace(
+            observed.poses,
+            p_nb=observed.poses.p_nb + small * roots[:, :3, i],
+            R_nb=observed.poses.R_nb @ turn,
+        )
+        moved = georeference(flight, replace(observed, poses=poses), np.random.default_rng(0))
+        by_hand = (moved[["north_m", "east_m"]] - points[["north_m", "east_m"]]).to_numpy(float) / small
+        assert np.allclose(shared[linear][..., i], by_hand[linear], rtol=0.02, atol=0.02)
+
+
+def test_errors_of_one_name_are_one_and_those_that_move_nothing_none() -> None:
+    one = Errors(("heading", "a: bias", "idle"), (30.0, np.inf, 5.0))
+    two = Errors(("heading",), (20.0,))
+    J, K = np.ones((2, 2, 3)), 7 * np.ones((1, 2, 1))
+    J[..., 1], J[..., 2] = 2, 0
+    lasting, (first, second) = laid_out([(one, [J, None]), (two, [K])])
+    assert lasting == (20.0, np.inf)
+    assert np.array_equal(first[0], J[..., :2]) and first[1].shape == (0, 2, 2)
+    assert np.array_equal(second[0][..., 0], K[..., 0]) and not second[0][..., 1].any()
+    assert laid_out([]) == ((), [])
+
+
+def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
+    """Three degrees at 100 m are five metres for the whole flight."""
+    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
+    considered = told + "[sensors.radar.considered.heading]\nsd_deg = 3.0\n"
+    nees = []
+    flight = robot_flight(heading_off_deg=3.0, labelled=False)
+    for text in (told, considered):
+        followed = follow_all(flight, settings=parse_settings(text))
+        own = []
+        for one in followed.shown[20:]:
+            e = one.x[:, :2] - boat(np.array([one.time]))
+            own += [float(a @ np.linalg.solve(P[:2, :2], a) / 2) for a, P in zip(e, one.P, strict=True)]
+        nees.append(np.mean(own))
+    assert nees[0] > 10 and 0.2 < nees[1] < 1.2

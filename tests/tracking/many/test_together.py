@@ -1,0 +1,252 @@
+"""Errors that a look's measurements share: one target is the Schmidt filter, a few are sums over all ways."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
+
+from tests.tracking.many.test_run import EYE, POINTS, lines, looks
+from wildlab.errors import WildlabError
+from wildlab.tracking.many.beliefs import Scan
+from wildlab.tracking.many.probabilities import association_probabilities
+from wildlab.tracking.many.run import follow_many, run_many
+from wildlab.tracking.many.together import moved_together, told_by_others
+from wildlab.tracking.many.update import Compared, compare, update
+from wildlab.tracking.maritime import white_acceleration
+from wildlab.tracking.schmidt import update_schmidt
+
+SURE = EYE._replace(detection=1 - 1e-12, clutter=1e-30)
+OPEN = POINTS._replace(gate=1e3, lifetime_s=1e12, hidden_s=1e-9, lost_m=1e6, fastest_m_s=1e6)
+
+
+def moved(
+    truth: np.ndarray, lasting_s: float, size: float, own: float, rng: np.random.Generator, told: bool = True
+) -> list[Scan]:
+    """Scans of (N, T, 2) places, in their order; an error north and one east, first order, move all.
+
+    Parameters
+    ----------
+    told
+        Whether the scans say that it is shared, or have it in the noise of each.
+    """
+    error = rng.normal(size=2)
+    left = np.exp(-1 / lasting_s) if lasting_s else 0.0
+    scans = []
+    for t, places in enumerate(truth):
+        if t:
+            error = left * error + np.sqrt(1 - left**2) * rng.normal(size=2)
+        z = places + size * error + own * rng.normal(size=places.shape)
+        R = np.tile((own**2 + (0 if told else size**2)) * np.eye(2), (len(z), 1, 1))
+        shared = np.tile(size * np.eye(2), (len(z), 1, 1)) if told else None
+        scans.append(Scan(float(t), 0, np.array([0.0, -500.0]), z, R, None, shared))
+    return scans
+
+
+@given(st.integers(0, 10_000), st.integers(1, 4))
+@settings(max_examples=25)
+def test_one_target_is_the_schmidt_filter(seed: int, k: int) -> None:
+    """Also where how the errors move a measurement changes from look to look, and they fade."""
+    rng = np.random.default_rng(seed)
+    lasting = rng.choice([0.0, 3.0, np.inf], k)
+    scans = [
+        one._replace(shared=rng.normal(size=(1, 2, k)))
+        for one in looks(lines(np.array([[5.0, 8.0]]), np.array([[1.0, -2.0]]), 8), rng)
+    ]
+    J, H = scans[0].shared[0], np.eye(2, 4)
+    x, P = np.array([*scans[0].z[0], 0.0, 0.0]), np.diag([0.0, 0.0, 9.0, 9.0])
+    P[:2, :2] = scans[0].R[0] + J @ J.T
+    C = np.vstack([-J, np.zeros((2, k))])
+    for scan, (tracks, _) in zip(scans, follow_many(scans, [SURE], OPEN, lasting), strict=True):
+        if scan.time:
+            F, Q = white_acceleration(1.0, OPEN.density)
+            x, P = F @ x, F @ P @ F.T + Q
+            C = F @ C @ np.diag([0.0 if one == 0 else np.exp(-1.0 / one) for one in lasting])
+            after = update_schmidt(
+                x, P, C, np.eye(k), scan.z[0] - x[:2], H, scan.shared[0], scan.R[0]
+            )  # fmt: skip
+            x, P, C = after.x, after.P, after.C
+        assert np.allclose(tracks.x[0, 0], x) and np.allclose(tracks.P[0, 0], P)
+        assert np.allclose(tracks.C[0, 0], C)
+
+
+@given(st.integers(0, 10_000))
+def test_a_mixture_has_the_moments_of_what_each_measurement_makes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    M, k = 3, 2
+    root = rng.normal(size=(4 + k, 4 + k))
+    whole = root @ root.T
+    unit = np.eye(4 + k)
+    unit[4:, 4:] = np.linalg.inv(np.linalg.cholesky(whole[4:, 4:]))
+    whole = unit @ whole @ unit.T
+    x, P, C = rng.normal(size=4), whole[:4, :4], whole[:4, 4:]
+    z, R, J = rng.normal(size=(M, 2)), np.tile(np.eye(2), (M, 1, 1)), rng.normal(size=(M, 2, k))
+    beta = rng.dirichlet(np.ones(1 + M))
+    one = x[None, None], P[None, None]
+    compared = compare(*one, np.zeros((1, 1, 2)), np.zeros((1, 1, 2, 2)), z, R, 1e9, C[None, None], J)
+    found = update(*one, [[1.0]], beta[None], compared, C[None, None])
+    parts = [update_schmidt(x, P, C, np.eye(k), z[m] - x[:2], np.eye(2, 4), J[m], R[m]) for m in range(M)]
+    mean = beta[0] * x + sum(b * one.x for b, one in zip(beta[1:], parts, strict=True))
+    spread = beta[0] * (P + np.outer(x - mean, x - mean))
+    spread = spread + sum(
+        b * (one.P + np.outer(one.x - mean, one.x - mean)) for b, one in zip(beta[1:], parts, strict=True)
+    )
+    assert np.allclose(found.x[0, 0], mean) and np.allclose(found.P[0, 0], spread)
+    assert np.allclose(
+        found.C[0, 0], beta[0] * C + sum(b * p.C for b, p in zip(beta[1:], parts, strict=True))
+    )
+    assert np.allclose(compared.S[0, 0, 0], parts[0].S)
+
+
+def _drawn(rng: np.random.Generator, T: int, k: int, size: float) -> tuple[Compared, np.ndarray]:
+    """T targets some metres apart, each detected, moved together; known to a metre; and (T, M) whose."""
+    x = np.zeros((T, 1, 4))
+    x[:, 0, :2] = rng.uniform(-6, 6, (T, 2))
+    J = np.tile(size * np.eye(2, k), (T, 1, 1)) + 0.1 * rng.normal(size=(T, 2, k))
+    z = x[:, 0, :2] + J @ rng.normal(size=k) + rng.normal(size=(T, 2)) * np.sqrt(0.5)
+    P = np.tile(np.diag([0.25, 0.25, 1.0, 1.0]), (T, 1, 1, 1))
+    R = np.tile(0.25 * np.eye(2), (T, 1, 1))
+    zero = np.zeros((T, 1, 2)), np.zeros((T, 1, 2, 2))
+    return compare(x, P, *zero, z, R, 1e3, np.zeros((T, 1, 4, k)), J), np.eye(T)
+
+
+def _enumerated(compared: Compared, seen: float, clutter: float) -> np.ndarray:
+    """(T, 1 + M) by all ways, each with the errors integrated out."""
+    nu, S, _, _, G = (part[:, 0] for part in compared)
+    T, M = nu.shape[:2]
+    alone = S - G @ np.swapaxes(G, -1, -2)
+    total = np.zeros((T, 1 + M))
+    for way in product(range(-1, M), repeat=T):
+        taken = [m for m in way if m >= 0]
+        if len(set(taken)) < len(taken):
+            continue
+        who = [t for t in range(T) if way[t] >= 0]
+        weight = (1 - seen) ** (T - len(who)) * (seen / clutter) ** len(who)
+        if who:
+            g = np.concatenate([G[t, way[t]] for t in who])
+            spread = g @ g.T
+            for place, t in enumerate(who):
+                spread[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] += alone[t, way[t]]
+            weight *= multivariate_normal.pdf(np.concatenate([nu[t, way[t]] for t in who]), cov=spread)
+        for t in range(T):
+            total[t, 1 + way[t]] += weight
+    return np.asarray(total / total.sum(axis=1, keepdims=True))
+
+
+def _both(compared: Compared, seen: float, clutter: float) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 1 + M) with each target by itself, and together."""
+    T, M = compared.likelihood.shape[0], compared.likelihood.shape[2]
+
+    def probable(likely: np.ndarray) -> np.ndarray:
+        return association_probabilities(seen * likely[:, 0] / clutter, np.full(T, 1 - seen))
+
+    alone = probable(compared.likelihood)
+    near = np.tile(np.arange(M), (T, 1))
+    return alone, moved_together(compared, near, np.ones((T, 1)), alone, 1e3, probable)[1]
+
+
+def test_together_is_near_the_sum_over_all_ways() -> None:
+    """Each target by itself is far off, where all are moved by more than they are apart."""
+    rng = np.random.default_rng(1)
+    off = []
+    for _ in range(150):
+        compared, _ = _drawn(rng, int(rng.integers(2, 5)), 3, 3.0)
+        right = _enumerated(compared, 0.9, 1e-4)
+        off.append([np.abs(one - right).max(axis=1).mean() for one in _both(compared, 0.9, 1e-4)])
+    alone, together = np.mean(off, axis=0)
+    assert alone > 0.15 and together < alone / 3
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=25)
+def test_an_error_that_moves_nothing_changes_nothing(seed: int) -> None:
+    compared, _ = _drawn(np.random.default_rng(seed), 3, 2, 1.0)
+    compared = compared._replace(
+        G=0 * compared.G, S=compared.S - compared.G @ np.swapaxes(compared.G, -1, -2)
+    )
+    compared = compared._replace(
+        likelihood=np.array(
+            [
+                [multivariate_normal.pdf(n, cov=s) for n, s in zip(nu, S, strict=True)]
+                for nu, S in zip(compared.innovation[:, 0], compared.S[:, 0], strict=True)
+            ]
+        )[:, None]
+    )
+    alone, together = _both(compared, 0.9, 1e-4)
+    assert np.allclose(alone, together) and np.allclose(alone, _enumerated(compared, 0.9, 1e-4))
+
+
+def test_what_others_tell_is_the_least_squares_of_them() -> None:
+    """Sure associations: the errors' posterior is that of all other targets' innovations at once."""
+    rng = np.random.default_rng(2)
+    compared, sure = _drawn(rng, 4, 3, 2.0)
+    mean, covariance = told_by_others(compared, sure[:, None])
+    nu, S, _, _, G = (part[:, 0] for part in compared)
+    for t in range(4):
+        others = [u for u in range(4) if u != t]
+        g = np.concatenate([G[u, u] for u in others])
+        alone = np.zeros((6, 6))
+        for place, u in enumerate(others):
+            alone[2 * place : 2 * place + 2, 2 * place : 2 * place + 2] = S[u, u] - G[u, u] @ G[u, u].T
+        gain = g.T @ np.linalg.inv(g @ g.T + alone)
+        assert np.allclose(mean[t], gain @ np.concatenate([nu[u, u] for u in others]))
+        assert np.allclose(covariance[t], np.eye(3) - gain @ g)
+
+
+@pytest.mark.parametrize("lasting", [0.0, 20.0, np.inf])
+def test_errors_are_as_large_as_tracks_say(lasting: float) -> None:
+    """Whatever the errors last; told as noise of each measurement those that last are not."""
+    starts = np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0]])
+    truth = lines(starts, np.array([[1.0, 0.5]] * 3), 40)
+    nees: dict[bool, list[float]] = {True: [], False: []}
+    for seed in range(25):
+        for told, found in nees.items():
+            scans = moved(truth, lasting, 3.0, 0.5, np.random.default_rng(seed), told)
+            for tracks, _ in list(
+                follow_many(scans, [SURE], OPEN._replace(density=0.02), [lasting] * 2 if told else [])
+            )[20::10]:
+                e = (
+                    tracks.x[:, 0, :2]
+                    - truth[int(tracks.last[0])][
+                        np.linalg.norm(tracks.x[:, :, :2] - truth[int(tracks.last[0])][None], axis=2).argmin(
+                            1
+                        )
+                    ]
+                )
+                P = tracks.P[:, 0, :2, :2]
+                found.append(float(np.einsum("ti,tij,tj->t", e, np.linalg.inv(P), e).mean() / 2))
+    # About 13 independent values of two degrees of freedom a flight at most, and one for errors that stay.
+    assert 0.75 < np.mean(nees[True]) < 1.3
+    if lasting:
+        assert np.mean(nees[False]) > 2
+
+
+def test_targets_that_are_moved_together_are_told_apart() -> None:
+    """Two metres apart and moved by three for long: who knows that they are moved together keeps them."""
+    starts = 2.0 * np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+    truth = lines(starts, np.array([[0.3, 0.2]] * 3), 40)
+    targets = POINTS._replace(density=0.02, start_speed_m_s=1.0)
+    kept = dict.fromkeys((True, False), 0)
+    for seed in range(8):
+        for told in kept:
+            scans = moved(truth, 100.0, 3.0, 0.3, np.random.default_rng(seed), told)
+            names = []
+            for k, (tracks, _) in enumerate(follow_many(scans, [EYE], targets, [100.0] * 2 if told else [])):
+                sure = tracks.only(np.flatnonzero(tracks.confirmed))
+                if k in (10, 39) and sure.number >= 3:
+                    near = np.linalg.norm(sure.x[:, :1, :2] - scans[k].z[None], axis=2).argmin(axis=0)
+                    names.append(tuple(sure.identity[near].tolist()))
+            kept[told] += len(names) == 2 and names[0] == names[1] and len(set(names[0])) == 3
+    assert kept[True] >= 6 > 2 >= kept[False]
+
+
+def test_shared_errors_that_nobody_told_of_are_refused() -> None:
+    scan = Scan(0.0, 0, np.zeros(2), np.ones((1, 2)), np.eye(2)[None], None, np.zeros((1, 2, 3)))
+    with pytest.raises(WildlabError, match=r"shared errors of shape \(1, 2, 3\)"):
+        run_many([scan], [EYE], POINTS, [1.0])
+    with pytest.raises(WildlabError, match="less than nothing"):
+        run_many([scan], [EYE], POINTS, [1.0, -1.0, 0.0])

@@ -1,0 +1,186 @@
+"""What the detections of a look have in common: errors of the pose, the mount, the ground and the sensor.
+
+Each is told as what one standard deviation of it moves every detection's place by, so that all have variance
+one. Of a pose whose covariance changes along the flight the six errors keep their identity as `wildlab
+track`'s filters keep it (``bias`` of `wildlab.tracking.schmidt`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.flight.store import Flight
+from wildlab.geometry.terrain import pixels_to_terrain
+from wildlab.geometry.terrain_uncertainty import terrain_jacobians
+from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
+from wildlab.pipeline.following.beliefs import Beliefs
+from wildlab.pipeline.following.considering import errors_of
+from wildlab.pipeline.following.expected import SLOTS, predict_scan
+from wildlab.pipeline.georeference import Observations, pose_errors
+from wildlab.pipeline.scans import Scans
+from wildlab.tracking.schmidt import transition_of_pose, transitions_of_pose
+
+Array = NDArray[np.float64]
+
+#: An error of the clock moves a target by its speed, which nobody knows before it is tracked.
+UNKNOWN_EFFECT = "clock"
+
+
+class Errors(NamedTuple):
+    """Of one sensor: ``names`` (k,) and for how long each lasts, s, (k,)."""
+
+    names: tuple[str, ...]
+    lasting_s: tuple[float, ...]
+
+
+#: None at all.
+NO_ERRORS = Errors((), ())
+
+
+def of_pixels(
+    flight: Flight, observed: Observations, total: Array, beliefs: Beliefs
+) -> tuple[Array, Array, Errors]:
+    """What georeferenced pixels have of their own and in common.
+
+    Parameters
+    ----------
+    observed
+        From `observe`, N rows.
+    total
+        (N, 2, 2) covariances of their places, m^2: where they are of samples, what is in common is stretched
+        to it.
+    beliefs
+        Of the sensor: how long its errors last.
+
+    Returns
+    -------
+    R, shared
+        (N, 2, 2) of each alone and (N, 2, k), in m.
+    errors
+        The k of them.
+    """
+    errors = pose_errors(flight, observed)
+    J = _jacobians(observed)
+    pixel = np.diag(beliefs.noise[:2] ** 2)
+    own = J["pixel"] @ pixel @ np.swapaxes(J["pixel"], -1, -2)
+    mount, plane = np.sqrt(np.diag(errors.mount)), np.sqrt(np.asarray(errors.plane))
+    shared = np.concatenate(
+        [
+            J["pose"] @ _pose_roots(observed, errors),
+            J["mount"] * mount,
+            (J["plane"] * np.broadcast_to(plane, len(own))[:, None])[..., None],
+        ],
+        axis=-1,
+    )
+    usual = J["pixel"] @ errors.pixel @ np.swapaxes(J["pixel"], -1, -2)
+    for row in np.flatnonzero(np.isfinite(shared).all(axis=(1, 2)) & np.isfinite(total).all(axis=(1, 2))):
+        first, whole = shared[row] @ shared[row].T, total[row] - usual[row]
+        if not np.allclose(first, whole, rtol=1e-6):
+            values, axes = np.linalg.eigh(whole)
+            whole = (axes * np.maximum(values, 0.0)) @ axes.T
+            shared[row] = transition_of_pose(first, whole, "bias") @ shared[row]
+    names = (
+        *(f"pose {i}" for i in range(1, 7)),
+        *(f"mount {i}" for i in range(1, 4)),
+        "height of the ground",
+    )
+    # The mount stays as it is, and the ground too.
+    return own, shared, Errors(names, (_lasting(beliefs),) * 6 + (np.inf,) * 4)
+
+
+def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, Errors]:
+    """What considered errors do to the places (N, K, 2) of detections: (N, K, 2, k), m."""
+    stated = errors_of(scans, beliefs)
+    if stated is None:
+        return np.zeros((*places.shape, 0)), NO_ERRORS
+    kept = [i for i, name in enumerate(stated.names) if name != UNKNOWN_EFFECT]
+    names = [stated.names[i] for i in kept]
+    columns = [SLOTS[scans.kind].index(name) for name in names]
+    sd = np.sqrt(np.diagonal(stated.covariance, axis1=1, axis2=2)[:, kept])
+    shared = np.full((*places.shape, len(kept)), np.nan)
+    for k in range(places.shape[1]):
+        known = np.asarray(np.isfinite(places[:, k]).all(axis=1), bool)
+        at = np.where(known[:, None], places[:, k], scans.platform + 1.0)
+        seen = predict_scan(scans, at, np.zeros_like(at))
+        # The detection is given: what an error adds to it, the place must take away.
+        back = np.linalg.pinv(np.nan_to_num(seen.H_position[..., :2])) @ seen.H_pose[..., columns]
+        shared[:, k] = np.where(known[:, None, None], back, np.nan) * sd[:, None]
+    times = np.broadcast_to(np.asarray(stated.correlation_time, float), len(stated.names))
+    common = stated.shared or (True,) * len(stated.names)
+    own = tuple(name if common[i] else f"{scans.sensor}: {name}" for i, name in zip(kept, names, strict=True))
+    return shared, Errors(own, tuple(float(times[i]) for i in kept))
+
+
+def _lasting(beliefs: Beliefs) -> float:
+    """s, from what is left from one look to the next."""
+    if not 0 < beliefs.fading < 1:
+        return np.inf if beliefs.fading >= 1 else 0.0
+    return float(-beliefs.interval_s / np.log(beliefs.fading))
+
+
+def _jacobians(observed: Observations) -> dict[str, Array]:
+    o = observed
+    if o.terrain is None:
+        J = ground_jacobians(o.poses, o.uv, o.plane_down)
+        return {"pixel": J.pixel, "pose": J.pose, "mount": J.mount, "plane": J.plane}
+    met = pixels_to_terrain(o.poses, o.uv, o.terrain).points
+    on = terrain_jacobians(o.poses, o.uv, met, o.terrain.slopes_at(met[:, :2]))
+    return {"pixel": on.pixel, "pose": on.pose, "mount": on.mount, "plane": on.height}
+
+
+def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
+    """(N, 6, 6) A with A A' the covariance of each row's pose, and each column one error along the flight."""
+    covariances = np.broadcast_to(np.asarray(errors.pose, float), (len(observed.uv), 6, 6))
+    times = observed.table["time_s"].to_numpy(float)
+    known = np.isfinite(times) & np.isfinite(covariances).all(axis=(1, 2))
+    roots = np.full((len(times), 6, 6), np.nan)
+    if not known.any():
+        return roots
+    _, first, look = np.unique(times[known], return_index=True, return_inverse=True)
+    own = covariances[known][first]
+    sd = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2)[0], 0.0))
+    unit = np.divide(1, sd, out=np.zeros_like(sd), where=sd > 0)
+    values, axes = np.linalg.eigh(own[0] * np.outer(unit, unit))
+    at = np.empty_like(own)
+    at[0] = sd[:, None] * (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
+    for row, change in enumerate(transitions_of_pose(own, "bias")[1:], start=1):
+        at[row] = change @ at[row - 1]
+    roots[known] = at[look]
+    return roots
+
+
+def laid_out(parts: list[tuple[Errors, list[Array | None]]]) -> tuple[tuple[float, ...], list[list[Array]]]:
+    """Errors of several sensors side by side: those of one name are one error, of which nothing is two.
+
+    Parameters
+    ----------
+    parts
+        For each sensor its errors, and of each of its looks (M, 2, k); None where they move nothing.
+
+    Returns
+    -------
+    lasting_s, shared
+        (K,) of all errors that move anything, the shorter time where sensors differ; and for each sensor and
+        look (M, 2, K).
+    """
+    lasting: dict[str, float] = {}
+    for errors, looks in parts:
+        for i, (name, lasts) in enumerate(zip(*errors, strict=True)):
+            if any(one is not None and one[..., i].any() for one in looks):
+                lasting[name] = min(lasts, lasting.get(name, np.inf))
+    columns = {name: i for i, name in enumerate(lasting)}
+    found = []
+    for errors, looks in parts:
+        kept = [i for i, name in enumerate(errors.names) if name in columns]
+        to = [columns[errors.names[i]] for i in kept]
+        mine = []
+        for one in looks:
+            shared = np.zeros((0 if one is None else len(one), 2, len(columns)))
+            if one is not None:
+                shared[..., to] = one[..., kept]
+            mine.append(shared)
+        found.append(mine)
+    return tuple(lasting.values()), found
