@@ -187,3 +187,18 @@ def test_settings_for_many_are_merged_key_by_key() -> None:
     own = parse_settings('[targets.many]\nhits = 4\n[[targets.many.hulls]]\nname = "ship"\n')
     many = settings_over(parse_settings("[targets.many]\ngate = 3.0\n"), own).targets.many
     assert many is not None and (many.gate, many.hits, many.hulls[0].name) == (3.0, 4, "ship")
+
+
+def test_calm_motions_are_told_where_there_are_any() -> None:
+    one = follow_all(robot_flight(kind="position", seconds=20.0))
+    calm = parse_settings("[targets.many]\ncalm = 0.2\nstay_s = 12.0\n")
+    two = follow_all(robot_flight(kind="position", seconds=20.0), settings=calm)
+    words = [{said.what: (said.value, said.source) for said in each.said} for each in (one, two)]
+    share, lasts = (
+        "calm motion: share of the usual acceleration, 1: there is none",
+        "how long either motion lasts",
+    )
+    assert words[0][share] == ("1", "assumed") and lasts not in words[0]
+    assert words[1][share] == ("0.2", "stated") and words[1][lasts] == ("12 s", "stated")
+    assert (two.targets.calm, two.targets.stay_s) == (0.2, 12.0)
+    assert two.shown[-1].kinds.shape == (1, 1)

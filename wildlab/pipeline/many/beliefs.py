@@ -43,6 +43,8 @@ _WORDS = {
     "moves_m": ("way after which a track is shown", " m"),
     "over_s": ("time within which it has to go that way", " s"),
     "apart_m": ("distance within which two tracks that move alike are one", " m"),
+    "calm": ("calm motion: share of the usual acceleration, 1: there is none", ""),
+    "stay_s": ("how long either motion lasts", " s"),
 }
 _HULLS = {
     "rough_m": "which part of a hull is seen, SD of each axis, by kind",
@@ -80,12 +82,14 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
     refuse_unfit(settings)
     stated, usual = settings.targets.many or ManyTargetsPart(), _usual()
     said: list[Said] = []
+    told: dict[str, Any] = {}
 
     def one(name: str) -> float:
         own = getattr(stated, name)
         value = float(getattr(usual, name) if own is None else own)
         what, unit = _WORDS[name]
-        said.append(Said("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
+        if name != "stay_s" or told["calm"] < 1:
+            said.append(Said("targets", what, f"{value:.3g}{unit}", ASSUMED if own is None else STATED))
         return value
 
     hulls = tuple(_hull(part) for part in stated.hulls or usual.hulls)
@@ -97,7 +101,8 @@ def of_many(settings: Settings, following: Following, places: list[Places]) -> T
             STATED if stated.hulls else ASSUMED,
         )
     )
-    told: dict[str, Any] = {name: one(name) for name in _WORDS}
+    for name in _WORDS:
+        told[name] = one(name)
     told["hits"] = int(told["hits"])
     targets = TargetBeliefs(hulls, following.density, following.start_speed_m_s, **told)
     sensors = []

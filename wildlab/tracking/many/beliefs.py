@@ -107,6 +107,9 @@ class TargetBeliefs(NamedTuple):
         A track is shown once it has moved so far within so long: what stays is a buoy or the shore.
     apart_m
         Tracks nearer to each other than this, and alike in velocity, are one.
+    calm, stay_s
+        Targets may also go calmly: with this share of ``density``, below one. Each motion lasts so long, in
+        the mean. At one there is no other.
     """
 
     hulls: tuple[Hull, ...]
@@ -126,6 +129,8 @@ class TargetBeliefs(NamedTuple):
     moves_m: float
     over_s: float
     apart_m: float
+    calm: float = 1.0
+    stay_s: float = 30.0
 
 
 #: Places (N, 2) in n to whether they are in view, (N,).

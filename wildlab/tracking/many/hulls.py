@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wildlab.tracking.many.beliefs import Hull, SensorBeliefs
+from wildlab.tracking.many.motions import largest_of
 
 Array = NDArray[np.float64]
 
@@ -114,8 +115,8 @@ def gather(
     likelihood
         (T, K, M).
     """
-    largest = int(np.argmax([hull.length_m for hull in hulls]))
-    hull = hulls[largest]
+    largest = largest_of(hulls)
+    hull = hulls[int(largest.argmax())]
     one = sensor.bearings or not sensor.several
     if one or len(z) < 2 or not established.any() or hull.length_m <= 0:
         return Gathered(z, R, shared, kinds)
@@ -125,10 +126,11 @@ def gather(
     taken = of_any.max(axis=0) > 0
     free = np.ones(len(z), bool)
     merged_z, merged_R, merged_shared = [], [], []
+    of_largest = np.einsum("tk,tkm->tm", kinds[:, largest], likelihood[:, largest])
     further = 1.0 / (hull.length_m * max(hull.beam_m, 1.0)) / sensor.clutter
     for track in np.flatnonzero(established):
         on_hull = np.linalg.norm(z - mean[track], axis=1) < 0.6 * hull.length_m
-        mine = (taken & (whose == track) & (likelihood[track, largest] > 0)) | (~taken & on_hull)
+        mine = (taken & (whose == track) & (likelihood[track, largest] > 0).any(axis=0)) | (~taken & on_hull)
         rows = np.flatnonzero(mine & free)
         if len(rows) < 2:
             continue
@@ -137,9 +139,9 @@ def gather(
             continue
         kinds[track, largest] *= min(further ** (len(rows) - 1), MOST_TOLD)
         kinds[track] /= kinds[track].sum()
-        if kinds[track, largest] > 0.5:
+        if kinds[track, largest].sum() > 0.5:
             free[rows] = False
-            share = likelihood[track, largest, rows]
+            share = of_largest[track, rows]
             share = share / share.sum() if share.any() else np.full(len(rows), 1 / len(rows))
             middle = share @ z[rows]
             merged_z.append(middle)

@@ -13,6 +13,7 @@ from wildlab.errors import WildlabError
 from wildlab.tracking.many.beliefs import Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.existence import after_scan, still_there, visible_later, weights
 from wildlab.tracking.many.hulls import LEAST_KIND, gather, hull_noise, near_side
+from wildlab.tracking.many.motions import at_least, each_motion, largest_of, of_hulls
 from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.together import moved_together, of_all
 from wildlab.tracking.many.tracks import (
@@ -118,7 +119,7 @@ def follow_many(
     WildlabError
         As `run_many`.
     """
-    eyes = tuple(sensors)
+    eyes, targets = each_motion(sensors, targets)
     for scan in scans:
         if not np.isfinite(scan.time):
             raise WildlabError("a scan has no time", "leave it out, or give it one")
@@ -157,7 +158,7 @@ def step(
     """Tracks after a scan that comes ``dt`` s after the one before, and ``own_dt`` s after the one before of
     its sensor, and the next free identity."""
     sensor = sensors[scan.sensor]
-    tracks = later(tracks, dt, targets.density, lasting_s)
+    tracks = later(tracks, dt, targets, lasting_s)
     seen = _within_reach(scan, sensor, tracks.C.shape[-1])
     mean, _ = tracks.estimate()
     inside = _sees(mean[:, :2], scan, sensor)
@@ -185,11 +186,11 @@ def _corrected(
         return tracks, seen, np.zeros(len(seen.z))
     offset, noise = near_side(tracks.x, scan.platform, sensor), hull_noise(tracks.x, sensor)
     compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
-    largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
+    largest = largest_of(targets.hulls)
+    of_largest = tracks.kinds[:, largest] + np.finfo(float).tiny
+    middle = np.einsum("tk,tki->ti", of_largest, tracks.x[:, largest, :2]) / of_largest.sum(axis=1)[:, None]
     established = (tracks.existence >= 0.5) | (tracks.hits >= 2)
-    gathered = gather(
-        *seen, tracks.x[:, largest, :2], tracks.kinds, established, likely, sensor, targets.hulls
-    )
+    gathered = gather(*seen, middle, tracks.kinds, established, likely, sensor, targets.hulls)
     if len(gathered.z) != len(seen.z):
         seen = Measured(gathered.z, gathered.R, gathered.shared)
         compared, near, likely = _compared(tracks, offset, noise, seen, scan, sensor, targets.gate)
@@ -214,7 +215,7 @@ def _corrected(
         existence, visible = tracks.existence, tracks.visible[:, which]
     own_here = np.concatenate([own[:, :1], mine], axis=1)
     x, P, kinds, C = update(tracks.x, tracks.P, kinds, own_here, compared, tracks.C)
-    kinds = np.maximum(kinds, LEAST_KIND if kinds.shape[1] > 1 else 0.0)
+    kinds = at_least(kinds, LEAST_KIND, targets)
     hit = (own[:, 1:].sum(axis=1) > 0.5) & (not sensor.bearings)
     all_visible, looked = tracks.visible.copy(), tracks.looked.copy()
     all_visible[:, which], looked[:, which] = visible, scan.time
@@ -329,4 +330,6 @@ def _shown(tracks: Tracks, scan: Scan, sensors: tuple[SensorBeliefs, ...], targe
     mine = tracks.only(rows)
     x, P = mine.estimate()
     C = np.einsum("tk,tkij->tij", mine.kinds, mine.C)
-    return Shown(scan.time, scan.sensor, mine.identity, x, P, mine.existence, mine.kinds, C)
+    return Shown(
+        scan.time, scan.sensor, mine.identity, x, P, mine.existence, of_hulls(mine.kinds, targets), C
+    )

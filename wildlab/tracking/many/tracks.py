@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from wildlab.tracking.many.beliefs import SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.hulls import near_side, on_one_hull
+from wildlab.tracking.many.motions import densities_of, interact, largest_of
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.schmidt import fade
 
@@ -101,11 +102,16 @@ def both(tracks: Tracks, more: Tracks) -> Tracks:
     return Tracks._make([*parts, tracks.trail + more.trail])
 
 
-def later(tracks: Tracks, dt: float, density: float, lasting_s: ArrayLike = ()) -> Tracks:
+def later(tracks: Tracks, dt: float, targets: TargetBeliefs, lasting_s: ArrayLike = ()) -> Tracks:
     """Estimates ``dt`` s later, driven by white acceleration; shared errors last for (k,) s in the mean."""
-    F, Q = white_acceleration(dt, density)
-    C = F @ tracks.C * [fade(dt, float(one)) for one in np.asarray(lasting_s, float)]
-    return tracks._replace(x=tracks.x @ F.T, P=F @ tracks.P @ F.T + Q, C=C)
+    densities, x, P, C, kinds = densities_of(targets), tracks.x, tracks.P, tracks.C, tracks.kinds
+    if len(densities) > 1:
+        x, P, C, kinds = interact(x, P, C, kinds, dt, targets.stay_s)
+    steps = [white_acceleration(dt, density) for density in densities]
+    F = steps[0][0]
+    Q = np.stack([Q for _, Q in steps])[np.arange(kinds.shape[1]) % len(densities)]
+    C = F @ C * [fade(dt, float(one)) for one in np.asarray(lasting_s, float)]
+    return tracks._replace(x=x @ F.T, P=F @ P @ F.T + Q, C=C, kinds=kinds)
 
 
 def begin(
@@ -178,8 +184,8 @@ def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tr
     if tracks.number < 2:
         return tracks
     mean, P = tracks.estimate()
-    largest = int(np.argmax([hull.length_m for hull in targets.hulls]))
-    hull = targets.hulls[largest]
+    largest = largest_of(targets.hulls)
+    hull = targets.hulls[int(largest.argmax())]
     kinds = tracks.kinds.copy()
     order = sorted(
         range(tracks.number), key=lambda row: (-int(tracks.confirmed[row]), -int(tracks.hits[row]))
@@ -199,8 +205,8 @@ def without_doubles(tracks: Tracks, targets: TargetBeliefs, several: bool) -> Tr
             apart = float(np.linalg.norm(mean[row, :2] - mean[one, :2]))
             if several and apart > targets.apart_m and on_one_hull(mean[one], mean[row], hull):
                 # Two that go along one line at one speed are the ends of something long.
-                kinds[one] = 0.1 / max(len(targets.hulls) - 1, 1)
-                kinds[one, largest] = 0.9
+                kinds[one, ~largest] = 0.1 / max(int((~largest).sum()), 1)
+                kinds[one, largest] = 0.9 / int(largest.sum())
                 break
     return tracks._replace(kinds=kinds).only(np.array(sorted(kept), np.intp))
 
@@ -214,16 +220,16 @@ def _is_of(
     one: int,
     targets: TargetBeliefs,
     several: bool,
-    largest: int,
+    largest: Flags,
 ) -> bool:
     """Whether a track is the same target as another that stays."""
-    hull = targets.hulls[largest]
+    hull = targets.hulls[int(largest.argmax())]
     apart = float(np.linalg.norm(mean[row, :2] - mean[one, :2]))
     differ = float(np.linalg.norm(mean[row, 2:] - mean[one, 2:]))
     old = tracks.hits[row] >= targets.hits and tracks.hits[one] > targets.hits
     if several and old and on_one_hull(mean[one], mean[row], hull):
         return True
-    long = kinds[one, largest] >= 0.5 and hull.length_m > 0
+    long = kinds[one, largest].sum() >= 0.5 and hull.length_m > 0
     reach = 0.6 * hull.length_m if long else targets.apart_m
     if apart >= reach or (differ >= MOVE_ALIKE_M_S and apart >= TOUCHING_M):
         return False
