@@ -31,8 +31,15 @@ def each_motion(
     def twice(values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple(value for value in values for _ in range(count))
 
-    names = ("rough_m", "along_m", "near_side_m", "near_end_m")
-    eyes = tuple(one._replace(**{name: twice(getattr(one, name)) for name in names}) for one in sensors)
+    eyes = tuple(
+        one._replace(
+            rough_m=twice(one.rough_m),
+            along_m=twice(one.along_m),
+            near_side_m=twice(one.near_side_m),
+            near_end_m=twice(one.near_end_m),
+        )
+        for one in sensors
+    )
     hulls = tuple(hull._replace(share=hull.share / count) for hull in targets.hulls for _ in range(count))
     return eyes, targets._replace(hulls=hulls)
 
