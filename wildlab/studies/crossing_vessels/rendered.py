@@ -24,6 +24,7 @@ from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels.spotted import Counted, Spotted, count, spot
 from wildlab.studies.crossing_vessels.trial import (
+    BOATS,
     JOINT,
     NONE,
     SUBJECTS,
@@ -35,7 +36,6 @@ from wildlab.studies.crossing_vessels.trial import (
     arrange,
     dressed,
     follow_by,
-    gather,
     identities_of,
     joint_numbers,
     photograph,
@@ -194,6 +194,18 @@ def on_the_sea(flight: Flight, spotted: Spotted, source: str = "autopilot") -> P
     return Placed(crossing, appearance, spotted.both[order], spotted.cut[order])
 
 
+def drawn_at_sea(flight: Flight, source: str = "autopilot") -> Crossing:
+    """The drawn detections as `on_the_sea` puts those of frames: on the sea's own level.
+
+    `gather` takes the height of each vessel's receiver, which needs to know whose a detection is.
+    """
+    table = flight.table("detections")
+    table = table[table["kind"] == "pixel"]
+    boat = np.array([BOATS.index(name) for name in table["target_id"]])
+    nameless = replace(flight, tables=flight.tables | {"detections": table.assign(target_id="")})
+    return arrange(flight, observe(nameless, source), boat)[0]
+
+
 def part_of(crossing: Crossing, span: tuple[float, float]) -> Crossing:
     """The detections from one time to another, s, both included."""
     kept = (crossing.times >= span[0]) & (crossing.times <= span[1])
@@ -277,7 +289,7 @@ def render_crossing(
         If there is no such twin, or nothing is detected.
     """
     flight = flight or simulate_twin(twin, seed, ("imu", "gnss"))
-    whole = gather(flight)
+    whole = drawn_at_sea(flight)
     until, since = apart_times(whole)
     span = until - WINDOW_S, since + WINDOW_S
     camera = Photographer(twin, seed)

@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from wildlab.pipeline.rendered import Photographer
-from wildlab.reporting.figures import BLUE, ORANGE, SKY, VERMILLION, new_figure
+from wildlab.reporting.figures import BLUE, GREEN, ORANGE, VERMILLION, new_figure
 from wildlab.studies.crossing_vessels.charts import Shown
 from wildlab.studies.crossing_vessels.rendered import Rendering
 from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, spot
@@ -89,7 +89,7 @@ def frames_shown(twin: str, flights: Sequence[Rendering]) -> Shown | None:
         for (x, y, width, height), boat, both in zip(
             picture.box, picture.spotted.boat, picture.spotted.both, strict=True
         ):
-            colour = VERMILLION if boat == NONE else SKY if both else (BLUE, ORANGE)[boat]
+            colour = VERMILLION if boat == NONE else GREEN if both else (BLUE, ORANGE)[boat]
             box = Rectangle((x - 4, y - 4), width + 8, height + 8, fill=False, ec=colour, lw=1.8)
             ax.add_patch(box)
         ax.set(xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5), xticks=[], yticks=[])
@@ -102,7 +102,7 @@ def frames_shown(twin: str, flights: Sequence[Rendering]) -> Shown | None:
         fig, "fig-6-22",
         f"Both vessels in rendered frames at the crossing, with boxes about what is detected: {said}.",
         f"{whole} of rendered frames of flight {one.seed}, of those with both vessels whole in view: {said}. "
-        f"Boxes: blue of {BOATS[0]}, orange of {BOATS[1]}, light blue of both in one, red of nothing. "
+        f"Boxes: blue of {BOATS[0]}, orange of {BOATS[1]}, green of both in one, red of nothing. "
         "Counterpart of H figure 6.22.",
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ import pandas as pd
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import OVERLAP
+from wildlab.simulation.scene.flights import Look
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance
@@ -33,7 +34,8 @@ distance that this pose has, and what it looks like is its own. It is a vessel's
 its pixels are, of several the one's with most; one that also holds more than half of the other vessel, which
 has none of its own, is of both, and is right on either's track. Tracking, spreads and what joint association
 is told are as for drawn detections. These are those of the same flight and time, tracked anew from its
-beginning, and look as rendered images of the flight do, drawn one by one."""
+beginning, and look as rendered images of the flight do, drawn one by one; here they are put on the level of
+the sea, as those from frames are, and elsewhere in this report at the height of the vessel's receiver."""
 
 DETECTED_COLUMNS = {
     "flight": "flight",
@@ -61,13 +63,15 @@ def share_words(count: int, of: int) -> str:
 
     Examples
     --------
-    >>> share_words(8, 10), share_words(0, 0)
-    ('8 of 10 (49 to 94 %)', 'none of 0')
+    >>> share_words(8, 10), share_words(98, 4837), share_words(0, 0)
+    ('8 of 10 (49 to 94 %)', '98 of 4837 (1.7 to 2.5 %)', 'none of 0')
     """
     if not of:
         return "none of 0"
     found = share_interval(count, of)
-    return f"{count} of {of} ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
+    ends = 100 * found.low, 100 * found.high
+    digits = 0 if round(ends[0]) != round(ends[1]) else 1
+    return f"{count} of {of} ({ends[0]:.{digits}f} to {ends[1]:.{digits}f} %)"
 
 
 def flights_words(flights: Sequence[Rendering]) -> str:
@@ -267,8 +271,12 @@ def summary_words(flights: Sequence[Rendering]) -> str:
 def limit_words(flights: Sequence[Rendering]) -> str:
     """What the rendered frames leave out."""
     n = len(flights)
+    nearest = min(float(np.nanmin(one.frames.crossing.apart)) for one in flights)
+    long, short = Look().lengths
     return (
         f"Rendered frames are of {n} flight{'s' * (n != 1)} about the crossing; the study's parameter "
-        "rendered says how many, each about a minute's work. Waves stand still from frame to frame, the "
-        "vessels keep their courses and warmth, and nothing else is afloat."
+        "rendered says how many, each about a minute's work. By their receivers the two come as near as "
+        f"{nearest:.0f} m, middle to middle, with hulls of {long:.0f} m and {short:.0f} m: their paths are "
+        "drawn without regard to each other. Waves stand still from frame to frame, the vessels keep their "
+        "courses and warmth, and nothing else is afloat."
     )
