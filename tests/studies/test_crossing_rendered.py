@@ -14,6 +14,7 @@ from wildlab.pipeline.rendered import Judged, Photographer, Shot, exposures_of
 from wildlab.simulation.scene.render import Seen
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import rendered as study
+from wildlab.studies.crossing_vessels import rendered_charts as charts
 from wildlab.studies.crossing_vessels.rendered import (
     Placed,
     Rendering,
@@ -357,3 +358,76 @@ def test_flights_are_those_after_the_chosen_one(monkeypatch, capsys) -> None:
     said = capsys.readouterr().out
     assert "flight 7: 100 of 150 frames\rflight 7: 150 of 150 frames\n" in said
     assert "50 of 150 frames\r" not in said.replace("150 of 150", "")
+
+
+def seen_frames(apart: list[float], found: list[list[bool]], joined: list[list[bool]]) -> Rendering:
+    """Frames 0, 1, ... with both whole in view, so many metres apart; a detection in each."""
+    n = len(apart)
+    none = np.zeros(n)
+    spotted = Spotted(
+        np.arange(n), np.arange(n), np.zeros((n, 2)), none, none, none, np.zeros(n, np.int64),
+        np.zeros(n, bool), np.zeros(n, bool), np.ones((n, 2)), np.array(found), np.array(joined),
+    )  # fmt: skip
+    truth = np.zeros((2, n, 2))
+    truth[1, :, 0] = apart
+    crossing = Crossing(Looks(np.arange(n), np.zeros((n, 2)), 1.0), spotted.boat, none, truth)
+    followed = study.Followed(crossing, none, {})
+    counted = count(spotted)
+    return Rendering(7, (0, 1), n, spotted, counted, counted, followed, followed, followed)
+
+
+def test_the_frames_shown_are_the_nearest_found_alone_and_as_one() -> None:
+    alone, one, missed = [True, True], [True, False], [False, False]
+    joined = [False, True]
+    found = [alone, alone, one, one, missed]
+    flight = seen_frames([9, 8, 7, 6, 1], found, [missed, missed, joined, joined, missed])
+    assert charts.telling_exposures(flight) == [1, 3]
+    cut = flight._replace(spotted=flight.spotted._replace(share=np.array([[1, 1], [1, 0.9], *[[1, 1]] * 3])))
+    assert charts.telling_exposures(cut) == [0, 3], "the border cuts one of the two in the nearer"
+    assert charts.telling_exposures(seen_frames([9.0], [missed], [missed])) == []
+    assert charts.frames_shown(TWIN, [seen_frames([9.0], [missed], [missed])]) is None
+    assert charts.frames_shown(TWIN, []) is None
+
+
+def test_a_frame_is_the_same_when_it_is_seen_again(rendering) -> None:
+    exposure = charts.telling_exposures(rendering)[0]
+    picture = charts.picture_of(TWIN, rendering, exposure)
+    np.testing.assert_array_equal(
+        picture.spotted.uv, rendering.spotted.uv[rendering.spotted.exposure == exposure]
+    )
+    assert picture.apart == pytest.approx(
+        rendering.frames.crossing.apart[rendering.frames.crossing.times == frame_time(rendering, exposure)][0]
+    )
+
+
+def frame_time(rendering: Rendering, exposure: int) -> float:
+    crossing = rendering.frames.crossing
+    return float(crossing.times[list(np.unique(crossing.looks.image)).index(exposure)])
+
+
+def test_the_figure_says_what_it_draws(rendering) -> None:
+    shown = charts.frames_shown(TWIN, [rendering])
+    assert shown is not None
+    fig, name, alt, caption = shown
+    exposures = charts.telling_exposures(rendering)
+    assert name == "fig-6-22" and len(fig.axes) == len(exposures)
+    for ax, exposure in zip(fig.axes, exposures, strict=True):
+        words = charts.picture_words(charts.picture_of(TWIN, rendering, exposure))
+        assert ax.get_title(loc="left").lower() == words
+        assert words in alt and words in caption
+        assert len(ax.patches) == (rendering.spotted.exposure == exposure).sum()
+        (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+        for box in ax.patches:
+            x, y = box.get_xy()
+            assert left <= x and x + box.get_width() <= right and top <= y and y + box.get_height() <= bottom
+    assert "flight 7" in caption
+
+
+def test_words_on_a_frame_turn_with_it() -> None:
+    spotted = spot(SHOTS[:1], SHAPE)
+    picture = charts.Picture(3, np.zeros(SHAPE, np.uint16), spotted, np.zeros((3, 4)), 11.2)
+    assert charts.picture_words(picture) == "both found, 11 m apart, 1 false"
+    as_one = picture._replace(spotted=spot(SHOTS[1:2], SHAPE))
+    assert charts.picture_words(as_one) == "found as one, 11 m apart"
+    assert charts.picture_words(picture._replace(spotted=spot(SHOTS[2:3], SHAPE))).startswith("none found")
+    assert charts.picture_words(picture._replace(spotted=spot(SHOTS[3:4], SHAPE))).startswith("one found")
