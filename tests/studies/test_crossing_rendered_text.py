@@ -47,7 +47,7 @@ BY_LOOKS = {FEATURES.replace("-", "_"): SWAPPED}
 
 def test_the_opening_says_how_many_frames_of_how_many() -> None:
     said = text.opening_words(flights(3), 6)
-    assert said.startswith("Flights 7, 8 and 9, those after flight 6")
+    assert said.startswith("Flights 7, 8 and 9, those after flight 6, which the other")
     assert "Of the 1200 frames in that time every one with a vessel near is rendered, 300," in said
     assert "one in 10, 60 in all" in said
     assert text.opening_words(flights(1), 6).startswith("Flight 7, that after flight 6")

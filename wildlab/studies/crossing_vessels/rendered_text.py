@@ -26,8 +26,9 @@ WAYS: dict[str, Callable[[Rendering], Followed]] = {
 DRAWN, FRAMES, INSIDE = WAYS
 
 _TOLD = FloatingThresholds()
-METHOD = f"""Rendered frames are taken with the true pose, whole, with the noise and faults of the sensor,
-and searched with the seven steps of H 4.3: the gradient of {_TOLD.gradient:g} and the
+METHOD = f"""Rendered frames are of the flights after that of the other figures, since the study's own is
+chosen by how its drawn detections turn out. They are taken with the true pose, whole, with the noise and
+faults of the sensor, and searched with the seven steps of H 4.3: the gradient of {_TOLD.gradient:g} and the
 {_TOLD.smallest_area:g} pixels of H 4.4.1 and what the study of vessels' detection uses beside these, set
 there and not on these frames. A detection goes to the sea by the autopilot's pose, its size is by the
 distance that this pose has, and what it looks like is its own. It is a vessel's if {100 * OVERLAP:.0f} % of
@@ -51,10 +52,11 @@ DETECTED_CAPTION = (
     "independent: neighbours are not, so these are too narrow."
 )
 OUTCOME_CAPTION = (
-    "Detections of one vessel alone that went to a track which the other one's detection started, of all "
-    "such; those that no track took; tracks, where they are not two; and whether each vessel has the "
-    "other's track in the two minutes after the crossing. Wrong ones have no interval: after one swap all "
-    "that follow are wrong. Shared by probability no detection is one track's, so none is counted."
+    "None at the border: without detections that touch the border of their image. Counted are detections of "
+    "one vessel alone that went to a track which the other one's detection started, of all such; those that "
+    "no track took; tracks, where they are not two; and whether each vessel has the other's track in the two "
+    "minutes after the crossing. Wrong ones have no interval: after one swap all that follow are wrong. "
+    "Shared by probability no detection is one track's, so none is counted."
 )
 
 
@@ -96,7 +98,7 @@ def opening_words(flights: Sequence[Rendering], seed: int) -> str:
     )
     first = flights_words(flights)
     those = "those" if len(flights) > 1 else "that"
-    chosen = f"{those} after flight {seed}, which was chosen by its drawn detections"
+    chosen = f"{those} after flight {seed}, which the other figures show"
     return (
         f"{first[0].upper()}{first[1:]}, {chosen}, from {WINDOW_S / 60:.0f} min before the two come within "
         f"{APART_M:.0f} m of each other to {WINDOW_S / 60:.0f} min after they are that far apart again. Of "
@@ -160,8 +162,8 @@ def _counts_words(flights: Sequence[Rendering]) -> str:
     off = [float(np.nanmedian(np.concatenate([one.off for one in many]))) for many in (frames, drawn)]
     return (
         f"That gives {counts[0]} detections, {off[0]:.1f} m from the vessels' receivers (median); drawn for "
-        f"the same times are {counts[1]}, {off[1]:.1f} m from them, of which as many are left out as the "
-        "thesis's count asks for."
+        f"the same times are {counts[1]}, {off[1]:.1f} m from them: the twin leaves out as many as the "
+        "thesis's counts ask for."
     )
 
 
