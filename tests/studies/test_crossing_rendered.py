@@ -306,6 +306,9 @@ def test_what_a_rule_did_is_counted_by_hand() -> None:
     bank = bank_of(crossing, track, [0, 1, 4])
     one = associate(placed_of(crossing, cut=cut), bank)
     assert (one.own, one.wrong, one.unassigned) == (8, 2, 1)
+    assert (one.own_inside, one.wrong_inside) == (7, 2)
+    wrong_cut = associate(placed_of(crossing, cut=np.arange(10) == 2), bank)
+    assert (wrong_cut.wrong, wrong_cut.wrong_inside) == (2, 1)
     assert one.mixed == 2, "a vessel's on the track of nothing, and nothing on a vessel's"
     assert (one.tracks, one.by_false, one.by_cut) == (3, 1, 1)
     both = np.zeros(10, bool)

@@ -17,9 +17,9 @@ NEAR = Counted(
     pieces=0,
 )  # fmt: skip
 SEA = Counted(20, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-GOOD = Associated(118, 0, 0, 0, 2, 0, 0, swapped=False, swaps=0)
-SWAPPED = GOOD._replace(wrong=59, swapped=True)
-SHARED = Associated(None, None, None, None, None, None, None, swapped=False, swaps=0)
+GOOD = Associated(118, 0, 0, 110, 0, 0, tracks=2, by_false=0, by_cut=0, swapped=False, swaps=0)
+SWAPPED = GOOD._replace(wrong=59, wrong_inside=50, swapped=True, swaps=2)
+SHARED = Associated(*[None] * 9, swapped=False, swaps=0)  # type: ignore[arg-type]
 
 
 def followed(off: float = 10.0, count: int = 4, **rules: Associated) -> Followed:
@@ -92,10 +92,10 @@ def test_the_table_of_tracks_never_adds_up_two_ways() -> None:
     own = table[table["rule"] == NAMES[DISTANCE]].set_index("from")
     assert own.loc[text.FRAMES, "swapped"].startswith("2 of 2")
     assert own.loc[text.DRAWN, "swapped"].startswith("0 of 2")
-    assert own.loc[text.FRAMES, "flight-8"] == "59 of 118 wrong, swapped"
-    assert own.loc[text.INSIDE, "flight-8"] == "0 of 118 wrong, no swap"
+    assert own.loc[text.FRAMES, "flight-8"] == "59 of 118 wrong, 2 go over, swapped"
+    assert own.loc[text.INSIDE, "flight-8"] == "0 of 118 wrong, not swapped"
     shared = table[table["rule"] == NAMES[JOINT]]
-    assert set(shared["flight-7"]) == {"no swap"}, "no detection is one track's"
+    assert set(shared["flight-7"]) == {"not swapped"}, "no detection is one track's"
 
 
 def test_swaps_are_told_from_chance_only_where_enough_flights_differ() -> None:
@@ -115,13 +115,13 @@ def test_words_on_the_border_turn_with_what_leaving_it_out_changes() -> None:
     bad = followed(**{FEATURES.replace("-", "_"): SWAPPED._replace(by_cut=1)})
     said = text.border_words(flights(3, frames=bad))
     assert "3 of 6 (19 to 81 %) tracks from frames start on a detection that touches the border" in said
-    assert "flight by flight: 59 of 118, 59 of 118, 59 of 118; where" in said
-    assert "left out, 0 of 118, 0 of 118, 0 of 118: a smaller share on 3 of 3, a larger one on 0" in said
+    assert "away from the border, 110, 110, 110, flight by flight" in said
+    assert "with features: 50, 50, 50; where" in said
+    assert "not tracked, 0, 0, 0: fewer on 3 of 3, more on 0" in said
     assert said.endswith("which chance may have done too.")
-    assert text.border_words(flights(6, frames=bad)).endswith("a larger one on 0.")
-    worse = text.border_words(flights(2, inside=bad))
-    assert "a smaller share on 0 of 2, a larger one on 2" in worse
-    assert "a smaller share on 0 of 2, a larger one on 0" in text.border_words(flights(2))
+    assert text.border_words(flights(6, frames=bad)).endswith("more on 0.")
+    assert "fewer on 0 of 2, more on 2" in text.border_words(flights(2, inside=bad))
+    assert "fewer on 0 of 2, more on 0" in text.border_words(flights(2))
 
 
 def test_the_summary_is_of_rendered_frames_alone() -> None:
@@ -140,10 +140,11 @@ def test_limits_say_how_near_the_two_come() -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({}, "0 of 118 wrong, no swap"),
-        ({"unassigned": 3}, "0 of 118 wrong, 3 to no track, no swap"),
-        ({"tracks": 1}, "0 of 118 wrong, 1 track, no swap"),
-        ({"tracks": 3, "by_false": 1}, "0 of 118 wrong, 3 tracks, 1 by a false one, no swap"),
+        ({}, "0 of 118 wrong, not swapped"),
+        ({"unassigned": 3}, "0 of 118 wrong, 3 to no track, not swapped"),
+        ({"tracks": 1}, "0 of 118 wrong, 1 track, not swapped"),
+        ({"tracks": 3, "by_false": 1}, "0 of 118 wrong, 3 tracks, 1 by a false one, not swapped"),
+        ({"swaps": 1}, "0 of 118 wrong, 1 goes over, not swapped"),
         ({"swapped": True}, "0 of 118 wrong, swapped"),
     ],
 )

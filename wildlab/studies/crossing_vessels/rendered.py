@@ -72,6 +72,8 @@ class Associated(NamedTuple):
     own, wrong, unassigned
         Detections of one vessel alone; of these those that went to a track that the other started; and those
         that went to none.
+    own_inside, wrong_inside
+        Of ``own`` and ``wrong`` those that do not touch the border of the image.
     mixed
         Detections of nothing that a vessel's track took, and vessels' that one started by nothing took.
     tracks, by_false, by_cut
@@ -86,6 +88,8 @@ class Associated(NamedTuple):
     own: int | None
     wrong: int | None
     unassigned: int | None
+    own_inside: int | None
+    wrong_inside: int | None
     mixed: int | None
     tracks: int | None
     by_false: int | None
@@ -218,15 +222,18 @@ def part_of(crossing: Crossing, span: tuple[float, float]) -> Crossing:
 
 def associate(placed: Placed, bank: Bank) -> Associated:
     """What is counted of one rule's tracks; a detection of both vessels is right on either's."""
-    crossing, alone = placed.crossing, ~placed.both
+    crossing = placed.crossing
     owner = np.append(crossing.boat[bank.started], NONE)[bank.track]
     vessel, given = crossing.boat != NONE, bank.track >= 0
     firsts = [np.flatnonzero(bank.track == track)[:2] for track in range(len(bank.started))]
+    own, wrong = vessel & ~placed.both, wrong_of(crossing, bank) & ~placed.both
     after, _ = swapped(crossing, bank)
     return Associated(
-        own=int((vessel & alone).sum()),
-        wrong=int((wrong_of(crossing, bank) & alone).sum()),
+        own=int(own.sum()),
+        wrong=int(wrong.sum()),
         unassigned=int((vessel & ~given).sum()),
+        own_inside=int((own & ~placed.cut).sum()),
+        wrong_inside=int((wrong & ~placed.cut).sum()),
         mixed=int((given & (vessel != (owner != NONE))).sum()),
         tracks=len(bank.started),
         by_false=int((crossing.boat[bank.started] == NONE).sum()),
@@ -242,7 +249,7 @@ def follow(placed: Placed) -> Followed:
     by_rule = {rule: associate(placed, follow_by(crossing, rule, placed.appearance)) for rule in SUBJECTS}
     joint = joint_numbers(crossing)
     shared = bool(joint[JOINT, "swapped"]), int(joint[JOINT, "swaps"])
-    by_rule[JOINT] = Associated(None, None, None, None, None, None, None, *shared)
+    by_rule[JOINT] = Associated(*[None] * 9, *shared)
     at = np.unique(crossing.looks.image, return_inverse=True)[1]
     off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
     return Followed(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)

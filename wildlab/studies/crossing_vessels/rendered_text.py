@@ -52,10 +52,11 @@ DETECTED_CAPTION = (
     "independent: neighbours are not, so these are too narrow."
 )
 OUTCOME_CAPTION = (
-    "None at the border: without detections that touch the border of their image. Counted are detections of "
-    "one vessel alone that went to a track which the other one's detection started, of all such; those that "
-    "no track took; tracks, where they are not two; and whether each vessel has the other's track in the two "
-    "minutes after the crossing. Wrong ones have no interval: after one swap all that follow are wrong. "
+    "None at the border: without detections that touch the border of their image. Wrong: detections of one "
+    "vessel alone that went to a track which the other one's detection started, of all such. Then those that "
+    "no track took; how many tracks, where they are not two; how often a track goes over to the other "
+    "vessel, at any time; and whether each vessel has the other's track, by most of its detections, in the "
+    "two minutes after the crossing. Wrong ones have no interval: after one swap all that follow are wrong. "
     "Shared by probability no detection is one track's, so none is counted."
 )
 
@@ -172,8 +173,9 @@ def outcome_words(one: Associated) -> str:
 
     Examples
     --------
-    >>> outcome_words(Associated(90, 4, 2, 0, 3, 1, 0, False, 0))
-    '4 of 90 wrong, 2 to no track, 3 tracks, 1 by a false one, no swap'
+    >>> one = Associated(90, 4, 2, 80, 3, 0, tracks=3, by_false=1, by_cut=0, swapped=False, swaps=1)
+    >>> outcome_words(one)
+    '4 of 90 wrong, 2 to no track, 3 tracks, 1 by a false one, 1 goes over, not swapped'
     """
     said = []
     if one.wrong is not None:
@@ -184,7 +186,9 @@ def outcome_words(one: Associated) -> str:
         said.append(f"{one.tracks} track{'s' * (one.tracks != 1)}")
     if one.by_false:
         said.append(f"{one.by_false} by a false one")
-    said.append("swapped" if one.swapped else "no swap")
+    if one.swaps:
+        said.append("1 goes over" if one.swaps == 1 else f"{one.swaps} go over")
+    said.append("swapped" if one.swapped else "not swapped")
     return ", ".join(said)
 
 
@@ -240,21 +244,27 @@ def swaps_words(flights: Sequence[Rendering]) -> str:
 
 
 def border_words(flights: Sequence[Rendering]) -> str:
-    """Tracks with features that began on what the border cuts, and what leaving that out changes."""
+    """Tracks with features that began on what the border cuts, and what leaving that out does to the others.
+
+    Compared are the same detections, those away from the border, with the others tracked beside them and not.
+    """
     frames = [WAYS[FRAMES](one).by_rule[FEATURES] for one in flights]
     inside = [WAYS[INSIDE](one).by_rule[FEATURES] for one in flights]
     begun = share_words(sum(one.by_cut or 0 for one in frames), sum(one.tracks or 0 for one in frames))
-    before, after = (", ".join(f"{one.wrong} of {one.own}" for one in many) for many in (frames, inside))
-    share = [[(one.wrong or 0) / one.own if one.own else 0.0 for one in many] for many in (frames, inside)]
-    fewer, more = (sum(sign * b < sign * a for a, b in zip(*share, strict=True)) for sign in (1, -1))
+    with_cut, without = ([one.wrong_inside or 0 for one in many] for many in (frames, inside))
+    fewer, more = (
+        sum(pairs)
+        for pairs in zip(*((b < a, b > a) for a, b in zip(with_cut, without, strict=True)), strict=True)
+    )
     n = len(flights)
-    compared = f"a smaller share on {fewer} of {n}, a larger one on {more}"
+    of = ", ".join(str(one.own_inside) for one in inside)
     told = "" if beyond_chance(fewer, more) else ", which chance may have done too"
     return (
         f"A track keeps the looks of the detections that it starts with. With features, {begun} tracks from "
         "frames start on a detection that touches the border of its image, where a vessel may be cut and "
-        f"look smaller than it is. Wrong with features, flight by flight: {before}; where detections at the "
-        f"border are left out, {after}: {compared}{told}."
+        f"look smaller than it is. Of the detections away from the border, {of}, flight by flight, so many "
+        f"go wrong with features: {', '.join(map(str, with_cut))}; where those at the border are not tracked, "
+        f"{', '.join(map(str, without))}: fewer on {fewer} of {n}, more on {more}{told}."
     )
 
 
