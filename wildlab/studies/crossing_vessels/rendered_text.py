@@ -263,8 +263,8 @@ def border_words(flights: Sequence[Rendering]) -> str:
         f"A track keeps the looks of the detections that it starts with. With features, {begun} tracks from "
         "frames start on a detection that touches the border of its image, where a vessel may be cut and "
         f"look smaller than it is. Of the detections away from the border, {of}, flight by flight, so many "
-        f"go wrong with features: {', '.join(map(str, with_cut))}; where those at the border are not tracked, "
-        f"{', '.join(map(str, without))}: fewer on {fewer} of {n}, more on {more}{told}."
+        f"go wrong with features: {', '.join(map(str, with_cut))}; where those at the border are not "
+        f"tracked, {', '.join(map(str, without))}: fewer on {fewer} of {n}, more on {more}{told}."
     )
 
 
