@@ -55,7 +55,7 @@ OUTCOME_CAPTION = (
     "None at the border: without detections that touch the border of their image. Wrong: detections of one "
     "vessel alone that went to a track which the other one's detection started, of all such. Then those that "
     "no track took; how many tracks, where they are not two; how often a track goes over to the other "
-    "vessel, at any time; and whether each vessel has the other's track, by most of its detections, in the "
+    "vessel, at any time; and whether each vessel has the other's track in the "
     "two minutes after the crossing. Wrong ones have no interval: after one swap all that follow are wrong. "
     "Shared by probability no detection is one track's, so none is counted."
 )
@@ -227,11 +227,14 @@ def swaps_words(flights: Sequence[Rendering]) -> str:
         frames, drawn = (
             np.array([WAYS[way](one).by_rule[rule].swapped for one in flights]) for way in (FRAMES, DRAWN)
         )
-        parts.append(f"{words}, on {frames.sum()} of {n} from frames and on {drawn.sum()} from drawn ones")
+        parts.append(f"{words}, {frames.sum()} and {drawn.sum()}")
         more, fewer = int((frames & ~drawn).sum()), int((drawn & ~frames).sum())
         if beyond_chance(more, fewer):
             told.append(f"by {words}, {'more' if more > fewer else 'fewer'} from frames")
-    said = f"Flights on which the tracks are swapped: {'; '.join(parts)}."
+    said = (
+        f"Flights, of {n}, on which the tracks are swapped from frames and from drawn detections: "
+        f"{'; '.join(parts)}."
+    )
     if told:
         return f"{said} Beyond chance, on the same flights: {'; '.join(told)}."
     if not beyond_chance(n, 0):
