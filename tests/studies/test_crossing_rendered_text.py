@@ -17,9 +17,12 @@ NEAR = Counted(
     pieces=0,
 )  # fmt: skip
 SEA = Counted(20, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-GOOD = Associated(118, 0, 0, 110, 0, 0, tracks=2, by_false=0, by_cut=0, swapped=False, swaps=0)
+GOOD = Associated(
+    swapped=False, swaps=0, own=118, wrong=0, unassigned=0, own_inside=110, wrong_inside=0, mixed=0, tracks=2,
+    by_false=0, by_cut=0,
+)  # fmt: skip
 SWAPPED = GOOD._replace(wrong=59, wrong_inside=50, swapped=True, swaps=2)
-SHARED = Associated(*[None] * 9, swapped=False, swaps=0)  # type: ignore[arg-type]
+SHARED = Associated(swapped=False, swaps=0)
 
 
 def followed(off: float = 10.0, count: int = 4, **rules: Associated) -> Followed:

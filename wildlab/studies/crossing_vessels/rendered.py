@@ -69,6 +69,10 @@ class Associated(NamedTuple):
 
     Attributes
     ----------
+    swapped
+        Whether each vessel has the other's track just after the crossing.
+    swaps
+        How often a track went over to the other vessel.
     own, wrong, unassigned
         Detections of one vessel alone; of these those that went to a track that the other started; and those
         that went to none.
@@ -79,23 +83,19 @@ class Associated(NamedTuple):
     tracks, by_false, by_cut
         That were started; of these by a detection of nothing; and of these with one of their first two
         detections at the border of the image.
-    swapped
-        Whether each vessel has the other's track just after the crossing.
-    swaps
-        How often a track went over to the other vessel.
     """
 
-    own: int | None
-    wrong: int | None
-    unassigned: int | None
-    own_inside: int | None
-    wrong_inside: int | None
-    mixed: int | None
-    tracks: int | None
-    by_false: int | None
-    by_cut: int | None
     swapped: bool
     swaps: int
+    own: int | None = None
+    wrong: int | None = None
+    unassigned: int | None = None
+    own_inside: int | None = None
+    wrong_inside: int | None = None
+    mixed: int | None = None
+    tracks: int | None = None
+    by_false: int | None = None
+    by_cut: int | None = None
 
 
 class Followed(NamedTuple):
@@ -249,7 +249,7 @@ def follow(placed: Placed) -> Followed:
     by_rule = {rule: associate(placed, follow_by(crossing, rule, placed.appearance)) for rule in SUBJECTS}
     joint = joint_numbers(crossing)
     shared = bool(joint[JOINT, "swapped"]), int(joint[JOINT, "swaps"])
-    by_rule[JOINT] = Associated(*[None] * 9, *shared)
+    by_rule[JOINT] = Associated(*shared)
     at = np.unique(crossing.looks.image, return_inverse=True)[1]
     off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
     return Followed(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)

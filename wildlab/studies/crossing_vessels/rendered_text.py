@@ -173,7 +173,7 @@ def outcome_words(one: Associated) -> str:
 
     Examples
     --------
-    >>> one = Associated(90, 4, 2, 80, 3, 0, tracks=3, by_false=1, by_cut=0, swapped=False, swaps=1)
+    >>> one = Associated(swapped=False, swaps=1, own=90, wrong=4, unassigned=2, tracks=3, by_false=1)
     >>> outcome_words(one)
     '4 of 90 wrong, 2 to no track, 3 tracks, 1 by a false one, 1 goes over, not swapped'
     """
