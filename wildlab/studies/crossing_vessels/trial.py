@@ -16,7 +16,7 @@ from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.validation import gate_threshold
-from wildlab.pipeline.georeference import observe
+from wildlab.pipeline.georeference import Observations, observe
 from wildlab.pipeline.rendered import Photographer, exposures_of
 from wildlab.pipeline.track import truth_states
 from wildlab.simulation.error_models import stream
@@ -34,6 +34,8 @@ Numbers = dict[tuple[str, str], float]
 
 #: The vessels as H 6.4.4 names them.
 BOATS = ("boat 1", "boat 2")
+#: Boat of a detection that is of neither.
+NONE = -1
 #: By distance alone; with features weighed in; with features as a veto.
 DISTANCE, FEATURES, VETO = "without-features", "with-features", "veto"
 RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO}
@@ -95,7 +97,7 @@ class Crossing(NamedTuple):
     looks
         All detections.
     boat
-        (D,) 0 or 1: whose each is, as by manual classification.
+        (D,) 0 or 1: whose each is, as by manual classification; `NONE` where it is of nothing.
     times
         (K,) s, of the images with detections.
     truth
@@ -116,9 +118,16 @@ class Crossing(NamedTuple):
 def gather(flight: Flight, source: str = "autopilot") -> Crossing:
     """The detections of both vessels on the sea, with the poses of a source."""
     seen = observe(flight, source)
+    return arrange(flight, seen, np.array([BOATS.index(name) for name in seen.table["target_id"]]))[0]
+
+
+def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, Index]:
+    """Observations on the sea, in order; and which of them are left, in that order, to have a place.
+
+    ``boat`` (N,) is 0 or 1, or `NONE` for a detection of nothing.
+    """
     positions = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
     number = exposures_of(seen.table).astype(int)
-    boat = np.array([BOATS.index(name) for name in seen.table["target_id"]])
     stamps = frame_times(flight)
     at = {one: stamp for one, stamp in zip(exposures_of(flight.table("frames")), stamps, strict=True)}
     order = np.lexsort((boat, number))
@@ -127,7 +136,7 @@ def gather(flight: Flight, source: str = "autopilot") -> Crossing:
     times = np.array([at[int(one)] for one in images])
     looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
     truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
-    return Crossing(looks, boat[order], times, truth)
+    return Crossing(looks, boat[order], times, truth), order
 
 
 def photograph(twin: str, seed: int, flight: Flight, images: int) -> list[Array]:
@@ -171,9 +180,9 @@ def made_up(crossing: Crossing, separation: float, seed: int) -> Appearance:
 
 
 def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
-    """(D,) which detections went to a track that another vessel's detection started."""
-    owner = crossing.boat[bank.started]
-    return np.asarray((bank.track >= 0) & (owner[bank.track] != crossing.boat))
+    """(D,) which vessels' detections went to a track that the other vessel's detection started."""
+    owner = np.append(crossing.boat[bank.started], NONE)[bank.track]  # track -1: of none
+    return np.asarray((owner != NONE) & (crossing.boat != NONE) & (owner != crossing.boat))
 
 
 def apart_times(crossing: Crossing) -> tuple[float, float]:
@@ -212,7 +221,8 @@ def identities_of(crossing: Crossing, bank: Bank) -> Identities:
     """Tracks against vessels at every `EVERY`-th image; visible is who was detected in it."""
     count = len(bank.images)
     shown = np.zeros((count, 2), bool)
-    shown[np.searchsorted(bank.images, crossing.looks.image), crossing.boat] = True
+    own = crossing.boat != NONE
+    shown[np.searchsorted(bank.images, crossing.looks.image)[own], crossing.boat[own]] = True
     ignored = np.zeros(2, bool)
     scans = []
     for row in range(0, count, EVERY):
