@@ -1,0 +1,234 @@
+"""The tracks of a bank of filters while they live, and what is kept of those that ended: H 3.4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wildlab.tracking.kalman import predict
+from wildlab.tracking.many.beliefs import Sees
+from wildlab.tracking.many.found_again import Mean, mean_differences, place_costs, reachable, recognise
+from wildlab.tracking.many.life import CONFIRMED, DROPPED, judge_start, outlived
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+#: Images to the transition and the noise over so many.
+Motion = Callable[[int], tuple[Array, Array]]
+
+
+class Life(NamedTuple):
+    """When tracks are believed, end, and are found again; by default all are believed and none ends.
+
+    Attributes
+    ----------
+    max_absence
+        s: so long may a target not be detected while its place is looked at.
+    max_age
+        s: so long may it not be detected at all.
+    max_sd
+        m: the largest standard deviation of a position, in any direction.
+    confirm
+        m and n of H 3.4.1: a new track is preliminary until m of the next n images in which its place is
+        looked at have a detection in its gate; empty: believed at once.
+    likelier
+        A new track is taken for one that had ended where that is so many times as likely as every other
+        one; 19 is 95 % of two.
+    """
+
+    max_absence: float = np.inf
+    max_age: float = np.inf
+    max_sd: float = np.inf
+    confirm: tuple[int, int] | tuple[()] = ()
+    likelier: float = 19.0
+
+    @property
+    def ends(self) -> bool:
+        """Whether tracks can end at all."""
+        return bool(np.isfinite([self.max_absence, self.max_age, self.max_sd]).any()) or bool(self.confirm)
+
+
+class Alive(NamedTuple):
+    """The A tracks that live, or those that are kept.
+
+    Attributes
+    ----------
+    number
+        (A,) of all tracks.
+    x, P
+        (A, 4) and (A, 4, 4) at the present image; ``x_then``, ``P_then`` at the last with a detection.
+    stored
+        (A, f) the looks that association goes by.
+    last
+        (A,) the last image with a detection.
+    absent
+        (A,) images since, in which it could have been seen.
+    total, known
+        (A, f) sums of the features of all its detections, and of how many each was known.
+    hits, scans
+        (A,) of a preliminary track, as `judge_start` has them.
+    believed
+        (A,) whether it is confirmed.
+    """
+
+    number: Index
+    x: Array
+    P: Array
+    x_then: Array
+    P_then: Array
+    stored: Array
+    last: Index
+    absent: Index
+    total: Array
+    known: Array
+    hits: Index
+    scans: Index
+    believed: Flags
+
+    def only(self, rows: Index | Flags) -> Alive:
+        """Some of them."""
+        parts: list[Any] = [one[rows] for one in self]
+        return Alive._make(parts)
+
+    def and_also(self, more: Alive) -> Alive:
+        """These and then others."""
+        parts: list[Any] = [np.concatenate(pair) for pair in zip(self, more, strict=True)]
+        return Alive._make(parts)
+
+    def mean(self) -> Mean:
+        """What they look like, over all their detections."""
+        count = np.where(self.known > 0, self.known, np.nan)
+        return Mean(self.total / count, self.known)
+
+
+def nobody(f: int) -> Alive:
+    """No track, with so many features."""
+    none, looks = np.empty(0, int), np.empty((0, f))
+    x, P = np.empty((0, 4)), np.empty((0, 4, 4))
+    return Alive(none, x, P, x, P, looks, none, none, looks, looks, none, none, np.empty(0, bool))
+
+
+def begun(number: int, x: Array, P: Array, image: int, features: Array, life: Life) -> Alive:
+    """One new track on detections with these features, (2, f), the second in this image."""
+    zero = np.zeros(1, int)
+    return Alive(
+        np.array([number]), x[None], P[None], x[None], P[None], features.mean(axis=0)[None], zero + image,
+        zero,
+        np.nansum(features, axis=0)[None], np.isfinite(features).sum(axis=0)[None].astype(float), zero, zero,
+        np.array([not life.confirm]),
+    )  # fmt: skip
+
+
+def come_to(alive: Alive, before: int, image: int, views: Mapping[int, Sees], motion: Motion) -> Alive:
+    """The tracks predicted to an image, with the images in between, which had no detection, counted."""
+    missed = np.full(len(alive.number), image - before - 1)
+    for number in views:
+        if before < number < image:
+            ahead, _ = motion(number - before)
+            missed -= ~views[number]((alive.x @ ahead.T)[:, :2])
+    x, P = predict(alive.x, alive.P, *motion(image - before))
+    scans = np.where(alive.believed, 0, alive.scans + missed)
+    return alive._replace(x=x, P=P, absent=alive.absent + missed, scans=scans)
+
+
+def over(alive: Alive, image: int, interval: float, life: Life) -> Flags:
+    """(A,) which end before an image: by absence, age or covariance, or as never to be confirmed."""
+    places = alive.P[:, :2, :2]
+    gone = outlived(alive.absent * interval, places, life.max_absence, life.max_sd)
+    gone |= outlived((image - alive.last) * interval, places, life.max_age, np.inf)
+    return np.asarray(gone | (verdicts(alive, life) == DROPPED))
+
+
+def looked(
+    alive: Alive, measured: Index, near: Flags, image: int, views: Mapping[int, Sees], features: Array
+) -> Alive:
+    """The counts and the looks after an image.
+
+    Parameters
+    ----------
+    alive
+        With the states after it.
+    measured
+        Rows that took a detection in it.
+    near
+        (A,) which had one in their gate.
+    image
+        Its number.
+    views
+        What images show.
+    features
+        (n, f) of the detections that were taken.
+    """
+    took = np.zeros(len(alive.number), bool)
+    took[measured] = True
+    seen = views[image](alive.x[:, :2]) if image in views else np.ones(len(took), bool)
+    # What was detected was looked at, whatever the view says.
+    seen = np.asarray(seen | took | near)
+    then = alive._replace(
+        last=np.where(took, image, alive.last),
+        absent=np.where(took, 0, alive.absent + seen),
+        hits=np.where(alive.believed, 0, alive.hits + near),
+        scans=np.where(alive.believed, 0, alive.scans + seen),
+    )
+    then.x_then[took], then.P_then[took] = alive.x[took], alive.P[took]
+    then.total[measured] += np.nan_to_num(features, nan=0.0)
+    then.known[measured] += np.isfinite(features)
+    return then
+
+
+def verdicts(alive: Alive, life: Life) -> NDArray[np.int8]:
+    """(A,) what `judge_start` says; those that are believed stay so."""
+    said = np.full(len(alive.number), CONFIRMED, np.int8)
+    if life.confirm:
+        m, n = life.confirm
+        rows = np.flatnonzero(~alive.believed)
+        said[rows] = judge_start(alive.hits[rows], np.minimum(alive.scans[rows], n), m, n)
+    return said
+
+
+def who(
+    new: Alive,
+    kept: Alive,
+    image: int,
+    interval: float,
+    motion: Motion,
+    limits: tuple[float, float, float],
+    looks: tuple[Array, Array] | None,
+    likelier: float,
+) -> Index:
+    """(N,) the row of the kept track that each new one is, or -1.
+
+    Parameters
+    ----------
+    new, kept
+        N tracks that begin to be believed, and M that ended.
+    image, interval
+        Now, and s between two images.
+    motion
+        Over a number of images.
+    limits
+        Largest speed, m/s; gate on places; largest feature distance.
+    looks
+        Spreads and weights of the features; None: looks do not count.
+    likelier
+        See `Life`.
+    """
+    if not len(new.number) or not len(kept.number):
+        return np.full(len(new.number), -1)
+    max_speed, gate, alike = limits
+    place, spread = new.x[:, :2], new.P[:, :2, :2]
+    passed = image - kept.last
+    may = reachable(
+        place, spread, kept.x_then[:, :2], kept.P_then[:, :2, :2], passed * interval, max_speed, gate
+    )
+    expected = [
+        predict(x, P, *motion(int(n))) for x, P, n in zip(kept.x_then, kept.P_then, passed, strict=True)
+    ]
+    costs = place_costs(
+        place, spread, np.array([x[:2] for x, _ in expected]), np.array([P[:2, :2] for _, P in expected])
+    )
+    differ = np.zeros((*may.shape, 0)) if looks is None else mean_differences(new.mean(), kept.mean(), *looks)
+    return recognise(may, costs, differ, alike, likelier).track
