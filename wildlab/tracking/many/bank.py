@@ -7,7 +7,7 @@ again by where its target can have come to and by what it looks like.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import NamedTuple
 
@@ -44,6 +44,8 @@ Index = NDArray[np.int64]
 DISTANCE, FEATURES, VETO = "distance", "features", "veto"
 
 _H = np.eye(2, 4)
+#: New tracks, kept ones and identities to the kept ones that remain.
+_Recall = Callable[[Alive, Alive, list[int]], Alive]
 
 
 class Tuning(NamedTuple):
@@ -121,7 +123,8 @@ class Bank(NamedTuple):
     x, P
         (K, T, 4) and (K, T, 4, 4) after each of these; NaN before a track starts and once it has ended.
     identity
-        (T,) the first track of the same target, as far as it was found again; of one that is new, itself.
+        (T,) the first track of the same target, as far as it was found again by the end of the flight; of one
+        that is new, itself.
     ended
         (T,) the image with detections by which each had ended; -1 where it lives on.
     believed
@@ -170,6 +173,10 @@ def run_bank(
     features = np.empty((len(track), 0)) if appearance is None else appearance.features
     alive = kept = nobody(features.shape[1])
     book = _Book([], [], [], [])
+    by = appearance if rule != DISTANCE else None
+    recall: _Recall = partial(_recall, tuning=tuning, appearance=by, interval=looks.interval, motion=motion)
+    # A place tells no more by then; what a track looks like is better known at its end.
+    once_more = None if by is None else recall
     states: list[tuple[Index, Array, Array]] = []
     waiting, before, views = np.empty(0, int), 0, looks.sees or {}
     for image, rows in _images(looks.image):
@@ -179,7 +186,7 @@ def run_bank(
             alive = come_to(alive, before, image, views, motion)
             if tuning.life.ends:
                 gone = over(alive, image, looks.interval, tuning.life)
-                alive, kept = _part(alive, kept, gone, image, book)
+                alive, kept = _part(alive, kept, gone, image, book, once_more)
         if len(alive.number):
             gap = z[:, None] - alive.x[:, :2]
             S = np.broadcast_to(alive.P[:, :2, :2] + R, (*gap.shape, 2))
@@ -203,7 +210,7 @@ def run_bank(
             if tuning.life.confirm:
                 said = verdicts(alive, tuning.life)
                 alive = alive._replace(believed=said == CONFIRMED)
-                alive, kept = _part(alive, kept, said == DROPPED, image, book)
+                alive, kept = _part(alive, kept, said == DROPPED, image, book, once_more)
         new = rows[free]
         if len(waiting) and image - before == 1 and len(new):
             pairs = pair_scans(
@@ -222,19 +229,14 @@ def run_bank(
                 track[two] = number = book.begin(int(first))
                 alive = alive.and_also(begun(number, x, P, image, features[two], tuning.life))
             new = new[pairs.track < 0]
-        fresh = alive.only(
-            np.array([not book.believed[number] for number in alive.number], bool) & alive.believed
-        )
-        taken = _who(
-            fresh, kept, image, looks.interval, motion, tuning, appearance if rule != DISTANCE else None
-        )
-        for number, old in zip(fresh.number, taken, strict=True):
+        fresh = alive.only(book.unknown(alive) & alive.believed)
+        for number in fresh.number:
             book.believed[number] = True
-            if old >= 0:
-                book.identity[number] = book.identity[kept.number[old]]
-        kept = kept.only(np.setdiff1d(np.arange(len(kept.number)), taken))
+        kept = recall(fresh, kept, book.identity)
         waiting, before = new, image
         states.append((alive.number, alive.x.copy(), alive.P.copy()))
+    if once_more:
+        once_more(alive.only(alive.believed), kept, book.identity)
     x, P = _padded(states, len(book.started))
     numbers = (np.array(one, int) for one in (book.started, book.identity, book.ended))
     first, identity, ended = numbers
@@ -258,39 +260,52 @@ class _Book(NamedTuple):
         self.believed.append(False)
         return number
 
-    def believe(self, new: Index, kept: Index, taken: Index) -> None:
-        """These numbers are believed, and are of the kept ones in those rows; -1 of none."""
-        for number, old in zip(new, taken, strict=True):
-            self.believed[number] = True
-            if old >= 0:
-                self.identity[number] = self.identity[kept[old]]
+    def unknown(self, alive: Alive) -> NDArray[np.bool_]:
+        """(A,) which of them were not believed until now."""
+        return np.array([not self.believed[number] for number in alive.number], bool)
 
 
-def _part(alive: Alive, kept: Alive, gone: NDArray[np.bool_], image: int, book: _Book) -> tuple[Alive, Alive]:
-    """Those that live on, and those that are kept: of what has ended what was believed."""
+def _part(
+    alive: Alive, kept: Alive, gone: NDArray[np.bool_], image: int, book: _Book, recall: _Recall | None
+) -> tuple[Alive, Alive]:
+    """Those that live on, and those that are kept: of what has ended what was believed.
+
+    Whose identity is not known by then is looked for once more, by all its detections, with ``recall``.
+    """
     if not gone.any():
         return alive, kept
     for number in alive.number[gone]:
         book.ended[number] = image
-    return alive.only(~gone), kept.and_also(alive.only(gone & alive.believed))
+    past = alive.only(gone & alive.believed)
+    if recall:
+        kept = recall(past, kept, book.identity)
+    return alive.only(~gone), kept.and_also(past)
 
 
-def _who(
-    fresh: Alive,
+def _recall(
+    new: Alive,
     kept: Alive,
-    image: int,
-    interval: float,
-    motion: Motion,
+    identity: list[int],
+    *,
     tuning: Tuning,
     appearance: Appearance | None,
-) -> Index:
-    """Which kept track each one is that is believed from now on."""
+    interval: float,
+    motion: Motion,
+) -> Alive:
+    """Give tracks that count as new the identities of those kept that they are; the kept ones that remain."""
+    rows = [row for row, number in enumerate(new.number) if identity[number] == number]
+    if not rows or not len(kept.number):
+        return kept
     looks, alike = None, np.inf
     if appearance is not None:
         looks = appearance.sd, appearance.weights
         alike = gate_threshold(tuning.veto_probability, len(appearance.sd))
     limits = tuning.max_speed, tuning.gate, alike
-    return who(fresh, kept, image, interval, motion, limits, looks, tuning.life.likelier)
+    taken = who(new.only(np.array(rows)), kept, interval, motion, limits, looks, tuning.life.likelier)
+    for row, old in zip(rows, taken, strict=True):
+        if old >= 0:
+            identity[new.number[row]] = identity[kept.number[old]]
+    return kept.only(np.setdiff1d(np.arange(len(kept.number)), taken))
 
 
 def associate(distances: Array, features: Array | None, rule: str, tuning: Tuning, count: int) -> Assignment:

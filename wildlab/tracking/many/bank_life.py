@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wildlab.tracking.kalman import predict
 from wildlab.tracking.many.beliefs import Sees
-from wildlab.tracking.many.found_again import Mean, mean_differences, place_costs, reachable, recognise
+from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, judge_start, outlived
 
 Array = NDArray[np.float64]
@@ -59,11 +59,12 @@ class Alive(NamedTuple):
     number
         (A,) of all tracks.
     x, P
-        (A, 4) and (A, 4, 4) at the present image; ``x_then``, ``P_then`` at the last with a detection.
+        (A, 4) and (A, 4, 4) at the present image; ``x_then``, ``P_then`` at the last with a detection, and
+        ``x_first``, ``P_first`` where it began.
     stored
         (A, f) the looks that association goes by.
-    last
-        (A,) the last image with a detection.
+    first, last
+        (A,) the image with its second detection, at which it began, and the last with one.
     absent
         (A,) images since, in which it could have been seen.
     total, known
@@ -79,7 +80,10 @@ class Alive(NamedTuple):
     P: Array
     x_then: Array
     P_then: Array
+    x_first: Array
+    P_first: Array
     stored: Array
+    first: Index
     last: Index
     absent: Index
     total: Array
@@ -98,25 +102,24 @@ class Alive(NamedTuple):
         parts: list[Any] = [np.concatenate(pair) for pair in zip(self, more, strict=True)]
         return Alive._make(parts)
 
-    def mean(self) -> Mean:
-        """What they look like, over all their detections."""
-        count = np.where(self.known > 0, self.known, np.nan)
-        return Mean(self.total / count, self.known)
+    def looks(self) -> Array:
+        """(A, f) what they look like: means over all detections, NaN where a feature was never known."""
+        return np.asarray(self.total / np.where(self.known > 0, self.known, np.nan))
 
 
 def nobody(f: int) -> Alive:
     """No track, with so many features."""
     none, looks = np.empty(0, int), np.empty((0, f))
     x, P = np.empty((0, 4)), np.empty((0, 4, 4))
-    return Alive(none, x, P, x, P, looks, none, none, looks, looks, none, none, np.empty(0, bool))
+    return Alive(none, x, P, x, P, x, P, looks, none, none, none, looks, looks, none, none, np.empty(0, bool))
 
 
 def begun(number: int, x: Array, P: Array, image: int, features: Array, life: Life) -> Alive:
     """One new track on detections with these features, (2, f), the second in this image."""
     zero = np.zeros(1, int)
     return Alive(
-        np.array([number]), x[None], P[None], x[None], P[None], features.mean(axis=0)[None], zero + image,
-        zero,
+        np.array([number]), x[None], P[None], x[None], P[None], x[None], P[None],
+        features.mean(axis=0)[None], zero + image, zero + image, zero,
         np.nansum(features, axis=0)[None], np.isfinite(features).sum(axis=0)[None].astype(float), zero, zero,
         np.array([not life.confirm]),
     )  # fmt: skip
@@ -192,21 +195,20 @@ def verdicts(alive: Alive, life: Life) -> NDArray[np.int8]:
 def who(
     new: Alive,
     kept: Alive,
-    image: int,
     interval: float,
     motion: Motion,
     limits: tuple[float, float, float],
     looks: tuple[Array, Array] | None,
     likelier: float,
 ) -> Index:
-    """(N,) the row of the kept track that each new one is, or -1.
+    """(N,) the row of the kept track that each new one is, or -1: by where it began, and its looks until now.
 
     Parameters
     ----------
     new, kept
-        N tracks that begin to be believed, and M that ended.
-    image, interval
-        Now, and s between two images.
+        N tracks whose identity is not known, and M that ended.
+    interval
+        Between two images, s.
     motion
         Over a number of images.
     limits
@@ -216,19 +218,18 @@ def who(
     likelier
         See `Life`.
     """
-    if not len(new.number) or not len(kept.number):
-        return np.full(len(new.number), -1)
-    max_speed, gate, alike = limits
-    place, spread = new.x[:, :2], new.P[:, :2, :2]
-    passed = image - kept.last
-    may = reachable(
-        place, spread, kept.x_then[:, :2], kept.P_then[:, :2, :2], passed * interval, max_speed, gate
-    )
-    expected = [
-        predict(x, P, *motion(int(n))) for x, P, n in zip(kept.x_then, kept.P_then, passed, strict=True)
-    ]
-    costs = place_costs(
-        place, spread, np.array([x[:2] for x, _ in expected]), np.array([P[:2, :2] for _, P in expected])
-    )
-    differ = np.zeros((*may.shape, 0)) if looks is None else mean_differences(new.mean(), kept.mean(), *looks)
-    return recognise(may, costs, differ, alike, likelier).track
+    N, M = len(new.number), len(kept.number)
+    if not N or not M:
+        return np.full(N, -1)
+    differ = np.zeros((N, M, 0)) if looks is None else look_differences(new.looks(), kept.looks(), *looks)
+    may, costs = np.zeros((N, M), bool), np.full((N, M), np.inf)
+    for row in range(N):
+        passed = new.first[row] - kept.last
+        # Who was still detected then is another one.
+        for old in np.flatnonzero(passed > 0):
+            place, spread = new.x_first[row, :2], new.P_first[row, :2, :2]
+            then, then_P = kept.x_then[old], kept.P_then[old]
+            seconds, (x, P) = passed[old] * interval, predict(then, then_P, *motion(int(passed[old])))
+            may[row, old] = reachable(place, spread, then[:2], then_P[:2, :2], [seconds], *limits[:2])[0, 0]
+            costs[row, old] = place_costs(place, spread, x[:2], P[:2, :2])[0, 0]
+    return recognise(may, costs, differ, limits[2], likelier).track

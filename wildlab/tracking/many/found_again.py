@@ -9,8 +9,6 @@ pair is nearly as likely: a new identity says less than is known, a wrong one sa
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,21 +17,6 @@ from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.many.assignment import Assignment, global_nearest
 
 Array = NDArray[np.float64]
-
-
-class Mean(NamedTuple):
-    """What tracks look like: means over their detections.
-
-    Attributes
-    ----------
-    features
-        (T, f); NaN where one is not known.
-    detections
-        (T, f) how many detections each is the mean of.
-    """
-
-    features: Array
-    detections: Array
 
 
 def reachable(
@@ -119,21 +102,23 @@ def place_costs(new: ArrayLike, new_P: ArrayLike, expected: ArrayLike, expected_
     return np.asarray(innovation_squared(gap, S) + np.linalg.slogdet(S)[1])
 
 
-def mean_differences(new: Mean, old: Mean, sd: ArrayLike, weights: ArrayLike) -> Array:
-    """Weighted squared differences of mean features, each in units of the spread of that difference.
+def look_differences(new: ArrayLike, old: ArrayLike, sd: ArrayLike, weights: ArrayLike) -> Array:
+    """Weighted squared differences of what tracks look like on the mean, feature by feature.
+
+    However many detections a mean is of, it counts as one of two: those of neighbouring images show a target
+    alike, and more of them tell little more. The spread of a difference is then that of one detection.
 
     Parameters
     ----------
     new, old
-        Of N and M tracks. Detections count as independent of each other.
+        (N, f) and (M, f) means over the detections of tracks.
     sd, weights
         (f,) spread of a detection, and weights, as of `feature_distances`.
 
     Returns
     -------
     (N, M, f)
-        NaN where a feature is not known of both; their sum over known ones is chi-square where all weights
-        are 1.
+        NaN where a feature is not known of both.
 
     Raises
     ------
@@ -142,33 +127,24 @@ def mean_differences(new: Mean, old: Mean, sd: ArrayLike, weights: ArrayLike) ->
 
     Examples
     --------
-    A mean of two beside one of two has the spread of one detection:
-
-    >>> one, other = (Mean(np.array([[x]]), np.array([[2]])) for x in (0.0, 3.0))
-    >>> mean_differences(one, other, sd=[1.5], weights=[1.0]).tolist()
-    [[[4.0]]]
+    >>> look_differences([[3.0, np.nan]], [[1.0, 1.0]], sd=[1.0, 3.0], weights=[1.0, 0.5]).tolist()
+    [[[4.0, nan]]]
     """
-    spread, w = np.asarray(sd, float), np.asarray(weights, float)
-    a, b = np.asarray(new.features, float), np.asarray(old.features, float)
-    shapes = {one.shape[1:] for one in (a, b, np.asarray(new.detections), np.asarray(old.detections))}
-    if a.ndim != 2 or shapes != {spread.shape} or w.shape != spread.shape:
+    a, b, spread, w = (np.asarray(one, float) for one in (new, old, sd, weights))
+    if not (a.ndim == b.ndim == 2 and a.shape[1:] == b.shape[1:] == spread.shape == w.shape):
         raise WildlabError(
             f"means of shapes {a.shape} and {b.shape} do not go with spreads of shape {spread.shape} and "
             f"weights of shape {w.shape}",
-            "give (N, f), (M, f), (f,) and (f,), and a count for each mean",
+            "give (N, f), (M, f), (f,) and (f,)",
         )
-    if not (np.isfinite(spread) & (spread > 0)).all() or not (np.isfinite(w) & (w >= 0)).all():
+    positive = bool((np.isfinite(spread) & (spread > 0)).all())
+    if not positive or not (np.isfinite(w) & (w >= 0)).all():
         raise WildlabError(
             f"spreads of {spread.tolist()} with weights of {w.tolist()}",
             "give positive spreads and no weight below zero; a weight of zero leaves a feature out",
-            field="weights" if (np.isfinite(spread) & (spread > 0)).all() else "sd",
+            field="weights" if positive else "sd",
         )
-    with np.errstate(divide="ignore"):
-        variance = spread**2 * (
-            1 / np.asarray(new.detections, float)[:, None] + 1 / np.asarray(old.detections, float)
-        )
-    squared = (a[:, None] - b) ** 2
-    return np.where(np.isfinite(squared) & np.isfinite(variance), w * squared / variance, np.nan)
+    return np.asarray(w * ((a[:, None] - b) / spread) ** 2)
 
 
 def recognise(
@@ -192,7 +168,7 @@ def recognise(
     places
         (N, M), from `place_costs`.
     looks
-        (N, M, f), from `mean_differences`; f may be zero.
+        (N, M, f), from `look_differences`; f may be zero.
     limit
         The largest sum of ``looks`` of a pair: those that look less alike are not possible.
     likelier
