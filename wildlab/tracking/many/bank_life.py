@@ -225,11 +225,14 @@ def who(
     may, costs = np.zeros((N, M), bool), np.full((N, M), np.inf)
     for row in range(N):
         passed = new.first[row] - kept.last
-        # Who was still detected then is another one.
-        for old in np.flatnonzero(passed > 0):
-            place, spread = new.x_first[row, :2], new.P_first[row, :2, :2]
-            then, then_P = kept.x_then[old], kept.P_then[old]
-            seconds, (x, P) = passed[old] * interval, predict(then, then_P, *motion(int(passed[old])))
-            may[row, old] = reachable(place, spread, then[:2], then_P[:2, :2], [seconds], *limits[:2])[0, 0]
-            costs[row, old] = place_costs(place, spread, x[:2], P[:2, :2])[0, 0]
+        # Who was still detected beside its first detection, one image before, is another one.
+        old = np.flatnonzero(passed > 1)
+        place, spread = new.x_first[[row], :2], new.P_first[[row], :2, :2]
+        then, then_P = kept.x_then[old], kept.P_then[old]
+        steps = [motion(int(images)) for images in passed[old]]
+        F, Q = (np.array([step[part] for step in steps]).reshape(-1, 4, 4) for part in (0, 1))
+        x, P = predict(then, then_P, F, Q)
+        seconds, (max_speed, gate) = passed[old] * interval, limits[:2]
+        may[row, old] = reachable(place, spread, then[:, :2], then_P[:, :2, :2], seconds, max_speed, gate)[0]
+        costs[row, old] = place_costs(place, spread, x[:, :2], P[:, :2, :2])[0]
     return recognise(may, costs, differ, limits[2], likelier).track

@@ -5,6 +5,9 @@ in place of a new one; how it is compared is left open. Here a new track may be 
 place could have been reached since, and where both look alike. How likely each such pair is follows from
 where the filter expects the kept track by now, and from the looks. An identity is taken only where no other
 pair is nearly as likely: a new identity says less than is known, a wrong one says what is not so.
+
+How likely it is that a new track is a target never seen before is not asked: of that speak the limits on
+place and looks alone.
 """
 
 from __future__ import annotations

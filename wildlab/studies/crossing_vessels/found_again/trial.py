@@ -103,7 +103,7 @@ def outcome(image: Index, boat: Index, bank: Bank) -> Outcome:
     for number in range(count):
         before = np.arange(number)
         same = before[bank.identity[before] == bank.identity[number]]
-        kept = [one for one in before[left[before]] if bank.ended[one] >= 0 and of[one][-1] < of[number][1]]
+        kept = [one for one in before[left[before]] if bank.ended[one] >= 0 and of[one][-1] < of[number][0]]
         if len(same):
             left[same[-1]] = False
             right += owner[same[-1]] == owner[number]
