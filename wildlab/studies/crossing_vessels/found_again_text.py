@@ -16,8 +16,8 @@ WITHOUT, WITH, GUESSED_WITHOUT, GUESSED_WITH = WAYS
 NAMES = {
     WITHOUT: "distance alone",
     WITH: "distance and features",
-    GUESSED_WITHOUT: "distance alone, the likeliest taken",
-    GUESSED_WITH: "distance and features, the likeliest taken",
+    GUESSED_WITHOUT: "distance alone, guessed",
+    GUESSED_WITH: "distance and features, guessed",
 }
 RIGHT, WRONG, MISSED, NEW = UNITS
 
@@ -44,25 +44,34 @@ def shares(spread: pd.DataFrame, subject: str, name: str) -> Array:
 
 
 def share_words(values: Array) -> str:
-    """A mean share over flights, with its 95 % interval where there are several.
+    """A mean share over flights, with its 95 % interval where they differ.
 
     Examples
     --------
     >>> share_words(np.array([0.9, 1.0, 1.0]))
     '96.7 % (82.3 to 100.0 %)'
+    >>> share_words(np.array([1.0, 1.0, 1.0]))
+    '100.0 % on each of 3 flights'
     """
     known = values[np.isfinite(values)]
     if not len(known):
         return "none to find"
-    if len(known) < 2:
-        return f"{100 * known[0]:.1f} %"
+    if (known == known[0]).all():
+        # Flights that are all alike have no spread to take an interval from.
+        return f"{100 * known[0]:.1f} %" + (f" on each of {len(known)} flights" if len(known) > 1 else "")
     found = mean_share_interval(known)
     return f"{100 * found.estimate:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f} %)"
 
 
-def wrong_words(spread: pd.DataFrame, subject: str) -> str:
-    """On how many flights a track took the other vessel's identity, with Wilson's interval for several."""
-    count, n = int((spread[subject, WRONG] > 0).sum()), len(spread)
+def flight_words(flights: NDArray[np.bool_]) -> str:
+    """On how many flights something is so, with Wilson's interval where there are several.
+
+    Examples
+    --------
+    >>> flight_words(np.array([True, False, False]))
+    '1 of 3 (6 to 79 %)'
+    """
+    count, n = int(flights.sum()), len(flights)
     if n == 1:
         return f"{count} of 1"
     found = share_interval(count, n)
@@ -70,12 +79,13 @@ def wrong_words(spread: pd.DataFrame, subject: str) -> str:
 
 
 def again_table(spread: pd.DataFrame) -> pd.DataFrame:
-    """One row for each way: shares of tracks with intervals over flights, and flights with a wrong one."""
+    """One row for each way: shares of tracks, and flights, with intervals over flights."""
     rows = [
         {
             "way": words,
             **{name: share_words(shares(spread, subject, name)) for name in (RIGHT, WRONG, MISSED)},
-            "flights": wrong_words(spread, subject),
+            "none wrong": flight_words(spread[subject, WRONG].to_numpy(float) == 0),
+            "all right": flight_words(shares(spread, subject, RIGHT) == 1),
         }
         for subject, words in NAMES.items()
     ]
@@ -88,7 +98,8 @@ AGAIN_COLUMNS = {
     RIGHT: "right",
     WRONG: "wrong",
     MISSED: "not at all",
-    "flights": "flights with a wrong one",
+    "none wrong": "flights with none wrong",
+    "all right": "flights with all right",
 }
 
 
@@ -101,8 +112,8 @@ def caption(spread: pd.DataFrame) -> str:
         f"Tracks that began when one of the same vessel was kept, or that took another's identity: "
         f"{np.median(of):.0f} on a flight, in the median, with features. A track is of the vessel that most "
         "of its detections are of. Shares are means over flights, with the 95 % interval of that mean; "
-        "flights with Wilson's. The likeliest taken: however little likelier it is. Tracks rightly taken for "
-        f"none, on all flights: {fresh or 'none'}."
+        "flights with Wilson's. Guessed: the likeliest is taken, however little it leads. Tracks rightly "
+        f"taken for none, on all flights: {fresh or 'none'}."
     )
 
 
@@ -110,9 +121,9 @@ def again_words(spread: pd.DataFrame) -> str:
     """How many are found again, what looks add, and what is bought by not guessing."""
     right = {one: share_words(shares(spread, one, RIGHT)) for one in (WITHOUT, WITH)}
     return (
-        f"Of these tracks so many get the identity that their vessel had: by distance alone "
-        f"{right[WITHOUT]}, with what the vessels look like {right[WITH]}. {_looks_words(spread)} "
-        f"{_guess_words(spread)}"
+        "Of the tracks that a vessel begins when it comes back, so many get the identity that it had: by "
+        f"distance alone {right[WITHOUT]}, with what the vessels look like {right[WITH]}. "
+        f"{_looks_words(spread)} {_guess_words(spread)}"
     )
 
 
@@ -125,27 +136,27 @@ def _differ(spread: pd.DataFrame, subject: str, other: str, name: str) -> tuple[
 
 def _looks_words(spread: pd.DataFrame) -> str:
     more, fewer, told = _differ(spread, WITH, WITHOUT, RIGHT)
-    n = len(spread)
-    counts = f"with features a larger share is right on {more} of {n}, a smaller on {fewer}"
+    counts = f"with features the share is larger on {more} of {len(spread)}, smaller on {fewer}"
     if not told:
         return f"Flight by flight {counts}, which chance may have done too."
     return f"Flight by flight {counts}: looks {'help' if more > fewer else 'do harm'}, beyond chance."
 
 
 def _guess_words(spread: pd.DataFrame) -> str:
+    """What is right and wrong where the likeliest is taken, however little it leads."""
     parts = []
     for words, careful, guessed in (
-        ("by distance alone", WITHOUT, GUESSED_WITHOUT),
-        ("with features", WITH, GUESSED_WITH),
+        ("By distance alone", WITHOUT, GUESSED_WITHOUT),
+        ("With features", WITH, GUESSED_WITH),
     ):
         more, fewer, told = _differ(spread, guessed, careful, WRONG)
+        wrong = {one: share_words(shares(spread, one, WRONG)) for one in (careful, guessed)}
         if told:
-            how = f"{'more' if more > fewer else 'fewer'} are wrong"
+            how = f"{'more' if more > fewer else 'less'} is wrong, beyond chance"
         else:
-            how = "whether more are wrong cannot be told"
+            how = "that guessing makes more wrong cannot be told"
         parts.append(
-            f"{words} {share_words(shares(spread, guessed, RIGHT))} are right and "
-            f"{share_words(shares(spread, guessed, WRONG))} wrong, in place of "
-            f"{share_words(shares(spread, careful, WRONG))} ({how})"
+            f"{words} a guess is right for {share_words(shares(spread, guessed, RIGHT))} and wrong for "
+            f"{wrong[guessed]}; without guessing {wrong[careful]} are wrong: {how}."
         )
-    return f"Where the likeliest is taken, however little it leads, {'; '.join(parts)}."
+    return f"To guess is to take the likeliest, however little it leads. {' '.join(parts)}"

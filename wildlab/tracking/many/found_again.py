@@ -162,7 +162,8 @@ def recognise(
     All are assigned at once, as many as possible with the least sum of costs (`global_nearest`). A pair of
     these is taken where, by the ratio of likelihoods, it is at least ``likelier`` times as likely as each
     other possible pair of its new or of its kept track, and the whole assignment as every other one of as
-    many pairs that does without it. Two pairs are compared by the features that are known in both.
+    many pairs that does without it. Two pairs are compared by the features that are known in both; in a sum
+    of costs one that is not known adds nothing.
 
     Parameters
     ----------
