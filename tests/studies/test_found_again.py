@@ -72,9 +72,9 @@ def test_a_track_is_of_whom_most_of_its_detections_are():
 
 
 def laps(count=6, apart=0.0, noise=2.0):
-    """Two vessels so far apart, in view for ten images of each lap of a minute, one after the other."""
+    """Two vessels so far apart, for ten images of each minute in view, half a minute one after the other."""
     rng = np.random.default_rng(0)
-    starts = [(120 * lap + 20 * boat, boat) for lap in range(count) for boat in (0, 1)]
+    starts = [(120 * lap + 60 * boat, boat) for lap in range(count) for boat in (0, 1)]
     image = np.concatenate([np.arange(at, at + 10) for at, _ in starts])
     boat = np.repeat([one for _, one in starts], 10)
     z = np.column_stack([apart * boat, np.zeros(len(boat))]) + rng.normal(0, noise, (len(boat), 2))
