@@ -184,6 +184,22 @@ def test_two_that_come_back_together_are_assigned_at_once():
         assert bank.identity[of.index(1, 2)] == of.index(1)
 
 
+def test_whom_another_one_was_taken_for_is_taken_once():
+    """Two images after it came back another one appears beside it."""
+    looks, _ = still([COMES_BACK, np.arange(132, 140)], [(0, 0), (40, 0)])
+    assert run_bank(looks, living(AGE)).identity.tolist() == [0, 0, 2]
+
+
+def test_who_was_detected_beside_its_first_detection_is_another_one():
+    """In one image they are two; where one comes after the other they may be one that is fast."""
+    fast = living(AGE)._replace(max_speed=100.0)
+    for begins, identity in ((20, 1), (21, 0)):
+        looks, owner = still([np.arange(21), np.r_[begins:31], [50]], [(0, 0), (60, 0), (900, 0)])
+        bank = run_bank(looks, fast, FEATURES, looking(owner, 0.0))
+        assert bank.ended.tolist() == [31 + 19, 50]
+        assert bank.identity.tolist() == [0, identity]
+
+
 def test_who_is_new_to_begin_with_is_compared_once_more_when_it_ends():
     """Its first two looks are odd ones, and on the whole it looks as before."""
     looks, _ = still([np.r_[0:10, 130:160, 300:302]])

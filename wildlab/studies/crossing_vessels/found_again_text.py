@@ -29,7 +29,8 @@ EXPLAINED = (
     f"and with features their distance within {100 * TUNING.veto_probability:.1f} % of chi-square. How "
     "likely a kept track is follows from where the filter expects it by now and from its looks. Its identity "
     f"is taken where it is {SURE:g} times as likely as each other one; or else the track stays new, and with "
-    "features is compared once more when it ends."
+    "features is compared once more when it ends. Looks are drawn from the same images for all laps: a "
+    "vessel that looks different from lap to lap may be found less often."
 )
 
 

@@ -277,9 +277,9 @@ def _part(
     for number in alive.number[gone]:
         book.ended[number] = image
     past = alive.only(gone & alive.believed)
-    if recall:
-        kept = recall(past, kept, book.identity)
-    return alive.only(~gone), kept.and_also(past)
+    # One that ends by the same image may have been over before another one of them began.
+    kept = kept.and_also(past)
+    return alive.only(~gone), recall(past, kept, book.identity) if recall else kept
 
 
 def _recall(
