@@ -71,12 +71,12 @@ def test_a_track_is_of_whom_most_of_its_detections_are():
     assert owners(np.array([0, 1, 1]), np.array([0, -1, 0]), 1).tolist() == [0], "of none do not count"
 
 
-def laps(count=6, apart=0.0, noise=2.0):
-    """Two vessels so far apart, for ten images of each minute in view, half a minute one after the other."""
+def laps(count=6, apart=0.0, noise=2.0, after=60):
+    """Two vessels so far apart, for ten images of each minute in view, one some images after the other."""
     rng = np.random.default_rng(0)
-    starts = [(120 * lap + 60 * boat, boat) for lap in range(count) for boat in (0, 1)]
-    image = np.concatenate([np.arange(at, at + 10) for at, _ in starts])
-    boat = np.repeat([one for _, one in starts], 10)
+    starts = [(120 * lap + after * boat, boat) for lap in range(count) for boat in (0, 1)]
+    rows = np.array(sorted((at + image, boat) for at, boat in starts for image in range(10)))
+    image, boat = rows.T
     z = np.column_stack([apart * boat, np.zeros(len(boat))]) + rng.normal(0, noise, (len(boat), 2))
     return Looks(image, z, INTERVAL), boat
 
@@ -93,8 +93,16 @@ def test_far_apart_all_are_found_by_place_and_near_each_other_by_looks_alone():
     told = Appearance(20.0 * boat[:, None].astype(float), np.ones(1), np.ones(1))
     numbers = again_numbers(looks, boat, told, sure)
     assert [numbers[WITH, name] for name in UNITS] == [10, 0, 0, 1]
-    assert numbers[WITHOUT, "found_right"] < 10
-    assert numbers[GUESSED_WITHOUT, "found_wrong"] > 0
+    assert numbers[WITHOUT, "found_wrong"] == 11, "whoever comes by is taken for who came by before"
+
+
+def test_two_that_come_back_beside_each_other_are_guessed_or_stay_new():
+    looks, boat = laps(apart=30.0, after=0)
+    told = Appearance(20.0 * boat[:, None].astype(float), np.ones(1), np.ones(1))
+    numbers = again_numbers(looks, boat, told, TUNING._replace(measurement=2.0))
+    assert numbers[WITHOUT, "not_found"] > 5
+    assert numbers[GUESSED_WITHOUT, "found_right"] + numbers[GUESSED_WITHOUT, "found_wrong"] == 10
+    assert numbers[WITH, "found_right"] == numbers[GUESSED_WITH, "found_right"] == 10
 
 
 def spread_of(*flights):

@@ -203,7 +203,7 @@ def test_who_was_detected_beside_its_first_detection_is_another_one():
 def test_who_is_new_to_begin_with_is_compared_once_more_when_it_ends():
     """Its first two looks are odd ones, and on the whole it looks as before."""
     looks, _ = still([np.r_[0:10, 130:160, 300:302]])
-    odd = np.where((looks.image >= 130) & (looks.image < 132), 6.0, 0.0)[:, None]
+    odd = np.where((looks.image >= 130) & (looks.image < 132), 56.0, 50.0)[:, None]
     appearance = Appearance(odd, np.ones(1), np.ones(1))
     bank = run_bank(looks, living(AGE), FEATURES, appearance)
     assert bank.identity.tolist() == [0, 0, 0]
@@ -213,6 +213,63 @@ def test_who_is_new_to_begin_with_is_compared_once_more_when_it_ends():
         living(AGE), FEATURES, appearance._replace(features=odd[until]),
     )  # fmt: skip
     assert first.identity.tolist() == [0, 1], "as far as was seen then"
+    until = looks.image < 160
+    alive = run_bank(
+        Looks(looks.image[until], looks.positions[until], INTERVAL),
+        living(AGE), FEATURES, appearance._replace(features=odd[until]),
+    )  # fmt: skip
+    assert alive.ended[1] == -1 and alive.identity.tolist() == [0, 0], "or when the flight ends"
+
+
+def going(*parts):
+    """Vessels without noise, east at a speed: (images, place north and east at the first, m/s) of each."""
+    rows = [
+        (image, owner, north, east + speed * INTERVAL * (image - images[0]))
+        for owner, (images, (north, east), speed) in enumerate(parts)
+        for image in images
+    ]
+    table = np.array(sorted(rows))
+    return Looks(table[:, 0].astype(int), table[:, 2:], INTERVAL), table[:, 1].astype(int)
+
+
+def test_it_is_looked_for_where_it_began_also_when_it_ends():
+    """Its first two looks are odd, and by its end it has gone farther than who had ended could have."""
+    looks, _ = going((range(10), (0, 0), 0.0), (range(30, 130), (0, 0), 4.0), ([200], (900, 0), 0.0))
+    odd = np.where((looks.image >= 30) & (looks.image < 32), 6.0, 0.0)[:, None]
+    bank = run_bank(looks, living(AGE), FEATURES, Appearance(odd, np.ones(1), np.ones(1)))
+    assert bank.ended.tolist() == [30, 200]
+    assert bank.identity.tolist() == [0, 0]
+
+
+def test_reach_is_from_where_it_was_detected_last():
+    """200 m on its way it vanishes for 20 s: it may have gone on, stayed or turned."""
+    for back, identity in ((280, 0), (200, 0), (140, 0), (40, 1), (360, 1)):
+        looks, _ = going((range(100), (0, 0), 4.0), (range(140, 150), (0, back), 0.0))
+        assert run_bank(looks, living(AGE)).identity.tolist() == [0, identity], back
+
+
+def test_of_two_it_is_the_one_that_is_expected_there():
+    """One goes on for 20 s to where another that rests is nearer to than its own last place."""
+    looks, _ = going(
+        (range(100), (0, 0), 4.0), (range(100), (60, 260), 0.0), (range(140, 150), (0, 280), 4.0)
+    )
+    assert run_bank(looks, living(AGE)).identity.tolist() == [0, 1, 0]
+
+
+def test_who_is_found_is_not_looked_for_again():
+    looks, owner = still([np.r_[0:10, 30:40, 60], np.r_[0:10]], [(0, 0), (60, 0)])
+    bank = run_bank(looks, living(AGE), FEATURES, looking(owner, 0.0))
+    assert bank.ended[:3].tolist() == [30, 30, 60]
+    assert bank.identity.tolist() == [0, 1, 0]
+
+
+def test_by_distance_alone_nobody_is_found_by_what_remains():
+    """One between two that had ended is new; that one of them comes back later makes it not the other."""
+    looks, _ = going(
+        (range(30), (0, 0), 0.0), (range(30), (40, 0), 0.0), (range(43, 60), (20, 0), 0.0),
+        (range(46, 60), (-10, 0), 0.0), ([100], (900, 0), 0.0),
+    )  # fmt: skip
+    assert run_bank(looks, living(AGE)).identity.tolist() == [0, 1, 2, 0]
 
 
 def test_of_what_is_known_of_no_detection_nothing_is_made():
@@ -244,6 +301,21 @@ def test_a_start_is_dropped_as_soon_as_m_cannot_be_reached():
     # Images that do not look at it do not count.
     blind = dict.fromkeys(range(2, 12), lambda places: places[:, 0] > 450)
     assert run_bank(looks._replace(sees=blind), living(Life(confirm=(3, 5)))).ended[own] == 14
+
+
+def test_what_was_detected_was_looked_at():
+    looks, _ = still([range(10)])
+    blind = looks._replace(sees=dict.fromkeys(range(10), never))
+    assert run_bank(blind, living(Life(confirm=(3, 5)))).believed.tolist() == [True]
+
+
+def test_a_detection_in_the_gate_confirms_whoever_takes_it():
+    """H asks that the validation region has one; here a veto keeps the track from taking it."""
+    looks, _ = still([range(5)])
+    strange = Appearance(np.array([0, 0, 90, 90, 90], float)[:, None], np.ones(1), np.ones(1))
+    bank = run_bank(looks, living(Life(confirm=(3, 5))), VETO, strange)
+    assert bank.track.tolist() == [0, 0, -1, -1, -1]
+    assert bank.believed.tolist() == [True]
 
 
 def test_what_was_never_confirmed_is_not_found_again():
