@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wildlab.studies.crossing_vessels import trial
 from wildlab.studies.crossing_vessels.claims import check_claims
+from wildlab.studies.crossing_vessels.found_again import trial as again
 from wildlab.studies.protocol import Metric, Study
 
 
@@ -14,7 +15,13 @@ def _metric(subject: str, name: str) -> Metric | None:
 
 STUDY = Study(
     "crossing-vessels",
-    (*trial.SUBJECTS, trial.JOINT, trial.LOOKS, *map(trial.curve_subject, trial.SEPARATIONS)),
+    (
+        *trial.SUBJECTS,
+        trial.JOINT,
+        trial.LOOKS,
+        *map(trial.curve_subject, trial.SEPARATIONS),
+        *again.WAYS,
+    ),
     trial.trial,
     check_claims,
     _metric,

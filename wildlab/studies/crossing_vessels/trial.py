@@ -21,6 +21,7 @@ from wildlab.pipeline.rendered import Photographer, exposures_of
 from wildlab.pipeline.track import truth_states
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.crossing_vessels.found_again import trial as again
 from wildlab.tracking.many import POINT, SensorBeliefs, TargetBeliefs, run_many
 from wildlab.tracking.many import Scan as Look
 from wildlab.tracking.many import bank as rules
@@ -85,6 +86,7 @@ UNITS = {
     "swapped": "1", "swapped_at_end": "1", "swaps": "1", "breaks": "1",
     "near_share": "1", "any_near_share": "1", "mae": "m", "gospa": "m", "anees": "1", "closest": "m",
     "detections": "1",
+    **again.UNITS,
     **{f"separation_{name}": "1" for name in NAMES}, **{f"spread_{name}": "1" for name in NAMES},
 }  # fmt: skip
 
@@ -415,8 +417,10 @@ def follow_by(crossing: Crossing, subject: str, appearance: Appearance | None = 
 
 def all_numbers(flown: Flown, seed: int) -> Numbers:
     """What the trial gives of a flight that was flown."""
+    crossing, appearance = flown.crossing, dressed(flown.crossing, flown.looks, seed)
     return {
         **numbers_of(flown.crossing, flown.banks),
+        **again.again_numbers(crossing.looks, crossing.boat, appearance, TUNING),
         **joint_numbers(flown.crossing),
         **looks_of(flown.looks),
         **curve_of(flown.crossing, seed),

@@ -8,13 +8,16 @@ A matrix of distances has a row for each measurement and a column for each track
 - `global_nearest`, `nearest`: firm association. `feature_distances`, `with_features`, `veto`: by what targets
   look like.
 - `run_bank`: a bank of filters on positions, with any of these.
-- `pair_scans`, `judge_start`, `outlived`: the life of a track.
+- `pair_scans`, `judge_start`, `outlived`: the life of a track. `Life`: what a bank is told of it.
+- `reachable`, `place_costs`, `look_differences`, `recognise`: whether a new track is one that had ended.
 """
 
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
 from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, run_bank
+from wildlab.tracking.many.bank_life import Life
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
+from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, UNDECIDED, judge_start, outlived, pair_scans
 from wildlab.tracking.many.probabilities import association_probabilities, belief_propagation
 from wildlab.tracking.many.run import Shown, follow_many, run_many
@@ -29,6 +32,7 @@ __all__ = [
     "Assignment",
     "Bank",
     "Hull",
+    "Life",
     "Looks",
     "Scan",
     "SensorBeliefs",
@@ -42,9 +46,13 @@ __all__ = [
     "global_nearest",
     "image_features",
     "judge_start",
+    "look_differences",
     "nearest",
     "outlived",
     "pair_scans",
+    "place_costs",
+    "reachable",
+    "recognise",
     "run_bank",
     "run_many",
     "smooth_many",
