@@ -15,6 +15,8 @@ from wildlab.simulation.scene.render import Seen
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import rendered as study
 from wildlab.studies.crossing_vessels import rendered_charts as charts
+from wildlab.studies.crossing_vessels.crossing import BOATS, NONE, WINDOW_S, Crossing, apart_times, gather
+from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER
 from wildlab.studies.crossing_vessels.rendered import (
     Placed,
     Rendering,
@@ -28,20 +30,7 @@ from wildlab.studies.crossing_vessels.rendered import (
     render_flights,
 )
 from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, count, spot
-from wildlab.studies.crossing_vessels.trial import (
-    BOATS,
-    DISTANCE,
-    FEATURES,
-    JOINT,
-    NONE,
-    WINDOW_S,
-    Crossing,
-    apart_times,
-    follow_by,
-    gather,
-    identities_of,
-    wrong_of,
-)
+from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES, follow_by, identities_of, wrong_of
 from wildlab.tracking.many.bank import Appearance, Bank, Looks
 
 TWIN, SEED = "crossing-vessels", 7
@@ -247,7 +236,7 @@ def test_looks_are_the_detections_own(rendering, flight) -> None:
 def test_all_ways_are_followed_by_every_rule(rendering) -> None:
     assert rendering.near == count(rendering.spotted)
     for one in (rendering.frames, rendering.inside, rendering.drawn):
-        assert set(one.by_rule) == {*study.SUBJECTS, JOINT}
+        assert set(one.by_rule) == {*study.SUBJECTS, JOINT, TOGETHER}
         assert len(one.off) == len(one.crossing.boat)
     cut = int(rendering.spotted.cut.sum())
     assert cut > 0 and len(rendering.inside.crossing.boat) == len(rendering.frames.crossing.boat) - cut
@@ -281,7 +270,9 @@ def placed_of(crossing: Crossing, **marks: np.ndarray) -> Placed:
 def bank_of(crossing: Crossing, track: np.ndarray, started: list[int]) -> Bank:
     images = np.unique(crossing.looks.image)
     x = np.full((len(images), len(started), 4), np.nan)
-    return Bank(track, np.array(started, int), images, x, np.full((*x.shape, 4), np.nan))
+    P, n = np.full((*x.shape, 4), np.nan), len(started)
+    never, sure = np.full(n, -1), np.ones(n, bool)
+    return Bank(track, np.array(started, int), images, x, P, np.arange(n), never, sure)
 
 
 def test_two_far_apart_are_two_tracks_and_nothing_is_wrong() -> None:

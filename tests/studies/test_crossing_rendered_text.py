@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from wildlab.studies.crossing_vessels import rendered_text as text
+from wildlab.studies.crossing_vessels.crossing import Crossing
+from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER
 from wildlab.studies.crossing_vessels.rendered import Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES
-from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES, JOINT, Crossing
+from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
 from wildlab.tracking.many.bank import Looks
 
 NEAR = Counted(
@@ -30,7 +32,7 @@ def followed(off: float = 10.0, count: int = 4, **rules: Associated) -> Followed
     looks = Looks(np.arange(count), np.zeros((count, 2)), 0.5)
     truth = np.array([np.zeros((count, 2)), np.full((count, 2), 3.0)])
     crossing = Crossing(looks, np.zeros(count, int), np.arange(count) * 0.5, truth)
-    by_rule = dict.fromkeys(NAMES, GOOD) | {JOINT: SHARED}
+    by_rule = dict.fromkeys(NAMES, GOOD) | dict.fromkeys((JOINT, TOGETHER), SHARED)
     by_rule |= {name.replace("_", "-"): one for name, one in rules.items()}
     return Followed(crossing, np.full(count, off), by_rule)
 

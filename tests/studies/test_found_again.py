@@ -8,6 +8,7 @@ import pytest
 
 from wildlab.evaluation.runs import mean_share_interval, share_interval
 from wildlab.studies.crossing_vessels import found_again_text as text
+from wildlab.studies.crossing_vessels.crossing import TUNING
 from wildlab.studies.crossing_vessels.found_again.trial import (
     UNITS,
     WAYS,
@@ -16,7 +17,6 @@ from wildlab.studies.crossing_vessels.found_again.trial import (
     outcome,
     owners,
 )
-from wildlab.studies.crossing_vessels.trial import TUNING
 from wildlab.tracking.many.bank import Appearance, Bank, Looks
 
 INTERVAL = 0.5

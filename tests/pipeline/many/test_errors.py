@@ -84,7 +84,7 @@ def test_alone_and_in_common_are_the_whole() -> None:
     points = georeference(flight, observed, np.random.default_rng(0))
     scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
     belief, _ = of_sensor(flight, scans, of_flight(flight))
-    R, shared, errors = of_pixels(flight, observed, covariances_of(points), belief)
+    R, shared, errors = of_pixels(flight, observed, covariances_of(points), belief.noise[:2], np.inf)
     known = np.isfinite(covariances_of(points)).all(axis=(1, 2)) & np.isfinite(shared).all(axis=(1, 2))
     assert known.sum() > 100 and shared.shape[-1] == len(errors.names) == 10
     whole = R + shared @ np.swapaxes(shared, 1, 2)
@@ -110,7 +110,7 @@ def test_an_error_stays_itself_along_the_flight() -> None:
     belief, _ = of_sensor(flight, scans, of_flight(flight))
     points = georeference(flight, observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
-    _, shared, _ = of_pixels(flight, observed, covariances_of(points), belief)
+    _, shared, _ = of_pixels(flight, observed, covariances_of(points), belief.noise[:2], np.inf)
     small = 1e-4
     for i in (0, 4, 5):
         turn = rotation_vector_to_matrix(small * roots[:, 3:, i])

@@ -41,7 +41,7 @@ NO_ERRORS = Errors((), ())
 
 
 def of_pixels(
-    flight: Flight, observed: Observations, total: Array, beliefs: Beliefs
+    flight: Flight, observed: Observations, total: Array, pixel_px: Array, lasting_s: float
 ) -> tuple[Array, Array, Errors]:
     """What georeferenced pixels have of their own and in common.
 
@@ -52,8 +52,10 @@ def of_pixels(
     total
         (N, 2, 2) covariances of their places, m^2: where they are of samples, what is in common is stretched
         to it.
-    beliefs
-        Of the sensor: how long its errors last.
+    pixel_px
+        (2,) standard deviations of a pixel.
+    lasting_s
+        For how long errors of the pose last; those of the mount and the ground stay.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def of_pixels(
     """
     errors = pose_errors(flight, observed)
     J = _jacobians(observed)
-    pixel = np.diag(beliefs.noise[:2] ** 2)
+    pixel = np.diag(np.asarray(pixel_px, float) ** 2)
     own = J["pixel"] @ pixel @ np.swapaxes(J["pixel"], -1, -2)
     mount, plane = np.sqrt(np.diag(errors.mount)), np.sqrt(np.asarray(errors.plane))
     shared = np.concatenate(
@@ -85,10 +87,9 @@ def of_pixels(
     names = (
         *(f"pose {i}" for i in range(1, 7)),
         *(f"mount {i}" for i in range(1, 4)),
-        "height of the ground",
+        "ground",
     )
-    # The mount stays as it is, and the ground too.
-    return own, shared, Errors(names, (_lasting(beliefs),) * 6 + (np.inf,) * 4)
+    return own, shared, Errors(names, (lasting_s,) * 6 + (np.inf,) * 4)
 
 
 def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, Errors]:
@@ -114,7 +115,7 @@ def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, E
     return shared, Errors(own, tuple(float(times[i]) for i in kept))
 
 
-def _lasting(beliefs: Beliefs) -> float:
+def lasting_of(beliefs: Beliefs) -> float:
     """s, from what is left from one look to the next."""
     if not 0 < beliefs.fading < 1:
         return np.inf if beliefs.fading >= 1 else 0.0

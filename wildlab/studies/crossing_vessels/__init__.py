@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wildlab.studies.crossing_vessels import trial
+from wildlab.studies.crossing_vessels import joint, trial
 from wildlab.studies.crossing_vessels.claims import check_claims
 from wildlab.studies.crossing_vessels.found_again import trial as again
 from wildlab.studies.protocol import Metric, Study
@@ -17,7 +17,8 @@ STUDY = Study(
     "crossing-vessels",
     (
         *trial.SUBJECTS,
-        trial.JOINT,
+        joint.JOINT,
+        joint.TOGETHER,
         trial.LOOKS,
         *map(trial.curve_subject, trial.SEPARATIONS),
         *again.WAYS,

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.spread import bounds_of, spread_words
+from wildlab.studies.crossing_vessels.crossing import BOATS, Crossing
 from wildlab.studies.crossing_vessels.trial import (
-    BOATS,
     DISTANCE,
     FEATURES,
     NAMES,
     SEPARATIONS,
-    Crossing,
     Flown,
     curve_subject,
     looks_of,

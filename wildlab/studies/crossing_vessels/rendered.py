@@ -22,22 +22,16 @@ from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.rendered import Photographer, Shot, exposures_of
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.crossing_vessels.crossing import BOATS, NONE, WINDOW_S, Crossing, apart_times, arrange
+from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER, joint_numbers
 from wildlab.studies.crossing_vessels.spotted import Counted, Spotted, count, spot
 from wildlab.studies.crossing_vessels.trial import (
-    BOATS,
-    JOINT,
-    NONE,
     SUBJECTS,
     TOLD_SD,
     WEIGHTS,
-    WINDOW_S,
-    Crossing,
-    apart_times,
-    arrange,
     dressed,
     follow_by,
     identities_of,
-    joint_numbers,
     photograph,
     swapped,
     wrong_of,
@@ -217,7 +211,8 @@ def part_of(crossing: Crossing, span: tuple[float, float]) -> Crossing:
     looks = crossing.looks._replace(
         image=crossing.looks.image[rows], positions=crossing.looks.positions[rows]
     )
-    return Crossing(looks, crossing.boat[rows], crossing.times[kept], crossing.truth[:, kept])
+    common = None if crossing.common is None else crossing.common.of(rows)
+    return Crossing(looks, crossing.boat[rows], crossing.times[kept], crossing.truth[:, kept], common)
 
 
 def associate(placed: Placed, bank: Bank) -> Associated:
@@ -248,8 +243,11 @@ def follow(placed: Placed) -> Followed:
     crossing = placed.crossing
     by_rule = {rule: associate(placed, follow_by(crossing, rule, placed.appearance)) for rule in SUBJECTS}
     joint = joint_numbers(crossing)
-    shared = bool(joint[JOINT, "swapped"]), int(joint[JOINT, "swaps"])
-    by_rule[JOINT] = Associated(*shared)
+    by_rule |= {
+        way: Associated(swapped=bool(joint[way, "swapped"]), swaps=int(joint[way, "swaps"]))
+        for way in (JOINT, TOGETHER)
+        if (way, "swapped") in joint
+    }
     at = np.unique(crossing.looks.image, return_inverse=True)[1]
     off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
     return Followed(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)

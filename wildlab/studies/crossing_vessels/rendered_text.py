@@ -12,10 +12,12 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import OVERLAP
 from wildlab.simulation.scene.flights import Look
+from wildlab.studies.crossing_vessels.crossing import APART_M, WINDOW_S
+from wildlab.studies.crossing_vessels.joint import JOINT
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance
-from wildlab.studies.crossing_vessels.trial import APART_M, DISTANCE, FEATURES, JOINT, WINDOW_S
+from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
 
 #: What is tracked, and how it is taken from a flight.
 WAYS: dict[str, Callable[[Rendering], Followed]] = {
@@ -211,9 +213,18 @@ def outcome_table(flights: Sequence[Rendering]) -> pd.DataFrame:
             "swapped": share_words(_swapped(flights, way, rule), len(flights)),
             **{f"flight-{one.seed}": outcome_words(take(one).by_rule[rule]) for one in flights},
         }
-        for rule, words in NAMES.items()
+        for rule, words in _rules(flights).items()
         for way, take in WAYS.items()
     )
+
+
+def _rules(flights: Sequence[Rendering]) -> dict[str, str]:
+    """Those that every flight was tracked by."""
+    return {
+        rule: words
+        for rule, words in NAMES.items()
+        if all(rule in take(one).by_rule for one in flights for take in WAYS.values())
+    }
 
 
 def _swapped(flights: Sequence[Rendering], way: str, rule: str) -> int:
@@ -223,7 +234,7 @@ def _swapped(flights: Sequence[Rendering], way: str, rule: str) -> int:
 def swaps_words(flights: Sequence[Rendering]) -> str:
     """Swaps from frames beside those from drawn detections of the same flights, and what can be told."""
     n, parts, told = len(flights), [], []
-    for rule, words in NAMES.items():
+    for rule, words in _rules(flights).items():
         frames, drawn = (
             np.array([WAYS[way](one).by_rule[rule].swapped for one in flights]) for way in (FRAMES, DRAWN)
         )

@@ -12,54 +12,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.evaluation.identities import Identities, Scan, compare_identities
-from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.validation import gate_threshold
-from wildlab.pipeline.georeference import Observations, observe
 from wildlab.pipeline.rendered import Photographer, exposures_of
-from wildlab.pipeline.track import truth_states
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
+from wildlab.studies.crossing_vessels.crossing import (
+    APART_M,
+    BOATS,
+    EVERY,
+    NONE,
+    TUNING,
+    WINDOW_S,
+    Crossing,
+    Numbers,
+    apart_times,
+    gather,
+)
 from wildlab.studies.crossing_vessels.found_again import trial as again
-from wildlab.tracking.many import POINT, SensorBeliefs, TargetBeliefs, run_many
-from wildlab.tracking.many import Scan as Look
+from wildlab.studies.crossing_vessels.joint import joint_numbers
 from wildlab.tracking.many import bank as rules
-from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, run_bank
+from wildlab.tracking.many.bank import Appearance, Bank, run_bank
 from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-#: Numbers of a flight by (subject, name).
-Numbers = dict[tuple[str, str], float]
-
-#: The vessels as H 6.4.4 names them.
-BOATS = ("boat 1", "boat 2")
-#: Boat of a detection that is of neither.
-NONE = -1
 #: By distance alone; with features weighed in; with features as a veto.
 DISTANCE, FEATURES, VETO = "without-features", "with-features", "veto"
 RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO}
 SUBJECTS = tuple(RULES)
-#: Joint integrated data association beside them, by distance alone (H 8.2 names it as what would come next).
-JOINT = "jipda"
-#: H 6.4.4; the gate is of 99 %, of the 95 to 99 % of H 3.3, and the largest speed, which serves the start
-#: alone, the deviation of the first velocity. Both are chosen.
-TUNING = Tuning(
-    measurement=17.5, acceleration=0.2, velocity_0=5.0, gate=gate_threshold(0.99, 2), max_speed=5.0
-)
-#: What joint association is told: the printed noise of `TUNING`, as white acceleration of the same strength.
-#: Chosen, once: nearly all that is in view is detected and hardly anything else is; a vessel is in view for
-#: some seconds in each lap and then for half a minute not, and both are there for good.
-SENSOR = SensorBeliefs(
-    name="camera", detection=0.95, clutter=1e-8, near_m=0.0, far_m=np.inf, patience_s=np.inf,
-    rough_m=(0.0,), along_m=(0.0,), near_side_m=(0.0,),
-)  # fmt: skip
-TARGETS = TargetBeliefs(
-    hulls=(POINT,), density=TUNING.acceleration, start_speed_m_s=TUNING.velocity_0, lifetime_s=1e6, birth=0.9,
-    visible_s=5.0, hidden_s=30.0, gate=float(np.sqrt(TUNING.gate)), confirmed=0.9, hits=2, shown=0.5,
-    forgotten=1e-3, lost_m=1e4, fastest_m_s=np.inf, moves_m=0.0, over_s=0.0, apart_m=0.0,
-)  # fmt: skip
 #: What the rendered images show.
 LOOKS = "looks"
 #: H figure 6.21, in its order.
@@ -73,13 +54,6 @@ SEPARATIONS = (0, 1, 2, 3, 4, 6)
 NEAR_M = 20.0
 #: Around a vessel, px: as wide as the longest is in the image, so that the sea about it is rendered too.
 MARGIN = 40
-#: Apart again are vessels twice the measurement noise from each other; how a crossing went is seen in the two
-#: minutes from then on, several laps, and how it ended in the last two. Chosen.
-APART_M, WINDOW_S = 2 * TUNING.measurement, 120.0
-
-#: Tracks are held against the vessels at every so many images with a detection: neighbours tell the same.
-EVERY = 5
-
 #: Names of the numbers that are recorded, and their units.
 UNITS = {
     **{f"wrong_rate_boat_{n}": "1" for n in (1, 2)}, "wrong": "1", "unassigned": "1", "tracks": "1",
@@ -89,56 +63,6 @@ UNITS = {
     **again.UNITS,
     **{f"separation_{name}": "1" for name in NAMES}, **{f"spread_{name}": "1" for name in NAMES},
 }  # fmt: skip
-
-
-class Crossing(NamedTuple):
-    """What one flight saw of the two.
-
-    Attributes
-    ----------
-    looks
-        All detections.
-    boat
-        (D,) 0 or 1: whose each is, as by manual classification; `NONE` where it is of nothing.
-    times
-        (K,) s, of the images with detections.
-    truth
-        (2, K, 2) where the two were by their own receivers, m.
-    """
-
-    looks: Looks
-    boat: Index
-    times: Array
-    truth: Array
-
-    @property
-    def apart(self) -> Array:
-        """(K,) distance between the two, m."""
-        return np.asarray(np.linalg.norm(self.truth[0] - self.truth[1], axis=-1))
-
-
-def gather(flight: Flight, source: str = "autopilot") -> Crossing:
-    """The detections of both vessels on the sea, with the poses of a source."""
-    seen = observe(flight, source)
-    return arrange(flight, seen, np.array([BOATS.index(name) for name in seen.table["target_id"]]))[0]
-
-
-def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, Index]:
-    """Observations on the sea, in order; and which of them are left, in that order, to have a place.
-
-    ``boat`` (N,) is 0 or 1, or `NONE` for a detection of nothing.
-    """
-    positions = georeference_pixels(seen.poses, seen.uv, seen.plane_down)[:, :2]
-    number = exposures_of(seen.table).astype(int)
-    stamps = frame_times(flight)
-    at = {one: stamp for one, stamp in zip(exposures_of(flight.table("frames")), stamps, strict=True)}
-    order = np.lexsort((boat, number))
-    order = order[np.isfinite(positions[order]).all(axis=1)]
-    images = np.unique(number[order])
-    times = np.array([at[int(one)] for one in images])
-    looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
-    truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
-    return Crossing(looks, boat[order], times, truth), order
 
 
 def photograph(twin: str, seed: int, flight: Flight, images: int) -> list[Array]:
@@ -187,20 +111,6 @@ def wrong_of(crossing: Crossing, bank: Bank) -> NDArray[np.bool_]:
     return np.asarray((owner != NONE) & (crossing.boat != NONE) & (owner != crossing.boat))
 
 
-def apart_times(crossing: Crossing) -> tuple[float, float]:
-    """When the two were last `APART_M` from each other before they were nearest, and first after it, s.
-
-    The first and the last time where they never were.
-    """
-    apart, times = crossing.apart, crossing.times
-    nearest = int(np.nanargmin(apart))
-    before, after = (np.flatnonzero(part > APART_M) for part in (apart[:nearest], apart[nearest:]))
-    return (
-        float(times[before[-1]] if len(before) else times[0]),
-        float(times[nearest + after[0]] if len(after) else times[-1]),
-    )
-
-
 def swapped(crossing: Crossing, bank: Bank) -> tuple[bool, bool]:
     """Whether the two have each other's track just after the crossing, and at the end.
 
@@ -238,80 +148,6 @@ def identities_of(crossing: Crossing, bank: Bank) -> Identities:
             )
         )  # fmt: skip
     return compare_identities(scans, APART_M)
-
-
-def joint_of(crossing: Crossing, density: float) -> Identities:
-    """The same detections by joint integrated data association, against the vessels at every image."""
-    number = np.searchsorted(np.unique(crossing.looks.image), crossing.looks.image)
-    R = TUNING.measurement**2 * np.eye(2)
-    looks = [
-        Look(float(time), 0, np.zeros(2), crossing.looks.positions[rows], np.tile(R, (int(rows.sum()), 1, 1)))
-        for k, time in enumerate(crossing.times)
-        for rows in [number == k]
-    ]
-    ignored, scans = np.zeros(2, bool), []
-    for k, one in enumerate(run_many(looks, [SENSOR], TARGETS._replace(density=density))):
-        if k % EVERY:
-            continue
-        known = np.isfinite(crossing.truth[:, k]).all(axis=1)
-        shown = np.isin([0, 1], crossing.boat[number == k])
-        scans.append(
-            Scan(
-                one.time, one.x[:, :2], one.P[:, :2, :2], one.identity.tolist(), crossing.truth[known, k],
-                [BOATS[n] for n in np.flatnonzero(known)], shown[known], ignored[known],
-            )
-        )  # fmt: skip
-    return compare_identities(scans, APART_M)
-
-
-def density_of(interval: float) -> float:
-    """White acceleration that spreads velocities as fast as `TUNING`'s, which is held from image to image.
-
-    An acceleration drawn anew every T s adds (sd T)^2 to the variance of a velocity each time.
-    """
-    return TUNING.acceleration * float(np.sqrt(interval))
-
-
-def joint_swapped(crossing: Crossing, told: Identities) -> tuple[bool, bool]:
-    """As `swapped`, of tracks that are shared: whether each is on the other vessel than before the crossing.
-
-    A vessel's track is the one that is on it most often: before the crossing since the beginning, after it in
-    `WINDOW_S` from when the two are apart again, and at the end in the last.
-    """
-    times = crossing.times
-    until, since = apart_times(crossing)
-    at = times[::EVERY]
-
-    def mostly(low: float, high: float) -> list[object]:
-        rows = np.flatnonzero((at >= low) & (at <= high))
-        found: list[object] = []
-        for boat in BOATS:
-            names = [told.followed[row][boat] for row in rows if boat in told.followed[row]]
-            found.append(max(sorted(set(names), key=str), key=names.count) if names else None)
-        return found
-
-    before = mostly(float(times[0]), until)
-
-    def exchanged(after: list[object]) -> bool:
-        return None not in before and after[0] == before[1] and after[1] == before[0]
-
-    end = float(times[-1])
-    return exchanged(mostly(since, since + WINDOW_S)), exchanged(mostly(end - WINDOW_S, end))
-
-
-def joint_numbers(crossing: Crossing) -> Numbers:
-    """What `UNITS` names of joint association; it gives no detection to one track alone."""
-    told = joint_of(crossing, density_of(crossing.looks.interval))
-    after, end = joint_swapped(crossing, told)
-    anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
-    return {
-        (JOINT, "swapped"): float(after),
-        (JOINT, "swapped_at_end"): float(end),
-        (JOINT, "swaps"): float(told.swaps),
-        (JOINT, "breaks"): float(told.breaks),
-        (JOINT, "gospa"): float(np.mean([one.distance for one in told.gospa])),
-        (JOINT, "anees"): float(np.median(anees)) if anees else np.nan,
-    }
 
 
 def numbers_of(crossing: Crossing, banks: dict[str, Bank]) -> Numbers:
