@@ -101,7 +101,8 @@ def test_two_that_come_back_beside_each_other_are_guessed_or_stay_new():
     told = Appearance(20.0 * boat[:, None].astype(float), np.ones(1), np.ones(1))
     numbers = again_numbers(looks, boat, told, TUNING._replace(measurement=2.0))
     assert numbers[WITHOUT, "not_found"] > 5
-    assert numbers[GUESSED_WITHOUT, "found_right"] + numbers[GUESSED_WITHOUT, "found_wrong"] == 10
+    taken = [numbers[way, "found_right"] + numbers[way, "found_wrong"] for way in (WITHOUT, GUESSED_WITHOUT)]
+    assert taken[1] > taken[0]
     assert numbers[WITH, "found_right"] == numbers[GUESSED_WITH, "found_right"] == 10
 
 
