@@ -108,3 +108,15 @@ def test_what_cannot_be_is_said(weights: list[list[float]], missed: list[float],
 def test_messages_need_targets_that_can_be_missed() -> None:
     with pytest.raises(WildlabError, match="cannot be missed"):
         belief_propagation([[1.0]], [0.0])
+
+
+def test_a_target_that_nothing_is_of_has_none_whatever_others_have() -> None:
+    """Also one that cannot be missed, and whether few or many are summed at once."""
+    for count in (2, 9):
+        weights = np.zeros((count, count))
+        weights[: count - 1, : count - 1] = 1.0
+        missed = np.append(np.full(count - 1, 0.5), 0.0)
+        found = association_probabilities(weights, missed)
+        assert found[-1].tolist() == [1.0] + [0.0] * count
+        assert np.allclose(found[:-1, -1], 0) and np.allclose(found.sum(axis=1), 1)
+        assert np.allclose(found[:-1, 1:-1], found[0, 1])

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 #: Clusters with more targets and more measurements than this are summed by belief propagation: the exact sum
 #: has two to the power of the smaller number terms.
 MOST_EXACT = 12
+#: With so few targets or measurements it takes longer to find the clusters than to sum over all at once.
+FEW = 5
 #: Belief propagation ends where no message changes by more, or after so many rounds.
 CLOSE, MOST_ROUNDS = 1e-9, 1000
 
@@ -68,9 +70,12 @@ def association_probabilities(weights: ArrayLike, missed: ArrayLike, most: int =
     if not (np.isfinite(w).all() and np.isfinite(w0).all() and (w >= 0).all() and (w0 >= 0).all()):
         raise WildlabError("a weight is negative or not a number", "give weights from zero up")
     found = np.zeros((len(w), 1 + w.shape[1]))
-    for targets, measurements in _clusters(w > 0):
+    linked = w > 0
+    rows, columns = (np.flatnonzero(linked.any(axis=axis)) for axis in (1, 0))
+    found[~linked.any(axis=1), 0] = 1.0
+    few = min(len(rows), len(columns)) <= min(FEW, most)
+    for targets, measurements in [(rows, columns)] if few else _clusters(linked):
         if not len(measurements):
-            found[targets, 0] = 1.0
             continue
         # A target's weights may be scaled as one likes; near one, no product leaves what a float holds.
         part, none = w[np.ix_(targets, measurements)], w0[targets]

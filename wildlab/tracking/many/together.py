@@ -23,7 +23,7 @@ from wildlab.tracking.many.update import Compared, likelihoods
 Array = NDArray[np.float64]
 
 #: How often what all tell each other is asked again. After the second time little changes.
-ROUNDS = 3
+ROUNDS = 2
 
 
 def of_all(values: Array, near: NDArray[np.intp], count: int) -> Array:
