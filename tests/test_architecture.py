@@ -279,9 +279,9 @@ def test_nothing_imports_in_a_circle() -> None:
 def test_a_trial_imports_no_other_part_of_the_studies() -> None:
     """Kept numbers of a seed stay as long as the trials and what lies below them do."""
     for module, names in import_graph(paths.ROOT).items():
-        if module.startswith("wildlab.studies.") and module.endswith(".trial"):
+        if module.startswith("wildlab.studies.") and ".trial" in module:
             above = {name for name in names if name.startswith(("wildlab.studies", "wildlab.reporting"))}
-            assert all(name.endswith(".trial") for name in above), module
+            assert all(name.split(".")[3:4] == ["trial"] for name in above), module
 
 
 def test_a_circle_is_found(tmp_path: Path) -> None:

@@ -15,8 +15,6 @@ from wildlab.simulation.scene.render import Seen
 from wildlab.simulation.twins import simulate_twin
 from wildlab.studies.crossing_vessels import rendered as study
 from wildlab.studies.crossing_vessels import rendered_charts as charts
-from wildlab.studies.crossing_vessels.crossing import BOATS, NONE, WINDOW_S, Crossing, apart_times, gather
-from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER
 from wildlab.studies.crossing_vessels.rendered import (
     Placed,
     Rendering,
@@ -31,6 +29,15 @@ from wildlab.studies.crossing_vessels.rendered import (
 )
 from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, count, spot
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES, follow_by, identities_of, wrong_of
+from wildlab.studies.crossing_vessels.trial.crossing import (
+    BOATS,
+    NONE,
+    WINDOW_S,
+    Crossing,
+    apart_times,
+    gather,
+)
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER
 from wildlab.tracking.many.bank import Appearance, Bank, Looks
 
 TWIN, SEED = "crossing-vessels", 7

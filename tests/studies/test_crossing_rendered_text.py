@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from wildlab.studies.crossing_vessels import rendered_text as text
-from wildlab.studies.crossing_vessels.crossing import Crossing
-from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER
 from wildlab.studies.crossing_vessels.rendered import Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
+from wildlab.studies.crossing_vessels.trial.crossing import Crossing
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER
 from wildlab.tracking.many.bank import Looks
 
 NEAR = Counted(

@@ -8,8 +8,8 @@ import pytest
 
 from wildlab.evaluation.runs import mean_share_interval, share_interval
 from wildlab.studies.crossing_vessels import found_again_text as text
-from wildlab.studies.crossing_vessels.crossing import TUNING
-from wildlab.studies.crossing_vessels.found_again.trial import (
+from wildlab.studies.crossing_vessels.trial.crossing import TUNING
+from wildlab.studies.crossing_vessels.trial.found_again import (
     UNITS,
     WAYS,
     Outcome,

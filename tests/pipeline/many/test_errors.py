@@ -13,7 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.pipeline.following.beliefs import of_flight, of_sensor
 from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe, pose_errors
-from wildlab.pipeline.many.errors import Errors, _pose_roots, laid_out, of_elements, of_pixels
+from wildlab.pipeline.many.errors import Errors, _pose_roots, laid_out, of_elements, of_pixels, told_errors
 from wildlab.pipeline.many.follow import follow_all
 from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of
@@ -82,9 +82,7 @@ def test_alone_and_in_common_are_the_whole() -> None:
     """Of every georeferenced pixel, also where its covariance comes from samples."""
     flight, observed = _pixels()
     points = georeference(flight, observed, np.random.default_rng(0))
-    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
-    R, shared, errors = of_pixels(flight, observed, covariances_of(points), belief.noise[:2], np.inf)
+    R, shared, errors = of_pixels(observed, pose_errors(flight, observed), covariances_of(points), np.inf)
     known = np.isfinite(covariances_of(points)).all(axis=(1, 2)) & np.isfinite(shared).all(axis=(1, 2))
     assert known.sum() > 100 and shared.shape[-1] == len(errors.names) == 10
     whole = R + shared @ np.swapaxes(shared, 1, 2)
@@ -106,11 +104,9 @@ def test_an_error_stays_itself_along_the_flight() -> None:
     for a, b in zip(order[:-1:20], order[1::20], strict=False):
         phi = transition_of_pose(errors.pose[a], errors.pose[b], "bias")
         assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
-    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
-    belief, _ = of_sensor(flight, scans, of_flight(flight))
     points = georeference(flight, observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
-    _, shared, _ = of_pixels(flight, observed, covariances_of(points), belief.noise[:2], np.inf)
+    _, shared, _ = of_pixels(observed, pose_errors(flight, observed), covariances_of(points), np.inf)
     small = 1e-4
     for i in (0, 4, 5):
         turn = rotation_vector_to_matrix(small * roots[:, 3:, i])
@@ -150,3 +146,24 @@ def test_a_heading_that_is_off_is_in_the_covariance_of_tracks() -> None:
             own += [float(a @ np.linalg.solve(P[:2, :2], a) / 2) for a, P in zip(e, one.P, strict=True)]
         nees.append(np.mean(own))
     assert nees[0] > 10 and 0.2 < nees[1] < 1.2
+
+
+@pytest.mark.slow
+def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
+    """In place of what is assumed, on top of a covariance that poses have; pixels are as noisy as told."""
+    flight, observed = _pixels()
+    name = str(flight.table("detections")["source"].iloc[0])
+    text = f"[sensors.{name}.noise]\npixel_px = 7.0\n[sensors.{name}.considered.heading]\nsd_deg = 9.0\n"
+    text += f"[sensors.{name}.considered.platform_east]\nsd_m = 4.0\n"
+    scans = scans_of(flight, name, 0.0, "autopilot")
+    belief, _ = of_sensor(flight, scans, of_flight(flight, parse_settings(text)))
+    usual, told = pose_errors(flight, observed), told_errors(flight, observed, belief)
+    assert np.allclose(told.pixel, 49.0 * np.eye(2))
+    assert np.allclose(told.pose[:, 1, 1], 16.0) and np.allclose(told.pose[:, 0, 0], usual.pose[:, 0, 0])
+    level = np.abs(observed.poses.R_nb[:, 2, 2]) > 0.999
+    assert np.allclose(told.pose[level][:, 5, 5], np.radians(9.0) ** 2, rtol=0.02)
+    own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
+    known = replace(observed, poses=replace(observed.poses, covariance=own))
+    on_top = told_errors(flight, known, belief).pose - own
+    expected = np.diag([0, 16.0, 0, 0, 0, np.radians(9.0) ** 2])
+    assert np.allclose(on_top, expected)

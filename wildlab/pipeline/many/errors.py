@@ -19,8 +19,14 @@ from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
-from wildlab.pipeline.georeference import Observations, pose_errors
+from wildlab.pipeline.georeference import (
+    Observations,
+    assumed_deviations,
+    assumed_pose_covariance,
+    pose_errors,
+)
 from wildlab.pipeline.scans import Scans
+from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import transition_of_pose, transitions_of_pose
 
 Array = NDArray[np.float64]
@@ -36,12 +42,36 @@ class Errors(NamedTuple):
     lasting_s: tuple[float, ...]
 
 
+#: Angles of `wildlab.pipeline.georeference.USUAL`.
+_DEGREES = {"roll": "roll_deg", "pitch": "pitch_deg", "heading": "yaw_deg"}
 #: None at all.
 NO_ERRORS = Errors((), ())
 
 
+def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> PoseErrors:
+    """What georeferenced pixels may be wrong by, as filters of one target are told.
+
+    That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
+    that are considered come on top of a covariance that poses have, and take the place of what is assumed.
+    """
+    errors = pose_errors(flight, observed)
+    sds = {one.name: one.sd for one in beliefs.considered if one.name in POSE}
+    pose = np.array(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6)))
+    if sds and observed.poses.covariance is None:
+        angles = {_DEGREES[name]: float(np.degrees(sd)) for name, sd in sds.items() if name in _DEGREES}
+        pose = assumed_pose_covariance(observed.poses.R_nb, assumed_deviations(flight) | angles)
+        pose = np.array(np.broadcast_to(pose, (len(observed.uv), 6, 6)))
+    for name, sd in sds.items():
+        place = POSE.index(name)
+        if observed.poses.covariance is not None:
+            pose[:, place, place] += sd**2
+        elif name not in _DEGREES:
+            pose[:, place, place] = sd**2
+    return errors._replace(pose=pose, pixel=np.diag(beliefs.noise[:2] ** 2))
+
+
 def of_pixels(
-    flight: Flight, observed: Observations, total: Array, pixel_px: Array, lasting_s: float
+    observed: Observations, errors: PoseErrors, total: Array, lasting_s: float
 ) -> tuple[Array, Array, Errors]:
     """What georeferenced pixels have of their own and in common.
 
@@ -49,11 +79,11 @@ def of_pixels(
     ----------
     observed
         From `observe`, N rows.
+    errors
+        What they may be wrong by.
     total
-        (N, 2, 2) covariances of their places, m^2: where they are of samples, what is in common is stretched
-        to it.
-    pixel_px
-        (2,) standard deviations of a pixel.
+        (N, 2, 2) covariances of their places by these, m^2: where they are of samples, what is in common is
+        stretched to it.
     lasting_s
         For how long errors of the pose last; those of the mount and the ground stay.
 
@@ -64,10 +94,8 @@ def of_pixels(
     errors
         The k of them.
     """
-    errors = pose_errors(flight, observed)
     J = _jacobians(observed)
-    pixel = np.diag(np.asarray(pixel_px, float) ** 2)
-    own = J["pixel"] @ pixel @ np.swapaxes(J["pixel"], -1, -2)
+    own = J["pixel"] @ errors.pixel @ np.swapaxes(J["pixel"], -1, -2)
     mount, plane = np.sqrt(np.diag(errors.mount)), np.sqrt(np.asarray(errors.plane))
     shared = np.concatenate(
         [
@@ -77,19 +105,14 @@ def of_pixels(
         ],
         axis=-1,
     )
-    usual = J["pixel"] @ errors.pixel @ np.swapaxes(J["pixel"], -1, -2)
     for row in np.flatnonzero(np.isfinite(shared).all(axis=(1, 2)) & np.isfinite(total).all(axis=(1, 2))):
-        first, whole = shared[row] @ shared[row].T, total[row] - usual[row]
+        first, whole = shared[row] @ shared[row].T, total[row] - own[row]
         if not np.allclose(first, whole, rtol=1e-6):
             values, axes = np.linalg.eigh(whole)
             whole = (axes * np.maximum(values, 0.0)) @ axes.T
             shared[row] = transition_of_pose(first, whole, "bias") @ shared[row]
-    names = (
-        *(f"pose {i}" for i in range(1, 7)),
-        *(f"mount {i}" for i in range(1, 4)),
-        "ground",
-    )
-    return own, shared, Errors(names, (lasting_s,) * 6 + (np.inf,) * 4)
+    names = [*(f"pose {i}" for i in range(1, 7)), *(f"mount {i}" for i in range(1, 4)), "ground"]
+    return own, shared, Errors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
 
 def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, Errors]:

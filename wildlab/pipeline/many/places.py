@@ -13,7 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
-from wildlab.pipeline.many.errors import NO_ERRORS, Errors, lasting_of, of_elements, of_pixels
+from wildlab.pipeline.many.errors import NO_ERRORS, Errors, lasting_of, of_elements, of_pixels, told_errors
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.coloured import thin
 from wildlab.tracking.many import Scan
@@ -171,10 +171,9 @@ def _of_pixels(
 ) -> tuple[Array, Array, Array, Errors]:
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
-    points = georeference(flight, observed, np.random.default_rng(0))
-    own, shared, errors = of_pixels(
-        flight, observed, covariances_of(points), beliefs.noise[:2], lasting_of(beliefs)
-    )
+    told = told_errors(flight, observed, beliefs)
+    points = georeference(flight, observed, np.random.default_rng(0), told)
+    own, shared, errors = of_pixels(observed, told, covariances_of(points), lasting_of(beliefs))
     ids = pd.Index(points["detection_id"])
     row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
     row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from wildlab.studies.crossing_vessels import joint, trial
+from wildlab.studies.crossing_vessels import trial
 from wildlab.studies.crossing_vessels.claims import check_claims
-from wildlab.studies.crossing_vessels.found_again import trial as again
+from wildlab.studies.crossing_vessels.trial import found_again as again
+from wildlab.studies.crossing_vessels.trial import joint
 from wildlab.studies.protocol import Metric, Study
 
 

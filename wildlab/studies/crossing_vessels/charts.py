@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, VERMILLION, map_axes, new_figure
 from wildlab.reporting.spread import bounds_of, spread_words
-from wildlab.studies.crossing_vessels.crossing import BOATS, Crossing
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
@@ -22,6 +21,7 @@ from wildlab.studies.crossing_vessels.trial import (
     swapped,
     wrong_of,
 )
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, Crossing
 
 Array = NDArray[np.float64]
 #: What `Report.figures` takes: figure, name, alternative text, caption.

@@ -7,8 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.evaluation.shares import Check
-from wildlab.studies.crossing_vessels.crossing import TUNING
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES, LOOKS
+from wildlab.studies.crossing_vessels.trial.crossing import TUNING
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from wildlab.evaluation.runs import mean_share_interval, share_interval
-from wildlab.studies.crossing_vessels.crossing import TUNING
-from wildlab.studies.crossing_vessels.found_again.trial import MAX_AGE_S, SURE, UNITS, WAYS
 from wildlab.studies.crossing_vessels.text import beyond_chance
+from wildlab.studies.crossing_vessels.trial.crossing import TUNING
+from wildlab.studies.crossing_vessels.trial.found_again import MAX_AGE_S, SURE, UNITS, WAYS
 
 Array = NDArray[np.float64]
 WITHOUT, WITH, GUESSED_WITHOUT, GUESSED_WITH = WAYS

@@ -22,8 +22,6 @@ from wildlab.pipeline.georeference import observe
 from wildlab.pipeline.rendered import Photographer, Shot, exposures_of
 from wildlab.simulation.scene.flights import SceneFlight
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels.crossing import BOATS, NONE, WINDOW_S, Crossing, apart_times, arrange
-from wildlab.studies.crossing_vessels.joint import JOINT, TOGETHER, joint_numbers
 from wildlab.studies.crossing_vessels.spotted import Counted, Spotted, count, spot
 from wildlab.studies.crossing_vessels.trial import (
     SUBJECTS,
@@ -36,6 +34,15 @@ from wildlab.studies.crossing_vessels.trial import (
     swapped,
     wrong_of,
 )
+from wildlab.studies.crossing_vessels.trial.crossing import (
+    BOATS,
+    NONE,
+    WINDOW_S,
+    Crossing,
+    apart_times,
+    arrange,
+)
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER, joint_numbers
 from wildlab.tracking.many.bank import Appearance, Bank
 from wildlab.tracking.many.features import image_features
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from wildlab.pipeline.rendered import Photographer
 from wildlab.reporting.figures import BLUE, GREEN, ORANGE, VERMILLION, new_figure
 from wildlab.studies.crossing_vessels.charts import Shown
-from wildlab.studies.crossing_vessels.crossing import BOATS, NONE
 from wildlab.studies.crossing_vessels.rendered import Rendering
 from wildlab.studies.crossing_vessels.spotted import WHOLE, Spotted, spot
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, NONE
 
 #: Around the boxes, px, and how wide what is shown is at least.
 AROUND, LEAST = 30, 200

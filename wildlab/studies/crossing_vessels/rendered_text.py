@@ -12,12 +12,12 @@ from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import OVERLAP
 from wildlab.simulation.scene.flights import Look
-from wildlab.studies.crossing_vessels.crossing import APART_M, WINDOW_S
-from wildlab.studies.crossing_vessels.joint import JOINT
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
+from wildlab.studies.crossing_vessels.trial.crossing import APART_M, WINDOW_S
+from wildlab.studies.crossing_vessels.trial.joint import JOINT
 
 #: What is tracked, and how it is taken from a flight.
 WAYS: dict[str, Callable[[Rendering], Followed]] = {

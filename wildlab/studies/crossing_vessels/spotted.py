@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wildlab.detection.centres import cut_sides
 from wildlab.pipeline.rendered import Shot
-from wildlab.studies.crossing_vessels.crossing import BOATS, NONE
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, NONE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

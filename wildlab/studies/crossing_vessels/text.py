@@ -11,7 +11,6 @@ from scipy.stats import binomtest
 from wildlab.evaluation.runs import share_interval
 from wildlab.reporting.spread import bounds_of, range_clause, range_words, spread_words
 from wildlab.reporting.text import percent
-from wildlab.studies.crossing_vessels.joint import JOINT, SENSOR, TARGETS, TOGETHER
 from wildlab.studies.crossing_vessels.trial import (
     DISTANCE,
     FEATURES,
@@ -21,6 +20,7 @@ from wildlab.studies.crossing_vessels.trial import (
     VETO,
     curve_subject,
 )
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, SENSOR, TARGETS, TOGETHER
 
 #: H 6.4.4: five of boat 1, none of boat 2.
 PUBLISHED_WRONG = 5

@@ -17,7 +17,8 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.pipeline.rendered import Photographer, exposures_of
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.twins import simulate_twin
-from wildlab.studies.crossing_vessels.crossing import (
+from wildlab.studies.crossing_vessels.trial import found_again as again
+from wildlab.studies.crossing_vessels.trial.crossing import (
     APART_M,
     BOATS,
     EVERY,
@@ -29,8 +30,7 @@ from wildlab.studies.crossing_vessels.crossing import (
     apart_times,
     gather,
 )
-from wildlab.studies.crossing_vessels.found_again import trial as again
-from wildlab.studies.crossing_vessels.joint import joint_numbers
+from wildlab.studies.crossing_vessels.trial.joint import joint_numbers
 from wildlab.tracking.many import bank as rules
 from wildlab.tracking.many.bank import Appearance, Bank, run_bank
 from wildlab.tracking.many.features import image_features

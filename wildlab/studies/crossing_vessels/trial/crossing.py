@@ -13,10 +13,10 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.validation import gate_threshold
 from wildlab.pipeline.georeference import (
     Observations,
-    assumed_deviations,
     covariances_of,
     georeference,
     observe,
+    pose_errors,
 )
 from wildlab.pipeline.many.errors import of_pixels
 from wildlab.pipeline.rendered import exposures_of
@@ -110,9 +110,9 @@ def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, 
 
 
 def _common(flight: Flight, seen: Observations, order: Index) -> Common:
-    points = georeference(flight, seen, np.random.default_rng(0))
-    pixel = np.full(2, assumed_deviations(flight)["pixel_px"])
-    own, shared, _ = of_pixels(flight, seen, covariances_of(points), pixel, np.inf)
+    errors = pose_errors(flight, seen)
+    points = georeference(flight, seen, np.random.default_rng(0), errors)
+    own, shared, _ = of_pixels(seen, errors, covariances_of(points), np.inf)
     return Common(own[order], shared[order][..., shared[order].any(axis=(0, 1))])
 
 

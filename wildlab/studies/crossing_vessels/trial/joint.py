@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wildlab.evaluation.identities import Identities, Scan, compare_identities
-from wildlab.studies.crossing_vessels.crossing import (
+from wildlab.studies.crossing_vessels.trial.crossing import (
     APART_M,
     BOATS,
     EVERY,

@@ -1,0 +1,74 @@
+"""Joint association of two that cross: swaps, shared errors of the pose, and what is said of them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.studies.test_crossing_vessels import INTERVAL, passing
+from wildlab.studies.crossing_vessels import text
+from wildlab.studies.crossing_vessels.trial import DISTANCE, joint
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY, Common
+
+
+def test_joint_association_of_two_far_apart_is_two_tracks():
+    crossing = passing(closest=400, noise=5)
+    numbers = joint.joint_numbers(crossing)
+    assert len(joint.joint_of(crossing, joint.density_of(INTERVAL)).tracks) == 2
+    assert numbers[joint.JOINT, "swaps"] == numbers[joint.JOINT, "swapped"] == 0
+    assert numbers[joint.JOINT, "gospa"] < 10
+
+
+def test_the_density_spreads_velocities_as_the_tuning_does():
+    # An acceleration of 0.2 m/s^2 held over each of two images a second, for 50 s.
+    assert joint.density_of(0.5) ** 2 * 50 == pytest.approx(100 * (0.2 * 0.5) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("after", "end", "expected"),
+    [((1, 2), (1, 2), (False, False)), ((2, 1), (2, 1), (True, True)), ((2, 1), (1, 2), (True, False)),
+     ((2, 2), (2, 2), (False, False)), ((None, 1), (None, 1), (False, False))],
+)  # fmt: skip
+def test_shared_tracks_are_swapped_where_each_has_the_others(after, end, expected):
+    crossing = passing(images=1200)
+    times = crossing.times[::EVERY]
+    told = []
+    for time in times:
+        pair = (1, 2) if time < 300 else after if time < 460 else end
+        told.append({boat: name for boat, name in zip(BOATS, pair, strict=True) if name is not None})
+    assert joint.joint_swapped(crossing, SimpleNamespace(followed=told)) == expected
+
+
+def test_joint_words_turn_with_the_flights():
+    table = {(joint.JOINT, "swapped"): [1.0] * 12 + [0.0] * 8, (DISTANCE, "swapped"): [0.0] * 20}
+    assert "on more of them, beyond chance" in text.joint_words(pd.DataFrame(table))
+    table = {(joint.JOINT, "swapped"): [0.0] * 20, (DISTANCE, "swapped"): [1.0] * 12 + [0.0] * 8}
+    assert "on fewer of them, beyond chance" in text.joint_words(pd.DataFrame(table))
+    table = {(joint.JOINT, "swapped"): [1.0, 0.0], (DISTANCE, "swapped"): [0.0, 0.0]}
+    assert "cannot be told" in text.joint_words(pd.DataFrame(table))
+    assert "alike and last" not in text.joint_words(pd.DataFrame(table))
+    table |= {(joint.JOINT, "swapped"): [1.0] * 2, (joint.TOGETHER, "swapped"): [0.0] * 2}
+    said = text.joint_words(pd.DataFrame(table))
+    assert "alike and last, it leaves them swapped on 0 of 2 flights" in said and said.endswith("told.")
+    many = {one: np.repeat(values, 10) for one, values in table.items()}
+    assert text.joint_words(pd.DataFrame(many)).endswith("on fewer of them, beyond chance.")
+
+
+def test_what_moves_both_vessels_swaps_nothing_where_it_is_known_to():
+    """Both keep 30 m from each other, and are moved together by tens of metres that last; told, and not."""
+    crossing = passing(closest=30, noise=1)
+    rng = np.random.default_rng(4)
+    error, moved = rng.normal(size=2), []
+    for _ in crossing.times:
+        error = 0.99 * error + np.sqrt(1 - 0.99**2) * rng.normal(size=2)
+        moved.append(25.0 * error)
+    at = np.unique(crossing.looks.image, return_inverse=True)[1]
+    positions = crossing.looks.positions + np.array(moved)[at]
+    common = Common(np.tile(np.eye(2), (len(at), 1, 1)), np.tile(25.0 * np.eye(2), (len(at), 1, 1)))
+    crossing = crossing._replace(looks=crossing.looks._replace(positions=positions), common=common)
+    numbers = joint.joint_numbers(crossing)
+    assert numbers[joint.TOGETHER, "swapped"] == numbers[joint.TOGETHER, "swapped_at_end"] == 0
+    assert numbers[joint.TOGETHER, "anees"] < numbers[joint.JOINT, "anees"]
