@@ -244,6 +244,16 @@ def test_targets_that_are_moved_together_are_told_apart() -> None:
     assert kept[True] >= 6 > 2 >= kept[False]
 
 
+def test_a_track_is_not_lost_for_what_all_are_wrong_by() -> None:
+    """A hundred metres that all share, where 50 m is what a place may be unknown by: new ones count."""
+    truth = lines(np.array([[0.0, 0.0]]), np.array([[1.0, 0.0]]), 15)
+    for lasting, kept in ((np.inf, True), (0.0, False)):
+        scans = moved(truth, lasting, 100.0, 0.5, np.random.default_rng(1))
+        first, *_, last = [tracks for tracks, _ in follow_many(scans, [EYE], POINTS, [lasting] * 2)]
+        assert first.identity.tolist() == [0]
+        assert (last.identity.tolist() == [0]) == kept
+
+
 def test_shared_errors_that_nobody_told_of_are_refused() -> None:
     scan = Scan(0.0, 0, np.zeros(2), np.ones((1, 2)), np.eye(2)[None], None, np.zeros((1, 2, 3)))
     with pytest.raises(WildlabError, match=r"shared errors of shape \(1, 2, 3\)"):

@@ -100,7 +100,8 @@ class TargetBeliefs(NamedTuple):
     shown
         A confirmed track is shown while it exists with a higher probability.
     forgotten
-        Below which probability it ends; ``lost_m`` standard deviation of its position above which it does.
+        Below which probability it ends; ``lost_m`` standard deviation of its position above which it does,
+        beside errors that all measurements share.
     fastest_m_s
         A track that is faster follows no target.
     moves_m, over_s

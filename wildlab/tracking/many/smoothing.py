@@ -1,7 +1,8 @@
 """Back over the tracks of many targets once the flight is over: what was seen later tells of what was before.
 
 Which measurements were of which target stays as it was taken at the time, and the covariance knows nothing
-of what was taken wrongly: among many false measurements it is too small. Kinds of hull stay merged.
+of what was taken wrongly: among many false measurements it is too small. Kinds of hull stay merged; targets
+that may also go calmly are smoothed by the lively motion.
 
 Errors that measurements share stay considered and are not estimated. With ``e`` for truth minus estimate and
 ``o`` for these errors, ``e_k = G e_k+1|k + B o_k+1 + r``, and what is left, ``r``, has nothing to do with any

@@ -164,9 +164,13 @@ def begin(
 
 
 def alive(tracks: Tracks, targets: TargetBeliefs) -> Tracks:
-    """Those that may exist, whose place is known at all, and whose speed is possible."""
+    """Those that may exist, whose place is known at all, and whose speed is possible.
+
+    What all measurements are wrong by together makes no track hard to find again: it is left out.
+    """
     mean, P = tracks.estimate()
-    good = np.trace(P[:, :2, :2], axis1=1, axis2=2) / 2 < targets.lost_m**2
+    shared = np.einsum("tk,tkij->tij", tracks.kinds, tracks.C)[:, :2]
+    good = (np.trace(P[:, :2, :2], axis1=1, axis2=2) - (shared**2).sum(axis=(1, 2))) / 2 < targets.lost_m**2
     good &= (tracks.existence > targets.forgotten) & (
         np.linalg.norm(mean[:, 2:], axis=1) < targets.fastest_m_s
     )
