@@ -13,7 +13,15 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.frames import rotation_vector_to_matrix
 from wildlab.pipeline.following.beliefs import of_flight, of_sensor
 from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe, pose_errors
-from wildlab.pipeline.many.errors import Errors, _pose_roots, laid_out, of_elements, of_pixels, told_errors
+from wildlab.pipeline.many.errors import (
+    Errors,
+    _pose_roots,
+    laid_out,
+    of_elements,
+    of_pixels,
+    said_of_pixels,
+    told_errors,
+)
 from wildlab.pipeline.many.follow import follow_all
 from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of
@@ -167,3 +175,29 @@ def test_what_is_considered_of_a_camera_is_in_its_pose() -> None:
     on_top = told_errors(flight, known, belief).pose - own
     expected = np.diag([0, 16.0, 0, 0, 0, np.radians(9.0) ** 2])
     assert np.allclose(on_top, expected)
+
+
+@pytest.mark.slow
+def test_what_is_believed_of_poses_is_said_with_its_source() -> None:
+    flight, _ = _pixels()
+    name = str(flight.table("detections")["source"].iloc[0])
+    scans = scans_of(flight, name, 0.0, "autopilot")
+    none = flight.manifest.uncertainty.model_copy(update=dict.fromkeys(
+        ("position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg", "plane_height_m")
+    ))  # fmt: skip
+    bare = replace(flight, manifest=flight.manifest.model_copy(update={"uncertainty": none}))
+    belief, _ = of_sensor(bare, scans, of_flight(bare))
+    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, belief)}
+    assert said["error of the heading, SD"] == ("2°", "assumed")
+    assert said["error of the ground's height, SD"] == ("1 m", "assumed")
+    assert said["how long errors of the pose last"] == ("the whole flight", "assumed")
+    text = f"[sensors.{name}]\ncorrelation_time_s = 40.0\n[sensors.{name}.considered.heading]\nsd_deg = 3.0\n"
+    belief, told = of_sensor(bare, scans, of_flight(bare, parse_settings(text)))
+    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, belief)}
+    assert "error of the heading, SD" not in said and "error of the roll, SD" in said
+    assert "considered error: heading" in {one.what for one in told}
+    poses = replace(scans.poses, covariance=np.tile(np.eye(6), (len(scans.times), 1, 1)))
+    belief, _ = of_sensor(bare, scans._replace(poses=poses), of_flight(bare))
+    said = {one.what: one.source for one in said_of_pixels(bare, scans._replace(poses=poses), belief)}
+    assert said["errors of the pose"] == "the poses' own" and "error of the roll, SD" not in said
+    assert "error of the ground's height, SD" in said

@@ -16,7 +16,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_jacobians
 from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
-from wildlab.pipeline.following.beliefs import Beliefs
+from wildlab.pipeline.following.beliefs import ASSUMED, STATED, Beliefs, Said
 from wildlab.pipeline.following.considering import errors_of
 from wildlab.pipeline.following.expected import SLOTS, predict_scan
 from wildlab.pipeline.georeference import (
@@ -44,6 +44,22 @@ class Errors(NamedTuple):
 
 #: Angles of `wildlab.pipeline.georeference.USUAL`.
 _DEGREES = {"roll": "roll_deg", "pitch": "pitch_deg", "heading": "yaw_deg"}
+_METRES = {
+    "platform_north": "position_horizontal_m",
+    "platform_east": "position_horizontal_m",
+    "platform_down": "position_vertical_m",
+}
+_OF_PLATFORM = _METRES | _DEGREES
+_SHARED = {
+    "position_horizontal_m": "error of the camera's position, SD of north and of east",
+    "position_vertical_m": "error of the camera's height, SD",
+    "roll_deg": "error of the roll, SD",
+    "pitch_deg": "error of the pitch, SD",
+    "yaw_deg": "error of the heading, SD",
+    "misalignment_deg": "error of the mount, SD of each axis",
+    "plane_height_m": "error of the ground's height, SD",
+}
+_OF_THE_MOUNT_AND_GROUND = ("misalignment_deg", "plane_height_m")
 #: None at all.
 NO_ERRORS = Errors((), ())
 
@@ -68,6 +84,27 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
         elif name not in _DEGREES:
             pose[:, place, place] = sd**2
     return errors._replace(pose=pose, pixel=np.diag(beliefs.noise[:2] ** 2))
+
+
+def said_of_pixels(flight: Flight, scans: Scans, beliefs: Beliefs) -> list[Said]:
+    """What is believed of the errors that all pixels of an image share, and who says so."""
+    said, stated = [], flight.manifest.uncertainty
+    taken = {_OF_PLATFORM.get(one.name) for one in beliefs.considered}
+    own = scans.poses is not None and scans.poses.covariance is not None
+    if own:
+        said.append(Said(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
+    for key, value in assumed_deviations(flight).items():
+        if key not in _SHARED or key in taken or (own and key not in _OF_THE_MOUNT_AND_GROUND):
+            continue
+        unit = "°" if key.endswith("deg") else " m"
+        source = ASSUMED if getattr(stated, key) is None else STATED
+        said.append(Said(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
+    if not taken:
+        lasts = lasting_of(beliefs)
+        words = "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
+        source = ASSUMED if np.isinf(lasts) else STATED
+        said.append(Said(scans.sensor, "how long errors of the pose last", words, source))
+    return said
 
 
 def of_pixels(

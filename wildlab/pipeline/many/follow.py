@@ -17,7 +17,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
-from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out
+from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, said_of_pixels
 from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
@@ -114,6 +114,8 @@ def follow_all(
         unused = [one for one in dict.fromkeys(more) if one.what.startswith("considered")
                   and (bearing or one.what.endswith(f": {UNKNOWN_EFFECT}"))]  # fmt: skip
         said += [one for one in dict.fromkeys(more) if one not in unused]
+        if looks.kind == "pixel":
+            said += said_of_pixels(flight, looks, belief)
         if unused:
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
