@@ -47,6 +47,7 @@ def made(
         scans=[SimpleNamespace(time=float(t), platform=platform[t]) for t in range(looks)],
         truth={name.format(i): ways[i] for i in range(targets)},
         targets=SimpleNamespace(hulls=(POINT,)),
+        cutoff_m=20.0,
     )
     return followed, compare_identities(compared, 20.0)
 

@@ -25,7 +25,12 @@ def followed(tracks: int = 2, looks: int = 61) -> Any:
     ]  # fmt: skip
     scans = [SimpleNamespace(time=float(t)) for t in range(looks)]
     return SimpleNamespace(
-        shown=shown, scans=scans, minutes=(looks - 1) / 60, targets=SimpleNamespace(hulls=(POINT,))
+        shown=shown,
+        scans=scans,
+        minutes=(looks - 1) / 60,
+        targets=SimpleNamespace(hulls=(POINT,)),
+        cutoff_m=20.0,
+        others=False,
     )
 
 
@@ -160,3 +165,15 @@ def test_names_are_only_text() -> None:
     assert not set("*`") & set(table["value"].iloc[2])
     text, *_ = said(followed(), lives(targets={"**x**": TargetLife(61, 0.0, np.nan, 0, 0)}))
     assert "**" not in text
+
+
+def test_tracks_that_may_be_farther_off_than_what_counts_are_told() -> None:
+    """Honest tracks may be beyond the cut-off where it is no three of their standard deviations."""
+    one = followed()
+    assert not any("may be" in said for said in words.summary(one, lives())[0])
+    for look in one.shown:
+        look.P[:, 0, 0] = 7.0**2
+    said = " ".join(words.summary(one, lives())[0])
+    assert "Tracks say that they may be 7" in said and "farther than 20 m counts as on nothing" in said
+    one.cutoff_m = 22.0
+    assert not any("may be" in said for said in words.summary(one, lives())[0])

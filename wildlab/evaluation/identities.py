@@ -50,6 +50,9 @@ class Scan(NamedTuple):
     complete
         Whether all targets are among these. Where not, a track on none of them may be on another one: it is
         not judged at this scan.
+    truth_sd
+        (M,) how well each of these places is known, standard deviation of each axis; one number for all. The
+        NEES has it beside a track's own covariance.
     """
 
     time: float
@@ -61,6 +64,7 @@ class Scan(NamedTuple):
     visible: ArrayLike
     ignored: ArrayLike
     complete: bool = True
+    truth_sd: ArrayLike = 0.0
 
 
 class TargetLife(NamedTuple):
@@ -152,6 +156,7 @@ class _Checked(NamedTuple):
     visible: NDArray[np.bool_]
     ignored: NDArray[np.bool_]
     complete: bool
+    truth_sd: Array
 
 
 def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
@@ -278,7 +283,17 @@ def _checked(scan: Scan) -> _Checked:
         raise WildlabError(
             f"a position at {scan.time:g} s is not finite", "leave out tracks and targets without a position"
         )
-    return _Checked(float(scan.time), x, P, identities, truth, names, visible, ignored, bool(scan.complete))
+    sd = np.asarray(scan.truth_sd, float)
+    if sd.shape not in ((), (m,)) or not (sd >= 0).all():
+        raise WildlabError(
+            f"truth_sd at {scan.time:g} s is not one number for each of {m} targets, or is below zero",
+            "give (M,) standard deviations, or one for all",
+            field="truth_sd",
+        )
+    return _Checked(
+        float(scan.time), x, P, identities, truth, names, visible, ignored, bool(scan.complete),
+        np.broadcast_to(sd, (m,)),
+    )  # fmt: skip
 
 
 def _gospa(one: _Checked, cutoff: float, order: float) -> Gospa:
@@ -380,7 +395,8 @@ def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hash
             on[identity] = on.get(identity, 0) + one.complete
             if not one.ignored[column]:
                 error = one.truth[column] - one.x[row]
-                errors.setdefault(identity, []).append((error, one.P[row]))
+                spread = one.P[row] + one.truth_sd[column] ** 2 * np.eye(len(error))
+                errors.setdefault(identity, []).append((error, spread))
     return {
         identity: TrackLife(
             count,

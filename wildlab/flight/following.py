@@ -65,6 +65,7 @@ class ManyTargetsPart(Strict):
     apart_m: Above | None = None
     calm: Annotated[float, Field(gt=0, le=1)] | None = None
     stay_s: Above | None = None
+    others: bool = False
 
 
 class ManySensorPart(Strict):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wildlab.evaluation.identities import Identities
-from wildlab.pipeline.many.follow import CUTOFF_M, Followed
+from wildlab.pipeline.many.follow import Followed
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
 from wildlab.reporting.georeferencing_cause import listed
@@ -49,7 +49,7 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
             words.parts_table(lives.gospa),
             columns={"part": "", "metres": "m", "share": "of the square (%)"},
             digits={"metres": 2, "share": 0},
-            caption=words.caption_of_gospa(),
+            caption=words.caption_of_gospa(followed.cutoff_m),
         )
     table = words.tracks_table(followed, lives)
     if not len(table):
@@ -59,9 +59,10 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
         table,
         columns={name: heading for name, heading in words.TRACKS.items() if name in table},
         digits={"from": 1, "to": 1, "looks": 0, "on": 0, "nees": 2},
-        caption="Seconds since the first look. On a target: of the looks at which the track is judged."
+        caption="Seconds since the first look."
         + (
-            " Mean NEES / 2: 1 where errors are as large as the track says, more where they are larger."
+            " On a target: of the looks at which the track is judged. Mean NEES / 2: 1 where errors are as "
+            "large as the track says, more where they are larger."
             if lives is not None
             else ""
         ),
@@ -73,6 +74,15 @@ def told_section(report: Report, followed: Followed) -> None:
     report.section("What the tracker was told", words.assumed_sentence(followed.said))
     headings = {"of": "of", "what": "what", "value": "value", "source": "from"}
     report.table(words.told_table(followed.said), columns=headings)
+
+
+def _truth_words(followed: Followed) -> str:
+    """Whose errors the truth's are."""
+    known = [sd for sd in followed.truth_sd.values() if sd > 0]
+    if len(known) == len(followed.truth):
+        return "What the truth says that it may be off itself is beside the tracks' own covariance."
+    some = "" if not known else f"of {len(followed.truth) - len(known)} of {len(followed.truth)} targets "
+    return f"The truth {some}has no standard deviation of its own: its error counts as the tracks'."
 
 
 def end_section(report: Report, followed: Followed) -> None:
@@ -95,13 +105,19 @@ def end_section(report: Report, followed: Followed) -> None:
             f"Errors of the platform's position and heading that last are in no covariance of {listed(bare)}."
         )
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
+    judged = [
+        f"A track farther than {followed.cutoff_m:g} m from every target is on nothing here, also where it "
+        "follows one whose places are that far off.",
+        _truth_words(followed),
+        "Tracks on others than the targets whose places are known are not told from tracks on nothing: state "
+        "`others = true` in [targets.many] where there are such; one beside a known target may count as its."
+        if not followed.others
+        else "A track on another target beside one whose place is known may count as on that one.",
+    ]
     report.limits(
         [
-            f"A track farther than {CUTOFF_M:g} m from every target is on nothing here, also where it "
-            "follows one whose places are that far off.",
-            "Where the truth has no standard deviation of its own, its error counts as the tracks'.",
+            *(judged if followed.truth else []),
             "A target that comes back after its track ended has another one: tracks are no count of targets.",
-            "Other things that move are tracks on nothing here, unless their true place is known too.",
             *poses,
         ]
     )

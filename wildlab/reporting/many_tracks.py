@@ -18,6 +18,8 @@ from wildlab.tracking.particles import Count, count_interval, count_probabilitie
 
 #: A target is followed well where it has a track at this share of the looks at which it can be seen.
 FOLLOWED = 0.9
+#: Of so many standard deviations hardly any honest error is larger.
+WITHIN_SDS = 3.0
 #: Mean NEES of a position, divided by two: between these a track is as far off as it says, to a factor of
 #: about 1.4 in size.
 SMALLEST, LARGEST = 0.5, 2.0
@@ -83,7 +85,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         first = f"Of {len(seen)} targets in reach, {plain(str(least))} has a track at the fewest looks, at "
     else:
         first = "The target in reach has a track at "
-    off = f"; tracks are off by {length(rms_error(lives))} (RMS of those within {CUTOFF_M:g} m)"
+    off = f"; tracks are off by {length(rms_error(lives))} (RMS of those within {followed.cutoff_m:g} m)"
     said = [
         f"{first}{_share(shares[least])} of those at which it can be seen{off if on_target(lives) else ''}.",
         f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to others')}, "
@@ -94,13 +96,33 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
         said.append(f"Judged are {len(lives.gospa)} of {looks} looks: a true place is known there.")
     if lives.incomplete:
         said.append(
-            f"At {lives.incomplete} of the judged looks not every target's true place is known: tracks on "
-            "none of the known ones are left out there."
+            "As is stated, others are about whose true places nobody knows: tracks on none of the known ones "
+            "are not judged."
+            if followed.others
+            else f"At {lives.incomplete} of the judged looks not every target's true place is known: tracks "
+            "on none of the known ones are left out there."
         )
+    if wide := _wide_words(followed):
+        said.append(wide)
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
         said.append(f"Never followed: {', '.join(plain(str(name)) for name in lost)}.")
     return said, _level(lives, shares)
+
+
+def _wide_words(followed: Followed) -> str:
+    """Where tracks may well be farther off than what counts as on a target; "" else."""
+    covariances = [look.P[:, :2, :2] for look in followed.shown if len(look.P)]
+    if not covariances:
+        return ""
+    widest = float(np.median(np.sqrt(np.linalg.eigvalsh(np.concatenate(covariances))[:, -1])))
+    if WITHIN_SDS * widest <= followed.cutoff_m:
+        return ""
+    return (
+        f"Tracks say that they may be {length(widest)} off (standard deviation of the worse axis, median), "
+        f"and what is farther than {followed.cutoff_m:g} m counts as on nothing: honest tracks may be among "
+        "it. State a larger `reach_m` in [targets]."
+    )
 
 
 def false_share(lives: Identities) -> float:
@@ -149,7 +171,10 @@ def verdict_of(followed: Followed, lives: Identities | None, level: str) -> tupl
     if never := sum(life.tracked == 0 for life in seen):
         reasons.append(f"targets never followed: {never} of {len(seen)}")
     if short := sum(0 < life.tracked < FOLLOWED for life in seen):
-        reasons.append(f"targets without a track at more than a tenth of the looks: {short} of {len(seen)}")
+        reasons.append(
+            "targets without a track at more than a tenth of the looks, those before it is confirmed "
+            f"counted too: {short} of {len(seen)}"
+        )
     nees = [track.anees / 2 for track in lives.tracks.values() if np.isfinite(track.anees)]
     if over := sum(value > LARGEST for value in nees):
         reasons.append(f"tracks farther off than they say: {over} of {len(nees)}")
@@ -299,10 +324,10 @@ def record(report: Report, followed: Followed, lives: Identities | None) -> None
             report.metric("time_to_confirm", f"target-{number}", life.time_to_confirm, "s")
 
 
-def caption_of_gospa() -> str:
-    """What GOSPA counts."""
+def caption_of_gospa(cutoff: float = CUTOFF_M) -> str:
+    """What GOSPA counts, with a cut-off in m."""
     return (
-        f"GOSPA adds the distances of tracks from their targets, and {CUTOFF_M / np.sqrt(2):.1f} m for every "
-        f"target without a track and every track on nothing, as squares; beyond {CUTOFF_M:g} m a track is on "
+        f"GOSPA adds the distances of tracks from their targets, and {cutoff / np.sqrt(2):.1f} m for every "
+        f"target without a track and every track on nothing, as squares; beyond {cutoff:g} m a track is on "
         "no target."
     )

@@ -202,3 +202,35 @@ def test_calm_motions_are_told_where_there_are_any() -> None:
     assert words[1][share] == ("0.2", "stated") and words[1][lasts] == ("12 s", "stated")
     assert (two.targets.calm, two.targets.stay_s) == (0.2, 12.0)
     assert two.shown[-1].kinds.shape == (1, 1)
+
+
+def test_what_the_truth_may_be_off_is_beside_the_tracks_own() -> None:
+    """Fixes of a receiver that is wrong by metres: without its own error tracks would be called wrong."""
+    flight = robot_flight(kind="position", seconds=200.0)
+    truth = flight.table("truth").copy()
+    rng = np.random.default_rng(0)
+    truth[["north_m", "east_m"]] += rng.normal(0, 5.0, (len(truth), 2))
+    found = []
+    for sd in (0.0, 5.0):
+        off = replace(flight, tables={**flight.tables, "truth": truth.assign(sd_horizontal_m=sd)})
+        lives = judged(follow_all(off))
+        assert lives is not None
+        found.append(max(one.anees / 2 for one in lives.tracks.values()))
+    assert found[0] > 5 and found[1] < 1.5
+
+
+def test_how_near_a_track_counts_and_whether_others_are_about_is_stated() -> None:
+    flight = robot_flight(kind="position", clutter=2, labelled=False, seed=3, heading_off_deg=8.0)
+    near, far = (
+        judged(follow_all(flight, settings=parse_settings(f"[targets]\nreach_m = {reach}\n")))
+        for reach in (5.0, 40.0)
+    )
+    assert near is not None and far is not None
+    assert near.targets["boat"].tracked < 0.5 < far.targets["boat"].tracked
+    alone = [one for one in near.tracks.values() if one.false]
+    text = "[targets]\nreach_m = 5.0\n[targets.many]\nothers = true\n"
+    followed = follow_all(flight, settings=parse_settings(text))
+    beside = judged(followed)
+    assert beside is not None and alone and not any(one.false for one in beside.tracks.values())
+    assert not complete_looks(followed).any() and beside.incomplete == len(beside.gospa)
+    assert max(one.n_false for one in beside.gospa) == 0 < max(one.n_false for one in near.gospa)

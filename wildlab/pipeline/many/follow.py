@@ -24,7 +24,8 @@ from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run
 
 Array = NDArray[np.float64]
 
-#: From this distance a track is on no target, and a target without a track: the cut-off of GOSPA, m.
+#: From this distance a track is on no target, and a target without a track: the cut-off of GOSPA, m, where no
+#: ``reach_m`` is stated.
 CUTOFF_M = 20.0
 
 
@@ -48,6 +49,12 @@ class Followed(NamedTuple):
         What was done to the detections, in sentences.
     lasting_s
         Of each error that the detections of a look share, for how long it lasts.
+    cutoff_m
+        From this distance a track is on no target: what is believed of how near detections are.
+    truth_sd
+        By target's name, m: how well its true place is known, each axis; zero where nobody says.
+    others
+        Whether targets are about of which no true place is known.
     """
 
     scans: list[Scan]
@@ -60,6 +67,9 @@ class Followed(NamedTuple):
     said: list[Said]
     notes: list[str]
     lasting_s: tuple[float, ...] = ()
+    cutoff_m: float = CUTOFF_M
+    truth_sd: Mapping[str, float] = {}
+    others: bool = False
 
     @property
     def minutes(self) -> float:
@@ -151,10 +161,12 @@ def follow_all(
     pairs.sort(key=lambda pair: pair[0].time)
     scans = [scan for scan, _ in pairs]
     shown = run_many(scans, beliefs.sensors, beliefs.targets, lasting_s)
-    truth = {}
+    truth, truth_sd = {}, {}
     if flight.truth is not None and len(flight.truth):
         times = np.array([scan.time for scan in scans])
-        truth = {one.target: one.position for one in truths_at(flight, times)}
+        known = truths_at(flight, times)
+        truth = {one.target: one.position for one in known}
+        truth_sd = {one.target: one.sd_m for one in known}
     return Followed(
         scans,
         [names for _, names in pairs],
@@ -166,6 +178,9 @@ def follow_all(
         [*said, *beliefs.said],
         notes,
         lasting_s,
+        following.reach_m if np.isfinite(following.reach_m) else CUTOFF_M,
+        truth_sd,
+        bool(told.targets.many is not None and told.targets.many.others),
     )
 
 
@@ -176,7 +191,7 @@ def known_looks(followed: Followed) -> NDArray[np.bool_]:
 
 def complete_looks(followed: Followed) -> NDArray[np.bool_]:
     """(N,) looks at which every target's true place is known: elsewhere no track is false."""
-    return known_looks(followed) & _true_places(followed).all(axis=0)
+    return known_looks(followed) & _true_places(followed).all(axis=0) & (not followed.others)
 
 
 def _true_places(followed: Followed) -> NDArray[np.bool_]:
@@ -231,9 +246,10 @@ def judged(
                 visible,
                 np.zeros(len(names), bool),
                 bool(complete[row]),
+                np.array([followed.truth_sd.get(name, 0.0) for name in names]),
             )
         )
-    return compare_identities(compared, CUTOFF_M)
+    return compare_identities(compared, followed.cutoff_m)
 
 
 def tracks_table(followed: Followed) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from matplotlib.ticker import MaxNLocator
 
 from wildlab.evaluation.identities import Identities
 from wildlab.geometry.frames import Array
-from wildlab.pipeline.many.follow import CUTOFF_M, Followed, known_looks
+from wildlab.pipeline.many.follow import Followed, known_looks
 from wildlab.reporting.charts.following import SENSOR_COLOURS, Shown
 from wildlab.reporting.figures import GREY, INK, VERMILLION, map_axes, mark_gaps, new_figure
 
@@ -107,7 +107,10 @@ def identities_shown(followed: Followed, lives: Identities) -> Shown:
     ax.set_title("No target changes its track" if not changes else f"Tracks change {_times(changes)}")
     alt = f"For {_many(len(names), 'target')} the track that is on it at each look; colours are tracks. "
     alt += "None changes." if not changes else f"They change {_times(changes)}."
-    return fig, "identities", alt, "A mark is a look with a track on the target; a colour is a track."
+    shown = {one for looks in lives.followed for one in looks.values()}
+    dark = sum(tints[one] == INK for one in shown)
+    colours = "a colour is a track" if dark < 2 else f"a colour is a track, but dark is any of {dark} others"
+    return fig, "identities", alt, f"A mark is a look with a track on the target; {colours}."
 
 
 def wrong_shown(followed: Followed, lives: Identities) -> Shown:
@@ -141,7 +144,8 @@ def wrong_shown(followed: Followed, lives: Identities) -> Shown:
     fig.legend(loc="outside lower center", ncols=2)
     mark_gaps(axes[0], times, pause)
     alt = (
-        f"GOSPA with a cut-off of {CUTOFF_M:g} m at {len(times)} looks, {distance.mean():.1f} m in the mean; "
+        f"GOSPA with a cut-off of {followed.cutoff_m:g} m at {len(times)} looks, {distance.mean():.1f} m in "
+        "the mean; "
         f"targets missed at {int((missed > 0).sum())} looks, tracks on nothing at {int((false > 0).sum())}."
     )
     caption = "Dashed: the mean. Below: targets missed upwards, tracks on nothing downwards."
