@@ -141,7 +141,7 @@ def sensor_meanings(flight: Flight) -> Iterator[s.WrongMeaning]:
                 ("east negated", np.diag([1, -1]), "east has the wrong sign"),
                 ("both negated", np.diag([-1, -1]), "north and east have the wrong sign"),
                 ("in ft", np.eye(2) / 0.3048, "in ft"),
-                ("in m, read as ft", np.eye(2) * 0.3048, "says ft"),
+                ("in m, read as ft", np.eye(2) * 0.3048, "read as ft"),
                 ("in cm", np.eye(2) * 100, "in cm"),
             ):
 

@@ -23,7 +23,7 @@ from tests.flight.checks.sabotage import WrongMeaning, wrong_meanings
 from wildlab.errors import WildlabError
 from wildlab.flight.checks.check import find
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.scans import scans_of
+from wildlab.flight.checks.sense.looks import scans_of
 from wildlab.flight.recipe.importing import import_flight
 from wildlab.flight.store import Flight
 from wildlab.geometry.georeference import georeference_pixels

@@ -1,118 +1,23 @@
-"""Positions and bearings that other sensors saw against the truth: how often something is seen where a target
-is."""
+"""What is wrong where other sensors and the truth disagree: usual mistakes about both, and clocks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 
-from wildlab.errors import WildlabError
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense import words
+from wildlab.flight.checks.sense.looks import USUAL, Scan, Scans, misfit, scans_of
 from wildlab.flight.checks.sense.places import LENGTHS, place_mistakes
-from wildlab.flight.checks.sense.trial import ALIKE, Misfit, Mistake, explain
-from wildlab.flight.clocks import frame_times, poses_at, truth_at
+from wildlab.flight.checks.sense.trial import ALIKE, Mistake, explain
+from wildlab.flight.checks.sense.turned import best_turn, turned_finding
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import Array, wrap
+from wildlab.geometry.frames import Array
 
-#: A detection is of a target within this of it: so far (m) and a share of the distance, or this angle (rad).
-NEAR_M, NEAR_SHARE, NEAR_RAD = 8.0, 0.02, np.radians(2.0)
-#: Detections looked at of one source, and the fewest that say anything.
-MOST, ENOUGH = 600, 40
-#: Among clutter and shores, this share of what a sensor sees is usually a target; below that one, none is.
-USUAL, NONE = 0.25, 0.01
 #: Clocks and zones that are tried, s.
 CLOCKS = (*np.arange(-75.0, 76.0, 1.5), -3600.0, 3600.0, -7200.0, 7200.0)
-
-
-@dataclass(frozen=True)
-class Scan:
-    """What one source saw: places (N, 3) in n or azimuths (N,), from where (N, 3), and the targets (M, N, 3);
-    targets and own place at other times; and where the bow pointed, (N,) rad from north towards east."""
-
-    source: str
-    places: Array | None
-    azimuth: Array | None
-    own: Array
-    targets: Array
-    at: Callable[[float], tuple[Array, Array]]
-    heading: Array
-
-
-def scans_of(flight: Flight) -> list[Scan]:
-    """The sources of positions and bearings, with enough detections each."""
-    detections, frames, truth = flight.detections, flight.frames, flight.truth
-    if detections is None or frames is None or truth is None or not len(truth) or not flight.nav:
-        return []
-    if frames["frame_id"].duplicated().any():
-        return []
-    # Positions for the same pixels are answers of another program, and judged with them.
-    if (detections["kind"] == "pixel").any():
-        return []
-    found = []
-    nav = next(iter(flight.nav.values()))
-    for (source, kind), rows in detections.groupby(["source", "kind"], sort=False):
-        if kind not in ("position", "bearing", "range-bearing") or len(rows) < ENOUGH:
-            continue
-        rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, MOST).astype(int))]
-        frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
-        rows, frame = rows[frame >= 0], frame[frame >= 0]
-        try:
-            times = frame_times(flight)[frame]
-            ids = rows["frame_id"]
-
-            def at(shift: float, times: Array = times, ids: pd.Series = ids) -> tuple[Array, Array]:
-                own, _, _ = poses_at(nav, times, ids)
-                offset = flight.manifest.clocks.truth_offset_s
-                return own, truth_at(truth, times + shift, offset_s=offset)[1]
-
-            own, targets = at(0.0)
-            R = poses_at(nav, times, ids)[1]
-        except (WildlabError, ValueError):  # said by the checks of times
-            continue
-        if len(rows) < ENOUGH:
-            continue
-        position = kind == "position"
-        found.append(
-            Scan(
-                str(source),
-                rows[["north_m", "east_m", "down_m"]].to_numpy(float) if position else None,
-                None if position else rows["azimuth_rad"].to_numpy(float),
-                own,
-                targets,
-                at,
-                np.arctan2(R[:, 1, 0], R[:, 0, 0]),
-            )
-        )
-    return found
-
-
-def hits(s: Scan) -> Array:
-    """Whether each detection is where a target is, (N,), 0 or 1."""
-    away = s.targets - s.own
-    distance = np.hypot(away[..., 0], away[..., 1])
-    with np.errstate(invalid="ignore"):
-        if s.places is not None:
-            off = np.hypot(*np.moveaxis((s.targets - s.places)[..., :2], -1, 0))
-            near = off < NEAR_M + NEAR_SHARE * distance
-        else:
-            off = np.abs(wrap(s.azimuth - np.arctan2(away[..., 1], away[..., 0])))
-            near = off < NEAR_RAD
-    return np.asarray(near.any(axis=0), float)
-
-
-def misfit(scans: tuple[Scan, ...]) -> Misfit:
-    """The usual share of hits over the one there is, (2, 3), the mean of all sources; both rows alike."""
-    result = np.zeros(3)
-    for s in scans:
-        hit = hits(s)
-        half = np.arange(len(hit)) // 10 % 2 == 0
-        shares = [float(hit[rows].mean()) for rows in (half | True, half, ~half)]
-        result += np.log(np.maximum(shares, NONE)) / len(scans)
-    return USUAL * np.tile(np.exp(-result), (2, 1))
 
 
 def scans(flight: Flight) -> Iterator[Finding]:
@@ -122,24 +27,32 @@ def scans(flight: Flight) -> Iterator[Finding]:
         return
     named = explain(misfit, given, common_mistakes(flight))
     of_each = [explain(misfit, (one,), source_mistakes(one)) for one in given]
-    if named:
-        # What concerns all is simpler; but it is not it where the sources' own mistakes explain far more.
-        undone = tuple(own[0].undone[0] if own else one for one, own in zip(given, of_each, strict=True))
-        if misfit(named[0].undone)[0, 0] > ALIKE * misfit(undone)[0, 0]:
-            named = []
+    # Each source as its own mistakes leave it, where it has any.
+    undone = tuple(own[0].undone[0] if own else one for one, own in zip(given, of_each, strict=True))
+    turn = best_turn(given, [*(one.undone for one in named), *([undone] if any(of_each) else [])])
+    if turn is not None:
+        yield turned_finding(given, turn)
+        return
+    # What concerns all is simpler; but it is not it where the sources' own mistakes explain far more.
+    if named and misfit(named[0].undone)[0, 0] > ALIKE * misfit(undone)[0, 0]:
+        named = []
     if named:
         share, then = (100 * USUAL / misfit(x)[0, 0] for x in (given, named[0].undone))
         yield Finding(
             "problem",
             "truth",
             "",
-            f"{share:.0f} % of the detections are where a target is: "
+            f"{share:.0f} % of the detections of a look are where a target is (mean of all looks): "
             f"{' or '.join(one.mistake.said for one in named)}; then it is {then:.0f} %",
             words.fixes([one.mistake.write for one in named]),
             tuple(one.mistake.cause for one in named),
         )
         return
     for one, own in zip(given, of_each, strict=True):
+        turn = best_turn((one,), [way.undone for way in own])
+        if turn is not None:
+            yield turned_finding((one,), turn)
+            continue
         if not own:
             continue
         share, then = (100 * USUAL / misfit(x)[0, 0] for x in ((one,), own[0].undone))
@@ -147,14 +60,11 @@ def scans(flight: Flight) -> Iterator[Finding]:
             "problem",
             "detections",
             "north_m" if one.places is not None else "azimuth_rad",
-            f"{share:.0f} % of the detections of {one.source} are where a target is: "
-            f"{' or '.join(way.mistake.said for way in own)}; then it is {then:.0f} %",
+            f"{share:.0f} % of the detections of {one.source} in a look are where a target is (mean of all "
+            f"looks): {' or '.join(way.mistake.said for way in own)}; then it is {then:.0f} %",
             words.fixes([way.mistake.write for way in own]),
             tuple(way.mistake.cause for way in own),
         )
-
-
-Scans = tuple[Scan, ...]
 
 
 def common_mistakes(flight: Flight) -> Iterator[Mistake[Scans]]:
@@ -202,33 +112,38 @@ def _later(s: Scan, by: float) -> Scan:
 
 def source_mistakes(one: Scan) -> Iterator[Mistake[Scans]]:
     """Mistakes about the positions or the bearings of one source."""
-    part = f"detections of {one.source}"
+    block = f'the [[detections]] with source = "{one.source}"'
 
     def each(change: Callable[[Scan], Scan]) -> Callable[[Scans], Scans]:
         return lambda given: tuple(change(s) for s in given)
 
     if one.places is not None:
+        part, of = "detections.position", f" of {block}"
         for cause, key, matrix in (
-            ("north and east are exchanged", "exchange north and east", [[0, 1, 0], [1, 0, 0], [0, 0, 1]]),
-            ("north has the wrong sign", words.negate("north", part), np.diag([-1, 1, 1])),
-            ("east has the wrong sign", words.negate("east", part), np.diag([1, -1, 1])),
+            (
+                "north and east are exchanged",
+                words.exchange("north", "east", part) + of,
+                [[0, 1, 0], [1, 0, 0], [0, 0, 1]],
+            ),
+            ("north has the wrong sign", words.negate("north", part) + of, np.diag([-1, 1, 1])),
+            ("east has the wrong sign", words.negate("east", part) + of, np.diag([1, -1, 1])),
             (
                 "north and east have the wrong sign",
-                words.negate("north and east", part),
+                words.negate("north and east", part) + of,
                 np.diag([-1, -1, 1]),
             ),
             *(
                 (
-                    f"it is in {unit}, and the recipe says m",
-                    words.unit("north and east", part, unit),
+                    f"it is in {unit}, and was read as m",
+                    words.unit("north and east", part, unit) + of,
                     k * np.eye(3),
                 )
                 for unit, k in LENGTHS.items()
             ),
             *(
                 (
-                    f"it is in m, and the recipe says {unit}",
-                    words.unit("north and east", part, "m"),
+                    f"it is in m, and was read as {unit}",
+                    words.unit("north and east", part, "m") + of,
                     np.eye(3) / k,
                 )
                 for unit, k in LENGTHS.items()
@@ -241,39 +156,64 @@ def source_mistakes(one: Scan) -> Iterator[Mistake[Scans]]:
                 each(lambda s, M=np.array(matrix, float): replace(s, places=s.places @ M.T)),  # type: ignore[misc]  # noqa: B008
             )
         return
+    azimuth = f"`azimuth` in {block}"
+    towards = "it counts from true north towards east"
     for cause, write, bearing in (
-        ("the bearing counts to the left (wrong sign)", words.negate("azimuth", part), lambda a: -a),
-        ("the bearing is off by 90 deg: it counts from east", "plus 90 deg", lambda a: a + np.pi / 2),
-        ("the bearing is off by -90 deg: it counts from west", "minus 90 deg", lambda a: a - np.pi / 2),
-        ("the bearing is off by 180 deg: it counts from south", "plus 180 deg", lambda a: a + np.pi),
-        ("the bearing counts to the left from east", "90 deg minus the bearing", lambda a: np.pi / 2 - a),
-        ("the bearing counts to the left from west", "-90 deg minus it", lambda a: -np.pi / 2 - a),
-        ("the bearing counts to the left from south", "180 deg minus it", lambda a: np.pi - a),
         (
-            "the bearing is in degrees, and the recipe says rad",
-            words.unit("azimuth", part, "deg"),
+            "the bearing counts to the left (wrong sign)",
+            f"turn `negate` of {azimuth}: {towards}",
+            lambda a: -a,
+        ),
+        (
+            "the bearing is off by 90 deg: it counts from east",
+            f"the bearing plus 90 deg as {azimuth}: {towards}",
+            lambda a: a + np.pi / 2,
+        ),
+        (
+            "the bearing is off by -90 deg: it counts from west",
+            f"the bearing minus 90 deg as {azimuth}: {towards}",
+            lambda a: a - np.pi / 2,
+        ),
+        (
+            "the bearing is off by 180 deg: it counts from south",
+            f"the bearing plus 180 deg as {azimuth}: {towards}",
+            lambda a: a + np.pi,
+        ),
+        (
+            "the bearing counts to the left from east",
+            f"90 deg minus the bearing as {azimuth}: {towards}",
+            lambda a: np.pi / 2 - a,
+        ),
+        (
+            "the bearing counts to the left from west",
+            f"-90 deg minus the bearing as {azimuth}: {towards}",
+            lambda a: -np.pi / 2 - a,
+        ),
+        (
+            "the bearing counts to the left from south",
+            f"180 deg minus the bearing as {azimuth}: {towards}",
+            lambda a: np.pi - a,
+        ),
+        (
+            "the bearing is in degrees, and was read as radians",
+            f'`unit = "deg"` of {azimuth}',
             np.radians,
         ),
         (
-            "the bearing is in radians, and the recipe says deg",
-            words.unit("azimuth", part, "rad"),
+            "the bearing is in radians, and was read as degrees",
+            f'`unit = "rad"` of {azimuth}',
             np.degrees,
         ),
     ):
         yield Mistake(
             f"{one.source}: {cause}",
             cause,
-            f"{write} for the azimuth of the {part}, from true north towards east",
+            write,
             each(lambda s, b=bearing: replace(s, azimuth=b(s.azimuth))),  # type: ignore[misc]
         )
     yield Mistake(
         f"{one.source}: the bearing counts from the bow",
-        "the bearing counts from the bow, and the recipe says from north",
-        f'`counts_from = "bow"` for the {part}',
+        "the bearing counts from the bow, and was taken to count from north",
+        f'`counts_from = "bow"` in {block}',
         each(lambda s: replace(s, azimuth=s.azimuth + s.heading)),  # type: ignore[operator]
     )
-
-
-def share_of(s: Scan) -> float:
-    """Share of the detections of a source that are where a target is."""
-    return float(hits(s).mean())

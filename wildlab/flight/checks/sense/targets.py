@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from wildlab.flight.checks.findings import Finding
-from wildlab.flight.checks.sense.scans import NEAR_M, Scan, scans_of
+from wildlab.flight.checks.sense.looks import NEAR_M, Scan, scans_of
 from wildlab.flight.checks.sense.trial import FAR_BETTER_ALONE
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array

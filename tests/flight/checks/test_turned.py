@@ -1,0 +1,185 @@
+"""A heading that is off by some degrees is said as such, and other mistakes are still found beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wildlab.flight.checks.check import check_flight
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense.looks import Scan, seen_at
+from wildlab.flight.checks.sense.turned import best_turn, turned
+from wildlab.flight.store import Flight
+from wildlab.geometry.frames import wrap
+
+Make = Callable[..., Flight]
+
+#: Where five boats are at first, and how fast they go, m and m/s, north and east.
+BOATS = np.array(
+    [
+        [150.0, -120.0, 1.0, 3.0],
+        [150.0, 140.0, 1.2, -3.0],
+        [320.0, -90.0, 1.0, 2.0],
+        [330.0, 100.0, 1.0, -2.2],
+        [60.0, 80.0, 2.0, 0.0],
+    ]
+)
+
+
+def watched(make: Make, off_deg: float = 0.0, late_s: float = 0.0, clutter: int = 1) -> Flight:
+    """Five moving boats and clutter in 60 looks of a radar; bearings are too large by `off_deg`, and the
+    truth has the stamps of `late_s` before."""
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 120.0, 2.0)
+    flight = make()
+    flight.nav.clear()
+    # The way bends, or all could as well be mirrored about it.
+    aside = 60 * np.sin(t / 25)
+    nav = pd.DataFrame({"time_s": t, "north_m": 2.0 * t, "east_m": aside, "down_m": 0.0, "q_w": 1.0})
+    flight.nav["compass"] = nav.assign(q_x=0.0, q_y=0.0, q_z=0.0)
+    frames = pd.DataFrame({"frame_id": [f"l{k}" for k in range(len(t))], "time_s": t, "sensor": "radar"})
+    flight.tables["frames"] = frames
+    truth, seen = [], []
+    for name, (north, east, v_north, v_east) in zip("abcde", BOATS, strict=True):
+        # Boats turn, so that no shift in time is a turn about the radar.
+        sway = 15 * np.sin(t / 9 + ord(name))
+        place = {"north_m": north + v_north * t, "east_m": east + v_east * t + sway, "down_m": 0.0}
+        truth.append(pd.DataFrame({"target_id": name, "time_s": t - late_s, **place}))
+        to = np.arctan2(place["east_m"] - aside, place["north_m"] - 2.0 * t)
+        seen.append((to + rng.normal(0, np.radians(0.4), len(t)), 200.0))
+    seen += [(rng.uniform(-np.pi, np.pi, len(t)), 300.0) for _ in range(clutter)]
+    flight.tables["truth"] = pd.concat(truth, ignore_index=True)
+    rows = [
+        pd.DataFrame(
+            {"frame_id": frames["frame_id"], "azimuth_rad": bearing + np.radians(off_deg), "range_m": r}
+        )
+        for bearing, r in seen
+    ]
+    detections = pd.concat(rows, ignore_index=True).assign(source="radar", kind="range-bearing")
+    detections["detection_id"] = [str(k) for k in range(len(detections))]
+    flight.tables["detections"] = detections
+    return flight
+
+
+def said(flight: Flight) -> list[Finding]:
+    """What is explained by a mistake; that an angle is beyond what is possible is said beside it."""
+    return [one for one in check_flight(flight) if one.causes and one.causes != ("beyond bounds",)]
+
+
+@pytest.mark.parametrize("off_deg", [-10.0, -4.0, -3.0, 3.0, 4.0, 15.0])
+def test_a_heading_that_is_off_is_a_warning_with_the_angle_and_nothing_else(
+    make_flight: Make, off_deg: float
+) -> None:
+    (found,) = said(watched(make_flight, off_deg))
+    assert found.level == "warning" and found.causes == ("heading off",)
+    told = float(found.sentence.partition("off by about ")[2].split(" deg")[0])
+    assert abs(told - off_deg) < 0.3
+    assert f"turned to the {'left' if off_deg > 0 else 'right'} by" in found.sentence
+    assert f"sd_deg = {abs(told):.1f}` in [sensors.radar.considered.heading]" in found.fix
+    assert f"by {-told:+.1f} deg and import again" in found.fix
+
+
+def test_a_heading_that_is_right_is_no_finding(make_flight: Make) -> None:
+    assert said(watched(make_flight)) == []
+
+
+@pytest.mark.parametrize("late_s", [-12.0, 15.0, 30.0])
+def test_a_clock_that_is_off_is_told_from_a_heading(make_flight: Make, late_s: float) -> None:
+    (found,) = said(watched(make_flight, late_s=late_s))
+    assert found.level == "problem" and all(cause.startswith("clock of the truth") for cause in found.causes)
+    assert f"truth_offset_s = {late_s:g}`" in found.fix
+
+
+@pytest.mark.parametrize(
+    ("reads", "cause"),
+    [
+        (lambda a: -a, "to the left (wrong sign)"),
+        (lambda a: a - np.pi / 2, "it counts from east"),
+        (np.degrees, "in degrees, and was read as radians"),
+    ],
+)
+def test_gross_mistakes_of_bearings_are_told_from_a_heading(
+    make_flight: Make, reads: Callable[[pd.Series], pd.Series], cause: str
+) -> None:
+    flight = watched(make_flight)
+    detections = flight.table("detections")
+    detections["azimuth_rad"] = reads(detections["azimuth_rad"])
+    (found,) = said(flight)
+    assert found.level == "problem" and cause in found.sentence
+    # What is written can be found in a recipe, and nothing is said of what stands there now.
+    assert '`azimuth` in the [[detections]] with source = "radar"' in found.fix
+    assert "the recipe says" not in found.sentence + found.fix
+
+
+def test_exchanged_axes_of_the_truth_are_told_from_a_heading(make_flight: Make) -> None:
+    flight = watched(make_flight)
+    truth = flight.table("truth")
+    truth[["north_m", "east_m"]] = truth[["east_m", "north_m"]].to_numpy()
+    (found,) = said(flight)
+    assert found.level == "problem" and "truth: north and east are exchanged" in found.sentence
+
+
+def test_only_the_sensor_that_is_turned_is_named(make_flight: Make) -> None:
+    flight = watched(make_flight)
+    good, bad = flight.table("detections"), watched(make_flight, 5.0).table("detections")
+    frames = flight.table("frames")
+    flight.tables["frames"] = pd.concat(
+        [frames, frames.assign(frame_id="h" + frames["frame_id"], sensor="horizon")], ignore_index=True
+    ).sort_values("time_s", kind="stable", ignore_index=True)
+    bad = bad.assign(source="horizon", frame_id="h" + bad["frame_id"], detection_id="h" + bad["detection_id"])
+    flight.tables["detections"] = pd.concat([good, bad], ignore_index=True)
+    (found,) = said(flight)
+    assert found.causes == ("heading off",)
+    assert "of horizon in a look" in found.sentence and "[sensors.horizon." in found.fix
+
+
+def test_one_look_full_of_clutter_is_no_mistake(make_flight: Make) -> None:
+    flight = watched(make_flight)
+    rng = np.random.default_rng(3)
+    azimuth = rng.uniform(-np.pi, np.pi, 4000)
+    clutter = pd.DataFrame({"frame_id": "l15", "azimuth_rad": azimuth, "range_m": 300.0, "source": "radar"})
+    clutter = clutter.assign(kind="range-bearing", detection_id=[f"x{k}" for k in range(4000)])
+    flight.tables["detections"] = pd.concat([flight.table("detections"), clutter], ignore_index=True)
+    assert said(flight) == []
+    # And a mistake is as plain beside it as without.
+    detections = flight.table("detections")
+    detections["azimuth_rad"] += np.radians(4.0)
+    (found,) = said(flight)
+    assert found.causes == ("heading off",)
+
+
+@given(by=st.floats(-20.0, 20.0))
+@settings(max_examples=20, deadline=None)
+def test_places_and_bearings_are_turned_alike(by: float) -> None:
+    """Turning places about the own one turns the bearings to them, and keeps the distance."""
+    rng = np.random.default_rng(5)
+    own, places = rng.normal(0, 50, (9, 3)), rng.normal(0, 200, (9, 3))
+    nothing = np.zeros((1, 9, 3))
+    scan = Scan("a", places, None, own, nothing, lambda t: (own, nothing), np.zeros(9), np.arange(9))
+    bearings = replace(scan, places=None, azimuth=seen_at(scan))
+    np.testing.assert_allclose(wrap(seen_at(turned(scan, by)) - seen_at(turned(bearings, by))), 0, atol=1e-9)
+    new = turned(scan, by).places
+    assert new is not None
+    np.testing.assert_allclose(np.linalg.norm(new - own, axis=1), np.linalg.norm(places - own, axis=1))
+
+
+def test_positions_are_turned_about_the_own_place() -> None:
+    """A lidar that is 6 deg off, from places that move."""
+    rng = np.random.default_rng(6)
+    own = np.column_stack([np.linspace(0, 200, 80), np.zeros((80, 2))])
+    targets = np.tile([[[150.0, 120.0, 0.0]], [[30.0, -160.0, 0.0]]], (1, 80, 1))
+    places = targets[rng.integers(0, 2, 80), np.arange(80)] + rng.normal(0, 0.5, (80, 3))
+    scan = Scan("lidar", places, None, own, targets, lambda t: (own, targets), np.zeros(80), np.arange(80))
+    found = best_turn((turned(scan, 6.0),), [])
+    assert found is not None and abs(found + 6.0) < 0.3
+    assert best_turn((scan,), []) is None
+    # Another explanation that brings all of it to targets, where the turn leaves a fifth, is the better one.
+    other = np.where(np.arange(80)[:, None] % 5 == 0, places + 50.0, places)
+    assert best_turn((turned(replace(scan, places=other), 6.0),), []) is not None
+    assert best_turn((turned(replace(scan, places=other), 6.0),), [(scan,)]) is None
