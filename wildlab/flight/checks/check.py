@@ -16,6 +16,7 @@ from wildlab.flight.checks.flown import why_no_start
 from wildlab.flight.checks.sense.sense import sense
 from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.terrain import terrain_findings
+from wildlab.flight.checks.times import gaps, overlap
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
@@ -65,7 +66,8 @@ def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
     found = [
         *findings.values(flight),
         *findings.order(flight),
-        *findings.overlap(flight),
+        *overlap(flight),
+        *gaps(flight),
         *findings_seen.truth_place(flight),
         *findings_seen.identity(flight),
         *sensors(flight),

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from wildlab.flight.clocks import covariances, frame_times
+from wildlab.flight.clocks import covariances
 from wildlab.flight.files import printable
 from wildlab.flight.schema import NAV, TABLES, extra_columns
 from wildlab.flight.store import Flight
@@ -19,9 +19,6 @@ Level = Literal["problem", "warning", "note"]
 
 #: Logs print quaternions with few digits: four leave an error of 2e-4 in the norm.
 NORM_TOLERANCE = 1e-3
-
-#: Logs do not begin and end together: fewer frames outside than this share are good to know, no more.
-FEW_OUTSIDE = 0.02
 
 POSE = ("time_s", "north_m", "east_m", "down_m", "q_w", "q_x", "q_y", "q_z")
 QUATERNION = ("q_w", "q_x", "q_y", "q_z")
@@ -176,55 +173,6 @@ def _increasing(name: str, times: pd.Series, whose: str) -> Iterator[Finding]:
             f"{times.iloc[row - 1]:.3f} s in row {row - 1} is followed by {times.iloc[row]:.3f} s",
             "look at those rows for a wrong stamp or a clock that was set back, and mend it; else sort the "
             "rows by time and take out repeated ones",
-        )
-
-
-def overlap(flight: Flight) -> Iterator[Finding]:
-    """Whether poses, frames and truth are of the same time."""
-    frames = flight.frames
-    if frames is None or len(frames) == 0:
-        return
-    times = frame_times(flight)
-    for name, nav in flight.nav.items():
-        if "frame_id" in nav:
-            lost = ~frames["frame_id"].isin(nav["frame_id"]).to_numpy()
-            if lost.any():
-                first = frames["frame_id"].iloc[first_row(lost)]
-                yield Finding(
-                    "problem" if lost.all() else "warning",
-                    f"nav/{name}",
-                    "frame_id",
-                    f"{count(lost, 'frame')} without a pose, first {first!r}",
-                    "check that both tables name the frames alike",
-                )
-        elif len(nav):
-            stamps = nav["time_s"].to_numpy()
-            yield from _within(f"nav/{name}", "poses", times, stamps, "frames")
-    if flight.truth is not None and flight.manifest.time.kind == "utc":
-        for target, rows in flight.truth.groupby("target_id", sort=False):
-            stamps = rows["time_s"].to_numpy() + flight.manifest.clocks.truth_offset_s
-            if np.isfinite(stamps).any():
-                yield from _within("truth", f"truth of {target!r}", times, stamps, "frames")
-
-
-def _within(table: str, what: str, times: np.ndarray, stamps: np.ndarray, of: str) -> Iterator[Finding]:
-    if not (np.isfinite(times).any() and np.isfinite(stamps).any()):
-        return
-    low, high = np.nanmin(stamps), np.nanmax(stamps)
-    outside = ~((times >= low) & (times <= high))
-    if outside.any():
-        few = outside.mean() < FEW_OUTSIDE
-        runs = "run" if what == "poses" else "runs"
-        yield Finding(
-            "problem" if outside.all() else "note" if few else "warning",
-            table,
-            "time_s",
-            f"the {what} {runs} from {low:.3f} s to {high:.3f} s, the {of} from {np.nanmin(times):.3f} s to "
-            f"{np.nanmax(times):.3f} s: "
-            + ("they do not overlap in time" if outside.all() else f"{count(outside, 'frame')} outside"),
-            "check the time zone, the format and the unit of the stamps of both, and [clocks]"
-            if outside.all()
-            else "check the time zone of both, and [clocks]",
         )
 
 
