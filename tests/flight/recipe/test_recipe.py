@@ -14,13 +14,16 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.check import check_flight
 from wildlab.flight.clocks import covariances
 from wildlab.flight.recipe.parts import Attitude, Stamp, parse_zone
 from wildlab.flight.recipe.poses import _covariance, _rotation
+from wildlab.flight.recipe.raw import RawFiles
 from wildlab.flight.store import Flight
 from wildlab.flight.units import UNITS, factor
 from wildlab.geometry.flodell import geodetic_to_enu_linear
 from wildlab.geometry.frames import euler_to_matrix, geodetic_to_ned, matrix_to_euler, quaternion_to_matrix
+from wildlab.runner.track_many import track_many
 
 ORIGIN = {"latitude_deg": 63.44, "longitude_deg": 10.4, "height_m": 40.0}
 ANGLES = {name: {"column": name, "unit": "deg"} for name in ("roll", "pitch", "yaw")}
@@ -217,6 +220,52 @@ def test_a_range_needs_no_elevation(raw: Any) -> None:
     assert list(detections["kind"]) == ["pixel"] * 3 + ["range-bearing"] * 3
     assert detections["range_m"].iloc[3] == 2000.0
     assert "elevation_rad" not in detections
+
+
+def test_a_night_in_which_nothing_was_detected_is_imported(raw: Any) -> None:
+    raw.tables["clicks.csv"] = "photo,x,y,what\n"
+    flight = raw.run()
+    assert len(flight.table("detections")) == 0 and len(flight.table("frames")) == 3
+    (told,) = [one for one in check_flight(flight) if one.table == "detections"]
+    assert told.level == "warning"
+    assert told.sentence == (
+        "detections: nothing was detected in this flight: of 3 frames, none has a detection."
+    )
+    with pytest.raises(WildlabError, match="there are no detections, so there is nothing to follow"):
+        track_many(flight.folder)
+
+
+def test_one_sensor_that_saw_nothing_leaves_the_others_alone(raw: Any) -> None:
+    before = raw.run().table("detections")
+    raw.into.rename(raw.folder / "old")
+    raw.tables["hits.csv"] = "photo,bearing\n"
+    azimuth = {"column": "bearing", "unit": "deg"}
+    radar = {
+        "source": "radar",
+        "file": "hits.csv",
+        "frame": "photo",
+        "azimuth": azimuth,
+        "counts_from": "bow",
+    }
+    raw.recipe["detections"] += [radar]
+    pd.testing.assert_frame_equal(raw.run().table("detections")[before.columns], before)
+
+
+def test_a_column_is_missed_where_nothing_was_detected_too(raw: Any) -> None:
+    raw.tables["clicks.csv"] = "photo,x,what\n"
+    with pytest.raises(WildlabError, match=r"y .*this column is missing"):
+        raw.run()
+    raw.tables["clicks.csv"] = ""
+    with pytest.raises(WildlabError, match="there are no rows in it"):
+        raw.run()
+
+
+def test_a_file_without_rows_is_refused_where_rows_are_needed_after_all(tmp_path: Any) -> None:
+    (tmp_path / "clicks.csv").write_text("photo,x\n")
+    files = RawFiles(tmp_path, tmp_path / "recipe.toml")
+    assert len(files.table("clicks.csv", ",", "detections", may_be_empty=True)) == 0
+    with pytest.raises(WildlabError, match="there are no rows in it"):
+        files.table("clicks.csv", ",", "truth")
 
 
 def _head_up(raw: Any, yaws_deg: list[float], bearings: list[float]) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from wildlab.flight.checks.sense.sense import sense
 from wildlab.flight.checks.sensors import sensors
 from wildlab.flight.checks.terrain import terrain_findings
 from wildlab.flight.checks.times import gaps, overlap
+from wildlab.flight.checks.twice import twice
 from wildlab.flight.checksums import manifest_changed
 from wildlab.flight.clocks import covariances
 from wildlab.flight.store import Flight
@@ -71,6 +72,7 @@ def find(flight: Flight, *, meaning: bool = True) -> list[Finding]:
         *findings_seen.truth_place(flight),
         *findings_seen.identity(flight),
         *sensors(flight),
+        *twice(flight),
         *findings_seen.image(flight),
         *findings_inertial.inertial(flight),
         *terrain_findings(flight),
@@ -168,6 +170,10 @@ def _kinds(flight: Flight) -> set[str]:
     return set() if flight.detections is None else set(flight.detections["kind"])
 
 
+def _seen(flight: Flight) -> pd.DataFrame:
+    return pd.DataFrame() if flight.detections is None else flight.detections
+
+
 def _missing(flight: Flight) -> Iterator[Finding]:
     if not flight.nav:
         yield Finding(
@@ -188,8 +194,15 @@ def _missing(flight: Flight) -> Iterator[Finding]:
         )
         return
     if flight.detections is None or len(flight.detections) == 0:
-        fix = "add detections, or use the flight for navigation only"
-        yield Finding("warning", "detections", "", "nothing was detected in this flight", fix)
+        said, fix = (
+            "nothing was detected in this flight",
+            "add detections, or use the flight for navigation only",
+        )
+        if flight.detections is not None and flight.frames is not None and len(flight.frames):
+            what = "look" if "sensor" in flight.frames else "frame"
+            said += f": of {_some(len(flight.frames), what)}, none has a detection"
+            fix = "leave it where that is so, there is nothing to track then; else look at that file"
+        yield Finding("warning", "detections", "", said, fix)
     elif flight.frames is None and "pixel" in _kinds(flight):
         fix = "add the table of frames"
         yield Finding("problem", "frames", "", "there are pixels, but no frames they could be in", fix)
@@ -201,8 +214,9 @@ def _missing(flight: Flight) -> Iterator[Finding]:
             "there is no truth: positions can be computed and tracked, but their errors cannot be judged",
             "add surveyed points, or the GPS track of a target",
         )
-    elif flight.manifest.scoring.rule == "labelled" and flight.detections is not None:
-        labelled = "target_id" in flight.detections and (flight.detections["target_id"] != "").any()
+    elif flight.manifest.scoring.rule == "labelled" and len(_seen(flight)):
+        seen = _seen(flight)
+        labelled = "target_id" in seen and (seen["target_id"] != "").any()
         if not labelled and flight.truth["target_id"].nunique() > 1:
             yield Finding(
                 "warning",

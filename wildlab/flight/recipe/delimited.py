@@ -28,7 +28,7 @@ pa: Any = pyarrow
 
 
 def read_delimited(
-    path: Path, data: bytes, separator: str
+    path: Path, data: bytes, separator: str, *, may_be_empty: bool = False
 ) -> tuple[tuple[str, ...], dict[str, Any], NDArray[np.int64]]:
     """A file of text whose first line has the names of the columns.
 
@@ -40,6 +40,8 @@ def read_delimited(
         What is in it.
     separator
         Between the cells of a row.
+    may_be_empty
+        Whether the names of the columns may be all there is, as where nothing was detected.
 
     Returns
     -------
@@ -67,10 +69,10 @@ def read_delimited(
     except UnicodeDecodeError:
         line = data[: _first_undecodable(data)].count(b"\n") + 1
         raise WildlabError(f"line {line} is not UTF-8 text", "save the file as UTF-8", file=path) from None
-    if not lines:
+    if not lines and not (may_be_empty and any(header)):
         raise WildlabError("there are no rows in it", "give it a line of column names and rows", file=path)
-    cells = {name: pa.chunked_array(chunks) for name, chunks in zip(header, packed, strict=True)}
-    return header, cells, np.concatenate(lines)
+    cells = {name: pa.chunked_array(chunks, pa.string()) for name, chunks in zip(header, packed, strict=True)}
+    return header, cells, np.concatenate([np.empty(0, np.int64), *lines])
 
 
 def packed(words: Iterable[str]) -> Any:

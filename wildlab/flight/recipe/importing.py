@@ -149,7 +149,8 @@ def _build(recipe: Recipe, raw: RawFiles) -> Flight:
             read_detections(one, raw, recipe, f"detections[{i}]", frames, places, image, of_frame)
             for i, one in enumerate(recipe.detections)
         ]
-        tables["detections"] = pd.concat(detections, ignore_index=True)
+        filled = [one for one in detections if len(one)]
+        tables["detections"] = pd.concat(filled or detections, ignore_index=True)
         # Files of detections are read last; the manifest names them too.
         manifest = _manifest(recipe, raw, camera, places, epoch, manifest.description)
     return Flight(manifest, nav, tables)

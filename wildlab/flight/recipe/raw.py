@@ -109,9 +109,9 @@ class RawFiles:
         self.hashes[name] = hashlib.sha256(data).hexdigest()
         return data
 
-    def table(self, name: str, separator: str, part: str) -> RawTable:
-        """A file as a table of text, its first line the names of the columns; or one of the tables that the
-        recipe makes of MATLAB files and logs.
+    def table(self, name: str, separator: str, part: str, *, may_be_empty: bool = False) -> RawTable:
+        """A file as a table of text, its first line the names of the columns (and all there is, where it may
+        be empty); or one of the tables that the recipe makes of MATLAB files and logs.
 
         Raises
         ------
@@ -125,8 +125,13 @@ class RawFiles:
             return self._matlab_table(name)
         if (name, separator) not in self._tables:
             data = self.read(name, part)
-            header, cells, lines = read_delimited(self.folder / name, data, separator)
-            self._tables[name, separator] = RawTable(self.folder / name, header, cells, lines)
+            header, cells, lines = read_delimited(
+                self.folder / name, data, separator, may_be_empty=may_be_empty
+            )
+            table = RawTable(self.folder / name, header, cells, lines)
+            if not len(table):
+                return table  # kept, it would pass where rows are asked for
+            self._tables[name, separator] = table
         return self._tables[name, separator]
 
     def _matlab_table(self, name: str) -> RawTable:
@@ -193,16 +198,16 @@ class RawFiles:
                 self._logs[key] = read_log(self.folder / block.file, data, block.format, block.zone)
         return self._logs[key]
 
-    def series(self, block: Series, part: str) -> RawTable:
-        """The rows of a table that count.
+    def series(self, block: Series, part: str, *, may_be_empty: bool = False) -> RawTable:
+        """The rows of a table that count; none of a text file without rows, where it may be empty.
 
         Raises
         ------
         WildlabError
             As `table`; and where a column of a condition is missing or not of numbers, or no row counts.
         """
-        table = self.table(block.file, block.separator, part)
-        if not block.changed and not block.where:
+        table = self.table(block.file, block.separator, part, may_be_empty=may_be_empty)
+        if not len(table) or (not block.changed and not block.where):
             return table
         counts = np.ones(len(table), bool)
         if block.changed:

@@ -148,7 +148,7 @@ def read_detections(
         Where a column is missing or a cell cannot be read, pixels belong to no frame, or bearings count from
         the bow and it is not known where that points.
     """
-    rows = raw.series(block, part)
+    rows = raw.series(block, part, may_be_empty=True)  # a night in which nothing was seen
     frame = frames_of_rows(frames, recipe, block, block.frame, rows, part)
     if frame is None and block.kind == "pixel":
         raise rows.fail(
