@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense import words
@@ -33,9 +34,11 @@ from wildlab.geometry.frames import Array
 
 #: Without a known mistake, misses this many times what is expected and this large (deg) are still said.
 UNEXPLAINED, UNEXPLAINED_DEG = 4.0, 8.0
-#: A single photo or mark is named where half of its misses are so many times those of all, by at least so
+#: A single photo or mark is named where most of its misses are so many times those of all, by at least so
 #: many points, and so many times what is expected.
 SINGLE, SINGLE_POINTS, SINGLE_EXPECTED = 6.0, 2, 5.0
+#: So many photos of a flight in which all is as stated may be named, in the mean.
+BY_CHANCE = 0.05
 
 
 def seen(flight: Flight) -> Iterator[Finding]:
@@ -162,10 +165,16 @@ def _single(s: Sightings) -> Iterator[Finding]:
     good = finite(m)
     if good.sum() < 8:
         return
-    size = left_over(m, good) / m.expected
-    usual = float(np.median(size[good]))
+    angle = left_over(m, good)
+    size = angle / m.expected
+    # What is expected takes the mean of the angles; one photo may be off by the one that is known least.
+    least = np.sqrt(m.expected**2 - s.sd[:, 0] ** 2 + s.sd[:, 3] ** 2)
     for what, names, table in (("photo", s.frames, "frames"), ("mark", s.labels, "truth")):
-        off = list(_off(size, names, good, usual))
+        most = np.sqrt(2 * np.log(max(len(set(names)), 1) / BY_CHANCE))
+        far = (
+            (size > SINGLE * float(np.median(size[good]))) & (size > SINGLE_EXPECTED) & (angle > most * least)
+        )
+        off = _off(far, names, good)
         if not off or len(off) > max(1, len(set(names)) // 5):
             continue
         listed = words.joined(
@@ -194,12 +203,19 @@ def _angles(m: Missed, names: NDArray[np.object_], off: list[str]) -> list[tuple
     return [(name, float(np.nanmedian(size[names == name]))) for name in off]
 
 
-def _off(size: Array, names: NDArray[np.object_], good: NDArray[np.bool_], usual: float) -> Iterator[str]:
-    for name in dict.fromkeys(names):
-        rows = (names == name) & good
-        if name == "" or rows.sum() < SINGLE_POINTS:
-            continue
-        # Half of them: one wrong click is not a wrong photo.
-        half = float(np.median(size[rows]))
-        if half > SINGLE * usual and half > SINGLE_EXPECTED:
-            yield str(name)
+def _off(far: NDArray[np.bool_], names: NDArray[np.object_], good: NDArray[np.bool_]) -> list[str]:
+    """Those whose points are for the most part far, where so many of them are hardly together by chance.
+
+    Far ones are everywhere: wrong clicks, and detections of what is no known point.
+    """
+    rows = {str(name): (names == name) & good for name in dict.fromkeys(names) if name != ""}
+    rows = {name: of for name, of in rows.items() if of.sum() >= SINGLE_POINTS}
+    # More than half of them: one wrong click is not a wrong photo.
+    off = [name for name, of in rows.items() if far[of].mean() > 0.5]
+    others = good & ~np.isin(names.astype(str), off)
+    # As if there had been half a far one more, so that none seen is not none ever.
+    share = (far[others].sum() + 0.5) / (others.sum() + 1)
+    by_chance = {
+        name: len(rows) * float(binom.sf(far[rows[name]].sum() - 1, rows[name].sum(), share)) for name in off
+    }
+    return [name for name in off if by_chance[name] < BY_CHANCE]

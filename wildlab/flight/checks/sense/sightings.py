@@ -64,7 +64,8 @@ class Sightings:
     image
         (N,) number of the image, in the order of time.
     sd
-        (N, 3): expected standard deviations of the attitude (rad), the position (m), and the click (px).
+        (N, 4): expected standard deviations of the attitude (rad, the mean of its angles), the position (m),
+        and the click (px); and of the angle that is known least (rad).
     origin
         Of frame n.
     looked
@@ -236,13 +237,16 @@ def _expected(flight: Flight, P: Array | None, n: int) -> Array:
     vertical = stated.position_vertical_m or USUAL_VERTICAL
     angles = [getattr(stated, f"{axis}_deg") for axis in ("roll", "pitch", "yaw")]
     turn = float(np.mean([USUAL_ATTITUDE if a is None else np.radians(a) for a in angles]))
-    sd = np.tile([turn, np.hypot(level, vertical) / np.sqrt(2), stated.pixel_px or USUAL_PIXEL], (n, 1))
+    least = max(USUAL_ATTITUDE if a is None else np.radians(a) for a in angles)
+    place = np.hypot(level, vertical) / np.sqrt(2)
+    sd = np.tile([turn, place, stated.pixel_px or USUAL_PIXEL, least], (n, 1))
     if P is not None:
         with np.errstate(invalid="ignore"):
             own = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
         good = np.isfinite(own).all(axis=1)
         sd[good, 0], sd[good, 1] = own[good, 3:].mean(axis=1), own[good, :3].mean(axis=1)
-    sd[:, 0] = np.maximum(sd[:, 0], LEAST_ATTITUDE)
+        sd[good, 3] = own[good, 3:].max(axis=1)
+    sd[:, [0, 3]] = np.maximum(sd[:, [0, 3]], LEAST_ATTITUDE)
     return sd
 
 
