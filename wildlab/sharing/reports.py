@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.beside import state_of
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.track_many import NOTEBOOK as MANY_NOTEBOOK
 from wildlab.runner.typed import typed
 from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.
-ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking").index))
+ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking", "-many").index))
+#: Of the one that `wildlab track --many` makes; `wildlab evaluate` makes the others.
+MANY = "-many"
 
 
 @dataclass(frozen=True)
@@ -115,20 +118,34 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
         # Of the catalogue: everybody has the data.
         return Source(folder.name, (folder,), False, {}, parameters)
     name = str(flight.get("name", ""))
-    if folder.name not in {f"{name}{end}" for end in ABOUT}:
+    if not _drawn_again(folder, name, provenance):
         there = _made(folder.parent, name)
         raise WildlabError(
-            "this report on a flight is not one that `wildlab evaluate` makes, so it cannot be drawn again "
-            "from generalised data",
+            "this report on a flight is not one that `wildlab evaluate` or `wildlab track --many` makes, so "
+            "it cannot be drawn again from generalised data",
             _instead(there) if there else "evaluate the flight (wildlab evaluate), and share what that makes",
             file=folder,
         )
     return Source(name, (folder,), True, flight, parameters)
 
 
+def _drawn_again(folder: Path, name: str, provenance: Mapping[str, Any]) -> bool:
+    """Whether a report is one that is made again from the flight of this name.
+
+    What is called like that on many targets may be another one: `wildlab track` leaves its own where it is
+    told to.
+    """
+    if folder.name not in {f"{name}{end}" for end in ABOUT}:
+        return False
+    notebook = provenance.get("notebook")
+    file = notebook.get("file") if isinstance(notebook, dict) else None
+    return folder.name != f"{name}{MANY}" or file == MANY_NOTEBOOK
+
+
 def _made(reports: Path, name: str) -> list[Path]:
-    """The reports of `wildlab evaluate` that there are on a flight of this name, and are done."""
-    found = (reports / f"{name}{end}" for end in ENDS)
+    """The reports that there are on a flight of this name, are made again, and are done."""
+    found = [reports / f"{name}{end}" for end in ENDS]
+    found = [one for one in found if _drawn_again(one, name, read_provenance(one))]
     return [one for one in found if (one / "report.html").is_file() and state_of(one).get("state") == "done"]
 
 
