@@ -141,7 +141,9 @@ def redraw(
     missing = tuple(ABOUT[end] for end in wanted if end not in ends)
     notes += [f"There is no report on {one} in the copy, as there is none here." for one in missing]
     (own,) = own_flights(reports, ())
-    return Redrawn(made, folders, own, compare(pairs, made.names), tuple(notes), missing)
+    numbered = [one for one in pairs if one.name == f"{source.name}{MANY}"]
+    agreement = compare(pairs, made.names, numbered)
+    return Redrawn(made, folders, own, agreement, tuple(notes), missing)
 
 
 def _many(

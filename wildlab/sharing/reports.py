@@ -64,7 +64,7 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
     sources : list of Source
         Of a single report on a flight, with all of the flight's reports.
     left_out : list of str
-        Sentences, on reports in a folder of reports that cannot be shared.
+        Sentences, on reports that do not go along: they cannot be shared, or are of other tables.
 
     Raises
     ------
@@ -79,20 +79,25 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
         raise WildlabError("there is no such report", _instead(there) if there else fix, file=path)
     if (folder / "report.html").is_file():
         source = _source(folder, studies)
-        return [_with_siblings(source, folder.parent, studies) if source.logged else source], []
+        if not source.logged:
+            return [source], []
+        source = _with_siblings(source, folder.parent, studies)
+        return [source], _of_other_tables(source, folder.parent, studies)
     found: dict[str, Source] = {}
+    single: list[Source] = []
     left_out = []
     for one in sorted(folder.iterdir()):
         if one.name.startswith(".") or not (one / "report.html").is_file():
             continue
         try:
-            source = _source(one, studies)
+            single.append(_source(one, studies))
         except WildlabError as error:
             left_out.append(str(error))
-            continue
-        if source.logged:
-            source = _with_siblings(source, folder, studies)
-        found.setdefault(source.name, source)
+    # The flight as it was evaluated is the one that is meant; targets may have been followed before that.
+    for source in sorted(single, key=lambda one: one.folders[0].name == f"{one.name}{MANY}"):
+        if source.name not in found:
+            found[source.name] = _with_siblings(source, folder, studies) if source.logged else source
+            left_out += _of_other_tables(found[source.name], folder, studies) if source.logged else []
     if not found:
         why = f" ({left_out[0]})" if left_out else ""
         raise WildlabError(
@@ -194,6 +199,22 @@ def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]
             folders.append(folder)
             parameters |= one.parameters
     return Source(source.name, tuple(folders), True, source.flight, parameters)
+
+
+def _of_other_tables(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> list[str]:
+    """Sentences on reports on a flight of this name that do not go along: they are of other tables."""
+    left_out = []
+    for end in ENDS:
+        folder = reports / f"{source.name}{end}"
+        if folder in source.folders or not (folder / "report.html").is_file():
+            continue
+        try:
+            one = _source(folder, studies)
+        except WildlabError:
+            continue
+        if one.logged and one.name == source.name:
+            left_out.append(f"{folder}: this report was made from other tables than the flight's others.")
+    return left_out
 
 
 def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:

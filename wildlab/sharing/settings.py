@@ -71,9 +71,10 @@ def neutral_settings(settings: Settings, names: Names, moved: Mapping[str, float
         if "clock_offset_s" in data:
             data["clock_offset_s"] = part.clock_offset_s - moved.get(name, 0.0)
             if whole_quarters(data["clock_offset_s"]):
+                here = f", and flight.toml about {moved[name]:g} s" if name in moved else ""
                 raise WildlabError(
-                    f"the settings add {part.clock_offset_s:g} s to the stamps of {name!r}, which tells a "
-                    "zone of time",
+                    f"the settings add {part.clock_offset_s:g} s to the stamps of {name!r}{here}, which "
+                    "tells a zone of time",
                     "state this offset in flight.toml, follow the targets again, and share that",
                     field=f"sensors.{name}.clock_offset_s",
                 )
