@@ -26,7 +26,6 @@ from wildlab.flight.store import Flight, load_flight, save_flight
 from wildlab.reporting.metrics import document, metric
 from wildlab.reporting.page import page
 from wildlab.reporting.text import escape
-from wildlab.runner.evaluate import evaluate_flight
 from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.provenance import provenance_of_flight
 from wildlab.runner.track_many import NOTEBOOK, track_many
@@ -285,7 +284,6 @@ def test_the_true_report_on_many_targets(tmp_path: Path, monkeypatch: pytest.Mon
     file.write_text(TOLD, encoding="utf-8")
     reports = tmp_path / "reports"
     track_many(flight, settings=file, sensors=("Letaba mast",), reports=reports)
-    evaluate_flight(flight, reports=reports)
     one, other = (share(reports / "kifaru-drift-many", out=tmp_path / name) for name in ("a.html", "b.html"))
     data = one.file.read_bytes()
     assert data == other.file.read_bytes()
