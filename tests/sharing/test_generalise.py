@@ -230,6 +230,13 @@ def test_a_sensors_clock_tells_no_zone_of_time(named: bool) -> None:
     assert any(one.what == "clock offset of Ranger Jonas" and "7300.5" in one.was for one in two.removed)
 
 
+def test_what_was_added_to_stamps_is_known_whatever_else_was_moved() -> None:
+    """Also where there is a magnetometer, whose field is moved."""
+    found = made(canary(sensors={"Ranger Jonas": {"clock_offset_s": 7200.5}}))
+    assert "magnetometer" in found.flight.tables and found.clocks == {"Ranger Jonas": 7200.0}
+    assert made(canary()).clocks == {}
+
+
 def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is() -> None:
     flight = canary(imu=False, sensors={"Ranger Jonas": {"clock_offset_s": 7200.0}})
     seen = flight.table("detections")

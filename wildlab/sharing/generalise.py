@@ -91,7 +91,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     WildlabError
         Where clocks of sensors are of several zones of time, and no frame says whose it is.
     """
-    true, (flight, moved) = flight, _of_one_zone(flight)
+    true, (flight, zones) = flight, _of_one_zone(flight)
     manifest = flight.manifest
     shift = new_origin(flight)
     place = ned_to_geodetic(shift[None], manifest.origin_tuple())[0]
@@ -141,7 +141,7 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     made = Flight(make_manifest(data), nav, tables, None, terrain)
     at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
     removed = tuple(removed_from(true, made, names, start, when, at))
-    return Generalised(made, cell, when, names, removed, moved)
+    return Generalised(made, cell, when, names, removed, zones)
 
 
 def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
@@ -152,9 +152,10 @@ def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
     if not moved or frames is None:
         return flight, {}
     if "sensor" in frames:
-        by = frames["sensor"].map(lambda name: moved.get(name, 0.0)).astype(float)
+        stamps = frames["time_s"] + frames["sensor"].map(lambda name: moved.get(name, 0.0)).astype(float)
     else:
-        sources = flight.tables["detections"]["source"].unique() if "detections" in flight.tables else []
+        seen = flight.tables.get("detections")
+        sources = () if seen is None else tuple(seen["source"].unique())
         zones = {moved.get(str(name), 0.0) for name in sources} or {0.0}
         if len(zones) > 1:
             raise WildlabError(
@@ -164,15 +165,16 @@ def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
                 file=flight.folder,
                 field="frames.sensor",
             )
-        (by,) = zones
-        moved = dict.fromkeys(moved, by)
+        (zone,) = zones
+        moved = dict.fromkeys(moved, zone)
+        stamps = frames["time_s"] + zone
     sensors = {
         name: part.model_copy(update={"clock_offset_s": part.clock_offset_s - moved[name]})
         if name in moved
         else part
         for name, part in flight.manifest.sensors.items()
     }
-    tables = flight.tables | {"frames": frames.assign(time_s=frames["time_s"] + by)}
+    tables = flight.tables | {"frames": frames.assign(time_s=stamps)}
     manifest = flight.manifest.model_copy(update={"sensors": sensors})
     return replace(flight, manifest=manifest, tables=tables), moved
 
