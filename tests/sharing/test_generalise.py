@@ -209,7 +209,7 @@ def test_kinds_of_hulls_have_no_names_in_the_copy() -> None:
     hulls = [{"name": "Thandi's dinghy", "length_m": 4.0}, {"name": "patrol", "length_m": 9.0}]
     many = made(canary(targets={"many": {"hulls": hulls}})).flight.manifest.targets.many
     assert many is not None
-    assert [(hull.name, hull.length_m) for hull in many.hulls] == [("kind 1", 4.0), ("kind 2", 9.0)]
+    assert [(hull.name, hull.length_m) for hull in many.hulls] == [("kind A", 4.0), ("kind B", 9.0)]
 
 
 @pytest.mark.parametrize("named", [True, False])

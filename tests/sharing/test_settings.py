@@ -52,7 +52,7 @@ def test_the_filter_is_told_the_same_in_neutral_names() -> None:
     assert found.sensors["radar"] == told.sensors["radar"]
     many, before = found.targets.many, told.targets.many
     assert many is not None and before is not None
-    assert [hull.name for hull in many.hulls] == ["kind 1", "kind 2"]
+    assert [hull.name for hull in many.hulls] == ["kind A", "kind B"]
     assert [hull.length_m for hull in many.hulls] == [hull.length_m for hull in before.hulls]
     assert found.targets.model_copy(update={"many": before}) == told.targets
     text = dump_toml(found.model_dump(exclude_none=True))
@@ -72,6 +72,8 @@ def test_all_names_that_somebody_gave_are_known() -> None:
         "Letaba mast", "Pafuri post", "radar", "Shingwedzi canoe", "Skukuza ferry",
     )  # fmt: skip
     assert names_in(Settings()) == ()
+    # Neutral ones are found in every copy.
+    assert names_in(parse_settings('[[targets.many.hulls]]\nname = "kind B"')) == ()
 
 
 def test_an_offset_is_what_is_left_of_it_after_the_stamps_were_moved() -> None:

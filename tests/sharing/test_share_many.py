@@ -152,7 +152,7 @@ def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made: Path) -> Non
     # Of the overview one number, of the other two: those of its subjects are no names.
     assert "All 3 numbers are those of the report" in text
     # What the filter is told is there, and what was left of a clock's offset.
-    assert "kind 2" in text and "length_m = 9.0" in text and "clock_offset_s = -1.5" in text
+    assert "kind B" in text and "length_m = 9.0" in text and "clock_offset_s = -1.5" in text
     lines = "\n".join(copy.lines)
     for told in (
         "speak of 'Pafuri post', which the flight does not have",
@@ -289,7 +289,7 @@ def test_the_true_report_on_many_targets(tmp_path: Path, monkeypatch: pytest.Mon
     assert data == other.file.read_bytes()
     whole = unpacked(data).lower()
     assert whole.count(b"ihdr") >= 3 and b"track,from" in whole.replace(b'"', b"")
-    assert b"all targets at once, by sensor-1" in whole and b"kind 1 4 m, kind 2 9 m" in whole
+    assert b"all targets at once, by sensor-1" in whole and b"kind a 4 m, kind b 9 m" in whole
     for secret in SECRETS:
         assert secret.encode() not in whole, secret
     lines = "\n".join(one.lines)

@@ -74,7 +74,7 @@ def removed_from(
         if part.clock_offset_s != kept:
             yield Removed(f"clock offset of {name}", f"{part.clock_offset_s} s", f"{kept:g} s")
     for one in hulls_of(was.targets):
-        yield Removed("kind of target", one, "numbered")
+        yield Removed("kind of target", one, "a letter")
     for source in was.sources:
         yield Removed("raw file", f"{source.file} ({source.sha256[:8]})", "left out")
     for key in sorted({*flight.tables} - {*made.tables}):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from string import ascii_uppercase
 from typing import Any, NamedTuple
 
 from wildlab.errors import WildlabError
@@ -33,9 +35,12 @@ def whole_quarters(offset_s: float) -> float:
 
 
 def neutral_hulls(targets: dict[str, Any]) -> None:
-    """Number the kinds of hulls in a ``[targets]`` that is given as plain values; it is changed."""
-    for number, hull in enumerate((targets.get("many") or {}).get("hulls", ()), start=1):
-        hull["name"] = f"kind {number}"
+    """Give letters to the kinds of hulls in a ``[targets]`` that is given as plain values; it is changed.
+
+    No numbers: a length stands beside the name.
+    """
+    for letter, hull in zip(ascii_uppercase, (targets.get("many") or {}).get("hulls", ()), strict=False):
+        hull["name"] = f"kind {letter}"
 
 
 def neutral_settings(settings: Settings, names: Names, moved: Mapping[str, float]) -> Neutral:
@@ -90,5 +95,6 @@ def names_in(settings: Settings) -> tuple[str, ...]:
 
 
 def hulls_of(targets: TargetsPart) -> tuple[str, ...]:
-    """What the kinds of targets are called that many are followed of."""
-    return tuple(hull.name for hull in (targets.many.hulls if targets.many is not None else ()))
+    """What the kinds of targets are called that many are followed of; a name like a neutral one is none."""
+    hulls = targets.many.hulls if targets.many is not None else ()
+    return tuple(hull.name for hull in hulls if not re.fullmatch("kind [A-Z]", hull.name))
