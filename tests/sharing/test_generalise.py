@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.sharing.canary import EPOCH, HASH, HERE, START, canary, place, velocity
+from wildlab.errors import WildlabError
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.manifest_parts import LocationsPart
 from wildlab.flight.store import Flight, save_flight
@@ -208,7 +209,40 @@ def test_kinds_of_hulls_have_no_names_in_the_copy() -> None:
     hulls = [{"name": "Thandi's dinghy", "length_m": 4.0}, {"name": "patrol", "length_m": 9.0}]
     many = made(canary(targets={"many": {"hulls": hulls}})).flight.manifest.targets.many
     assert many is not None
-    assert [(hull.name, hull.length_m) for hull in many.hulls] == [("kind 1", 4.0), ("kind 2", 9.0)]
+    assert [(hull.name, hull.length_m) for hull in many.hulls] == [("kind A", 4.0), ("kind B", 9.0)]
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_sensors_clock_tells_no_zone_of_time(named: bool) -> None:
+    """Its looks are when they were, whatever zone its clock was in."""
+    frames = canary(imu=False).table("frames")
+    own = frames.assign(time_s=frames["time_s"] - 1000.5, **({"sensor": "Ranger Jonas"} if named else {}))
+    other = canary(imu=False, sensors={"Ranger Jonas": {"clock_offset_s": 1000.5}})
+    zone = own.assign(time_s=own["time_s"] - 6300.0)
+    far = canary(imu=False, sensors={"Ranger Jonas": {"clock_offset_s": 7300.5}})
+    one = made(dataclasses.replace(other, tables=other.tables | {"frames": own}))
+    two = made(dataclasses.replace(far, tables=far.tables | {"frames": zone}))
+    assert two.clocks == {"Ranger Jonas": 7200.0} and one.clocks == {"Ranger Jonas": 900.0}
+    assert one.flight.manifest == two.flight.manifest
+    assert two.flight.manifest.sensors["sensor-1"].clock_offset_s == pytest.approx(100.5)
+    pd.testing.assert_frame_equal(one.flight.table("frames"), two.flight.table("frames"))
+    pd.testing.assert_frame_equal(one.flight.nav["poses-1"], two.flight.nav["poses-1"])
+    assert any(one.what == "clock offset of Ranger Jonas" and "7300.5" in one.was for one in two.removed)
+
+
+def test_what_was_added_to_stamps_is_known_whatever_else_was_moved() -> None:
+    """Also where there is a magnetometer, whose field is moved."""
+    found = made(canary(sensors={"Ranger Jonas": {"clock_offset_s": 7200.5}}))
+    assert "magnetometer" in found.flight.tables and found.clocks == {"Ranger Jonas": 7200.0}
+    assert made(canary()).clocks == {}
+
+
+def test_clocks_of_several_zones_are_refused_where_no_frame_says_whose_it_is() -> None:
+    flight = canary(imu=False, sensors={"Ranger Jonas": {"clock_offset_s": 7200.0}})
+    seen = flight.table("detections")
+    seen.loc[:9, "source"] = "radar"
+    with pytest.raises(WildlabError, match=r"7200 s apart.*column sensor of frames"):
+        made(flight)
 
 
 def test_columns_that_the_schema_does_not_know_are_dropped() -> None:

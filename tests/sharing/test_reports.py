@@ -8,28 +8,67 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.files import write_json
+from wildlab.runner.track_many import NOTEBOOK
 from wildlab.sharing.reports import sources_of
+
+
+def report(folder: Path, *, notebook: str = "overview.ipynb", tables: str = "x") -> None:
+    """One that is done, on a flight of this name."""
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text("<p>x</p>", encoding="utf-8")
+    write_json(folder / "status.json", {"state": "done"})
+    flight = {"name": "kifaru-ridge", "kind": "logged", "files": {"nav": tables}}
+    told = {"flight": flight, "parameters": {"source": folder.name}, "notebook": {"file": notebook}}
+    write_json(folder / "provenance.json", told)
+
+
+def advice(folder: Path) -> str:
+    with pytest.raises(WildlabError) as caught:
+        sources_of(folder, {})
+    return caught.value.fix
 
 
 def test_only_reports_that_are_there_are_advised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     reports = tmp_path / "reports"
-    for name in ("kifaru-ridge", "kifaru-ridge-many"):
-        (reports / name).mkdir(parents=True)
-        (reports / name / "report.html").write_text("<p>x</p>", encoding="utf-8")
-        write_json(reports / name / "status.json", {"state": "done"})
-        flight = {"name": "kifaru-ridge", "kind": "logged", "files": {"nav": "x"}}
-        write_json(reports / name / "provenance.json", {"flight": flight, "parameters": {}})
-
-    def advice(name: str) -> str:
-        with pytest.raises(WildlabError) as caught:
-            sources_of(reports / name, {})
-        return caught.value.fix
-
-    assert advice("kifaru-ridge-many").endswith("wildlab share reports/kifaru-ridge")
+    report(reports / "kifaru-ridge")
+    report(reports / "kifaru-ridge-other", notebook=NOTEBOOK)
+    assert advice(reports / "kifaru-ridge-other").endswith("wildlab share reports/kifaru-ridge")
     (reports / "kifaru-ridge").rename(reports / "kifaru-ridge-overview")
-    for name in ("kifaru-ridge-many", "kifaru-ridge"):
-        assert advice(name).endswith("wildlab share reports/kifaru-ridge-overview")
+    for name in ("kifaru-ridge-other", "kifaru-ridge"):
+        assert advice(reports / name).endswith("wildlab share reports/kifaru-ridge-overview")
     write_json(reports / "kifaru-ridge-overview" / "status.json", {"state": "failed"})
-    assert "wildlab evaluate" in advice("kifaru-ridge-many")
-    assert "wildlab share" not in advice("kifaru-ridge-many") + advice("kifaru-ridge")
+    assert "wildlab evaluate" in advice(reports / "kifaru-ridge-other")
+    assert "wildlab share" not in advice(reports / "kifaru-ridge-other") + advice(reports / "kifaru-ridge")
+    report(reports / "kifaru-ridge-many", notebook=NOTEBOOK)
+    assert advice(reports / "kifaru-ridge").endswith("wildlab share reports/kifaru-ridge-many")
+
+
+def test_a_report_on_many_targets_goes_with_the_others_whichever_is_named(tmp_path: Path) -> None:
+    reports = tmp_path / "reports"
+    report(reports / "kifaru-ridge-many", notebook=NOTEBOOK)
+    report(reports / "kifaru-ridge-overview")
+    for named in ("", "kifaru-ridge-many", "kifaru-ridge-overview"):
+        ((source,), left_out) = sources_of(reports / named, {})
+        assert [one.name for one in source.folders] == ["kifaru-ridge-overview", "kifaru-ridge-many"]
+        assert source.parameters["kifaru-ridge-many"] == {"source": "kifaru-ridge-many"}
+        assert source.logged and not left_out
+
+
+def test_one_on_many_targets_that_is_of_other_tables_does_not_go_along(tmp_path: Path) -> None:
+    reports = tmp_path / "reports"
+    report(reports / "kifaru-ridge-many", notebook=NOTEBOOK, tables="older")
+    report(reports / "kifaru-ridge-overview")
+    (source,), _ = sources_of(reports / "kifaru-ridge-overview", {})
+    assert [one.name for one in source.folders] == ["kifaru-ridge-overview"]
+
+
+def test_what_is_only_called_like_one_on_many_targets_cannot_be_drawn_again(tmp_path: Path) -> None:
+    """`wildlab track` leaves the report on one target in whatever folder it is told."""
+    reports = tmp_path / "reports"
+    report(reports / "kifaru-ridge-many", notebook="tracking.ipynb")
+    report(reports / "kifaru-ridge-overview")
+    assert "kifaru-ridge-overview" in advice(reports / "kifaru-ridge-many")
+    (source,), left_out = sources_of(reports, {})
+    assert [one.name for one in source.folders] == ["kifaru-ridge-overview"]
+    assert len(left_out) == 1 and "kifaru-ridge-many" in left_out[0]

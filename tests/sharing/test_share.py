@@ -310,7 +310,7 @@ def test_a_report_that_cannot_be_shared_is_refused(change: Any, said: str, made:
 
 def test_a_report_that_is_not_of_evaluate_is_refused(made: Path) -> None:
     (made / "reports" / "kifaru-ridge").rename(made / "reports" / "found")
-    with pytest.raises(WildlabError, match="not one that `wildlab evaluate` makes"):
+    with pytest.raises(WildlabError, match="not one that `wildlab evaluate` or `wildlab track --many` makes"):
         share(made / "reports" / "found")
 
 

@@ -49,6 +49,8 @@ def share(
 ) -> None:
     """Make one file of REPORT that can be mailed: a report, or a folder of reports.
 
+    All reports on a flight go together: those of `wildlab evaluate`, and that of `wildlab track --many`.
+
     For the public the place is withheld or is a cell of the flight's category (locations.category in
     flight.toml), dates are months, names are neutral, pictures are left out. For partners it may be what
     was agreed with them (locations.agreed_category). Reports are computed and drawn again from generalised

@@ -33,7 +33,8 @@ class OwnReport(NamedTuple):
     folder
         Its name.
     about
-        ``overview``, ``georeferencing``, ``navigation``, ``tracking``, or the folder's name.
+        ``overview``, ``georeferencing``, ``navigation``, ``tracking``, ``many targets``, or the
+        folder's name.
     state
         ``done``, ``failed`` or ``broken off``.
     finished

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,7 +41,7 @@ class Agreement(NamedTuple):
     otherwise: tuple[str, ...] = ()
 
 
-def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
+def compare(pairs: Mapping[Path, Path], names: Names, numbered: Collection[Path] = ()) -> Agreement:
     """Numbers of the sender's reports against those of the copy's.
 
     Parameters
@@ -50,6 +50,9 @@ def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
         Folders: of the copy's report by the sender's.
     names
         Neutral names by the true ones, which subjects may hold.
+    numbered
+        Those of the sender's reports whose subjects are no names: a target that is the first there is the
+        first in the copy, whatever it is called.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def compare(pairs: Mapping[Path, Path], names: Names) -> Agreement:
         here, there = _numbers(mine), _numbers(theirs)
         otherwise += _otherwise(_said(mine, here), _said(theirs, there))
         for (name, subject), value in here.items():
-            other = there.get((name, _neutral(subject, names)))
+            other = there.get((name, subject if mine in numbered else _neutral(subject, names)))
             if other is None:
                 continue
             compared += 1

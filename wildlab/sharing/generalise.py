@@ -8,13 +8,14 @@ is computed from such a flight is what would be computed from the true one, to r
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from wildlab.errors import WildlabError
 from wildlab.flight.following import SensorPart
 from wildlab.flight.learnt import Learnt
 from wildlab.flight.manifest import Manifest, make_manifest
@@ -26,12 +27,11 @@ from wildlab.sharing.cells import Cell, cell_of
 from wildlab.sharing.inertial import USUAL_DECLINATION_DEG, USUAL_INCLINATION_DEG, moved_field, moved_imu
 from wildlab.sharing.names import Names, learn_names, renamed
 from wildlab.sharing.removed import Removed, removed_from
+from wildlab.sharing.settings import QUARTER, neutral_hulls, whole_quarters
 from wildlab.sharing.tiers import Treatment
 
 #: Where a flight is put whose place is withheld: a latitude that is nobody's.
 NOWHERE = (45.0, 0.0)
-#: Offsets of clocks are cut by whole quarters of an hour, which zones of time are made of, s.
-QUARTER = 900.0
 _PLACES = (
     ("north_m", "east_m", "down_m"),
     ("second_north_m", "second_east_m", "second_down_m"),
@@ -58,6 +58,8 @@ class Generalised:
         Neutral names by the true ones.
     removed
         For the sender only.
+    clocks
+        By the true name of a sensor, what was added to its stamps so that its offset tells no zone, s.
     """
 
     flight: Flight
@@ -65,6 +67,7 @@ class Generalised:
     when: str
     names: Names
     removed: tuple[Removed, ...]
+    clocks: dict[str, float] = field(default_factory=dict)
 
 
 def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Generalised:
@@ -82,7 +85,13 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
     Returns
     -------
     Generalised
+
+    Raises
+    ------
+    WildlabError
+        Where clocks of sensors are of several zones of time, and no frame says whose it is.
     """
+    true, (flight, zones) = flight, _of_one_zone(flight)
     manifest = flight.manifest
     shift = new_origin(flight)
     place = ned_to_geodetic(shift[None], manifest.origin_tuple())[0]
@@ -131,8 +140,43 @@ def generalise(flight: Flight, treatment: Treatment, name: str = "flight") -> Ge
         )
     made = Flight(make_manifest(data), nav, tables, None, terrain)
     at = "withheld" if cell is None else f"{cell.latitude_deg:g}, {cell.longitude_deg:g}, a cell's middle"
-    removed = tuple(removed_from(flight, made, names, start, when, at))
-    return Generalised(made, cell, when, names, removed)
+    removed = tuple(removed_from(true, made, names, start, when, at))
+    return Generalised(made, cell, when, names, removed, zones)
+
+
+def _of_one_zone(flight: Flight) -> tuple[Flight, dict[str, float]]:
+    """The flight with stamps of all sensors in its own zone of time, and what that added to each, s."""
+    moved = {name: whole_quarters(part.clock_offset_s) for name, part in flight.manifest.sensors.items()}
+    moved = {name: by for name, by in moved.items() if by}
+    frames = flight.tables.get("frames")
+    if not moved or frames is None:
+        return flight, {}
+    if "sensor" in frames:
+        stamps = frames["time_s"] + frames["sensor"].map(lambda name: moved.get(name, 0.0)).astype(float)
+    else:
+        seen = flight.tables.get("detections")
+        sources = () if seen is None else tuple(seen["source"].unique())
+        zones = {moved.get(str(name), 0.0) for name in sources} or {0.0}
+        if len(zones) > 1:
+            raise WildlabError(
+                f"clocks of sensors are {max(zones) - min(zones):g} s apart, which tells zones of time, and "
+                "no frame says which sensor looked",
+                "name the sensor of every frame, in the column sensor of frames",
+                file=flight.folder,
+                field="frames.sensor",
+            )
+        (zone,) = zones
+        moved = dict.fromkeys(moved, zone)
+        stamps = frames["time_s"] + zone
+    sensors = {
+        name: part.model_copy(update={"clock_offset_s": part.clock_offset_s - moved[name]})
+        if name in moved
+        else part
+        for name, part in flight.manifest.sensors.items()
+    }
+    tables = flight.tables | {"frames": frames.assign(time_s=stamps)}
+    manifest = flight.manifest.model_copy(update={"sensors": sensors})
+    return replace(flight, manifest=manifest, tables=tables), moved
 
 
 def new_origin(flight: Flight) -> Array:
@@ -233,8 +277,7 @@ def _manifest(manifest: Manifest, names: Names, clocks: dict[str, float], name: 
         key: getattr(manifest, key).model_dump(exclude_none=True)
         for key in ("mount", "imu", "gnss", "uncertainty", "scoring", "targets")
     }
-    for number, hull in enumerate((parts["targets"].get("many") or {}).get("hulls", ()), start=1):
-        hull["name"] = f"kind {number}"
+    neutral_hulls(parts["targets"])
     for part in ("imu", "gnss"):
         parts[part] |= {"name": "", "note": ""}
     parts["uncertainty"]["note"] = ""

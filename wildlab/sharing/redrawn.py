@@ -8,17 +8,23 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 
-from wildlab.errors import RunFailed
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.files import write_atomic
 from wildlab.flight.checksums import CALIBRATION
+from wildlab.flight.following import parse_settings
 from wildlab.flight.learnt import Learnt, parse_learnt, read_learnt, write_learnt
 from wildlab.flight.store import Flight, save_flight
+from wildlab.flight.toml import dump_toml
 from wildlab.paths import NOTEBOOKS
 from wildlab.reporting.own_flights import OwnFlight
 from wildlab.runner.evaluate import evaluate_flight
+from wildlab.runner.processes.scheduling import Outcome
 from wildlab.runner.record.own_flights import ABOUT, own_flights
+from wildlab.runner.track_many import track_many
 from wildlab.sharing.agreement import Agreement, compare
 from wildlab.sharing.generalise import Generalised, generalise, neutral_learnt
-from wildlab.sharing.reports import ENDS, Source
+from wildlab.sharing.reports import ENDS, MANY, Source
+from wildlab.sharing.settings import neutral_settings
 from wildlab.sharing.tiers import Treatment
 
 #: What `wildlab evaluate` does not set of these, `wildlab track` was told.
@@ -107,6 +113,11 @@ def redraw(
         console=console,
     )
     done = {one.name for one in source.folders}
+    several = f"{source.name}{MANY}" in done
+    if several:
+        outcome, more = _many(copy, made, source, work, reports, notebooks, console)
+        outcomes = [*outcomes, outcome]
+        told["notes"] += more
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
     for outcome in failed:
         if f"{source.name}{outcome.name.removeprefix(name)}" in done:
@@ -116,7 +127,8 @@ def redraw(
                 "check the flight: wildlab check; then evaluate it and share it again",
                 file=flight.folder,
             )
-    ends = [end for end in ENDS if f"{name}{end}" not in {outcome.name for outcome in failed}]
+    wanted = [end for end in ENDS if end != MANY or several]
+    ends = [end for end in wanted if f"{name}{end}" not in {outcome.name for outcome in failed}]
     folders = {
         end: reports / f"{name}{end}" for end in ends if (reports / f"{name}{end}" / "report.html").is_file()
     }
@@ -126,10 +138,57 @@ def redraw(
     }
     lost = [one for one in mine if mine[one] not in pairs]
     notes = told["notes"] + [f"There is no counterpart of your report {one} in the copy." for one in lost]
-    missing = tuple(ABOUT[end] for end in ENDS if end not in ends)
+    missing = tuple(ABOUT[end] for end in wanted if end not in ends)
     notes += [f"There is no report on {one} in the copy, as there is none here." for one in missing]
     (own,) = own_flights(reports, ())
-    return Redrawn(made, folders, own, compare(pairs, made.names), tuple(notes), missing)
+    numbered = [one for one in pairs if one.name == f"{source.name}{MANY}"]
+    agreement = compare(pairs, made.names, numbered)
+    return Redrawn(made, folders, own, agreement, tuple(notes), missing)
+
+
+def _many(
+    copy: Path,
+    made: Generalised,
+    source: Source,
+    work: Path,
+    reports: Path,
+    notebooks: Path,
+    console: Console | None,
+) -> tuple[Outcome, list[str]]:
+    """The report on many targets, told what the sender's was told; and notes for the sender."""
+    given = source.parameters.get(f"{source.name}{MANY}", {})
+    named = f"{made.flight.manifest.name}{MANY}"
+    notes = []
+    try:
+        text, file = str(given.get("settings") or ""), None
+        if text:
+            told, left_out = neutral_settings(parse_settings(text), made.names, made.clocks)
+            file = work / "settings.toml"
+            write_atomic(file, dump_toml(told.model_dump(exclude_none=True)))
+            notes = [
+                f"The settings of your report {source.name}{MANY} speak of {one!r}, which the flight does "
+                "not have: those of the copy do not."
+                for one in left_out
+            ]
+        sensors = given.get("sensors") or ()
+        poses = given.get("source")
+        outcome = track_many(
+            copy,
+            sensors=[made.names.of("sensor", str(one)) for one in sensors],
+            settings=file,
+            source=made.names.of("poses", str(poses)) if poses else None,
+            reports=reports,
+            notebooks=notebooks,
+            console=console,
+        )
+    except WildlabError as error:
+        raise RunFailed(
+            f"the report {named} could not be made from generalised data ({error.problem.rstrip('.')})",
+            error.fix,
+            file=source.folders[0].with_name(f"{source.name}{MANY}"),
+            field=error.field,
+        ) from None
+    return outcome, notes
 
 
 def _told(source: Source, made: Generalised) -> dict[str, Any]:
@@ -137,6 +196,9 @@ def _told(source: Source, made: Generalised) -> dict[str, Any]:
     given: Mapping[str, Any] = {}
     notes = []
     for end in ENDS:
+        if end == MANY and len(source.folders) > 1:
+            # What it was told says nothing of what the others were told.
+            continue
         parameters = source.parameters.get(f"{source.name}{end}", {})
         given = {**{key: value for key, value in parameters.items() if value}, **given}
         if end == "-tracking" and any(parameters.get(key) for key in _TOLD):

@@ -10,6 +10,7 @@ import pandas as pd
 
 from wildlab.flight.store import Flight
 from wildlab.sharing.names import Names
+from wildlab.sharing.settings import hulls_of
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,12 @@ def removed_from(
         kept = getattr(now.clocks, key)
         if value != kept:
             yield Removed(key.removesuffix("_s").replace("_", " "), f"{value} s", f"{kept:g} s")
+    for name, part in was.sensors.items():
+        kept = now.sensors[names.of("sensor", name)].clock_offset_s
+        if part.clock_offset_s != kept:
+            yield Removed(f"clock offset of {name}", f"{part.clock_offset_s} s", f"{kept:g} s")
+    for one in hulls_of(was.targets):
+        yield Removed("kind of target", one, "a letter")
     for source in was.sources:
         yield Removed("raw file", f"{source.file} ({source.sha256[:8]})", "left out")
     for key in sorted({*flight.tables} - {*made.tables}):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from wildlab.runner.catalogue import StudyEntry
 from wildlab.runner.record.beside import state_of
 from wildlab.runner.record.own_flights import ABOUT
 from wildlab.runner.record.provenance import provenance_of_flight, read_provenance
+from wildlab.runner.track_many import NOTEBOOK as MANY_NOTEBOOK
 from wildlab.runner.typed import typed
 from wildlab.simulation.parameters import load_twin, twin_names
 
 #: What the names of the reports on a flight end in, in the order in which they are read.
-ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking").index))
+ENDS = tuple(sorted(ABOUT, key=("-overview", "", "-navigation", "-tracking", "-many").index))
+#: Of the one that `wildlab track --many` makes; `wildlab evaluate` makes the others.
+MANY = "-many"
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
     sources : list of Source
         Of a single report on a flight, with all of the flight's reports.
     left_out : list of str
-        Sentences, on reports in a folder of reports that cannot be shared.
+        Sentences, on reports that do not go along: they cannot be shared, or are of other tables.
 
     Raises
     ------
@@ -76,20 +79,25 @@ def sources_of(path: Path, studies: dict[str, StudyEntry]) -> tuple[list[Source]
         raise WildlabError("there is no such report", _instead(there) if there else fix, file=path)
     if (folder / "report.html").is_file():
         source = _source(folder, studies)
-        return [_with_siblings(source, folder.parent, studies) if source.logged else source], []
+        if not source.logged:
+            return [source], []
+        source = _with_siblings(source, folder.parent, studies)
+        return [source], _of_other_tables(source, folder.parent, studies)
     found: dict[str, Source] = {}
+    single: list[Source] = []
     left_out = []
     for one in sorted(folder.iterdir()):
         if one.name.startswith(".") or not (one / "report.html").is_file():
             continue
         try:
-            source = _source(one, studies)
+            single.append(_source(one, studies))
         except WildlabError as error:
             left_out.append(str(error))
-            continue
-        if source.logged:
-            source = _with_siblings(source, folder, studies)
-        found.setdefault(source.name, source)
+    # The flight as it was evaluated is the one that is meant; targets may have been followed before that.
+    for source in sorted(single, key=lambda one: one.folders[0].name == f"{one.name}{MANY}"):
+        if source.name not in found:
+            found[source.name] = _with_siblings(source, folder, studies) if source.logged else source
+            left_out += _of_other_tables(found[source.name], folder, studies) if source.logged else []
     if not found:
         why = f" ({left_out[0]})" if left_out else ""
         raise WildlabError(
@@ -115,20 +123,34 @@ def _source(folder: Path, studies: dict[str, StudyEntry]) -> Source:
         # Of the catalogue: everybody has the data.
         return Source(folder.name, (folder,), False, {}, parameters)
     name = str(flight.get("name", ""))
-    if folder.name not in {f"{name}{end}" for end in ABOUT}:
+    if not _drawn_again(folder, name, provenance):
         there = _made(folder.parent, name)
         raise WildlabError(
-            "this report on a flight is not one that `wildlab evaluate` makes, so it cannot be drawn again "
-            "from generalised data",
+            "this report on a flight is not one that `wildlab evaluate` or `wildlab track --many` makes, so "
+            "it cannot be drawn again from generalised data",
             _instead(there) if there else "evaluate the flight (wildlab evaluate), and share what that makes",
             file=folder,
         )
     return Source(name, (folder,), True, flight, parameters)
 
 
+def _drawn_again(folder: Path, name: str, provenance: Mapping[str, Any]) -> bool:
+    """Whether a report is one that is made again from the flight of this name.
+
+    What is called like that on many targets may be another one: `wildlab track` leaves its own where it is
+    told to.
+    """
+    if folder.name not in {f"{name}{end}" for end in ABOUT}:
+        return False
+    notebook = provenance.get("notebook")
+    file = notebook.get("file") if isinstance(notebook, dict) else None
+    return folder.name != f"{name}{MANY}" or file == MANY_NOTEBOOK
+
+
 def _made(reports: Path, name: str) -> list[Path]:
-    """The reports of `wildlab evaluate` that there are on a flight of this name, and are done."""
-    found = (reports / f"{name}{end}" for end in ENDS)
+    """The reports that there are on a flight of this name, are made again, and are done."""
+    found = [reports / f"{name}{end}" for end in ENDS]
+    found = [one for one in found if _drawn_again(one, name, read_provenance(one))]
     return [one for one in found if (one / "report.html").is_file() and state_of(one).get("state") == "done"]
 
 
@@ -177,6 +199,22 @@ def _with_siblings(source: Source, reports: Path, studies: dict[str, StudyEntry]
             folders.append(folder)
             parameters |= one.parameters
     return Source(source.name, tuple(folders), True, source.flight, parameters)
+
+
+def _of_other_tables(source: Source, reports: Path, studies: dict[str, StudyEntry]) -> list[str]:
+    """Sentences on reports on a flight of this name that do not go along: they are of other tables."""
+    left_out = []
+    for end in ENDS:
+        folder = reports / f"{source.name}{end}"
+        if folder in source.folders or not (folder / "report.html").is_file():
+            continue
+        try:
+            one = _source(folder, studies)
+        except WildlabError:
+            continue
+        if one.logged and one.name == source.name:
+            left_out.append(f"{folder}: this report was made from other tables than the flight's others.")
+    return left_out
 
 
 def same_flight(one: dict[str, Any], other: dict[str, Any]) -> bool:

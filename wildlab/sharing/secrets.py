@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from wildlab.errors import WildlabError
+from wildlab.flight.following import parse_settings
 from wildlab.flight.manifest import Manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import Array, ned_to_geodetic
@@ -22,6 +24,7 @@ from wildlab.paths import ROOT
 from wildlab.sharing.generalise import Generalised, first_stamp, new_origin
 from wildlab.sharing.reports import Source
 from wildlab.sharing.scan import Secrets
+from wildlab.sharing.settings import hulls_of, names_in
 from wildlab.sharing.tiers import Treatment
 
 #: So many places of each table are looked for; the scan finds what is near to one of them.
@@ -79,7 +82,7 @@ def flight_secrets(
         numbers=tuple(_numbers(m)),
     )
     paths = (str(folder.resolve()), *(str(one.resolve()) for one in source.folders))
-    return own.with_words(*dict.fromkeys((*_words(m, made), *paths, *_hashes(source))))
+    return own.with_words(*dict.fromkeys((*_words(m, made), *_told(source, made), *paths, *_hashes(source))))
 
 
 def all_of(several: Sequence[Secrets]) -> Secrets:
@@ -143,9 +146,21 @@ def _words(m: Manifest, made: Generalised) -> Iterator[str]:
     yield m.camera.name if m.camera is not None else ""
     yield from (m.terrain.source, m.terrain.crs) if m.terrain is not None else ()
     yield from (one.file for one in m.sources)
+    yield from hulls_of(m.targets)
     for kind, known in made.names.by_kind.items():
         # A true name like target-7 is what a neutral one looks like, and says as little.
         yield from (name for name in _some(known) if not re.fullmatch(rf"{kind}[-_ ]?\d*", name))
+
+
+def _told(source: Source, made: Generalised) -> Iterator[str]:
+    """Names in the settings that reports were made with: of sensors that the flight may not have too."""
+    for parameters in source.parameters.values():
+        try:
+            named = names_in(parse_settings(str(parameters.get("settings") or "")))
+        except WildlabError:
+            # Made by another wildlab; where the report is made again, this is said there.
+            continue
+        yield from (name for name in named if made.names.of("sensor", name) != name)
 
 
 def _some(names: Iterable[str]) -> list[str]:

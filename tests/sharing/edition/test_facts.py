@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.pipeline.robots import KNOWN, robot_flight
-from tests.sharing.edition.flights import flight, overview, report
+from tests.sharing.edition.flights import WHOLE, flight, overview, report
 from wildlab.flight.following import parse_settings
 from wildlab.pipeline.following.follow import follow_targets
 from wildlab.pipeline.following.judged import judged
@@ -131,3 +131,39 @@ def test_a_number_that_could_not_be_computed_is_not_known() -> None:
     places = report("georeferencing", {("horizontal_error_median", "logged-pose"): {"value": None, "n": 0}})
     facts = facts_of(flight(overview(detections={"value": 5}), places))
     assert math.isnan(facts.error_median) and facts.compared == 0 and facts.possible is None
+
+
+@pytest.mark.parametrize(
+    ("height", "way", "flown"),
+    [
+        (118.0, 9000.0, True),
+        # A boat; a radar on a tower; poses of which the ground is not known.
+        (4.0, 9000.0, False),
+        (45.0, 0.0, False),
+        (None, 9000.0, False),
+        (118.0, None, False),
+    ],
+)
+def test_only_what_moves_high_above_the_ground_is_known_to_fly(
+    height: float | None, way: float | None, flown: bool
+) -> None:
+    known = {"height_above_ground": height, "path_length": way}
+    values = {name: {"value": value} for name, value in known.items() if value is not None}
+    assert facts_of(flight(overview(**values))).flown == flown
+    assert not facts_of(flight()).flown
+
+
+@pytest.mark.parametrize("code", ["en", "nb", "sv"])
+def test_a_page_on_what_is_not_known_to_fly_speaks_of_sensors(code: str) -> None:
+    trouble = WHOLE._replace(gains=(), troubles=(("poses", 700.0),), verdict="look closer")
+    words = {
+        "en": ("aircraft", "sensors"),
+        "nb": ("luftfartøy", "sensorene"),
+        "sv": ("farkost", "sensorerna"),
+    }
+    air, neutral = words[code]
+    for flown, said, other in ((True, air, neutral), (False, neutral, air)):
+        page = edition_html(
+            trouble._replace(flown=flown), name="x", place=Place("withheld"), language=code
+        ).casefold()
+        assert said in page and other not in page

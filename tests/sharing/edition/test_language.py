@@ -13,7 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
-from wildlab.sharing.edition.language import FOLDER, languages, load_language, placeholders, say
+from wildlab.sharing.edition.language import (
+    FOLDER,
+    UNFLOWN,
+    languages,
+    load_language,
+    of_unflown,
+    placeholders,
+    say,
+)
 from wildlab.sharing.edition.said import Day, Quantity, Said, duration, length, number, share
 
 ENGLISH = FOLDER / "en.toml"
@@ -95,6 +103,38 @@ def test_numbers_and_dates(code: str, said: Any, shown: str) -> None:
 def test_no_number_is_shown_with_a_minus_and_nothing(value: float, kind: str) -> None:
     text = say(load_language("sv"), Quantity(kind, abs(value) if kind != "number" else value))
     assert text.strip() and not text.startswith("−0 ") and text != "−0"
+
+
+AIRCRAFT = ("aircraft", "luftfart", "farkost", "propel", "take-off", "avgang", "flies ", "flyr", "flyger")
+
+
+@pytest.mark.parametrize("code", languages())
+def test_of_what_never_flew_no_text_speaks_of_an_aircraft(code: str) -> None:
+    language = load_language(code)
+    of_it = of_unflown(language)
+    spoken = {
+        key
+        for key, text in language.texts.items()
+        if not key.startswith(UNFLOWN) and any(word in str(text).casefold() for word in AIRCRAFT)
+    }
+    own = {key.removeprefix(UNFLOWN) for key in language.texts if key.startswith(UNFLOWN)}
+    assert len(spoken) > 20 and spoken <= own <= set(language.texts)
+    assert all(of_it.texts[key] != language.texts[key] for key in own)
+    for key in own:
+        assert not any(word in str(of_it.texts[key]).casefold() for word in AIRCRAFT), key
+    rest = set(language.texts) - own
+    assert {key: of_it.texts[key] for key in rest} == {key: language.texts[key] for key in rest}
+
+
+def test_a_language_without_texts_for_what_never_flew_is_whole_and_keeps_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "xx.toml"
+    text = (FOLDER / "nb.toml").read_text(encoding="utf-8").partition("[unflown.why]")[0]
+    file.write_text(text, encoding="utf-8")
+    language = load_language(file)
+    assert not language.missing and of_unflown(language).texts == language.texts
+    file.write_text(text.replace('path = "luftfartøyets vei"', ""), encoding="utf-8")
+    assert load_language(file).missing == ("picture.path",)
+    assert of_unflown(load_language(file)).texts["picture.path"] == "way of the sensors"
 
 
 def test_one_and_many() -> None:

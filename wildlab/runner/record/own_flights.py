@@ -18,6 +18,7 @@ ABOUT = {
     "-navigation": "navigation",
     "-tracking": "tracking",
     "": "georeferencing",
+    "-many": "many targets",
 }
 
 

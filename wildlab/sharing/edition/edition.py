@@ -10,7 +10,7 @@ from wildlab.pipeline.overviews.worth_fixing import LEVELS, UNJUDGED
 from wildlab.reporting.page import POLICY
 from wildlab.reporting.text import escape, inline
 from wildlab.sharing.edition.facts import Facts
-from wildlab.sharing.edition.language import Language, load_language, say
+from wildlab.sharing.edition.language import Language, load_language, of_unflown, say
 from wildlab.sharing.edition.picture import IN_STEPS, ImagePicture, MapPicture, picture_html
 from wildlab.sharing.edition.said import Day, Said, Value, length
 from wildlab.sharing.edition.sentences import Story, tell
@@ -81,6 +81,7 @@ def edition_html(
         If the language or the picture cannot be used.
     """
     words = language if isinstance(language, Language) else load_language(language)
+    words = words if facts.flown else of_unflown(words)
     story = tell(facts)
     level = LEVELS[facts.verdict or UNJUDGED]
 

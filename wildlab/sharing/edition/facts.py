@@ -14,6 +14,8 @@ from wildlab.reporting.own_flights import OwnFlight
 NAN = math.nan
 #: Reports that tell how good something was, beside the overview.
 PARTS = ("georeferencing", "tracking", "navigation")
+#: What moves so far, and so far above the ground, flies: no mast of a boat or a car is as high, m.
+FLYING = 30.0
 _TROUBLES = dict(
     zip(
         (trouble.replace(" ", "-") for trouble in TROUBLES),
@@ -76,6 +78,8 @@ class Facts(NamedTuple):
         Reports that ask for a closer look themselves: ``tracking``, ``navigation``.
     failed, lacking
         Those of `PARTS`, and ``overview``, that failed, and that the records do not allow.
+    flown
+        Whether it is known that the sensors flew. Else they may be a boat's, or stand somewhere.
     """
 
     twin: bool
@@ -104,6 +108,7 @@ class Facts(NamedTuple):
     doubted: tuple[str, ...] = ()
     pictured: float = NAN
     track_worst: float = NAN
+    flown: bool = True
 
     @property
     def other_sensors(self) -> bool:
@@ -166,6 +171,7 @@ def facts_of(flight: OwnFlight) -> Facts:
         failed=tuple(about for about in ("overview", *PARTS) if about in failed),
         lacking=tuple(sorted(_lacking(flight), key=PARTS.index)),
         doubted=doubted(numbers),
+        flown=value("height_above_ground") >= FLYING and value("path_length") >= FLYING,
     )
 
 

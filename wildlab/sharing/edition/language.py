@@ -20,6 +20,8 @@ from wildlab.sharing.edition.said import Day, Quantity, Said, Value
 #: Where the files are, one for each language, named by its code.
 FOLDER = DATA / "edition"
 ENGLISH = "en"
+#: Before the keys of texts that stand in place of others where it is not known that anything flew.
+UNFLOWN = "unflown."
 #: A text that depends on how many: for one, and for all other numbers.
 FORMS = ("one", "many")
 #: More than a page takes; a translation is a sentence.
@@ -41,13 +43,16 @@ class Language(NamedTuple):
     texts
         By key, whole: what the file lacks is English.
     missing
-        Keys that the file lacks.
+        Keys that the file lacks, and that are English therefore.
+    lacking
+        All keys that the file lacks, also those of `UNFLOWN`.
     """
 
     code: str
     name: str
     texts: Texts
     missing: tuple[str, ...]
+    lacking: frozenset[str] = frozenset()
 
 
 def languages() -> list[str]:
@@ -106,8 +111,10 @@ def load_language(language: str | Path = ENGLISH) -> Language:
             file=path,
             field="language",
         )
-    missing = tuple(key for key in english if key not in own)
-    return Language(code, name, {**english, **own}, missing)
+    lacking = frozenset(english) - frozenset(own)
+    # A language without texts of its own for what did not fly says what it says of what did.
+    missing = tuple(key for key in english if key in lacking and not key.startswith(UNFLOWN))
+    return Language(code, name, {**english, **own}, missing, lacking)
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -154,6 +161,32 @@ def _check(key: str, text: Any, english: Any, path: Path) -> None:
             raise refuse(
                 f"the text {ours[:60]!r} has other placeholders than the English one", f"use {braced}"
             )
+
+
+def of_unflown(language: Language) -> Language:
+    """The language as it speaks of a flight of which it is not known that anything flew.
+
+    Parameters
+    ----------
+    language
+        From `load_language`.
+
+    Returns
+    -------
+    Language
+
+    Examples
+    --------
+    >>> of_unflown(load_language()).texts["picture.path"]
+    'way of the sensors'
+    """
+    own = {
+        key.removeprefix(UNFLOWN): text
+        for key, text in language.texts.items()
+        if key.startswith(UNFLOWN)
+        and (key not in language.lacking or key.removeprefix(UNFLOWN) in language.lacking)
+    }
+    return language._replace(texts={**language.texts, **own})
 
 
 def placeholders(text: str) -> list[str]:

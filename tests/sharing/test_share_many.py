@@ -1,0 +1,296 @@
+"""Copies of what `wildlab track --many` makes: drawn again, told the same, and nothing of who or where.
+
+Reports are made by stand-ins that print all that they are given; one slow test runs the true notebooks.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote_to_bytes
+
+import pytest
+from bs4 import BeautifulSoup
+
+from tests.pipeline.robots import robot_flight
+from wildlab.errors import RunFailed, WildlabError
+from wildlab.files import write_json
+from wildlab.flight.following import read_settings
+from wildlab.flight.manifest import manifest_toml
+from wildlab.flight.store import Flight, load_flight, save_flight
+from wildlab.reporting.metrics import document, metric
+from wildlab.reporting.page import page
+from wildlab.reporting.text import escape
+from wildlab.runner.processes.scheduling import Outcome
+from wildlab.runner.record.provenance import provenance_of_flight
+from wildlab.runner.track_many import NOTEBOOK, track_many
+from wildlab.sharing import generalise, redrawn
+from wildlab.sharing import settings as neutral
+from wildlab.sharing.share import share
+
+HERE = {"latitude_deg": -24.873165, "longitude_deg": 31.486297, "height_m": 317.43}
+SECRETS = (
+    *("kifaru", "letaba", "thandi", "mokoro", "skukuza", "shingwedzi", "canoe", "pafuri", "olifants"),
+    *("kestrel", "masorini", "873165", "486297", "317.43", "2023-09-17", "7198", "7200", "settings.toml"),
+)
+TOLD = """
+[sensors."Letaba mast"]
+clock_offset_s = 7198.5
+[sensors."Letaba mast".noise]
+range_m = 0.5
+azimuth_deg = 0.3
+[sensors."Pafuri post".noise]
+range_m = 1.5
+[targets]
+acceleration_m_s_sqrt_s = 0.15
+start_speed_m_s = 1.0
+[[targets.many.hulls]]
+name = "Shingwedzi canoe"
+length_m = 4.0
+beam_m = 1.0
+[[targets.many.hulls]]
+name = "Skukuza ferry"
+length_m = 9.0
+beam_m = 3.0
+"""
+
+
+def telling(seconds: float = 12.0) -> Flight:
+    """Of a robot: its sensor, its target, its kinds of hulls, its clock and its place tell of somewhere."""
+    hulls = [{"name": "Thandis mokoro", "length_m": 4.0}, {"name": "Skukuza ferry", "length_m": 9.0}]
+    flight = robot_flight(
+        3,
+        name="kifaru-drift",
+        sensor="Letaba mast",
+        seconds=seconds,
+        clutter=1,
+        manifest={
+            "locations": {"category": 2},
+            "origin": HERE,
+            "platform": {"name": "Kestrel of Olifants"},
+            "time": {"kind": "utc", "epoch": "2023-09-17T12:00:00Z"},
+            "sensors": {"Letaba mast": {"clock_offset_s": 7198.5}},
+            "targets": {"many": {"hulls": hulls}},
+        },
+    )
+    frames = flight.table("frames")
+    tables = flight.tables | {"frames": frames.assign(time_s=frames["time_s"] - 7198.5)}
+    for name in ("detections", "truth"):
+        tables[name] = tables[name].replace({"target_id": {"boat": "Masorini"}})
+    return replace(flight, tables=tables, nav={"Kestrel-log": flight.nav["own"]})
+
+
+def everything(flight: Path, told: Path | None = None, sensors: Any = ()) -> str:
+    """All that a flight and its settings say, as a careless report might print it."""
+    loaded = load_flight(flight)
+    tables = {**loaded.nav, **loaded.tables}
+    shown = "".join(f"<h2>{escape(name)}</h2>{table.head(60).to_html()}" for name, table in tables.items())
+    texts = [manifest_toml(loaded.manifest), "" if told is None else told.read_text(encoding="utf-8")]
+    return f"<pre>{escape(' '.join((*texts, *sensors)))}</pre>{shown}"
+
+
+def write_report(folder: Path, flight: Path, body: str, told: dict[str, Any], notebook: str) -> None:
+    folder.mkdir(parents=True)
+    (folder / "report.html").write_text(page(title="x", body=f"<h1>{notebook}</h1>{body}"), encoding="utf-8")
+    content = {"flight": provenance_of_flight(flight), "parameters": told, "notebook": {"file": notebook}}
+    write_json(folder / "provenance.json", content)
+    write_json(folder / "status.json", {"state": "done"})
+    subjects = ("all", "target-1") if notebook == NOTEBOOK else ("logged-pose",)
+    numbers = [metric(name="error", subject=one, value=3.25, unit="m") for one in subjects]
+    whole = document(study="x", flight="x", kind="logged", seed=1, seeds=None, metrics=numbers, claims=[])
+    write_json(folder / "metrics.json", whole)
+
+
+@pytest.fixture
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a flight, an overview and a report on many targets; stand-ins make them on copies."""
+    monkeypatch.chdir(tmp_path)
+    flight = tmp_path / "flights" / "mine"
+    save_flight(telling(), flight)
+    reports = tmp_path / "reports"
+    write_report(reports / "kifaru-drift-overview", flight, everything(flight), {}, "overview.ipynb")
+    told = {"settings": TOLD, "sensors": ["Letaba mast"], "source": "Kestrel-log"}
+    write_report(reports / "kifaru-drift-many", flight, everything(flight), told, NOTEBOOK)
+
+    def evaluate(folder: Path, *, source: str | None, reports: Path, **_: Any) -> list[Outcome]:
+        assert source is None
+        place = reports / f"{load_flight(folder).name}-overview"
+        write_report(place, folder, everything(folder), {}, "overview.ipynb")
+        return [Outcome(place.name, "done", 1.0, "", place)]
+
+    def follow(
+        folder: Path, *, settings: Path, sensors: Any, source: str, reports: Path, **_: Any
+    ) -> Outcome:
+        copy = load_flight(folder)
+        assert source in copy.nav and set(sensors) == set(copy.manifest.sensors) == {"sensor-1"}
+        assert set(read_settings(settings).sensors) == {"sensor-1"}
+        place = reports / f"{copy.name}-many"
+        write_report(place, folder, everything(folder, settings, sensors), {}, NOTEBOOK)
+        return Outcome(place.name, "done", 1.0, "", place)
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
+    monkeypatch.setattr(redrawn, "track_many", follow)
+    return tmp_path
+
+
+def without_many(made: Path) -> None:
+    (made / "reports" / "kifaru-drift-many").rename(made / "away")
+
+
+def test_a_report_on_many_targets_is_a_part_and_tells_nothing(made: Path) -> None:
+    copy = share(made / "reports" / "kifaru-drift-many")
+    text = copy.file.read_text(encoding="utf-8")
+    for secret in SECRETS:
+        assert secret not in text.casefold(), secret
+    parts = [one.get_text() for one in BeautifulSoup(text, "html.parser").select("nav li")]
+    assert parts == ["overview.ipynb", NOTEBOOK]
+    # Of the overview one number, of the other two: those of its subjects are no names.
+    assert "All 3 numbers are those of the report" in text
+    # What the filter is told is there, and what was left of a clock's offset.
+    assert "kind B" in text and "length_m = 9.0" in text and "clock_offset_s = -1.5" in text
+    lines = "\n".join(copy.lines)
+    for told in (
+        "speak of 'Pafuri post', which the flight does not have",
+        "kind of target: 'Thandis mokoro'",
+    ):
+        assert told in lines
+
+
+def test_it_is_in_the_page_of_a_zip_and_in_the_copy_of_the_team(made: Path) -> None:
+    zipped = share(made / "reports", "partner", zipped=True)
+    with zipfile.ZipFile(zipped.file) as inside:
+        assert inside.namelist() == ["flight.html"]
+        assert NOTEBOOK.encode() in inside.read("flight.html")
+    team = share(made / "reports" / "kifaru-drift-overview", "team").file.read_text(encoding="utf-8")
+    assert f"<h1>{NOTEBOOK}</h1>" in team and "Letaba mast" in team
+
+
+def test_where_nobody_followed_many_targets_no_copy_does(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any, **__: Any) -> Outcome:
+        raise AssertionError("nobody asked for it")
+
+    without_many(made)
+    monkeypatch.setattr(redrawn, "track_many", never)
+    copy = share(made / "reports" / "kifaru-drift-overview")
+    text = copy.file.read_text(encoding="utf-8")
+    assert NOTEBOOK not in text and "many targets" not in text + "".join(copy.lines)
+    assert "All 1 numbers" in text
+
+
+def hulls_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(neutral, "neutral_hulls", lambda _: None)
+
+
+def hulls_of_the_flight_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(generalise, "neutral_hulls", lambda _: None)
+
+
+def settings_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    clean = redrawn.track_many
+
+    def careless(*given: Any, reports: Path, **told: Any) -> Outcome:
+        outcome = clean(*given, reports=reports, **told)
+        file = reports / "flight-many" / "report.html"
+        text = file.read_text(encoding="utf-8")
+        file.write_text(text.replace("</main>", "<p>Pafuri post: 1.5 m</p></main>"), encoding="utf-8")
+        return outcome
+
+    monkeypatch.setattr(redrawn, "track_many", careless)
+
+
+@pytest.mark.parametrize(
+    ("broken", "found"),
+    [(hulls_left, "Shingwedzi"), (hulls_of_the_flight_left, "mokoro"), (settings_left, "Pafuri")],
+)
+def test_a_name_that_is_left_in_is_found_and_there_is_no_copy(
+    broken: Callable[[pytest.MonkeyPatch], None],
+    found: str,
+    made: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    broken(monkeypatch)
+    with pytest.raises(RunFailed, match=rf"(?i)there is no copy, since this was found in it: .*{found}"):
+        share(made / "reports" / "kifaru-drift-many")
+    assert sorted(path.name for path in made.iterdir()) == ["flights", "reports"]
+
+
+def test_one_that_fails_on_the_copy_stops_it(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    failed = Outcome("flight-many", "failed", 1.0, "no looks.")
+    monkeypatch.setattr(redrawn, "track_many", lambda *_, **__: failed)
+    with pytest.raises(RunFailed, match=r"flight-many could not be made from generalised data \(no looks\)"):
+        share(made / "reports" / "kifaru-drift-many")
+
+
+def test_one_that_is_refused_on_the_copy_stops_it_with_what_to_do(
+    made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: Any, **__: Any) -> Outcome:
+        raise WildlabError("no sensor detects places", "follow one target", field="detections.kind")
+
+    monkeypatch.setattr(redrawn, "track_many", refused)
+    said = r"could not be made from generalised data \(no sensor detects places\)\. Follow one target"
+    with pytest.raises(RunFailed, match=said) as caught:
+        share(made / "reports" / "kifaru-drift-many")
+    assert "kifaru-drift-many" in str(caught.value.file) and caught.value.field == "detections.kind"
+
+
+def test_one_that_was_made_from_other_tables_is_told_to_the_sender(made: Path) -> None:
+    """Followed, then imported and evaluated anew: the flight that is there is the one that is shared."""
+    flight = made / "flights" / "mine"
+    save_flight(telling(seconds=11.0), flight, overwrite=True)
+    for folder in (made / "reports").iterdir():
+        if folder.name.endswith("-overview"):
+            folder.rename(made / "away")
+    write_report(made / "reports" / "kifaru-drift-overview", flight, "", {}, "overview.ipynb")
+    for named in ("", "kifaru-drift-overview"):
+        copy = share(made / "reports" / named, overwrite=True)
+        assert NOTEBOOK not in copy.file.read_text(encoding="utf-8")
+        assert "kifaru-drift-many: this report was made from other tables" in "\n".join(copy.lines)
+
+
+def test_poses_that_it_was_told_are_its_own_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others are told none; only where there are no others, these are the poses that are meant."""
+    (made / "reports" / "kifaru-drift-overview").rename(made / "away")
+    told: list[str | None] = []
+
+    def evaluate(folder: Path, *, source: str | None, **_: Any) -> list[Outcome]:
+        told.append(source)
+        return []
+
+    monkeypatch.setattr(redrawn, "evaluate_flight", evaluate)
+    share(made / "reports" / "kifaru-drift-many")
+    assert told == ["poses-1"]
+
+
+def unpacked(data: bytes) -> bytes:
+    """A page with all that is packed inside of its addresses."""
+    packed = re.findall(rb'data:[^;,"]*(?:;charset=[^;,"]*)?(;base64)?,([^"\'\s>)]*)', data)
+    inside = [base64.b64decode(one) if coded else unquote_to_bytes(one.decode()) for coded, one in packed]
+    return b"\n".join([data, *inside])
+
+
+@pytest.mark.slow
+def test_the_true_report_on_many_targets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through the notebooks, twice: the sender's own numbers, no secret in any byte, the same bytes."""
+    monkeypatch.chdir(tmp_path)
+    flight = tmp_path / "flights" / "mine"
+    save_flight(telling(40.0), flight)
+    file = tmp_path / "settings.toml"
+    file.write_text(TOLD, encoding="utf-8")
+    reports = tmp_path / "reports"
+    track_many(flight, settings=file, sensors=("Letaba mast",), reports=reports)
+    one, other = (share(reports / "kifaru-drift-many", out=tmp_path / name) for name in ("a.html", "b.html"))
+    data = one.file.read_bytes()
+    assert data == other.file.read_bytes()
+    whole = unpacked(data).lower()
+    assert whole.count(b"ihdr") >= 3 and b"track,from" in whole.replace(b'"', b"")
+    assert b"all targets at once, by sensor-1" in whole and b"kind a 4 m, kind b 9 m" in whole
+    for secret in SECRETS:
+        assert secret.encode() not in whole, secret
+    lines = "\n".join(one.lines)
+    assert "-many: " not in lines and not re.search(r'To "Who is where', lines), lines
