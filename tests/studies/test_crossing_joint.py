@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from tests.studies.test_crossing_vessels import INTERVAL, passing
 from wildlab.studies.crossing_vessels import text
 from wildlab.studies.crossing_vessels.trial import DISTANCE, joint
-from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY, Common
+from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY
 
 
 def test_joint_association_of_two_far_apart_is_two_tracks():
@@ -49,26 +48,3 @@ def test_joint_words_turn_with_the_flights():
     assert "on fewer of them, beyond chance" in text.joint_words(pd.DataFrame(table))
     table = {(joint.JOINT, "swapped"): [1.0, 0.0], (DISTANCE, "swapped"): [0.0, 0.0]}
     assert "cannot be told" in text.joint_words(pd.DataFrame(table))
-    assert "alike and last" not in text.joint_words(pd.DataFrame(table))
-    table |= {(joint.JOINT, "swapped"): [1.0] * 2, (joint.TOGETHER, "swapped"): [0.0] * 2}
-    said = text.joint_words(pd.DataFrame(table))
-    assert "alike and last, it leaves them swapped on 0 of 2 flights" in said and said.endswith("told.")
-    many = {one: np.repeat(values, 10) for one, values in table.items()}
-    assert text.joint_words(pd.DataFrame(many)).endswith("on fewer of them, beyond chance.")
-
-
-def test_what_moves_both_vessels_swaps_nothing_where_it_is_known_to():
-    """Both keep 30 m from each other, and are moved together by tens of metres that last; told, and not."""
-    crossing = passing(closest=30, noise=1)
-    rng = np.random.default_rng(4)
-    error, moved = rng.normal(size=2), []
-    for _ in crossing.times:
-        error = 0.99 * error + np.sqrt(1 - 0.99**2) * rng.normal(size=2)
-        moved.append(25.0 * error)
-    at = np.unique(crossing.looks.image, return_inverse=True)[1]
-    positions = crossing.looks.positions + np.array(moved)[at]
-    common = Common(np.tile(np.eye(2), (len(at), 1, 1)), np.tile(25.0 * np.eye(2), (len(at), 1, 1)))
-    crossing = crossing._replace(looks=crossing.looks._replace(positions=positions), common=common)
-    numbers = joint.joint_numbers(crossing)
-    assert numbers[joint.TOGETHER, "swapped"] == numbers[joint.TOGETHER, "swapped_at_end"] == 0
-    assert numbers[joint.TOGETHER, "anees"] < numbers[joint.JOINT, "anees"]

@@ -37,7 +37,7 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     apart_times,
     gather,
 )
-from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER
+from wildlab.studies.crossing_vessels.trial.joint import JOINT
 from wildlab.tracking.many.bank import Appearance, Bank, Looks
 
 TWIN, SEED = "crossing-vessels", 7
@@ -243,7 +243,7 @@ def test_looks_are_the_detections_own(rendering, flight) -> None:
 def test_all_ways_are_followed_by_every_rule(rendering) -> None:
     assert rendering.near == count(rendering.spotted)
     for one in (rendering.frames, rendering.inside, rendering.drawn):
-        assert set(one.by_rule) == {*study.SUBJECTS, JOINT, TOGETHER}
+        assert set(one.by_rule) == {*study.SUBJECTS, JOINT}
         assert len(one.off) == len(one.crossing.boat)
     cut = int(rendering.spotted.cut.sum())
     assert cut > 0 and len(rendering.inside.crossing.boat) == len(rendering.frames.crossing.boat) - cut

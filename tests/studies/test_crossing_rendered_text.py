@@ -11,7 +11,7 @@ from wildlab.studies.crossing_vessels.spotted import Counted
 from wildlab.studies.crossing_vessels.text import NAMES
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
 from wildlab.studies.crossing_vessels.trial.crossing import Crossing
-from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER
+from wildlab.studies.crossing_vessels.trial.joint import JOINT
 from wildlab.tracking.many.bank import Looks
 
 NEAR = Counted(
@@ -32,7 +32,7 @@ def followed(off: float = 10.0, count: int = 4, **rules: Associated) -> Followed
     looks = Looks(np.arange(count), np.zeros((count, 2)), 0.5)
     truth = np.array([np.zeros((count, 2)), np.full((count, 2), 3.0)])
     crossing = Crossing(looks, np.zeros(count, int), np.arange(count) * 0.5, truth)
-    by_rule = dict.fromkeys(NAMES, GOOD) | dict.fromkeys((JOINT, TOGETHER), SHARED)
+    by_rule = dict.fromkeys(NAMES, GOOD) | {JOINT: SHARED}
     by_rule |= {name.replace("_", "-"): one for name, one in rules.items()}
     return Followed(crossing, np.full(count, off), by_rule)
 

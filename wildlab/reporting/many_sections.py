@@ -99,7 +99,11 @@ def end_section(report: Report, followed: Followed) -> None:
             "A bearing moves a track that another sensor began; it begins and confirms none, and is no "
             "sighting that a track is shown for. One whose place bearings keep known is not given up."
         )
-    bare = [name for name, one in followed.places.items() if not one.errors.names]
+    bare = [
+        name
+        for name, one in followed.places.items()
+        if not {"pose 1", "heading", "platform_north", "platform_east"} & set(one.errors.names)
+    ]
     if bare:
         poses.append(
             f"Errors of the platform's position and heading that last are in no covariance of {listed(bare)}."

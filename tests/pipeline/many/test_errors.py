@@ -17,15 +17,17 @@ from wildlab.pipeline.many.errors import (
     Errors,
     _pose_roots,
     laid_out,
+    lasting_of,
     of_elements,
     of_pixels,
     said_of_pixels,
     told_errors,
 )
-from wildlab.pipeline.many.follow import follow_all
+from wildlab.pipeline.many.follow import follow_all, tracks_table
 from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of
 from wildlab.simulation.twins import simulate_twin
+from wildlab.tracking.many import smooth_many
 from wildlab.tracking.schmidt import transition_of_pose
 
 ALL = """
@@ -186,18 +188,67 @@ def test_what_is_believed_of_poses_is_said_with_its_source() -> None:
         ("position_horizontal_m", "position_vertical_m", "roll_deg", "pitch_deg", "yaw_deg", "plane_height_m")
     ))  # fmt: skip
     bare = replace(flight, manifest=flight.manifest.model_copy(update={"uncertainty": none}))
-    belief, _ = of_sensor(bare, scans, of_flight(bare))
-    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, belief)}
+    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, None)}
     assert said["error of the heading, SD"] == ("2°", "assumed")
     assert said["error of the ground's height, SD"] == ("1 m", "assumed")
-    assert said["how long errors of the pose last"] == ("the whole flight", "assumed")
+    assert said["how long errors of the pose last"] == ("another at each look", "assumed")
     text = f"[sensors.{name}]\ncorrelation_time_s = 40.0\n[sensors.{name}.considered.heading]\nsd_deg = 3.0\n"
-    belief, told = of_sensor(bare, scans, of_flight(bare, parse_settings(text)))
-    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, belief)}
+    part = parse_settings(text).sensors[name]
+    _, told = of_sensor(bare, scans, of_flight(bare, parse_settings(text)))
+    said = {one.what: (one.value, one.source) for one in said_of_pixels(bare, scans, part)}
     assert "error of the heading, SD" not in said and "error of the roll, SD" in said
     assert "considered error: heading" in {one.what for one in told}
     poses = replace(scans.poses, covariance=np.tile(np.eye(6), (len(scans.times), 1, 1)))
-    belief, _ = of_sensor(bare, scans._replace(poses=poses), of_flight(bare))
-    said = {one.what: one.source for one in said_of_pixels(bare, scans._replace(poses=poses), belief)}
+    said = {one.what: one.source for one in said_of_pixels(bare, scans._replace(poses=poses), None)}
     assert said["errors of the pose"] == "the poses' own" and "error of the roll, SD" not in said
     assert "error of the ground's height, SD" in said
+
+
+def test_how_long_errors_of_a_pose_last_is_what_is_stated_of_it() -> None:
+    def of(text: str) -> float:
+        return lasting_of(parse_settings(text).sensors.get("eye"))
+
+    assert of("") == of("[sensors.eye.noise]\npixel_px = 2.0\n") == 0.0
+    assert of("[sensors.eye]\ncorrelation_time_s = 40.0\n") == 40.0
+    heading = "[sensors.eye.considered.heading]\nsd_deg = 3.0\n"
+    assert of(heading) == np.inf
+    assert of(heading + "[sensors.eye.considered.roll]\nsd_deg = 1.0\ncorrelation_time_s = 9.0\n") == 9.0
+    # An error of the clock is no error of the pose.
+    assert of("[sensors.eye.considered.clock]\nsd_s = 0.1\ncorrelation_time_s = 0.5\n") == 0.0
+
+
+@pytest.mark.slow
+def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
+    flight, observed = _pixels()
+    errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
+    points = georeference(flight, observed, np.random.default_rng(0), errors)
+    linear = points["ellipse"].to_numpy(str) == "linear"
+    R, shared, found = of_pixels(observed, errors, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
+    whole = R + shared @ np.swapaxes(shared, 1, 2)
+    assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
+    assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
+    assert (np.abs(shared[linear][..., 6:]).max(axis=(0, 1)) > 0.01).all()
+
+
+@pytest.mark.slow
+def test_a_pose_whose_covariance_is_unknown_for_a_while_has_the_usual_one() -> None:
+    flight, observed = _pixels()
+    own = np.tile(np.diag([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4]), (len(observed.uv), 1, 1))
+    own[::3] = np.nan
+    known = replace(observed, poses=replace(observed.poses, covariance=own))
+    scans = scans_of(flight, str(flight.table("detections")["source"].iloc[0]), 0.0, "autopilot")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    told, usual = told_errors(flight, known, belief._replace(considered=())), pose_errors(flight, observed)
+    assert np.allclose(told.pose[::3], usual.pose[::3]) and np.allclose(told.pose[1::3], own[1::3])
+
+
+def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
+    told = "[sensors.radar.noise]\nrange_m = 0.5\nazimuth_deg = 0.3\n"
+    told += "[sensors.radar.considered.heading]\nsd_deg = 3.0\ncorrelation_time_s = 5.0\n"
+    followed = follow_all(robot_flight(labelled=False, seconds=60.0), settings=parse_settings(told))
+    table = tracks_table(followed)
+    after = smooth_many(followed.shown, followed.targets.density, followed.lasting_s)
+    forever = smooth_many(followed.shown, followed.targets.density, [np.inf])
+    x = np.concatenate([x[:, 0] for x, _ in after])
+    assert followed.lasting_s == (5.0,) and np.allclose(table["smoothed_north_m"], x)
+    assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))

@@ -65,10 +65,10 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
     likely[0, 1] = [0.03, 0.01, 0.0]
     sensor = LONG._replace(several=True)
     kinds, sure = np.array([[0.1, 0.9]]), np.array([True])
-    found = gather(
-        z, R, np.zeros((len(z), 2, 0)), np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls
-    )
+    J = np.random.default_rng(0).normal(size=(3, 2, 2))
+    found = gather(z, R, J, np.array([[0.0, 0.0]]), kinds, sure, likely, sensor, BOTH.hulls)
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.75]]) and len(found.R) == 2
+    assert np.allclose(found.shared, [J[2], 0.75 * J[0] + 0.25 * J[1]])
     spread = 0.75 * np.outer([5, 0.25], [5, 0.25]) + 0.25 * np.outer([-15, -0.75], [-15, -0.75])
     assert np.allclose(found.R[1], np.eye(2) + spread)
     # What no gate takes is of the hull all the same, each part alike.

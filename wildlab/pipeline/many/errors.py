@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wildlab.flight.following import SensorPart
 from wildlab.flight.store import Flight
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_jacobians
@@ -71,6 +72,7 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
     that are considered come on top of a covariance that poses have, and take the place of what is assumed.
     """
     errors = pose_errors(flight, observed)
+    unknown = ~np.isfinite(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6))).all(axis=(1, 2))
     sds = {one.name: one.sd for one in beliefs.considered if one.name in POSE}
     pose = np.array(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6)))
     if sds and observed.poses.covariance is None:
@@ -83,13 +85,16 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
             pose[:, place, place] += sd**2
         elif name not in _DEGREES:
             pose[:, place, place] = sd**2
+    if observed.poses.covariance is not None and unknown.any():
+        # Where the log says nothing for a while, what is stated or usual is taken.
+        pose[unknown] = assumed_pose_covariance(observed.poses.R_nb, assumed_deviations(flight))[unknown]
     return errors._replace(pose=pose, pixel=np.diag(beliefs.noise[:2] ** 2))
 
 
-def said_of_pixels(flight: Flight, scans: Scans, beliefs: Beliefs) -> list[Said]:
+def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[Said]:
     """What is believed of the errors that all pixels of an image share, and who says so."""
     said, stated = [], flight.manifest.uncertainty
-    taken = {_OF_PLATFORM.get(one.name) for one in beliefs.considered}
+    taken = {_OF_PLATFORM.get(name) for name in ({} if part is None else part.considered)}
     own = scans.poses is not None and scans.poses.covariance is not None
     if own:
         said.append(Said(scans.sensor, "errors of the pose", "as the poses say", "the poses' own"))
@@ -99,11 +104,13 @@ def said_of_pixels(flight: Flight, scans: Scans, beliefs: Beliefs) -> list[Said]
         unit = "°" if key.endswith("deg") else " m"
         source = ASSUMED if getattr(stated, key) is None else STATED
         said.append(Said(scans.sensor, _SHARED[key], f"{value:.3g}{unit}", source))
-    if not taken:
-        lasts = lasting_of(beliefs)
-        words = "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
-        source = ASSUMED if np.isinf(lasts) else STATED
-        said.append(Said(scans.sensor, "how long errors of the pose last", words, source))
+    lasts = lasting_of(part)
+    words = (
+        "another at each look" if lasts == 0 else "the whole flight" if np.isinf(lasts) else f"{lasts:.3g} s"
+    )
+    said.append(
+        Said(scans.sensor, "how long errors of the pose last", words, ASSUMED if lasts == 0 else STATED)
+    )
     return said
 
 
@@ -175,11 +182,18 @@ def of_elements(scans: Scans, beliefs: Beliefs, places: Array) -> tuple[Array, E
     return shared, Errors(own, tuple(float(times[i]) for i in kept))
 
 
-def lasting_of(beliefs: Beliefs) -> float:
-    """s, from what is left from one look to the next."""
-    if not 0 < beliefs.fading < 1:
-        return np.inf if beliefs.fading >= 1 else 0.0
-    return float(-beliefs.interval_s / np.log(beliefs.fading))
+def lasting_of(part: SensorPart | None) -> float:
+    """For how long errors of a camera's pose last, s: as stated, or the shortest time of those considered.
+
+    Zero, another error at each look, where nobody says: a part of them fades within seconds, and a track that
+    took them for constant would be left by its own detections.
+    """
+    if part is None:
+        return 0.0
+    if part.correlation_time_s is not None:
+        return float(part.correlation_time_s)
+    times = [one.correlation_time_s for name, one in part.considered.items() if name in POSE]
+    return min((np.inf if one is None else float(one) for one in times), default=0.0)
 
 
 def _jacobians(observed: Observations) -> dict[str, Array]:

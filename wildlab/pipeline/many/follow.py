@@ -14,10 +14,10 @@ from wildlab.evaluation.identities import Identities, compare_identities
 from wildlab.evaluation.identities import Scan as Compared
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
-from wildlab.pipeline.following.beliefs import Said, of_flight, of_sensor, of_targets
+from wildlab.pipeline.following.beliefs import STATED, Said, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
 from wildlab.pipeline.many.beliefs import of_many
-from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, said_of_pixels
+from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, lasting_of, said_of_pixels
 from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
 from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
@@ -123,15 +123,18 @@ def follow_all(
         bearing = looks.kind == "bearing"
         unused = [one for one in dict.fromkeys(more) if one.what.startswith("considered")
                   and (bearing or one.what.endswith(f": {UNKNOWN_EFFECT}"))]  # fmt: skip
+        if looks.kind == "pixel":
+            # Those of [uncertainty] are said with all that pixels share.
+            more = [one for one in more if not one.what.startswith("considered") or one.source == STATED]
         said += [one for one in dict.fromkeys(more) if one not in unused]
         if looks.kind == "pixel":
-            said += said_of_pixels(flight, looks, belief)
+            said += said_of_pixels(flight, looks, told.sensors.get(name))
         if unused:
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
             notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
         notes += order_notes(looks)
-        found = places_of(flight, looks, belief, len(places), source)
+        found = places_of(flight, looks, belief, len(places), source, lasting_of(told.sensors.get(name)))
         if found.bearings and np.isfinite(belief.thinning_s):
             kept = thinned(found, belief.thinning_s)
             if len(kept.scans) < len(found.scans):

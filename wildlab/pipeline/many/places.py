@@ -13,7 +13,7 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
-from wildlab.pipeline.many.errors import NO_ERRORS, Errors, lasting_of, of_elements, of_pixels, told_errors
+from wildlab.pipeline.many.errors import NO_ERRORS, Errors, of_elements, of_pixels, told_errors
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.coloured import thin
 from wildlab.tracking.many import Scan
@@ -90,7 +90,9 @@ class Places(NamedTuple):
         return disc * max(float(np.median(shares)), 1 / len(_DISC)) if shares else disc
 
 
-def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source: str | None) -> Places:
+def places_of(
+    flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source: str | None, lasting_s: float = 0.0
+) -> Places:
     """The looks of a sensor as places, what each is wrong by alone, and what they have in common.
 
     Parameters
@@ -100,6 +102,8 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
         that last.
     order
         Which of the sensors it is.
+    lasting_s
+        For how long errors of the pose last, of a camera.
     source
         Name of the ``nav`` table, for pixels.
 
@@ -117,7 +121,7 @@ def places_of(flight: Flight, scans: Scans, beliefs: Beliefs, order: int, source
         )
     shared, errors = np.zeros((*scans.detections.shape[:2], 2, 0)), NO_ERRORS
     if scans.kind == "pixel":
-        z, R, shared, errors = _of_pixels(flight, scans, beliefs, source)
+        z, R, shared, errors = _of_pixels(flight, scans, beliefs, source, lasting_s)
     elif scans.kind == "position":
         z = scans.detections
         R = np.broadcast_to(np.diag(beliefs.noise**2), (*z.shape, 2))
@@ -167,13 +171,13 @@ def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
 
 
 def _of_pixels(
-    flight: Flight, scans: Scans, beliefs: Beliefs, source: str | None
+    flight: Flight, scans: Scans, beliefs: Beliefs, source: str | None, lasting_s: float
 ) -> tuple[Array, Array, Array, Errors]:
     """Rays where they meet the ground, what each is wrong by alone, and what the poses do to all."""
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
     told = told_errors(flight, observed, beliefs)
     points = georeference(flight, observed, np.random.default_rng(0), told)
-    own, shared, errors = of_pixels(observed, told, covariances_of(points), lasting_of(beliefs))
+    own, shared, errors = of_pixels(observed, told, covariances_of(points), lasting_s)
     ids = pd.Index(points["detection_id"])
     row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
     row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])

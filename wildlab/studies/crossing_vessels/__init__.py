@@ -19,7 +19,6 @@ STUDY = Study(
     (
         *trial.SUBJECTS,
         joint.JOINT,
-        joint.TOGETHER,
         trial.LOOKS,
         *map(trial.curve_subject, trial.SEPARATIONS),
         *again.WAYS,

@@ -42,7 +42,7 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     apart_times,
     arrange,
 )
-from wildlab.studies.crossing_vessels.trial.joint import JOINT, TOGETHER, joint_numbers
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, joint_numbers
 from wildlab.tracking.many.bank import Appearance, Bank
 from wildlab.tracking.many.features import image_features
 
@@ -218,8 +218,7 @@ def part_of(crossing: Crossing, span: tuple[float, float]) -> Crossing:
     looks = crossing.looks._replace(
         image=crossing.looks.image[rows], positions=crossing.looks.positions[rows]
     )
-    common = None if crossing.common is None else crossing.common.of(rows)
-    return Crossing(looks, crossing.boat[rows], crossing.times[kept], crossing.truth[:, kept], common)
+    return Crossing(looks, crossing.boat[rows], crossing.times[kept], crossing.truth[:, kept])
 
 
 def associate(placed: Placed, bank: Bank) -> Associated:
@@ -250,11 +249,7 @@ def follow(placed: Placed) -> Followed:
     crossing = placed.crossing
     by_rule = {rule: associate(placed, follow_by(crossing, rule, placed.appearance)) for rule in SUBJECTS}
     joint = joint_numbers(crossing)
-    by_rule |= {
-        way: Associated(swapped=bool(joint[way, "swapped"]), swaps=int(joint[way, "swaps"]))
-        for way in (JOINT, TOGETHER)
-        if (way, "swapped") in joint
-    }
+    by_rule[JOINT] = Associated(swapped=bool(joint[JOINT, "swapped"]), swaps=int(joint[JOINT, "swaps"]))
     at = np.unique(crossing.looks.image, return_inverse=True)[1]
     off = np.linalg.norm(crossing.looks.positions - crossing.truth[crossing.boat, at], axis=1)
     return Followed(crossing, np.where(crossing.boat == NONE, np.nan, off), by_rule)

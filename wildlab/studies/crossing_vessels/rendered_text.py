@@ -213,18 +213,9 @@ def outcome_table(flights: Sequence[Rendering]) -> pd.DataFrame:
             "swapped": share_words(_swapped(flights, way, rule), len(flights)),
             **{f"flight-{one.seed}": outcome_words(take(one).by_rule[rule]) for one in flights},
         }
-        for rule, words in _rules(flights).items()
+        for rule, words in NAMES.items()
         for way, take in WAYS.items()
     )
-
-
-def _rules(flights: Sequence[Rendering]) -> dict[str, str]:
-    """Those that every flight was tracked by."""
-    return {
-        rule: words
-        for rule, words in NAMES.items()
-        if all(rule in take(one).by_rule for one in flights for take in WAYS.values())
-    }
 
 
 def _swapped(flights: Sequence[Rendering], way: str, rule: str) -> int:
@@ -234,7 +225,7 @@ def _swapped(flights: Sequence[Rendering], way: str, rule: str) -> int:
 def swaps_words(flights: Sequence[Rendering]) -> str:
     """Swaps from frames beside those from drawn detections of the same flights, and what can be told."""
     n, parts, told = len(flights), [], []
-    for rule, words in _rules(flights).items():
+    for rule, words in NAMES.items():
         frames, drawn = (
             np.array([WAYS[way](one).by_rule[rule].swapped for one in flights]) for way in (FRAMES, DRAWN)
         )

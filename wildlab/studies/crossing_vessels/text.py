@@ -20,7 +20,7 @@ from wildlab.studies.crossing_vessels.trial import (
     VETO,
     curve_subject,
 )
-from wildlab.studies.crossing_vessels.trial.joint import JOINT, SENSOR, TARGETS, TOGETHER
+from wildlab.studies.crossing_vessels.trial.joint import JOINT, SENSOR, TARGETS
 
 #: H 6.4.4: five of boat 1, none of boat 2.
 PUBLISHED_WRONG = 5
@@ -29,7 +29,6 @@ NAMES = {
     FEATURES: "distance and features",
     VETO: "distance, features as a veto",
     JOINT: "distance, shared by probability (JIPDA)",
-    TOGETHER: "the same, errors of the pose shared",
 }
 
 METHOD = r"""Where and when each vessel is detected comes from the twin, with the printed numbers of
@@ -56,10 +55,7 @@ alone and with the same noises; it is told besides that a vessel in view is dete
 {100 * SENSOR.detection:.0f} % of the images, that it is in view for {TARGETS.visible_s:g} s and out of it for
 {TARGETS.hidden_s:g} s, and that hardly anything else is detected. Each track is updated with both detections,
 weighed by how probable each is. There a vessel's track is the one that is on it most often, and tracks are
-swapped where each vessel has the other's from before the crossing. A second one is told what the flight
-states of its pose and its pixels in place of the printed noise: an error of the pose moves all detections of
-an image together, as first derivatives say, and lasts for the flight; it is considered and not estimated
-(H 7.4). How large the errors of the twin are is set apart from what the flight states."""
+swapped where each vessel has the other's from before the crossing."""
 
 LIMITS = [
     "How the vessels looked is not printed: their lengths of 11 m and 7 m, warmth and wakes are chosen, and "
@@ -209,13 +205,7 @@ def joint_words(spread: pd.DataFrame) -> str:
         f"Shared by probability, detections leave the tracks swapped on {swap_words(spread, JOINT)}, given "
         f"to one track each on {swap_words(spread, DISTANCE)}"
     )
-    said = f"{counts}{_beside(spread, JOINT, DISTANCE)}"
-    if (TOGETHER, "swapped") not in spread:
-        return said
-    return (
-        f"{said} Told that errors of the pose move both vessels alike and last, it leaves them swapped on "
-        f"{swap_words(spread, TOGETHER)}{_beside(spread, TOGETHER, JOINT)}"
-    )
+    return f"{counts}{_beside(spread, JOINT, DISTANCE)}"
 
 
 def _beside(spread: pd.DataFrame, one: str, other: str) -> str:

@@ -13,12 +13,8 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.validation import gate_threshold
 from wildlab.pipeline.georeference import (
     Observations,
-    covariances_of,
-    georeference,
     observe,
-    pose_errors,
 )
-from wildlab.pipeline.many.errors import of_pixels
 from wildlab.pipeline.rendered import exposures_of
 from wildlab.pipeline.track import truth_states
 from wildlab.tracking.many.bank import Looks, Tuning
@@ -44,18 +40,6 @@ APART_M, WINDOW_S = 2 * TUNING.measurement, 120.0
 EVERY = 5
 
 
-class Common(NamedTuple):
-    """What D places are wrong by alone, (D, 2, 2), m^2, and in common with others of their image: `shared`,
-    (D, 2, k), m, of `wildlab.pipeline.many.errors.of_pixels`."""
-
-    own: Array
-    shared: Array
-
-    def of(self, rows: NDArray[np.bool_]) -> Common:
-        """Of these detections."""
-        return Common(self.own[rows], self.shared[rows])
-
-
 class Crossing(NamedTuple):
     """What one flight saw of the two.
 
@@ -69,15 +53,12 @@ class Crossing(NamedTuple):
         (K,) s, of the images with detections.
     truth
         (2, K, 2) where the two were by their own receivers, m.
-    common
-        How wrong the detections may be, by what the flight states; None where nothing is stated.
     """
 
     looks: Looks
     boat: Index
     times: Array
     truth: Array
-    common: Common | None = None
 
     @property
     def apart(self) -> Array:
@@ -106,14 +87,7 @@ def arrange(flight: Flight, seen: Observations, boat: Index) -> tuple[Crossing, 
     times = np.array([at[int(one)] for one in images])
     looks = Looks(number[order], positions[order], float(np.median(np.diff(stamps))))
     truth = np.stack([truth_states(flight, name, times)[:, :2] for name in BOATS])
-    return Crossing(looks, boat[order], times, truth, _common(flight, seen, order)), order
-
-
-def _common(flight: Flight, seen: Observations, order: Index) -> Common:
-    errors = pose_errors(flight, seen)
-    points = georeference(flight, seen, np.random.default_rng(0), errors)
-    own, shared, _ = of_pixels(seen, errors, covariances_of(points), np.inf)
-    return Common(own[order], shared[order][..., shared[order].any(axis=(0, 1))])
+    return Crossing(looks, boat[order], times, truth), order
 
 
 def apart_times(crossing: Crossing) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Joint association of two vessels that cross: by distance, and with errors that their detections share."""
+"""Joint association of two vessels that cross, by distance alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     EVERY,
     TUNING,
     WINDOW_S,
-    Common,
     Crossing,
     Numbers,
     apart_times,
@@ -21,9 +20,6 @@ from wildlab.tracking.many import Scan as Look
 
 #: Joint integrated data association beside them, by distance alone (H 8.2 names it as what would come next).
 JOINT = "jipda"
-#: The same, told that errors of the pose move all detections of an image alike and last for the flight, as
-#: large as the flight states them.
-TOGETHER = "jipda-shared-errors"
 #: What joint association is told: the printed noise of `TUNING`, as white acceleration of the same strength.
 #: Chosen, once: nearly all that is in view is detected and hardly anything else is; a vessel is in view for
 #: some seconds in each lap and then for half a minute not, and both are there for good.
@@ -38,25 +34,17 @@ TARGETS = TargetBeliefs(
 )  # fmt: skip
 
 
-def joint_of(crossing: Crossing, density: float, common: Common | None = None) -> Identities:
-    """The same detections by joint integrated data association, against the vessels at every image.
-
-    ``common`` what they are wrong by alone and together; left out: each by the printed noise, alone.
-    """
+def joint_of(crossing: Crossing, density: float) -> Identities:
+    """The same detections by joint integrated data association, against the vessels at every image."""
     number = np.searchsorted(np.unique(crossing.looks.image), crossing.looks.image)
-    printed = np.tile(TUNING.measurement**2 * np.eye(2), (len(number), 1, 1))
-    R, shared = (printed, None) if common is None else common
+    R = TUNING.measurement**2 * np.eye(2)
     looks = [
-        Look(
-            float(time), 0, np.zeros(2), crossing.looks.positions[rows], R[rows], None,
-            None if shared is None else shared[rows],
-        )
+        Look(float(time), 0, np.zeros(2), crossing.looks.positions[rows], np.tile(R, (int(rows.sum()), 1, 1)))
         for k, time in enumerate(crossing.times)
         for rows in [number == k]
-    ]  # fmt: skip
-    lasting = [np.inf] * (0 if shared is None else shared.shape[-1])
+    ]
     ignored, scans = np.zeros(2, bool), []
-    for k, one in enumerate(run_many(looks, [SENSOR], TARGETS._replace(density=density), lasting)):
+    for k, one in enumerate(run_many(looks, [SENSOR], TARGETS._replace(density=density))):
         if k % EVERY:
             continue
         known = np.isfinite(crossing.truth[:, k]).all(axis=1)
@@ -106,19 +94,15 @@ def joint_swapped(crossing: Crossing, told: Identities) -> tuple[bool, bool]:
 
 
 def joint_numbers(crossing: Crossing) -> Numbers:
-    """What `UNITS` names of joint association both ways; it gives no detection to one track alone."""
-    numbers: Numbers = {}
-    ways = {JOINT: None} if crossing.common is None else {JOINT: None, TOGETHER: crossing.common}
-    for subject, common in ways.items():
-        told = joint_of(crossing, density_of(crossing.looks.interval), common)
-        after, end = joint_swapped(crossing, told)
-        anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
-        numbers |= {
-            (subject, "swapped"): float(after),
-            (subject, "swapped_at_end"): float(end),
-            (subject, "swaps"): float(told.swaps),
-            (subject, "breaks"): float(told.breaks),
-            (subject, "gospa"): float(np.mean([one.distance for one in told.gospa])),
-            (subject, "anees"): float(np.median(anees)) if anees else np.nan,
-        }
-    return numbers
+    """What `UNITS` names of joint association; it gives no detection to one track alone."""
+    told = joint_of(crossing, density_of(crossing.looks.interval))
+    after, end = joint_swapped(crossing, told)
+    anees = [track.anees for track in told.tracks.values() if np.isfinite(track.anees)]
+    return {
+        (JOINT, "swapped"): float(after),
+        (JOINT, "swapped_at_end"): float(end),
+        (JOINT, "swaps"): float(told.swaps),
+        (JOINT, "breaks"): float(told.breaks),
+        (JOINT, "gospa"): float(np.mean([one.distance for one in told.gospa])),
+        (JOINT, "anees"): float(np.median(anees)) if anees else np.nan,
+    }
