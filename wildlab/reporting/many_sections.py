@@ -108,6 +108,17 @@ def end_section(report: Report, followed: Followed) -> None:
         poses.append(
             f"Errors of the platform's position and heading that last are in no covariance of {listed(bare)}."
         )
+    of_poses = [name for name, one in followed.places.items() if "pose 1" in one.errors.names]
+    of_platforms = [
+        name
+        for name, one in followed.places.items()
+        if {"heading", "platform_north", "platform_east"} & set(one.errors.names)
+    ]
+    if of_poses and of_platforms:
+        poses.append(
+            f"Errors of the platform that {listed(of_poses)} and {listed(of_platforms)} share are taken for "
+            "two: tracks of both may be surer than they should be."
+        )
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
     judged = [
         f"A track farther than {followed.cutoff_m:g} m from every target is on nothing here, also where it "

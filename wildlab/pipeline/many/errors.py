@@ -228,7 +228,9 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
 
 
 def laid_out(parts: list[tuple[Errors, list[Array | None]]]) -> tuple[tuple[float, ...], list[list[Array]]]:
-    """Errors of several sensors side by side: those of one name are one error, of which nothing is two.
+    """Errors of several sensors side by side: those of one name are one error.
+
+    A camera's pose has names of its own: with a radar on the same platform its heading stands there twice.
 
     Parameters
     ----------
