@@ -59,3 +59,15 @@ def test_the_same_place_in_another_look_or_by_another_sensor_is_no_double(make_f
     # Without a look nobody knows whether it was at the same time.
     flight.tables["detections"] = once.assign(frame_id="", north_m=1.0)
     assert said(flight) == []
+
+
+def test_one_among_hundreds_is_a_note(make_flight: Make) -> None:
+    """A click too many is worth a word, and no warning."""
+    flight = seen(make_flight)
+    first = flight.table("detections").iloc[:1]
+    many = pd.concat(
+        [first.assign(detection_id=f"m{number}", north_m=30.0 + number) for number in range(150)]
+    )
+    flight.tables["detections"] = pd.concat([many, many.iloc[:1].assign(detection_id="x")], ignore_index=True)
+    found = [one for one in check_flight(flight) if one.field == "detection_id"]
+    assert [one.level for one in found] == ["note"] and "1 of 151 detections" in found[0].sentence

@@ -9,6 +9,8 @@ from wildlab.flight.store import Flight
 
 #: What may differ between two rows of one detection: what it is called, and whose it is said to be.
 NAMES = ("detection_id", "target_id")
+#: One clicked twice now and then is worth a word; this share of all is a file that was read twice.
+FEW = 0.01
 
 
 def twice(flight: Flight) -> Iterator[Finding]:
@@ -37,7 +39,7 @@ def twice(flight: Flight) -> Iterator[Finding]:
     first = rows.iloc[0]
     n, looks = len(rows), rows["frame_id"].nunique()
     yield Finding(
-        "warning",
+        "warning" if n > FEW * len(detections) else "note",
         "detections",
         "detection_id",
         f"{n} of {len(detections)} detections {'is' if n == 1 else 'are'} exactly like another one of the "
