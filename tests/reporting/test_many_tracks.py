@@ -174,6 +174,7 @@ def test_tracks_that_may_be_farther_off_than_what_counts_are_told() -> None:
     for look in one.shown:
         look.P[:, 0, 0] = 7.0**2
     said = " ".join(words.summary(one, lives())[0])
+    assert "State `reach_m = 21` in [targets]." in said
     assert "Tracks say that they may be 7" in said and "farther than 20 m counts as on nothing" in said
     one.cutoff_m = 22.0
     assert not any("may be" in said for said in words.summary(one, lives())[0])

@@ -131,17 +131,20 @@ All else holds.</p>
 <ul><li><code>wildlab check</code> on the flight says which.</li></ul>
 <p>1 finding. <code>wildlab check</code> says which.</p>
 <p>Is 3.5 m much? <a href="#a">See <code>wildlab georeference</code></a></p>
-<p>The filter <code>schmidt</code> is one.</p>"""
+<p>The filter <code>schmidt</code> is one.</p>
+<p>Others count. State <code>others = true</code> in [targets.many]. Down <code>down = 0</code> is.
+State <code>reach_m = 60</code>.</p>"""
     path = report(tmp_path, body)
     outside, inside = (
         BeautifulSoup(read_part(path, 1, exact=one).body, "html.parser") for one in (False, True)
     )
     assert len(inside.find_all("code")) > 5 and "--settings" in inside.get_text()
-    assert [" ".join(one.get_text().split()) for one in outside.find_all("p")][:4] == [
+    assert [" ".join(one.get_text().split()) for one in outside.find_all("p")][:5] == [
         "2 of 9 values are assumed. All else holds.",
         "1 finding.",
         "Is 3.5 m much?",
         "The filter schmidt is one.",
+        "Others count. Down down = 0 is.",
     ]
     assert not outside.find_all(["ul", "li"]) and "wildlab" not in outside.get_text()
 

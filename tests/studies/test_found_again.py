@@ -143,7 +143,6 @@ def test_intervals_are_those_of_flights():
     assert row["none wrong"] == f"3 of 6 ({100 * wilson.low:.0f} to {100 * wilson.high:.0f} %)"
     assert row["all right"] == row["none wrong"]
     assert text.share_words(np.array([0.4])) == "40.0 %"
-    assert text.flight_words(np.array([True])) == "1 of 1"
     assert list(text.again_table(spread).columns) == list(text.AGAIN_COLUMNS)
 
 

@@ -124,8 +124,9 @@ def end_section(report: Report, followed: Followed) -> None:
         f"A track farther than {followed.cutoff_m:g} m from every target is on nothing here, also where it "
         "follows one whose places are that far off.",
         _truth_words(followed),
-        "Tracks on others than the targets whose places are known are not told from tracks on nothing: state "
-        "`others = true` in [targets.many] where there are such; one beside a known target may count as its."
+        "Tracks on others than the targets whose places are known are not told from tracks on nothing, and "
+        "one beside a known target may count as its. Where there are such, state `others = true` in "
+        "[targets.many]."
         if not followed.others
         else "A track on another target beside one whose place is known may count as on that one.",
     ]

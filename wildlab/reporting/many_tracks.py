@@ -121,7 +121,7 @@ def _wide_words(followed: Followed) -> str:
     return (
         f"Tracks say that they may be {length(widest)} off (standard deviation of the worse axis, median), "
         f"and what is farther than {followed.cutoff_m:g} m counts as on nothing: honest tracks may be among "
-        "it. State a larger `reach_m` in [targets]."
+        f"it. State `reach_m = {np.ceil(WITHIN_SDS * widest):.0f}` in [targets]."
     )
 
 

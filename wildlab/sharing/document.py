@@ -33,8 +33,8 @@ _REFERENCES = re.compile(r"url\(\s*['\"]?#([^'\")\s]+)['\"]?\s*\)")
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
 #: Scripts and whatever else loads or runs something; pictures inside of the page stay.
 _NEVER = ("script", "iframe", "object", "embed", "link", "meta", "base", "form", "noscript", "template")
-#: What is typed, where wildlab and the flight are; what a sentence stands in.
-_COMMAND = re.compile(r"wildlab [a-z]|--[a-z]")
+#: What is typed, or stated in a file, where wildlab and the flight are; what a sentence stands in.
+_COMMAND = re.compile(r"wildlab [a-z]|--[a-z]|[a-z]+_\w+ = |[a-z]+ = (?:true|false)$")
 _BLOCKS = ("p", "li", "td", "th", "figcaption", "caption", "summary", "dd", "h2", "h3", "div")
 #: What screen readers list by its name, to go to.
 _LANDMARKS = "section[aria-label], nav[aria-label], aside[aria-label], [role=region][aria-label]"

@@ -12,11 +12,12 @@ from scipy.stats import multivariate_normal
 
 from tests.tracking.many.test_run import EYE, POINTS, lines, looks
 from wildlab.errors import WildlabError
-from wildlab.tracking.many.beliefs import Scan
+from wildlab.tracking.many import together
+from wildlab.tracking.many.beliefs import Hull, Scan
 from wildlab.tracking.many.probabilities import association_probabilities
 from wildlab.tracking.many.run import follow_many, run_many
 from wildlab.tracking.many.together import moved_together, told_by_others
-from wildlab.tracking.many.update import Compared, compare, update
+from wildlab.tracking.many.update import Compared, compare, compare_bearings, update
 from wildlab.tracking.maritime import white_acceleration
 from wildlab.tracking.schmidt import update_schmidt
 
@@ -195,6 +196,80 @@ def test_what_others_tell_is_the_least_squares_of_them() -> None:
         gain = g.T @ np.linalg.inv(g @ g.T + alone)
         assert np.allclose(mean[t], gain @ np.concatenate([nu[u, u] for u in others]))
         assert np.allclose(covariance[t], np.eye(3) - gain @ g)
+
+
+def test_what_nobody_is_sure_of_tells_little() -> None:
+    """Two measurements that may be a target's: their middle, as unsure as they lie apart, and probable."""
+    nu = np.array([[4.0, 0.0], [0.0, 2.0]])
+    S, G = np.tile(5.0 * np.eye(2), (2, 1, 1)), np.tile(2.0 * np.eye(2), (2, 1, 1))
+    one = Compared(*(np.stack([part, part])[:, None] for part in (nu, S)), np.ones((2, 1, 2)), np.zeros(0),
+                   np.stack([G, G])[:, None])  # fmt: skip
+    share, probable = np.array([0.25, 0.75]), 0.6
+    mean, covariance = told_by_others(one, np.tile(probable * share, (2, 1, 1)))
+    middle = share @ nu
+    off = nu - middle
+    spread = np.eye(2) + np.einsum("m,mi,mj->ij", share, off, off)
+    information = probable * 2.0 * np.linalg.inv(spread) * 2.0
+    right = np.linalg.inv(np.eye(2) + information)
+    assert np.allclose(covariance, right)
+    assert np.allclose(mean, right @ (probable * 2.0 * np.linalg.solve(spread, middle)))
+
+
+def test_two_rounds_are_nearly_all_that_can_be_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, off = np.random.default_rng(4), {0: [], 1: [], 2: [], 6: []}
+    drawn = [_drawn(rng, 4, 3, 3.0)[0] for _ in range(60)]
+    for rounds, found in off.items():
+        monkeypatch.setattr(together, "ROUNDS", rounds)
+        found += [np.abs(_both(one, 0.9, 1e-4)[1] - _enumerated(one, 0.9, 1e-4)).mean() for one in drawn]
+    mean = {rounds: float(np.mean(found)) for rounds, found in off.items()}
+    assert mean[2] < mean[1] < mean[0] / 2
+    assert abs(mean[2] - mean[6]) < 0.1 * mean[0]
+
+
+def test_a_bearing_moves_what_is_shared_too() -> None:
+    """The cross-covariance after a bearing is that of the Schmidt filter that has it."""
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(6, 6))
+    whole = root @ root.T + np.eye(6)
+    unit = np.eye(6)
+    unit[4:, 4:] = np.linalg.inv(np.linalg.cholesky(whole[4:, 4:]))
+    whole = unit @ whole @ unit.T
+    x, P, C = np.array([300.0, 400.0, 1.0, 2.0]), whole[:4, :4], whole[:4, 4:]
+    one = x[None, None], P[None, None]
+    compared = compare_bearings(
+        *one, np.zeros((1, 1, 2, 2)), np.zeros(2), [[0.93]], [[[1e-4]]], 1e3, C[None, None]
+    )
+    found = update(*one, [[1.0]], [[0.0, 1.0]], compared, C[None, None])
+    H = np.array([[-400.0, 300.0, 0.0, 0.0]]) / 500.0**2
+    nu = np.array([0.93 - np.arctan2(400.0, 300.0)])
+    right = update_schmidt(x, P, C, np.eye(2), nu, H, np.zeros((1, 2)), np.array([[1e-4]]))
+    assert np.allclose(found.C[0, 0], right.C, atol=1e-4) and not np.allclose(found.C[0, 0], C, atol=1e-3)
+    assert np.allclose(found.x[0, 0], right.x, atol=1e-3)
+
+
+def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
+    """What moves all by thirty metres at each look is no reason to leave a measurement out."""
+    truth = lines(np.array([[0.0, 0.0]]), np.array([[0.0, 0.0]]), 2)
+    base = moved(truth, 0.0, 30.0, 0.5, np.random.default_rng(0))
+    scans = [base[0]._replace(z=np.zeros((1, 2))), base[1]._replace(z=np.array([[100.0, 0.0]]))]
+    targets = POINTS._replace(lost_m=1e3, start_speed_m_s=0.1, fastest_m_s=1e3)
+    for errors, met in ((scans, True), ([one._replace(shared=None) for one in scans], False)):
+        *_, last = follow_many(errors, [EYE._replace(clutter=1e-9)], targets, [0.0] * 2 if met else [])
+        tracks = last[0]
+        assert (tracks.hits[tracks.identity == 0].max(initial=0) == 2) == met
+
+
+def test_what_is_shown_has_the_mean_of_its_kinds() -> None:
+    hulls = (Hull("a", 4.0, 2.0, 0.5), Hull("b", 30.0, 8.0, 0.5))
+    sensor = EYE._replace(rough_m=(0.0, 4.0), along_m=(0.0, 6.0), near_side_m=(0.0, 3.0))
+    scans = moved(
+        lines(np.array([[50.0, 8.0]]), np.array([[1.0, 0.5]]), 8), 10.0, 3.0, 0.5, np.random.default_rng(1)
+    )
+    targets = POINTS._replace(hulls=hulls, hits=1, confirmed=0.05, shown=0.01)
+    for tracks, shown in follow_many(scans, [sensor], targets, [10.0] * 2):
+        expected = np.einsum("tk,tkij->tij", tracks.kinds, tracks.C)
+        assert np.allclose(shown.C, expected[: len(shown.C)])
+    assert len(shown.C) == 1 and not np.allclose(tracks.C[0, 0], tracks.C[0, 1])
 
 
 @pytest.mark.parametrize("lasting", [0.0, 20.0, np.inf])

@@ -149,12 +149,12 @@ def of_pixels(
         ],
         axis=-1,
     )
-    for row in np.flatnonzero(np.isfinite(shared).all(axis=(1, 2)) & np.isfinite(total).all(axis=(1, 2))):
-        first, whole = shared[row] @ shared[row].T, total[row] - own[row]
-        if not np.allclose(first, whole, rtol=1e-6):
-            values, axes = np.linalg.eigh(whole)
-            whole = (axes * np.maximum(values, 0.0)) @ axes.T
-            shared[row] = transition_of_pose(first, whole, "bias") @ shared[row]
+    first, rest = shared @ np.swapaxes(shared, 1, 2), total - own
+    known = (np.isfinite(first) & np.isfinite(rest)).all(axis=(1, 2))
+    for row in np.flatnonzero(known & ~np.isclose(first, rest, rtol=1e-6).all(axis=(1, 2))):
+        values, axes = np.linalg.eigh(rest[row])
+        whole = (axes * np.maximum(values, 0.0)) @ axes.T
+        shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
     names = [*(f"pose {i}" for i in range(1, 7)), *(f"mount {i}" for i in range(1, 4)), "ground"]
     return own, shared, Errors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 

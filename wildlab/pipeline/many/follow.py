@@ -120,16 +120,12 @@ def follow_all(
         belief, more = of_sensor(flight, looks, told)
         if belief.offset_s:
             looks = scans_of(flight, name, belief.offset_s, source)
-        bearing = looks.kind == "bearing"
-        unused = [one for one in dict.fromkeys(more) if one.what.startswith("considered")
-                  and (bearing or one.what.endswith(f": {UNKNOWN_EFFECT}"))]  # fmt: skip
-        if looks.kind == "pixel":
-            # Those of [uncertainty] are said with all that pixels share.
-            more = [one for one in more if not one.what.startswith("considered") or one.source == STATED]
-        said += [one for one in dict.fromkeys(more) if one not in unused]
+        told_here, unused = _considered_apart(list(dict.fromkeys(more)), looks.kind)
+        said += told_here
         if looks.kind == "pixel":
             said += said_of_pixels(flight, looks, told.sensors.get(name))
         if unused:
+            bearing = looks.kind == "bearing"
             what = "Errors" if bearing else "An error of the clock"
             which = "that last are" if bearing else "is"
             notes.append(f"{what} of {name} {which} not considered where many targets are followed.")
@@ -185,6 +181,17 @@ def follow_all(
         truth_sd,
         bool(told.targets.many is not None and told.targets.many.others),
     )
+
+
+def _considered_apart(said: list[Said], kind: str) -> tuple[list[Said], list[Said]]:
+    """What a sensor of this kind is told, and which considered errors have no part in it.
+
+    What [uncertainty] says of a camera's pose is said with all that pixels share, and is in neither.
+    """
+    considered = [one for one in said if one.what.startswith("considered")]
+    unused = [one for one in considered if kind == "bearing" or one.what.endswith(f": {UNKNOWN_EFFECT}")]
+    elsewhere = [one for one in considered if kind == "pixel" and one.source != STATED]
+    return [one for one in said if one not in unused and one not in elsewhere], unused
 
 
 def known_looks(followed: Followed) -> NDArray[np.bool_]:

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.evaluation.runs import mean_share_interval, share_interval
-from wildlab.studies.crossing_vessels.text import beyond_chance
+from wildlab.evaluation.runs import mean_share_interval
+from wildlab.studies.crossing_vessels.text import beyond_chance, counted
 from wildlab.studies.crossing_vessels.trial.crossing import TUNING
 from wildlab.studies.crossing_vessels.trial.found_again import MAX_AGE_S, SURE, UNITS, WAYS
 
@@ -64,29 +64,14 @@ def share_words(values: Array) -> str:
     return f"{100 * found.estimate:.1f} % ({100 * found.low:.1f} to {100 * found.high:.1f} %)"
 
 
-def flight_words(flights: NDArray[np.bool_]) -> str:
-    """On how many flights something is so, with Wilson's interval where there are several.
-
-    Examples
-    --------
-    >>> flight_words(np.array([True, False, False]))
-    '1 of 3 (6 to 79 %)'
-    """
-    count, n = int(flights.sum()), len(flights)
-    if n == 1:
-        return f"{count} of 1"
-    found = share_interval(count, n)
-    return f"{count} of {n} ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
-
-
 def again_table(spread: pd.DataFrame) -> pd.DataFrame:
     """One row for each way: shares of tracks, and flights, with intervals over flights."""
     rows = [
         {
             "way": words,
             **{name: share_words(shares(spread, subject, name)) for name in (RIGHT, WRONG, MISSED)},
-            "none wrong": flight_words(spread[subject, WRONG].to_numpy(float) == 0),
-            "all right": flight_words(shares(spread, subject, RIGHT) == 1),
+            "none wrong": counted(int((spread[subject, WRONG] == 0).sum()), len(spread)),
+            "all right": counted(int((shares(spread, subject, RIGHT) == 1).sum()), len(spread)),
         }
         for subject, words in NAMES.items()
     ]

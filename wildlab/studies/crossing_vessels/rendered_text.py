@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
-from wildlab.evaluation.runs import share_interval
 from wildlab.pipeline.rendered import OVERLAP
+from wildlab.reporting.georeferencing_cause import listed
 from wildlab.simulation.scene.flights import Look
 from wildlab.studies.crossing_vessels.rendered import SEA_EVERY, Associated, Followed, Rendering
 from wildlab.studies.crossing_vessels.spotted import Counted
-from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance
+from wildlab.studies.crossing_vessels.text import NAMES, beyond_chance, counted
 from wildlab.studies.crossing_vessels.trial import DISTANCE, FEATURES
 from wildlab.studies.crossing_vessels.trial.crossing import APART_M, WINDOW_S
 from wildlab.studies.crossing_vessels.trial.joint import JOINT
@@ -63,22 +63,6 @@ OUTCOME_CAPTION = (
 )
 
 
-def share_words(count: int, of: int) -> str:
-    """A count of so many, with the interval of its share.
-
-    Examples
-    --------
-    >>> share_words(8, 10), share_words(98, 4837), share_words(0, 0)
-    ('8 of 10 (49 to 94 %)', '98 of 4837 (1.7 to 2.5 %)', 'none of 0')
-    """
-    if not of:
-        return "none of 0"
-    found = share_interval(count, of)
-    ends = 100 * found.low, 100 * found.high
-    digits = 0 if round(ends[0]) != round(ends[1]) else 1
-    return f"{count} of {of} ({ends[0]:.{digits}f} to {ends[1]:.{digits}f} %)"
-
-
 def flights_words(flights: Sequence[Rendering]) -> str:
     """Their names in a sentence.
 
@@ -88,9 +72,7 @@ def flights_words(flights: Sequence[Rendering]) -> str:
     >>> flights_words([SimpleNamespace(seed=seed) for seed in (7, 8, 9)])
     'flights 7, 8 and 9'
     """
-    names = [str(one.seed) for one in flights]
-    listed = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-    return f"flight{'s' * (len(names) != 1)} {listed}"
+    return f"flight{'s' * (len(flights) != 1)} {listed([str(one.seed) for one in flights])}"
 
 
 def opening_words(flights: Sequence[Rendering], seed: int) -> str:
@@ -126,12 +108,12 @@ def detected_table(flights: Sequence[Rendering]) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "flight": name,
-            "whole": share_words(near.found, near.whole),
-            "joined": share_words(near.joined, near.whole),
-            "missed": share_words(near.missed, near.whole),
-            "cut": share_words(near.cut_found, near.cut),
+            "whole": counted(near.found, near.whole),
+            "joined": counted(near.joined, near.whole),
+            "missed": counted(near.missed, near.whole),
+            "cut": counted(near.cut_found, near.cut),
             "false": str(near.false + sea.false),
-            "sea": share_words(sea.with_false, sea.frames),
+            "sea": counted(sea.with_false, sea.frames),
         }
         for name, near, sea in rows
     )
@@ -142,13 +124,13 @@ def detected_words(flights: Sequence[Rendering]) -> str:
     near, sea = _all(flights)
     if near.whole:
         said = (
-            f"Of the times that a vessel is whole in view, {share_words(near.found, near.whole)} are "
-            f"detected alone, {share_words(near.joined, near.whole)} lie in one detection with the other "
+            f"Of the times that a vessel is whole in view, {counted(near.found, near.whole)} are "
+            f"detected alone, {counted(near.joined, near.whole)} lie in one detection with the other "
             f"vessel, and {near.missed} {'is' if near.missed == 1 else 'are'} missed."
         )
     else:
         said = "No vessel is ever whole in view."
-    cut = f" Of those cut by the border, {share_words(near.cut_found, near.cut)} are." if near.cut else ""
+    cut = f" Of those cut by the border, {counted(near.cut_found, near.cut)} are." if near.cut else ""
     false = near.false + sea.false
     over = f"in {near.frames} frames with a vessel near and {sea.frames} without"
     if not false:
@@ -210,7 +192,7 @@ def outcome_table(flights: Sequence[Rendering]) -> pd.DataFrame:
         {
             "rule": words,
             "from": way,
-            "swapped": share_words(_swapped(flights, way, rule), len(flights)),
+            "swapped": counted(_swapped(flights, way, rule), len(flights)),
             **{f"flight-{one.seed}": outcome_words(take(one).by_rule[rule]) for one in flights},
         }
         for rule, words in NAMES.items()
@@ -255,7 +237,7 @@ def border_words(flights: Sequence[Rendering]) -> str:
     """
     frames = [WAYS[FRAMES](one).by_rule[FEATURES] for one in flights]
     inside = [WAYS[INSIDE](one).by_rule[FEATURES] for one in flights]
-    begun = share_words(sum(one.by_cut or 0 for one in frames), sum(one.tracks or 0 for one in frames))
+    begun = counted(sum(one.by_cut or 0 for one in frames), sum(one.tracks or 0 for one in frames))
     with_cut, without = ([one.wrong_inside or 0 for one in many] for many in (frames, inside))
     fewer, more = (
         sum(pairs)
@@ -276,12 +258,12 @@ def border_words(flights: Sequence[Rendering]) -> str:
 def summary_words(flights: Sequence[Rendering]) -> str:
     """A sentence on swaps from rendered frames."""
     by_distance, with_looks = (
-        share_words(_swapped(flights, FRAMES, rule), len(flights)) for rule in (DISTANCE, FEATURES)
+        counted(_swapped(flights, FRAMES, rule), len(flights)) for rule in (DISTANCE, FEATURES)
     )
     return (
         f"From rendered frames of {flights_words(flights)} the tracks are swapped by distance alone on "
         f"{by_distance}, with features on {with_looks}, and shared by probability on "
-        f"{share_words(_swapped(flights, FRAMES, JOINT), len(flights))}."
+        f"{counted(_swapped(flights, FRAMES, JOINT), len(flights))}."
     )
 
 

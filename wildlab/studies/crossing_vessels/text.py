@@ -64,8 +64,24 @@ LIMITS = [
     "for long.",
     "Looks are drawn one by one, and in truth those of neighbouring images go together: cut at the border, a "
     "vessel is too small for as long as it is there.",
-    "Nothing else is detected: no false alarms and no third vessel.",
+    "Drawn detections are of the two vessels alone: there is no false alarm among them, and no third vessel.",
 ]
+
+
+def counted(count: int, of: int) -> str:
+    """A count of so many, with the interval of its share.
+
+    Examples
+    --------
+    >>> counted(8, 10), counted(98, 4837), counted(0, 0)
+    ('8 of 10 (49 to 94 %)', '98 of 4837 (1.7 to 2.5 %)', 'none of 0')
+    """
+    if not of:
+        return "none of 0"
+    found = share_interval(count, of)
+    ends = 100 * found.low, 100 * found.high
+    digits = 0 if round(ends[0]) != round(ends[1]) else 1
+    return f"{count} of {of} ({ends[0]:.{digits}f} to {ends[1]:.{digits}f} %)"
 
 
 def swap_words(spread: pd.DataFrame, subject: str) -> str:
