@@ -80,7 +80,7 @@ def _truth_words(followed: Followed) -> str:
     """Whose errors the truth's are."""
     known = [sd for sd in followed.truth_sd.values() if sd > 0]
     if len(known) == len(followed.truth):
-        return "What the truth says that it may be off itself is beside the tracks' own covariance."
+        return "The standard deviation of the truth itself is counted beside that of the tracks."
     some = "" if not known else f"of {len(followed.truth) - len(known)} of {len(followed.truth)} targets "
     return f"The truth {some}has no standard deviation of its own: its error counts as the tracks'."
 

@@ -249,15 +249,15 @@ def test_a_bearing_moves_what_is_shared_too() -> None:
 
 
 def test_who_lies_far_off_by_what_is_shared_is_compared_too() -> None:
-    """What moves all by thirty metres at each look is no reason to leave a measurement out."""
-    truth = lines(np.array([[0.0, 0.0]]), np.array([[0.0, 0.0]]), 2)
-    base = moved(truth, 0.0, 30.0, 0.5, np.random.default_rng(0))
-    scans = [base[0]._replace(z=np.zeros((1, 2))), base[1]._replace(z=np.array([[100.0, 0.0]]))]
-    targets = POINTS._replace(lost_m=1e3, start_speed_m_s=0.1, fastest_m_s=1e3)
-    for errors, met in ((scans, True), ([one._replace(shared=None) for one in scans], False)):
-        *_, last = follow_many(errors, [EYE._replace(clutter=1e-9)], targets, [0.0] * 2 if met else [])
-        tracks = last[0]
-        assert (tracks.hits[tracks.identity == 0].max(initial=0) == 2) == met
+    """A place known to a metre, and a look that is wrong by thirty: sixty is no reason to leave it out."""
+    known = looks(np.zeros((4, 1, 2)), np.random.default_rng(0))
+    off = Scan(4.0, 0, known[0].platform, np.array([[60.0, 0.0]]), np.eye(2)[None])
+    sure = EYE._replace(clutter=1e-9)
+    for shared, met in ((np.tile(30.0 * np.eye(2), (1, 1, 1)), True), (None, False)):
+        scans = [*known, off._replace(shared=shared)]
+        *_, last = follow_many(scans, [sure], POINTS, [0.0] * 2 if met else [])
+        hits = dict(zip(last[0].identity.tolist(), last[0].hits.tolist(), strict=True))
+        assert hits[0] == (5 if met else 4)
 
 
 def test_what_is_shown_has_the_mean_of_its_kinds() -> None:
