@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from wildlab.errors import WildlabError, system_error
 
@@ -30,9 +30,24 @@ TOML_LIMIT = 4_000_000
 
 
 class Strict(BaseModel):
-    """A part of a TOML file: unknown keys are errors, numbers are finite."""
+    """A part of a TOML file: unknown keys are errors, numbers are finite, and true is no number."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _true_is_no_number(cls, value: Any, info: ValidationInfo) -> Any:
+        # Python takes True for 1: `calm = true` would be a share of one.
+        truths = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, bool)]
+        if truths and not _takes(cls.model_fields[str(info.field_name)].annotation, bool):
+            said = str(truths[0]).lower()
+            raise ValueError(f"{said} is no value for this key; write a number, a text or a table")
+        return value
+
+
+def _takes(annotation: Any, kind: type) -> bool:
+    """Whether a type, or one of those that it is made of, is this kind or anything at all."""
+    return annotation in (kind, Any) or any(_takes(one, kind) for one in typing.get_args(annotation))
 
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -6,12 +6,13 @@ Nothing of it has to be stated: `wildlab.pipeline.following.beliefs` says what i
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from wildlab.flight.files import Strict, check_model, parse_toml, read_toml
+from wildlab.flight.files import Strict, check_model, did_you_mean, parse_toml, read_toml
 
 #: Errors that a filter may consider, with the unit of their standard deviation. Position of the platform (and
 #: of the part of a target that is seen), its attitude, the clock of the sensor, and a range that is too long.
@@ -204,6 +205,17 @@ def parse_settings(text: str) -> Settings:
         Where it is not TOML, or a key is unknown, missing or wrong.
     """
     return check_model(Settings, parse_toml(text, Path("settings.toml")), None)
+
+
+def absent_sensors(settings: Settings, there: Collection[str]) -> dict[str, str]:
+    """The sensors that are told of and that a flight does not have, each with a clause on what may be meant.
+
+    Examples
+    --------
+    >>> absent_sensors(parse_settings("[sensors.radra]"), ["radar", "lidar"])
+    {'radra': "did you mean 'radar'? Known are lidar, radar"}
+    """
+    return {name: did_you_mean(name, there) for name in settings.sensors if name not in there}
 
 
 def settings_over(stated: Settings, own: Settings) -> Settings:

@@ -97,6 +97,23 @@ def test_what_agrees_or_is_not_said_is_no_finding(make_flight: Callable[..., Fli
     assert said(detected(make_flight, LOOKS, [(0, "radar"), (1, "radar")], named=False)) == []
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_a_misspelt_sensor_is_told_with_what_may_be_meant(
+    make_flight: Callable[..., Flight], named: bool
+) -> None:
+    seen = detected(make_flight, LOOKS, [(0, "radar"), (1, "lidar"), (2, "radar")], named=named)
+    told = {"sensors": {"radra": {"rate_hz": 2.0}, "lidar": {"rate_hz": 2.0}}}
+    flight = Flight(replace_in_manifest(seen.manifest, told), seen.nav, seen.tables)
+    (warning,) = [one for one in check_flight(flight) if one.field.startswith("sensors.")]
+    assert warning.level == "warning"
+    assert warning.sentence.startswith("flight.toml, sensors.radra: this sensor looked at nothing")
+    assert warning.fix.startswith("Did you mean 'radar'?")
+    seen.tables["detections"] = seen.tables["detections"].iloc[:0]
+    if not named:  # nobody has looked yet
+        flight = Flight(replace_in_manifest(seen.manifest, told), seen.nav, seen.tables)
+        assert not [one for one in check_flight(flight) if one.field.startswith("sensors.")]
+
+
 def all_said(flight: Flight) -> str:
     return " ".join(f"{one.sentence} {one.fix}" for one in check_flight(flight))
 

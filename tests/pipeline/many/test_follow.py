@@ -165,7 +165,8 @@ def test_what_settings_say_in_vain_is_said() -> None:
     text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"
     followed = follow_all(robot_flight(), settings=parse_settings(text))
     notes, said = followed.notes, [one.what for one in followed.said]
-    assert "The settings speak of a sensor 'rader', which this flight does not have." in notes
+    said_of = "The settings speak of a sensor 'rader', which this flight does not have; did you mean 'radar'?"
+    assert any(note.startswith(said_of) for note in notes)
     assert "An error of the clock of radar is not considered where many targets are followed." in notes
     assert "considered error: heading" in said and "considered error: clock" not in said
     assert followed.lasting_s == (np.inf,)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pandas as pd
 
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
 
 
@@ -33,11 +34,23 @@ def looks_of_others(frames: pd.DataFrame, detections: pd.DataFrame) -> pd.DataFr
 
 
 def sensors(flight: Flight) -> Iterator[Finding]:
-    """Detections that a sensor made in the looks of another one, and sources that are no sensor's."""
+    """Detections that a sensor made in the looks of another one, sources that are no sensor's, and sensors of
+    ``[sensors]`` that there are not."""
     frames, detections = flight.frames, flight.detections
-    if frames is None or detections is None or "sensor" not in frames:
+    if frames is None or detections is None:
         return
-    named = {name for name in frames["sensor"] if name}
+    named = {name for name in frames["sensor"] if name} if "sensor" in frames else set(detections["source"])
+    told = Settings(sensors=flight.manifest.sensors)
+    for name, meant in absent_sensors(told, named).items() if named else ():
+        yield Finding(
+            "warning",
+            "flight.toml",
+            f"sensors.{name}",
+            "this sensor looked at nothing, so that what is stated of it is not used",
+            f"{meant}; or take it out",
+        )
+    if "sensor" not in frames:
+        return
     others = looks_of_others(frames, detections)
     for (source, sensor), rows in others.groupby(["source", "sensor"], sort=True):
         whose = f"looks of the sensor {sensor!r}" if sensor else "looks that name no sensor"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.errors import WildlabError
-from wildlab.flight.following import Settings
+from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import (
     OF_UNNAMED,
@@ -98,7 +98,7 @@ def follow_targets(
         said = [one for one in said if not one.what.startswith("acceleration")]
         said.insert(0, tuned.said_of_density())
     wanted = sensors_with_detections(flight, sensors)
-    notes: list[str] = []
+    notes = notes_of_absent(flight, told)
     scans: dict[str, Scans] = {}
     beliefs: dict[str, Beliefs] = {}
     tracks: list[SensorTrack] = []
@@ -159,6 +159,15 @@ def refuse_without_times(flight: Flight) -> None:
             file=flight.folder,
             field="time.kind",
         )
+
+
+def notes_of_absent(flight: Flight, told: Settings) -> list[str]:
+    """A sentence for each sensor that the settings speak of and the flight does not have."""
+    absent = absent_sensors(told, sensors_of(flight))
+    return [
+        f"The settings speak of a sensor {name!r}, which this flight does not have; {meant}."
+        for name, meant in absent.items()
+    ]
 
 
 def sensors_with_detections(flight: Flight, wanted: Sequence[str] = ()) -> list[str]:

@@ -15,11 +15,16 @@ from wildlab.evaluation.identities import Scan as Compared
 from wildlab.flight.following import Settings
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import STATED, Said, of_flight, of_sensor, of_targets
-from wildlab.pipeline.following.follow import order_notes, refuse_without_times, sensors_with_detections
+from wildlab.pipeline.following.follow import (
+    notes_of_absent,
+    order_notes,
+    refuse_without_times,
+    sensors_with_detections,
+)
 from wildlab.pipeline.many.beliefs import of_many
 from wildlab.pipeline.many.errors import UNKNOWN_EFFECT, laid_out, lasting_of, said_of_pixels
 from wildlab.pipeline.many.places import ABLE, Places, places_of, thinned
-from wildlab.pipeline.scans import scans_of, sensors_of, truths_at
+from wildlab.pipeline.scans import scans_of, truths_at
 from wildlab.tracking.many import Scan, SensorBeliefs, Shown, TargetBeliefs, run_many, smooth_many
 
 Array = NDArray[np.float64]
@@ -105,12 +110,7 @@ def follow_all(
     told = of_flight(flight, settings)
     following, said = of_targets(told.targets)
     said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
-    there = sensors_of(flight)
-    notes = [
-        f"The settings speak of a sensor {name!r}, which this flight does not have."
-        for name in told.sensors
-        if name not in there
-    ]
+    notes = notes_of_absent(flight, told)
     places: dict[str, Places] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)

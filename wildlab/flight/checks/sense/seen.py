@@ -73,16 +73,27 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
         now = misfit(given)[0, 0]
         angle = degrees(given)
         if now > UNEXPLAINED and angle > UNEXPLAINED_DEG:
-            yield Finding(
-                "warning",
-                f"nav/{given.source}",
-                "",
-                f"the rays of clicks on known points pass them by {words.number(metres(given))} m, "
-                f"{angle:.0f} deg (median), and none of the usual mistakes explains it",
-                "check mount, attitude, clock and names of the points: the report shows how errors go "
-                "together",
-            )
+            yield from _unexplained(flight, given, angle)
     yield from _single(given)
+
+
+def _unexplained(flight: Flight, given: Sightings, angle: float) -> Iterator[Finding]:
+    named = bool((given.labels != "").any())
+    many = flight.manifest.targets.many
+    if not named and many is not None and many.others:
+        return  # most of what is detected may be of those whose places nobody knows
+    seen_of = "clicks on known points pass them" if named else "detections pass the nearest known target"
+    yield Finding(
+        "warning",
+        f"nav/{given.source}",
+        "",
+        f"the rays of {seen_of} by {words.number(metres(given))} m, {angle:.0f} deg (median), and none of "
+        "the usual mistakes explains it",
+        "check mount, attitude, clock and names of the points: the report shows how errors go together"
+        if named
+        else "check mount, attitude and clock; where most detections are of others than the known targets, "
+        "state `others = true` in [targets.many]",
+    )
 
 
 def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:

@@ -138,9 +138,13 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         return None
     detections = flight.detections
     rows = (detections["kind"] == "pixel").to_numpy() & np.isfinite(detections["u_px"].to_numpy())
-    named = "target_id" in detections and manifest.scoring.rule == "labelled"
+    labelled = np.zeros(len(rows), bool)
+    if "target_id" in detections and manifest.scoring.rule == "labelled":
+        labelled = rows & detections["target_id"].isin(flight.truth["target_id"]).to_numpy()
+    # Where none names a target, as a detector's do not, each may be of any of them.
+    named = bool(labelled.any())
     if named:
-        rows &= detections["target_id"].isin(flight.truth["target_id"]).to_numpy()
+        rows = labelled
     frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
     chosen = np.flatnonzero(rows & (frame >= 0))
     if len(chosen) > MOST:
