@@ -38,7 +38,8 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     apart_times,
     gather,
 )
-from wildlab.tracking.many.bank import Appearance, Bank, Looks
+from wildlab.tracking.many.bank import Bank, Looks
+from wildlab.tracking.many.bank_rules import Appearance
 
 INTERVAL = 0.5
 

@@ -17,7 +17,8 @@ from wildlab.studies.crossing_vessels.trial.found_again import (
     outcome,
     owners,
 )
-from wildlab.tracking.many.bank import Appearance, Bank, Looks
+from wildlab.tracking.many.bank import Bank, Looks
+from wildlab.tracking.many.bank_rules import Appearance
 
 INTERVAL = 0.5
 WITHOUT, WITH, GUESSED_WITHOUT, GUESSED_WITH = WAYS

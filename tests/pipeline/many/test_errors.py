@@ -252,3 +252,10 @@ def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
     x = np.concatenate([x[:, 0] for x, _ in after])
     assert followed.lasting_s == (5.0,) and np.allclose(table["smoothed_north_m"], x)
     assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
+
+
+def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says() -> None:
+    moves = [np.ones((1, 2, 1))]
+    for times in ((10.0, 30.0), (30.0, 10.0)):
+        lasting_s, _ = laid_out([(Errors(("heading",), (one,)), moves) for one in times])
+        assert lasting_s == (10.0,)

@@ -9,16 +9,17 @@ import pytest
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
+from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.assignment import global_nearest
-from wildlab.tracking.many.bank import (
+from wildlab.tracking.many.bank import Looks, Tuning, run_bank
+from wildlab.tracking.many.bank_rules import (
     DISTANCE,
     FEATURES,
+    STATE,
     VETO,
     Appearance,
-    Looks,
-    Tuning,
     associate,
-    run_bank,
+    limits_of,
 )
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import constant_velocity, in_steps
@@ -82,13 +83,80 @@ def test_what_a_veto_has_left_starts_nothing():
 def test_each_rule_by_hand():
     d = np.array([[2.0, 1.0], [1.0, 2.0]])
     f = np.array([[0.0, 50.0], [50.0, 0.0]])
-    assert associate(d, None, DISTANCE, TUNING, 1).track.tolist() == [1, 0]
-    assert associate(d, f, DISTANCE, TUNING, 1).track.tolist() == [1, 0]
-    assert associate(d, f, FEATURES, TUNING, 1).track.tolist() == [0, 1]
-    assert associate(d, f, VETO, TUNING, 1).track.tolist() == [-1, -1]
-    assert associate(d, 0.1 * f, VETO, TUNING, 1).track.tolist() == global_nearest(d, 9.21).track.tolist()
-    assert associate(d, 0.22 * f, VETO, TUNING, 1).track.tolist() == [-1, -1], "11 is above 10.8, of one"
-    assert associate(d, 0.22 * f, VETO, TUNING, 2).track.tolist() == [1, 0], "and below 13.8, of two"
+
+    def by(rule: str, features: np.ndarray | None, count: int = 1) -> list[int]:
+        looks = Appearance(np.zeros((2, count)), np.ones(count), np.ones(count))
+        limits = limits_of(rule, TUNING.gate, TUNING.veto_probability, looks)
+        return associate(d, features, rule, limits).track.tolist()
+
+    assert by(DISTANCE, None) == by(DISTANCE, f) == [1, 0]
+    assert by(FEATURES, f) == [0, 1]
+    assert by(VETO, f) == [-1, -1]
+    assert by(VETO, 0.1 * f) == global_nearest(d, 9.21).track.tolist()
+    assert by(VETO, 0.22 * f) == [-1, -1], "11 is above 10.8, of one"
+    assert by(VETO, 0.22 * f, 2) == [1, 0], "and below 13.8, of two"
+
+
+def test_features_in_the_state_are_a_filter_of_the_whole_state():
+    """Places and two features, one of them now and then not known, through one filter of six elements.
+
+    Its innovation squared lets in or keeps out what the bank does, which keeps the two parts apart; what it
+    keeps out moves neither the place nor the looks.
+    """
+    rng = np.random.default_rng(8)
+    image = np.r_[0, np.arange(1, 119, 2)]  # with an image between any two, nothing else can start
+    z = np.column_stack([0.3 * image, 0.0 * image]) + rng.normal(0, 20, (60, 2))
+    sd, true = np.array([0.1, 8.0]), np.array([3.0, 50.0])
+    features = true + sd * rng.normal(0, 1.6, (60, 2))
+    features[5::7, 1] = np.nan
+    looks = Appearance(features, sd, np.array([1.0, 0.4]))
+    bank = run_bank(Looks(image, z, INTERVAL), TUNING, STATE, looks)
+    alone = run_bank(Looks(image[:2], z[:2], INTERVAL), TUNING)
+    x = np.r_[alone.x[1, 0], features[:2].mean(axis=0)]
+    P = np.zeros((6, 6))
+    P[:4, :4], P[4:, 4:] = alone.P[1, 0], np.diag(sd**2 / 2)
+    F, Q = np.eye(6), np.zeros((6, 6))
+    motion = partial(constant_velocity, sd_acceleration=TUNING.acceleration)
+    F[:4, :4], Q[:4, :4] = in_steps(2 * INTERVAL, motion, 1.001 * INTERVAL)
+    H = np.zeros((4, 6))
+    H[:2, :2] = H[2:, 4:] = np.eye(2)
+    noise = np.diag(np.r_[[TUNING.measurement**2] * 2, sd**2])
+    gate, took, outside = gate_threshold(0.99, 4), [], 0
+    for k in range(2, len(image)):
+        x, P = predict(x, P, F, Q)
+        seen = np.r_[z[k], features[k]]
+        known = np.isfinite(seen)
+        G, R = H[known], noise[np.ix_(known, known)]
+        left, S = seen[known] - G @ x, G @ P @ G.T + R
+        inside = left @ np.linalg.solve(S, left) <= gate
+        outside += left[:2] @ np.linalg.solve(S[:2, :2], left[:2]) <= TUNING.gate and not inside
+        took.append(inside)
+        if inside:
+            done = update(x, P, seen[known], G, R)
+            x, P = done.x, done.P
+        assert np.allclose(bank.x[k, 0], x[:4], atol=1e-8) and np.allclose(bank.P[k, 0], P[:4, :4], atol=1e-8)
+    assert (bank.track[2:] == 0).tolist() == took
+    assert 0 < outside < 20, "some that are near enough do not look like it"
+
+
+def test_looks_in_the_state_follow_what_went_to_the_track():
+    """What slowly looks otherwise is followed, and a track that keeps its first looks loses it."""
+    image = np.arange(200)
+    slow = Appearance(np.linspace(0.0, 5.0, 200)[:, None], np.ones(1), np.ones(1))
+    looks = Looks(image, np.zeros((200, 2)), INTERVAL)
+    assert (run_bank(looks, TUNING, STATE, slow).track == 0).all()
+    assert (run_bank(looks, TUNING, VETO, slow).track[-20:] == -1).all()
+
+
+def test_a_feature_without_weight_is_no_part_of_the_state():
+    image = np.arange(6)
+    strange = np.array([[0.0, 0], [0, 0], [0, 0], [90, 0], [90, 0], [90, 0]])
+    looks = Looks(image, np.zeros((6, 2)), INTERVAL)
+    tracks = [
+        run_bank(looks, TUNING, STATE, Appearance(strange, np.ones(2), np.array(weights))).track.tolist()
+        for weights in ([0.0, 1.0], [1.0, 1.0])
+    ]
+    assert tracks == [[0] * 6, [0, 0, 0, 1, 1, 1]]
 
 
 def test_no_detections_are_no_tracks():
@@ -109,3 +177,15 @@ def test_no_detections_are_no_tracks():
 def test_what_is_refused(looks, rule, words):
     with pytest.raises(WildlabError, match=words):
         run_bank(looks, TUNING, rule)
+
+
+def test_a_veto_lets_through_as_many_of_a_targets_own_looks_as_it_says():
+    """Over many tracks: what each keeps is the mean of two detections, and as uncertain as half of one."""
+    rng, image = np.random.default_rng(3), np.r_[0, np.arange(1, 40, 2)]
+    tuning, looks = TUNING._replace(veto_probability=0.9), Looks(image, np.zeros((len(image), 2)), INTERVAL)
+    kept = [
+        (run_bank(looks, tuning, VETO, Appearance(own, np.ones(1), np.ones(1))).track[2:] == 0).mean()
+        for own in rng.normal(size=(400, len(image), 1))
+    ]
+    assert np.mean(kept) == pytest.approx(0.9, abs=3.5 * np.std(kept) / 20)
+    assert np.std(kept) / 20 < 0.01, "0.82 where it is taken for certain"

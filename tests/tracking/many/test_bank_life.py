@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
-from wildlab.tracking.many.bank import DISTANCE, FEATURES, VETO, Appearance, Looks, Tuning, run_bank
+from wildlab.tracking.many.bank import Looks, Tuning, run_bank
 from wildlab.tracking.many.bank_life import Life
+from wildlab.tracking.many.bank_rules import DISTANCE, FEATURES, VETO, Appearance
 
 INTERVAL = 0.5
 TUNING = Tuning(5.0, 0.2, 5.0, gate_threshold(0.99, 2), 5.0)

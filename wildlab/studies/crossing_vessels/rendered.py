@@ -43,7 +43,8 @@ from wildlab.studies.crossing_vessels.trial.crossing import (
     arrange,
 )
 from wildlab.studies.crossing_vessels.trial.joint import JOINT, joint_numbers
-from wildlab.tracking.many.bank import Appearance, Bank
+from wildlab.tracking.many.bank import Bank
+from wildlab.tracking.many.bank_rules import Appearance
 from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]

@@ -13,8 +13,9 @@ A matrix of distances has a row for each measurement and a column for each track
 """
 
 from wildlab.tracking.many.assignment import Assignment, global_nearest, nearest
-from wildlab.tracking.many.bank import Appearance, Bank, Looks, Tuning, run_bank
+from wildlab.tracking.many.bank import Bank, Looks, Tuning, run_bank
 from wildlab.tracking.many.bank_life import Life
+from wildlab.tracking.many.bank_rules import Appearance
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.features import feature_distances, image_features, veto, with_features
 from wildlab.tracking.many.found_again import look_differences, place_costs, reachable, recognise

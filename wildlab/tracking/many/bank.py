@@ -18,7 +18,6 @@ from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.kalman import predict, update
-from wildlab.tracking.many.assignment import Assignment, global_nearest
 from wildlab.tracking.many.bank_life import (
     Alive,
     Life,
@@ -31,17 +30,22 @@ from wildlab.tracking.many.bank_life import (
     verdicts,
     who,
 )
+from wildlab.tracking.many.bank_rules import (
+    DISTANCE,
+    RULES,
+    STATE,
+    Appearance,
+    associate,
+    compare_looks,
+    has_room,
+    limits_of,
+)
 from wildlab.tracking.many.beliefs import Sees
-from wildlab.tracking.many.features import feature_distances, veto, with_features
 from wildlab.tracking.many.life import CONFIRMED, DROPPED, pair_scans
 from wildlab.tracking.motion import constant_velocity, in_steps
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-#: What association goes by: distance alone; with features weighed in; with features as a veto on what was
-#: associated by distance.
-DISTANCE, FEATURES, VETO = "distance", "features", "veto"
 
 _H = np.eye(2, 4)
 #: New tracks, kept ones and identities to the kept ones that remain.
@@ -101,14 +105,6 @@ class Looks(NamedTuple):
     sees: Mapping[int, Sees] | None = None
 
 
-class Appearance(NamedTuple):
-    """What detections look like, (D, f), and what is told of it: spreads and weights, (f,)."""
-
-    features: Array
-    sd: Array
-    weights: Array
-
-
 class Bank(NamedTuple):
     """What the tracking system made of it.
 
@@ -153,9 +149,10 @@ def run_bank(
     tuning
         Of filters, gates and starts.
     rule
-        `DISTANCE`, or one of `FEATURES` and `VETO`, which need an appearance.
+        One of `RULES`; all but `DISTANCE` need an appearance.
     appearance
-        Of the detections. A track keeps the mean of the two that it starts with.
+        Of the detections. A track keeps the mean of the two that it starts with, and by `STATE` that of all
+        that went to it.
 
     Returns
     -------
@@ -174,6 +171,7 @@ def run_bank(
     alive = kept = nobody(features.shape[1])
     book = _Book([], [], [], [])
     by = appearance if rule != DISTANCE else None
+    limits = limits_of(rule, tuning.gate, tuning.veto_probability, appearance)
     recall: _Recall = partial(_recall, tuning=tuning, appearance=by, interval=looks.interval, motion=motion)
     # A place tells no more by then; what a track looks like is better known at its end.
     once_more = None if by is None else recall
@@ -191,21 +189,19 @@ def run_bank(
             gap = z[:, None] - alive.x[:, :2]
             S = np.broadcast_to(alive.P[:, :2, :2] + R, (*gap.shape, 2))
             distances = innovation_squared(gap, S)
-            seen = None
-            if appearance is not None:
-                # What is stored is the mean of two, and as uncertain as half of a detection.
-                spread = np.sqrt(1.5) * appearance.sd
-                seen = feature_distances(features[rows], alive.stored, spread, appearance.weights)
-            chosen = associate(distances, seen, rule, tuning, features.shape[1])
+            seen = None if appearance is None else compare_looks(features[rows], alive, appearance, rule)
+            if rule == STATE:
+                distances = distances + seen
+            chosen = associate(distances, seen, rule, limits)
             one = np.flatnonzero(chosen.track >= 0)
             to = chosen.track[one]
             if len(one):
                 done = update(alive.x[to], alive.P[to], z[one], _H, R)
                 alive.x[to], alive.P[to], track[rows[one]] = done.x, done.P, alive.number[to]
             # In the gate of a track that took nothing it is nothing new (H 3.3); only a veto leaves such.
-            free = (chosen.track < 0) & ~_has_room(distances, chosen, tuning.gate)
-            if tuning.life.ends:
-                near = np.asarray((distances <= tuning.gate).any(axis=0))
+            free = (chosen.track < 0) & ~has_room(distances, chosen, limits.gate)
+            if tuning.life.ends or rule == STATE:
+                near = np.asarray((distances <= limits.gate).any(axis=0))
                 alive = looked(alive, to, near, image, views, features[rows[one]])
             if tuning.life.confirm:
                 said = verdicts(alive, tuning.life)
@@ -308,36 +304,9 @@ def _recall(
     return kept.only(np.setdiff1d(np.arange(len(kept.number)), taken))
 
 
-def associate(distances: Array, features: Array | None, rule: str, tuning: Tuning, count: int) -> Assignment:
-    """One image's association by a rule.
-
-    Parameters
-    ----------
-    distances, features
-        (N, M), by (3.9) and from `feature_distances`.
-    rule
-        One of the three.
-    tuning
-        With the gate, and what a veto lets through.
-    count
-        How many features there are.
-
-    Returns
-    -------
-    Assignment
-    """
-    if rule == FEATURES and features is not None:
-        return global_nearest(with_features(distances, features, tuning.gate), np.inf)
-    chosen = global_nearest(distances, tuning.gate)
-    if rule == VETO and features is not None:
-        return veto(chosen, features, gate_threshold(tuning.veto_probability, count))
-    return chosen
-
-
 def _check(looks: Looks, rule: str, appearance: Appearance | None) -> None:
-    if rule not in (DISTANCE, FEATURES, VETO):
-        known = ", ".join((DISTANCE, FEATURES, VETO))
-        raise WildlabError(f"there is no rule {rule!r}", f"use one of: {known}", field="rule")
+    if rule not in RULES:
+        raise WildlabError(f"there is no rule {rule!r}", f"use one of: {', '.join(RULES)}", field="rule")
     if rule != DISTANCE and appearance is None:
         raise WildlabError(
             f"the rule {rule!r} needs what detections look like", "give an appearance", field="appearance"
@@ -348,11 +317,6 @@ def _check(looks: Looks, rule: str, appearance: Appearance | None) -> None:
             "sort them by image, and leave out those without a position",
             field="looks",
         )
-
-
-def _has_room(distances: Array, chosen: Assignment, gate: float) -> NDArray[np.bool_]:
-    """Which rows lie in the gate of a track that took nothing."""
-    return np.asarray(((distances <= gate) & (chosen.measurement < 0)).any(axis=1))
 
 
 def _images(image: Index) -> Iterator[tuple[int, Index]]:

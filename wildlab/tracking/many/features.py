@@ -62,7 +62,8 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, wei
     stored
         (M, f) of tracks.
     sd
-        (f,) standard deviation of the difference between a measurement of a target and what its track keeps.
+        (f,) standard deviation of the difference between a measurement of a target and what its track keeps,
+        or (M, f) where tracks know it differently well.
     weights
         (f,), not negative; zero leaves a feature out.
 
@@ -82,12 +83,12 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, wei
     [[4.0, 0.5]]
     """
     new, kept, spread, w = (np.asarray(one, float) for one in (measured, stored, sd, weights))
-    f = spread.shape[0] if spread.ndim == 1 else -1
+    f = spread.shape[-1] if spread.shape in (spread.shape[-1:], kept.shape) else -1
     if new.ndim != 2 or kept.ndim != 2 or (new.shape[1], kept.shape[1], w.shape) != (f, f, (f,)):
         raise WildlabError(
             f"features of shapes {new.shape} and {kept.shape} do not go with spreads of shape {spread.shape} "
             f"and weights of shape {w.shape}",
-            "give (N, f), (M, f), (f,) and (f,)",
+            "give (N, f), (M, f), (f,) or (M, f), and (f,)",
         )
     if not (np.isfinite(spread) & (spread > 0)).all():
         raise WildlabError(f"a spread of {spread.tolist()}", "give positive ones", field="sd")
@@ -97,6 +98,43 @@ def feature_distances(measured: ArrayLike, stored: ArrayLike, sd: ArrayLike, wei
         )
     apart = (new[:, None] - kept) / spread
     return np.asarray(np.where(np.isnan(apart), 0.0, w * apart**2).sum(axis=-1))
+
+
+def estimated_distances(
+    measured: ArrayLike, total: ArrayLike, known: ArrayLike, sd: ArrayLike, used: ArrayLike
+) -> Array:
+    """Normalised innovations squared of features that are part of a track's state, H 6.4.4's future work.
+
+    A feature of a target is the same at all times, and every measurement of it has the same noise: the Kalman
+    filter's estimate is the mean of what was measured, its variance that of the noise over their number.
+    Noise of features and of places have nothing to do with each other, and so the two parts of the state
+    neither: the innovation squared of the whole state is the sum of both.
+
+    Parameters
+    ----------
+    measured
+        (N, f) of measurements.
+    total, known
+        (M, f) sums of all that went to each track, and of how many.
+    sd
+        (f,) standard deviation of one measurement.
+    used
+        (f,) which features count.
+
+    Returns
+    -------
+    (N, M)
+        Chi-square of as many degrees of freedom as features are known. One that is not adds nothing.
+
+    Examples
+    --------
+    >>> estimated_distances([[3.0]], [[2.0], [4.0]], [[2.0], [2.0]], [1.0], [True]).round(3).tolist()
+    [[2.667, 0.667]]
+    """
+    count = np.asarray(known, float)
+    mean = np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
+    spread = np.asarray(sd, float) * np.sqrt(1 + 1 / np.maximum(count, 1))
+    return feature_distances(measured, mean, spread, np.asarray(used, float))
 
 
 def with_features(distances: ArrayLike, features: ArrayLike, gate: float) -> Array:
