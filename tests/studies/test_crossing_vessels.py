@@ -20,6 +20,7 @@ from wildlab.studies.crossing_vessels.trial import (
     FEATURES,
     LOOKS,
     SEPARATIONS,
+    STATE,
     SUBJECTS,
     VETO,
     all_numbers,
@@ -341,6 +342,16 @@ def test_words_on_the_veto(numbers, wrong, said):
     )
     assert said in text.veto_words(spread)
     assert "70 detections go to no track" in text.veto_words(spread)
+
+
+def test_words_on_features_in_the_state_turn_with_the_flights(numbers):
+    state = {(STATE, "wrong"): 2.0, (STATE, "tracks"): 9.0, (STATE, "unassigned"): 70.0}
+    base = {(FEATURES, "wrong"): 5.0, (FEATURES, "tracks"): 2.0, (FEATURES, "unassigned"): 30.0}
+    for mine, theirs, said in ((0.0, 1.0, "on fewer of them"), (1.0, 0.0, "on more"), (0.0, 0.0, "cannot")):
+        swaps = {(STATE, "swapped"): mine, (FEATURES, "swapped"): theirs}
+        told = text.state_words(spread_of(numbers, state | base | swaps, 20))
+        assert said in told and "2 and 5" in told and "70 and 30" in told and "9 and 2" in told
+        assert f"on {int(20 * mine)} of 20 flights" in told
 
 
 def test_ties_with_the_print_are_told_where_there_are_any(numbers):

@@ -38,9 +38,9 @@ from wildlab.tracking.many.features import image_features
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-#: By distance alone; with features weighed in; with features as a veto.
-DISTANCE, FEATURES, VETO = "without-features", "with-features", "veto"
-RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO}
+#: By distance alone; with features weighed in; with features as a veto; with features in the state.
+DISTANCE, FEATURES, VETO, STATE = "without-features", "with-features", "veto", "features-in-state"
+RULES = {DISTANCE: rules.DISTANCE, FEATURES: rules.FEATURES, VETO: rules.VETO, STATE: rules.STATE}
 SUBJECTS = tuple(RULES)
 #: What the rendered images show.
 LOOKS = "looks"
