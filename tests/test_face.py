@@ -7,6 +7,7 @@ import importlib
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,15 +131,17 @@ def test_long_summaries_are_cut() -> None:
 
 
 def test_points_and_their_errors(ship: Flight) -> None:
-    points = wildlab.georeference(ship, source="autopilot")
+    points = wildlab.georeference(ship)
     errors = wildlab.evaluate_points(points)
     assert errors.summary.n == len(ship.table("detections")) == len(points.table)
     assert errors.summary.mean == pytest.approx(errors.table["error_m"].mean())
     again = wildlab.georeference(ship, source="autopilot")
     pd.testing.assert_frame_equal(points.table, again.table)
     assert f"{errors.summary.n} points" in repr(errors)
-    with pytest.raises(wildlab.WildlabError, match="not clear which nav source"):
-        wildlab.georeference(ship)
+    two = replace(ship, nav=ship.nav | {"observer": ship.nav["autopilot"]})
+    with pytest.raises(wildlab.WildlabError, match="not clear which nav source") as caught:
+        wildlab.georeference(two)
+    assert caught.value.fix == "name one of those there are as source: autopilot, observer, truth"
 
 
 def test_a_track_says_what_it_was_told(ship: Flight) -> None:

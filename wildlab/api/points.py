@@ -59,7 +59,7 @@ def georeference(flight: Flight, source: str | None = None, seed: int = 0) -> Po
     flight
         With frames, pixel detections and poses.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     seed
         Of the samples that decide the ellipses of flat rays.
 

@@ -201,7 +201,7 @@ def track(
     target
         Its name; may be left out where the detections name one only.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     filter
         ``"schmidt"`` on pixels, with the poses' uncertainty considered; ``"ekf"`` on pixels, poses taken for
         true; ``"kf"`` on georeferenced positions.

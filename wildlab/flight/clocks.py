@@ -197,7 +197,7 @@ def frame_poses(
     flight
         With frames and poses.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     max_gap_s
         As in `poses_at`.
 

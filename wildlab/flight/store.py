@@ -123,22 +123,27 @@ class Flight(Brief):
         return self.tables[name]
 
     def pose_source(self, name: str | None = None) -> tuple[str, pd.DataFrame]:
-        """Name and table of a nav source; without a name, the only one (or ``logged``, where there are more).
+        """Name and table of a nav source; without a name, the only one beside those of the truth (or
+        ``logged``, where there are more).
 
         Raises
         ------
         WildlabError
             Where there is none of that name, or the choice is not clear.
         """
-        if name is None and len(self.nav) == 1:
-            return next(iter(self.nav.items()))
+        # A twin's truth, or a reference that is called so, is what poses are held against.
+        found = [one for one in self.nav if not one.startswith("truth")] or list(self.nav)
+        if name is None and len(found) == 1:
+            return found[0], self.nav[found[0]]
         wanted = "logged" if name is None else name
         if wanted in self.nav:
             return wanted, self.nav[wanted]
         known = ", ".join(sorted(self.nav)) or "none"
         raise WildlabError(
             f"there is no nav source {wanted!r}" if name else "it is not clear which nav source to use",
-            f"name one of those there are: {known}" if self.nav else "add the poses as nav/<source>.parquet",
+            f"name one of those there are as source: {known}"
+            if self.nav
+            else "add the poses as nav/<source>.parquet",
             file=self.folder,
             field="nav",
         )

@@ -116,7 +116,7 @@ def judge_accuracy(
     rng
         Draws folds, halves, blocks, and samples of flat rays.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     deviations
         Standard deviations in place of those that log and manifest state.
 

@@ -85,7 +85,7 @@ def calibrate_flight(
     rng
         Draws the halves, and samples of flat rays.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     estimate
         What to estimate: see `wildlab.geometry.calibration.calibrate`.
     splits

@@ -84,7 +84,7 @@ def camera_clock_by_points(flight: Flight, source: str | None = None) -> ClockBy
     flight
         With frames, poses, pixel detections that name targets, and truth of these.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------
@@ -196,7 +196,7 @@ def camera_clock_by_motion(
     pairs, motion
         From `image_motions`.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------

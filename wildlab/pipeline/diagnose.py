@@ -200,7 +200,7 @@ def diagnose(
     rng
         Draws the folds.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     rounds
         How many times the blocks are put into folds.
 

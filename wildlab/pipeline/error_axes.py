@@ -37,7 +37,7 @@ def axes_of(
     scored
         From `score_points`, N rows.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------

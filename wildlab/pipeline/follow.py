@@ -59,7 +59,7 @@ def usual_tuning(
     target
         Name of the target; None for all detections.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     acceleration
         Standard deviation per axis, m/s^2.
     velocity

@@ -90,7 +90,7 @@ def observe(
     flight
         With frames, pixel detections and poses.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     stamps
         Column of the frames that holds the camera's stamps.
     clock_shift

@@ -49,7 +49,7 @@ def learn_flight(
     rng
         Draws the folds.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Returns
     -------

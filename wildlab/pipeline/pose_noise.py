@@ -198,7 +198,7 @@ def evaluate_with_estimated_noise(
     rng
         Draws the halves, of whole blocks in time order.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
     names
         Parameters that are taken off first: estimated on the other half, too.
 

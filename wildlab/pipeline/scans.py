@@ -143,8 +143,8 @@ def scans_of(flight: Flight, sensor: str, offset_s: float = 0.0, source: str | N
         What to add to the sensor's stamps. The platform's position goes with the stamp: what was seen stands
         where the platform was then, so positions move with it.
     source
-        Name of the ``nav`` table; may be left out where there is only one. One row is a platform that stays
-        where it is.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's. One row is a
+        platform that stays where it is.
 
     Raises
     ------

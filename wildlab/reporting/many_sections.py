@@ -33,6 +33,10 @@ def pictures_section(report: Report, followed: Followed, lives: Identities | Non
     report.figures([*shown, charts.wrong_shown(followed, lives)])
 
 
+#: A table of more tracks is folded away.
+MOST_SHOWN = 25
+
+
 def tables_section(report: Report, followed: Followed, lives: Identities | None) -> None:
     """Targets, tracks, and what GOSPA is made of."""
     if lives is not None and lives.targets:
@@ -66,6 +70,7 @@ def tables_section(report: Report, followed: Followed, lives: Identities | None)
             if lives is not None
             else ""
         ),
+        fold=f"All {len(table)} tracks, one by one" if len(table) > MOST_SHOWN else "",
     )
 
 

@@ -83,7 +83,7 @@ def follow_targets(
     targets, sensors
         Names; left out: all of them.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Raises
     ------

@@ -145,7 +145,7 @@ def tune(
         By kind: detections further from a target than this (m, or rad of bearings and pixels) are not its
         own, where they do not say what they are of.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def follow_all(
     sensors
         Names; left out: all that detect places.
     source
-        Name of the ``nav`` table; may be left out where there is only one.
+        Name of the ``nav`` table; may be left out where there is one beside the truth's.
 
     Raises
     ------
