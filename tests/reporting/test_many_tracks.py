@@ -11,8 +11,11 @@ import pytest
 from wildlab.evaluation.identities import Identities, TargetLife, TrackLife
 from wildlab.evaluation.sets import gospa
 from wildlab.pipeline.following.beliefs import Said
+from wildlab.pipeline.many.errors import OF_COVARIANCE, Errors
 from wildlab.reporting import many_tracks as words
+from wildlab.reporting.many_sections import pose_limits
 from wildlab.tracking.many import POINT, Shown
+from wildlab.tracking.predictions import POSE
 
 
 def followed(tracks: int = 2, looks: int = 61) -> Any:
@@ -178,3 +181,28 @@ def test_tracks_that_may_be_farther_off_than_what_counts_are_told() -> None:
     assert "Tracks say that they may be 7" in said and "farther than 20 m counts as on nothing" in said
     one.cutoff_m = 22.0
     assert not any("may be" in said for said in words.summary(one, lives())[0])
+
+
+@pytest.mark.parametrize(
+    ("camera", "radar", "twice", "advice", "bare"),
+    [
+        (POSE, ("heading",), False, False, ""),
+        (tuple(f"eye: {name}" for name in POSE), ("heading",), True, True, ""),
+        (OF_COVARIANCE, ("heading",), True, False, ""),
+        (OF_COVARIANCE, (), False, False, "radar"),
+        (POSE, ("radar: range_bias",), False, False, "radar"),
+        (tuple(f"eye: {name}" for name in POSE), ("radar: heading",), False, False, ""),
+    ],
+)
+def test_what_is_said_of_the_platforms_errors_follows_from_their_names(
+    camera: tuple[str, ...], radar: tuple[str, ...], twice: bool, advice: bool, bare: str
+) -> None:
+    of: Any = {
+        name: SimpleNamespace(kind=kind, errors=Errors(names, (0.0,) * len(names)))
+        for name, kind, names in (("eye", "pixel", camera), ("radar", "range-bearing", radar))
+    }
+    followed: Any = SimpleNamespace(places=of)
+    told = " ".join(pose_limits(followed))
+    assert ("that eye and radar share are taken for two" in told) is twice
+    assert ("stated in [sensors.eye]" in told) is advice
+    assert (f"are in no covariance of {bare}." in told) if bare else ("no covariance" not in told)

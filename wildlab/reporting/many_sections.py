@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wildlab.evaluation.identities import Identities
+from wildlab.pipeline.many.errors import OF_COVARIANCE, counted_twice, of_platform
 from wildlab.pipeline.many.follow import Followed
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.charts import many as charts
@@ -90,40 +91,45 @@ def _truth_words(followed: Followed) -> str:
     return f"The truth {some}has no standard deviation of its own: its error counts as the tracks'."
 
 
-def end_section(report: Report, followed: Followed) -> None:
-    """What is not said, and how it was computed."""
+def pose_limits(followed: Followed) -> list[str]:
+    """What is not said of errors of the platform and of bearings, in sentences."""
     kinds = {one.kind for one in followed.places.values()}
-    poses = []
+    said = []
     if "pixel" in kinds:
-        poses.append(
+        said.append(
             "Errors of the pose are those that all detections of an image share, considered and not "
             "estimated; and what an image shows is told by the same poses."
         )
     if "bearing" in kinds:
-        poses.append(
+        said.append(
             "A bearing moves a track that another sensor began; it begins and confirms none, and is no "
             "sighting that a track is shown for. One whose place bearings keep known is not given up."
         )
     bare = [
         name
         for name, one in followed.places.items()
-        if not {"pose 1", "heading", "platform_north", "platform_east"} & set(one.errors.names)
+        if not {"heading", "platform_north", "platform_east"} & of_platform(one.errors)
     ]
     if bare:
-        poses.append(
+        said.append(
             f"Errors of the platform's position and heading that last are in no covariance of {listed(bare)}."
         )
-    of_poses = [name for name, one in followed.places.items() if "pose 1" in one.errors.names]
-    of_platforms = [
-        name
-        for name, one in followed.places.items()
-        if {"heading", "platform_north", "platform_east"} & set(one.errors.names)
-    ]
-    if of_poses and of_platforms:
-        poses.append(
-            f"Errors of the platform that {listed(of_poses)} and {listed(of_platforms)} share are taken for "
-            "two: tracks of both may be surer than they should be."
-        )
+    every = {name: one.errors for name, one in followed.places.items()}
+    for name, own in every.items():
+        others = [other for other, errors in every.items() if counted_twice(own, errors)]
+        if others:
+            twice = (
+                f"Errors of the platform that {name} and {listed(others)} share are taken for two: tracks of "
+                "both may be surer than they should be."
+            )
+            if OF_COVARIANCE[0] not in own.names:
+                twice += f" They are one where `correlation_time_s` is stated in [sensors.{name}]."
+            said.append(twice)
+    return said
+
+
+def end_section(report: Report, followed: Followed) -> None:
+    """What is not said, and how it was computed."""
     hulls = " Each track is of every kind of hull at once, which differ in where on the hull it is seen."
     judged = [
         f"A track farther than {followed.cutoff_m:g} m from every target is on nothing here, also where it "
@@ -139,7 +145,7 @@ def end_section(report: Report, followed: Followed) -> None:
         [
             *(judged if followed.truth else []),
             "A target that comes back after its track ended has another one: tracks are no count of targets.",
-            *poses,
+            *pose_limits(followed),
         ]
     )
     report.method(

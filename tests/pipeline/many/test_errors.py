@@ -10,17 +10,30 @@ import pytest
 from tests.pipeline.robots import boat, robot_flight
 from wildlab.flight.following import Settings, parse_settings
 from wildlab.flight.store import Flight
-from wildlab.geometry.frames import rotation_vector_to_matrix
+from wildlab.geometry.frames import euler_to_matrix, matrix_to_rotation_vector, rotation_vector_to_matrix
+from wildlab.geometry.uncertainty import PoseErrors
 from wildlab.pipeline.following.beliefs import of_flight, of_sensor
-from wildlab.pipeline.georeference import Observations, covariances_of, georeference, observe, pose_errors
+from wildlab.pipeline.georeference import (
+    Observations,
+    assumed_pose_covariance,
+    covariances_of,
+    georeference,
+    observe,
+    pose_errors,
+)
 from wildlab.pipeline.many.errors import (
+    OF_COVARIANCE,
     Errors,
+    OfPose,
     _pose_roots,
+    counted_twice,
     laid_out,
     lasting_of,
     of_elements,
     of_pixels,
+    of_poses,
     said_of_pixels,
+    stated_roots,
     told_errors,
 )
 from wildlab.pipeline.many.follow import follow_all, tracks_table
@@ -28,6 +41,7 @@ from wildlab.pipeline.many.places import Places, places_of
 from wildlab.pipeline.scans import scans_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import smooth_many
+from wildlab.tracking.predictions import POSE
 from wildlab.tracking.schmidt import transition_of_pose
 
 ALL = """
@@ -87,12 +101,20 @@ def _pixels(seed: int = 3) -> tuple[Flight, Observations]:
     return flight, observe(flight, "autopilot")
 
 
+def taken(flight: Flight, observed: Observations, lasting_s: float = np.inf) -> tuple[PoseErrors, OfPose]:
+    scans = scans_of(flight, "manual", 0.0, "autopilot")
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    told = told_errors(flight, observed, belief)
+    return told, of_poses(flight, observed, told, belief, lasting_s)
+
+
 @pytest.mark.slow
 def test_alone_and_in_common_are_the_whole() -> None:
     """Of every georeferenced pixel, also where its covariance comes from samples."""
     flight, observed = _pixels()
     points = georeference(flight, observed, np.random.default_rng(0))
-    R, shared, errors = of_pixels(observed, pose_errors(flight, observed), covariances_of(points), np.inf)
+    told, of_pose = taken(flight, observed)
+    R, shared, errors = of_pixels(observed, told, of_pose, covariances_of(points), np.inf)
     known = np.isfinite(covariances_of(points)).all(axis=(1, 2)) & np.isfinite(shared).all(axis=(1, 2))
     assert known.sum() > 100 and shared.shape[-1] == len(errors.names) == 10
     whole = R + shared @ np.swapaxes(shared, 1, 2)
@@ -116,7 +138,8 @@ def test_an_error_stays_itself_along_the_flight() -> None:
         assert np.allclose(phi @ roots[a], roots[b], atol=1e-9)
     points = georeference(flight, observed, np.random.default_rng(0))
     linear = points["ellipse"].to_numpy(str) == "linear"
-    _, shared, _ = of_pixels(observed, pose_errors(flight, observed), covariances_of(points), np.inf)
+    of_pose = OfPose(roots, OF_COVARIANCE)
+    _, shared, _ = of_pixels(observed, errors, of_pose, covariances_of(points), np.inf)
     small = 1e-4
     for i in (0, 4, 5):
         turn = rotation_vector_to_matrix(small * roots[:, 3:, i])
@@ -127,7 +150,7 @@ def test_an_error_stays_itself_along_the_flight() -> None:
         )
         moved = georeference(flight, replace(observed, poses=poses), np.random.default_rng(0))
         by_hand = (moved[["north_m", "east_m"]] - points[["north_m", "east_m"]]).to_numpy(float) / small
-        assert np.allclose(shared[linear][..., i], by_hand[linear], rtol=0.02, atol=0.02)
+        assert np.allclose(shared[linear][..., i], -by_hand[linear], rtol=0.02, atol=0.02)
 
 
 def test_errors_of_one_name_are_one_and_those_that_move_nothing_none() -> None:
@@ -223,7 +246,8 @@ def test_mount_and_ground_are_in_what_is_shared_and_stay() -> None:
     errors = pose_errors(flight, observed)._replace(mount=np.diag([1e-4, 4e-4, 9e-4]), plane=9.0)
     points = georeference(flight, observed, np.random.default_rng(0), errors)
     linear = points["ellipse"].to_numpy(str) == "linear"
-    R, shared, found = of_pixels(observed, errors, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
+    of_pose = OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
+    R, shared, found = of_pixels(observed, errors, of_pose, np.full((len(observed.uv), 2, 2), np.nan), 7.0)
     whole = R + shared @ np.swapaxes(shared, 1, 2)
     assert linear.sum() > 100 and np.allclose(whole[linear], covariances_of(points)[linear], rtol=1e-6)
     assert found.lasting_s == (7.0,) * 6 + (np.inf,) * 4
@@ -252,6 +276,62 @@ def test_tables_of_tracks_are_smoothed_by_what_lasts() -> None:
     x = np.concatenate([x[:, 0] for x, _ in after])
     assert followed.lasting_s == (5.0,) and np.allclose(table["smoothed_north_m"], x)
     assert not np.allclose(x, np.concatenate([x[:, 0] for x, _ in forever]))
+
+
+def test_an_angle_that_is_off_stays_one_whichever_way_the_airframe_lies() -> None:
+    """Against the rotations themselves; and the whole is the covariance that poses without one are given."""
+    rng = np.random.default_rng(5)
+    angles = rng.uniform(-1, 1, (50, 3)) * [np.pi, 1.4, np.pi]
+    R = euler_to_matrix(*angles.T)
+    sd = np.array([2.0, 2.0, 3.0, *np.radians([1.0, 1.5, 4.0])])
+    roots = stated_roots(R, sd)
+    usual = dict(zip(("position_horizontal_m", "position_vertical_m"), (2.0, 3.0), strict=True))
+    usual |= dict(zip(("roll_deg", "pitch_deg", "yaw_deg"), (1.0, 1.5, 4.0), strict=True))
+    assert np.allclose(roots @ np.swapaxes(roots, 1, 2), assumed_pose_covariance(R, usual))
+    for i in range(3):
+        off = angles.copy()
+        off[:, i] += 1e-6
+        turn = matrix_to_rotation_vector(np.swapaxes(R, 1, 2) @ euler_to_matrix(*off.T)) / 1e-6
+        assert np.allclose(roots[:, 3:, 3 + i], turn * sd[3 + i], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_platforms_errors_move_pixels_as_they_move_a_radars_places() -> None:
+    """North, east and heading, by the same closed form: a radar on board has one and the same error."""
+    flight, observed = _pixels()
+    told, of_pose = taken(flight, observed, 30.0)
+    assert of_pose.names == POSE
+    nothing = np.full((len(observed.uv), 2, 2), np.nan)
+    _, shared, errors = of_pixels(observed, told, of_pose, nothing, 30.0)
+    assert errors.names[:6] == POSE and set(errors.lasting_s[:6]) == {30.0}
+    sd = flight.manifest.uncertainty
+    points = georeference(flight, observed, np.random.default_rng(0), told)
+    away = points[["north_m", "east_m"]].to_numpy(float) - observed.poses.p_nb[:, :2]
+    known = np.isfinite(shared).all(axis=(1, 2))
+    assert known.sum() > 100
+    assert np.allclose(shared[known][..., 0], [-sd.position_horizontal_m, 0.0])
+    assert np.allclose(shared[known][..., 1], [0.0, -sd.position_horizontal_m])
+    turned = -np.radians(sd.yaw_deg) * np.stack([-away[:, 1], away[:, 0]], axis=-1)
+    assert np.allclose(shared[known][..., 5], turned[known], rtol=1e-6, atol=1e-6)
+
+
+def test_errors_of_a_platform_are_one_where_it_is_stated_how_long_they_last() -> None:
+    flight, observed = _pixels()
+    radar = Errors(("heading", "radar: range_bias"), (np.inf, np.inf))
+    for lasting_s, twice in ((0.0, True), (30.0, False)):
+        told, of_pose = taken(flight, observed, lasting_s)
+        camera = Errors(of_pose.names, (lasting_s,) * 6)
+        assert counted_twice(camera, radar) is twice
+        known = replace(observed, poses=replace(observed.poses, covariance=told.pose))
+        scans = scans_of(flight, "manual", 0.0, "autopilot")
+        belief, _ = of_sensor(flight, scans, of_flight(flight))
+        of_pose = of_poses(flight, known, told, belief, lasting_s)
+        assert counted_twice(Errors(of_pose.names, (lasting_s,) * 6), radar)
+        assert not counted_twice(camera, Errors(("radar: range_bias",), (np.inf,)))
+    text = "[sensors.manual]\ncorrelation_time_s = 9.0\n[sensors.manual.considered.heading]\nsd_deg = 3.0\n"
+    apart = of_sensor(flight, scans, of_flight(flight, parse_settings(text + "shared = false\n")))[0]
+    names = of_poses(flight, observed, told, apart, 9.0).names
+    assert names == (*POSE[:5], "manual: heading")
 
 
 def test_one_error_of_two_sensors_lasts_as_long_as_the_shorter_says() -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wildlab.flight.following import SensorPart
 from wildlab.flight.store import Flight
+from wildlab.geometry.frames import euler_errors_to_body, matrix_to_euler
 from wildlab.geometry.terrain import pixels_to_terrain
 from wildlab.geometry.terrain_uncertainty import terrain_jacobians
 from wildlab.geometry.uncertainty import PoseErrors, ground_jacobians
@@ -61,6 +62,8 @@ _SHARED = {
     "plane_height_m": "error of the ground's height, SD",
 }
 _OF_THE_MOUNT_AND_GROUND = ("misalignment_deg", "plane_height_m")
+#: Errors of a pose that has a covariance of its own, of which no single one has a name.
+OF_COVARIANCE = tuple(f"pose {i}" for i in range(1, 7))
 #: None at all.
 NO_ERRORS = Errors((), ())
 
@@ -71,24 +74,52 @@ def told_errors(flight: Flight, observed: Observations, beliefs: Beliefs) -> Pos
     That is `pose_errors` with the noise of pixels that the sensor is believed to have. Errors of the pose
     that are considered come on top of a covariance that poses have, and take the place of what is assumed.
     """
-    errors = pose_errors(flight, observed)
-    unknown = ~np.isfinite(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6))).all(axis=(1, 2))
-    sds = {one.name: one.sd for one in beliefs.considered if one.name in POSE}
+    errors = pose_errors(flight, observed)._replace(pixel=np.diag(beliefs.noise[:2] ** 2))
+    if observed.poses.covariance is None:
+        roots = stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs))
+        return errors._replace(pose=roots @ np.swapaxes(roots, 1, 2))
     pose = np.array(np.broadcast_to(errors.pose, (len(observed.uv), 6, 6)))
-    if sds and observed.poses.covariance is None:
-        angles = {_DEGREES[name]: float(np.degrees(sd)) for name, sd in sds.items() if name in _DEGREES}
-        pose = assumed_pose_covariance(observed.poses.R_nb, assumed_deviations(flight) | angles)
-        pose = np.array(np.broadcast_to(pose, (len(observed.uv), 6, 6)))
-    for name, sd in sds.items():
-        place = POSE.index(name)
-        if observed.poses.covariance is not None:
-            pose[:, place, place] += sd**2
-        elif name not in _DEGREES:
-            pose[:, place, place] = sd**2
-    if observed.poses.covariance is not None and unknown.any():
+    unknown = ~np.isfinite(pose).all(axis=(1, 2))
+    for one in beliefs.considered:
+        if one.name in POSE:
+            place = POSE.index(one.name)
+            pose[:, place, place] += one.sd**2
+    if unknown.any():
         # Where the log says nothing for a while, what is stated or usual is taken.
         pose[unknown] = assumed_pose_covariance(observed.poses.R_nb, assumed_deviations(flight))[unknown]
-    return errors._replace(pose=pose, pixel=np.diag(beliefs.noise[:2] ** 2))
+    return errors._replace(pose=pose)
+
+
+def stated_deviations(flight: Flight, beliefs: Beliefs) -> Array:
+    """(6,) of the errors of `POSE`, m and rad, of poses without a covariance of their own."""
+    usual = assumed_deviations(flight)
+    found = [np.radians(usual[key]) if name in _DEGREES else usual[key] for name, key in _OF_PLATFORM.items()]
+    sds = dict(zip(_OF_PLATFORM, found, strict=True))
+    sds |= {one.name: one.sd for one in beliefs.considered if one.name in POSE}
+    return np.array([sds[name] for name in POSE])
+
+
+def stated_roots(R_nb: Array, sd: Array) -> Array:
+    """What a standard deviation of each error of `POSE` does to poses.
+
+    Parameters
+    ----------
+    R_nb
+        (N, 3, 3).
+    sd
+        (6,) from `stated_deviations`.
+
+    Returns
+    -------
+    (N, 6, 6)
+        A column for each error: position in n, m, and rotation vector in b, rad. Times its transpose it is
+        the covariance; and an error of roll, pitch or heading stays one, whichever way the airframe lies.
+    """
+    roll, pitch, _ = np.moveaxis(matrix_to_euler(R_nb), -1, 0)
+    roots = np.zeros((len(R_nb), 6, 6))
+    roots[:, :3, :3] = np.diag(sd[:3])
+    roots[:, 3:, 3:] = euler_errors_to_body(roll, pitch) * sd[3:]
+    return roots
 
 
 def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> list[Said]:
@@ -114,8 +145,47 @@ def said_of_pixels(flight: Flight, scans: Scans, part: SensorPart | None) -> lis
     return said
 
 
+class OfPose(NamedTuple):
+    """Errors of the poses: ``roots`` (N, 6, 6) whose columns are what a standard deviation of each does to a
+    pose, and the ``names`` of the six."""
+
+    roots: Array
+    names: tuple[str, ...]
+
+
+def of_poses(
+    flight: Flight,
+    observed: Observations,
+    errors: PoseErrors,
+    beliefs: Beliefs,
+    lasting_s: float,
+) -> OfPose:
+    """What the poses of pixels are wrong by, error by error.
+
+    Where poses have no covariance of their own and it is stated how long their errors last, these are errors
+    of the platform, and those that another sensor on it considers are the same. Else they are the sensor's.
+    """
+    if observed.poses.covariance is not None:
+        return OfPose(_pose_roots(observed, errors), OF_COVARIANCE)
+    apart = {one.name for one in beliefs.considered if not one.shared}
+    names = (f"{beliefs.sensor}: {name}" if lasting_s == 0 or name in apart else name for name in POSE)
+    return OfPose(stated_roots(observed.poses.R_nb, stated_deviations(flight, beliefs)), tuple(names))
+
+
+def of_platform(errors: Errors) -> set[str]:
+    """Which errors of `POSE` stand among a sensor's, by whatever name."""
+    if OF_COVARIANCE[0] in errors.names:
+        return set(POSE)
+    return {name.split(": ")[-1] for name in errors.names} & set(POSE)
+
+
+def counted_twice(errors: Errors, other: Errors) -> bool:
+    """Whether errors of the platform that another sensor considers stand among these under other names."""
+    return bool((of_platform(errors) & set(other.names)) - set(errors.names))
+
+
 def of_pixels(
-    observed: Observations, errors: PoseErrors, total: Array, lasting_s: float
+    observed: Observations, errors: PoseErrors, of_pose: OfPose, total: Array, lasting_s: float
 ) -> tuple[Array, Array, Errors]:
     """What georeferenced pixels have of their own and in common.
 
@@ -125,6 +195,8 @@ def of_pixels(
         From `observe`, N rows.
     errors
         What they may be wrong by.
+    of_pose
+        The part of the poses, from `of_poses`.
     total
         (N, 2, 2) covariances of their places by these, m^2: where they are of samples, what is in common is
         stretched to it.
@@ -143,7 +215,8 @@ def of_pixels(
     mount, plane = np.sqrt(np.diag(errors.mount)), np.sqrt(np.asarray(errors.plane))
     shared = np.concatenate(
         [
-            J["pose"] @ _pose_roots(observed, errors),
+            # As of other sensors: what is added to the known pose for the true one comes off the place.
+            -J["pose"] @ of_pose.roots,
             J["mount"] * mount,
             (J["plane"] * np.broadcast_to(plane, len(own))[:, None])[..., None],
         ],
@@ -155,7 +228,7 @@ def of_pixels(
         values, axes = np.linalg.eigh(rest[row])
         whole = (axes * np.maximum(values, 0.0)) @ axes.T
         shared[row] = transition_of_pose(first[row], whole, "bias") @ shared[row]
-    names = [*(f"pose {i}" for i in range(1, 7)), *(f"mount {i}" for i in range(1, 4)), "ground"]
+    names = [*of_pose.names, *(f"mount {i}" for i in range(1, 4)), "ground"]
     return own, shared, Errors(tuple(names), (lasting_s,) * 6 + (np.inf,) * 4)
 
 
@@ -229,8 +302,6 @@ def _pose_roots(observed: Observations, errors: PoseErrors) -> Array:
 
 def laid_out(parts: list[tuple[Errors, list[Array | None]]]) -> tuple[tuple[float, ...], list[list[Array]]]:
     """Errors of several sensors side by side: those of one name are one error.
-
-    A camera's pose has names of its own: with a radar on the same platform its heading stands there twice.
 
     Parameters
     ----------

@@ -13,7 +13,14 @@ from wildlab.flight.store import Flight
 from wildlab.geometry.camera import in_image, project
 from wildlab.pipeline.following.beliefs import Beliefs
 from wildlab.pipeline.georeference import covariances_of, georeference, observe
-from wildlab.pipeline.many.errors import NO_ERRORS, Errors, of_elements, of_pixels, told_errors
+from wildlab.pipeline.many.errors import (
+    NO_ERRORS,
+    Errors,
+    of_elements,
+    of_pixels,
+    of_poses,
+    told_errors,
+)
 from wildlab.pipeline.scans import Scans
 from wildlab.tracking.coloured import thin
 from wildlab.tracking.many import Scan
@@ -177,7 +184,8 @@ def _of_pixels(
     observed = observe(flight, source, clock_shift=beliefs.offset_s)
     told = told_errors(flight, observed, beliefs)
     points = georeference(flight, observed, np.random.default_rng(0), told)
-    own, shared, errors = of_pixels(observed, told, covariances_of(points), lasting_s)
+    of_pose = of_poses(flight, observed, told, beliefs, lasting_s)
+    own, shared, errors = of_pixels(observed, told, of_pose, covariances_of(points), lasting_s)
     ids = pd.Index(points["detection_id"])
     row = pd.Index(ids[~ids.duplicated()]).get_indexer(pd.Index(scans.ids.ravel()))
     row = np.where(row < 0, -1, np.flatnonzero(~ids.duplicated())[row])

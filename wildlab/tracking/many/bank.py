@@ -190,7 +190,7 @@ def run_bank(
             S = np.broadcast_to(alive.P[:, :2, :2] + R, (*gap.shape, 2))
             distances = innovation_squared(gap, S)
             seen = None if appearance is None else compare_looks(features[rows], alive, appearance, rule)
-            if rule == STATE:
+            if rule == STATE and seen is not None:
                 distances = distances + seen
             chosen = associate(distances, seen, rule, limits)
             one = np.flatnonzero(chosen.track >= 0)
