@@ -7,6 +7,8 @@
 
 # How many notebooks or test processes at once.
 JOBS ?= 2
+# Test processes: one more, since tests wait for commands and browsers that they start.
+TEST_JOBS ?= $(shell expr $(JOBS) + 1)
 # More arguments for the tool behind a target: make test ARGS="tests/geometry -k frames"
 ARGS ?=
 
@@ -35,10 +37,10 @@ tutorials: environment ## run the tutorials of notebooks/tutorials, and say wher
 	@$(BIN)/python -m wildlab.runner.tutorials --jobs $(JOBS) $(ARGS)
 
 test: environment ## run the tests (where CI=true: the slow ones too)
-	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+	@$(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile $(ARGS)
 
 test-all: environment ## run all tests, the slow ones too
-	@CI=true $(BIN)/python -m pytest -n $(JOBS) --dist loadfile $(ARGS)
+	@CI=true $(BIN)/python -m pytest -n $(TEST_JOBS) --dist loadfile $(ARGS)
 
 style: environment ## ruff, mypy and the notebooks' state, as the tests check them
 	@$(BIN)/ruff check .
