@@ -13,7 +13,7 @@ import re
 import stat
 import tomllib
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, TypeVar
 
@@ -38,11 +38,21 @@ class Strict(BaseModel):
     @classmethod
     def _true_is_no_number(cls, value: Any, info: ValidationInfo) -> Any:
         # Python takes True for 1: `calm = true` would be a share of one.
-        truths = [one for one in (value if isinstance(value, list) else [value]) if isinstance(one, bool)]
-        if truths and not _takes(cls.model_fields[str(info.field_name)].annotation, bool):
-            said = str(truths[0]).lower()
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        truths = [] if _takes(annotation, bool) or _model_in(annotation) else list(_truths(value))
+        if truths or (isinstance(value, bool) and not _takes(annotation, bool)):
+            said = str(truths[0] if truths else value).lower()
             raise ValueError(f"{said} is no value for this key; write a number, a text or a table")
         return value
+
+
+def _truths(value: Any) -> Iterator[bool]:
+    """Every true and false in values, lists and tables."""
+    if isinstance(value, bool):
+        yield value
+    elif isinstance(value, list | tuple | dict):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _truths(one)
 
 
 def _takes(annotation: Any, kind: type) -> bool:

@@ -121,14 +121,14 @@ def test_features_in_the_state_are_a_filter_of_the_whole_state():
     H = np.zeros((4, 6))
     H[:2, :2] = H[2:, 4:] = np.eye(2)
     noise = np.diag(np.r_[[TUNING.measurement**2] * 2, sd**2])
-    gate, took, outside = gate_threshold(0.99, 4), [], 0
+    took, outside = [], 0
     for k in range(2, len(image)):
         x, P = predict(x, P, F, Q)
         seen = np.r_[z[k], features[k]]
         known = np.isfinite(seen)
         G, R = H[known], noise[np.ix_(known, known)]
         left, S = seen[known] - G @ x, G @ P @ G.T + R
-        inside = left @ np.linalg.solve(S, left) <= gate
+        inside = left @ np.linalg.solve(S, left) <= gate_threshold(0.99, int(known.sum()))
         outside += left[:2] @ np.linalg.solve(S[:2, :2], left[:2]) <= TUNING.gate and not inside
         took.append(inside)
         if inside:

@@ -163,12 +163,16 @@ def thinned(places: Places, apart_s: float) -> Places:
 
 
 def _of_ranges(scans: Scans, beliefs: Beliefs) -> tuple[Array, Array]:
-    """Range on the level and bearing from north as a place; the covariance to first order."""
+    """Range on the level and bearing from north as a place; the covariance to first order.
+
+    A range no longer than the drop tells no place: NaN.
+    """
     distance, azimuth = scans.detections[..., 0], scans.detections[..., 1]
     drop = np.nan_to_num(scans.drop)[:, None] if len(scans.drop) else 0.0
     with np.errstate(invalid="ignore"):
         level = np.sqrt(np.maximum(distance**2 - drop**2, 0.0))
-        stretch = np.divide(distance, level, out=np.ones_like(distance), where=level > 0)
+        level = np.where(level > 0, level, np.nan)
+        stretch = distance / level
     c, s = np.cos(azimuth), np.sin(azimuth)
     z = scans.platform[:, None] + np.stack([level * c, level * s], axis=-1)
     J = np.stack(

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.errors import WildlabError
-from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.association import innovation_squared
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.bank_life import (
@@ -35,6 +34,7 @@ from wildlab.tracking.many.bank_rules import (
     RULES,
     STATE,
     Appearance,
+    alike_limit,
     associate,
     compare_looks,
     has_room,
@@ -189,7 +189,11 @@ def run_bank(
             gap = z[:, None] - alive.x[:, :2]
             S = np.broadcast_to(alive.P[:, :2, :2] + R, (*gap.shape, 2))
             distances = innovation_squared(gap, S)
-            seen = None if appearance is None else compare_looks(features[rows], alive, appearance, rule)
+            seen = (
+                None
+                if appearance is None
+                else compare_looks(features[rows], alive, appearance, rule, tuning.gate)
+            )
             if rule == STATE and seen is not None:
                 distances = distances + seen
             chosen = associate(distances, seen, rule, limits)
@@ -294,8 +298,8 @@ def _recall(
         return kept
     looks, alike = None, np.inf
     if appearance is not None:
-        looks = appearance.sd, appearance.weights
-        alike = gate_threshold(tuning.veto_probability, len(appearance.sd))
+        looks = appearance.sd, appearance.used
+        alike = alike_limit(tuning.veto_probability, appearance)
     limits = tuning.max_speed, tuning.gate, alike
     taken = who(new.only(np.array(rows)), kept, interval, motion, limits, looks, tuning.life.likelier)
     for row, old in zip(rows, taken, strict=True):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.many.assignment import Assignment, global_nearest
@@ -28,12 +29,18 @@ RULES = (DISTANCE, FEATURES, VETO, STATE)
 class Appearance(NamedTuple):
     """What detections look like, (D, f), and what is told of it: spreads and weights, (f,).
 
-    Features of the state have no weights: all count whose weight is not zero.
+    Weights are of `FEATURES` alone. By the other rules, and where a track is found again, the distance has to
+    be chi-square: all features count alike whose weight is not zero.
     """
 
     features: Array
     sd: Array
     weights: Array
+
+    @property
+    def used(self) -> Array:
+        """(f,) one for each feature that counts, and zero for the others."""
+        return (self.weights > 0).astype(float)
 
 
 class Limits(NamedTuple):
@@ -57,20 +64,38 @@ def limits_of(rule: str, gate: float, veto_probability: float, appearance: Appea
     True
     """
     if rule == STATE and appearance is not None:
-        inside = float(-np.expm1(-gate / 2))
-        return Limits(gate_threshold(inside, 2 + int((appearance.weights > 0).sum())))
+        return Limits(float(_with_more(gate, np.array([appearance.used.sum()]))[0]))
     if rule == VETO and appearance is not None:
-        return Limits(gate, gate_threshold(veto_probability, len(appearance.sd)))
+        return Limits(gate, alike_limit(veto_probability, appearance))
     return Limits(gate)
 
 
-def compare_looks(rows: Array, alive: Alive, appearance: Appearance, rule: str) -> Array:
-    """(N, M) how far detections with features (N, f) are from what the tracks look like."""
+def alike_limit(probability: float, appearance: Appearance) -> float:
+    """The largest distance of looks that lets in so many of a target's own; none where no feature counts."""
+    count = int(appearance.used.sum())
+    return gate_threshold(probability, count) if count else np.inf
+
+
+def _with_more(gate: float, count: Array) -> Array:
+    """A gate on places, as of so many elements more: as many of a target's own are beyond it."""
+    # By what is outside: what is inside rounds to one.
+    return np.asarray(chdtri(2 + count, np.exp(-gate / 2)), float)
+
+
+def compare_looks(rows: Array, alive: Alive, appearance: Appearance, rule: str, gate: float) -> Array:
+    """(N, M) how far detections with features (N, f) are from what the tracks look like.
+
+    By `STATE` features that are not known of both take the gate on places, ``gate``, as far: of any pair it
+    lets in as many as of one whose features are all known.
+    """
     if rule == STATE:
-        used = appearance.weights > 0
-        return estimated_distances(rows, alive.total, alive.known, appearance.sd, used)
+        used = appearance.used
+        known = (np.isfinite(rows) * used) @ (alive.known > 0).T
+        wider = _with_more(gate, np.array([used.sum()])) - _with_more(gate, known)
+        return wider + estimated_distances(rows, alive.total, alive.known, appearance.sd, used)
     # What is stored is the mean of two, and as uncertain as half of a detection.
-    return feature_distances(rows, alive.stored, np.sqrt(1.5) * appearance.sd, appearance.weights)
+    weights = appearance.weights if rule == FEATURES else appearance.used
+    return feature_distances(rows, alive.stored, np.sqrt(1.5) * appearance.sd, weights)
 
 
 def associate(distances: Array, features: Array | None, rule: str, limits: Limits) -> Assignment:

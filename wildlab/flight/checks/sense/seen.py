@@ -14,6 +14,7 @@ from wildlab.flight.checks.sense import words
 from wildlab.flight.checks.sense.attitudes import attitude_mistakes
 from wildlab.flight.checks.sense.constants import clock_mistakes, height_mistakes
 from wildlab.flight.checks.sense.lens import calibration_mistakes, mount_mistakes, pixel_mistakes
+from wildlab.flight.checks.sense.nameless import nameless
 from wildlab.flight.checks.sense.places import place_mistakes
 from wildlab.flight.checks.sense.sightings import (
     Missed,
@@ -27,6 +28,7 @@ from wildlab.flight.checks.sense.sightings import (
     misfit,
     missed,
     sightings,
+    with_attitude,
 )
 from wildlab.flight.checks.sense.trial import FAR_BETTER, Mistake, Named, explain
 from wildlab.flight.store import Flight
@@ -63,6 +65,14 @@ def seen(flight: Flight) -> Iterator[Finding]:
 
 def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
     """The findings about one nav source."""
+    if not given.named:
+        many = flight.manifest.targets.many
+        if many is not None and many.others:
+            return  # most of what is detected may be of those whose places nobody knows
+        yield from nameless(flight, given)
+        if flight.manifest.scoring.rule == "nearest":
+            yield from _single(given)
+        return
     named = explain(misfit, given, camera_mistakes(flight, given), glance)
     # Misfits are in units of what is expected, which a mistake may change too: metres have to fall as well.
     named = [one for one in named if _nearer(given, one.undone)]
@@ -73,27 +83,16 @@ def judge(flight: Flight, given: Sightings) -> Iterator[Finding]:
         now = misfit(given)[0, 0]
         angle = degrees(given)
         if now > UNEXPLAINED and angle > UNEXPLAINED_DEG:
-            yield from _unexplained(flight, given, angle)
+            yield Finding(
+                "warning",
+                f"nav/{given.source}",
+                "",
+                f"the rays of clicks on known points pass them by {words.number(metres(given))} m, "
+                f"{angle:.0f} deg (median), and none of the usual mistakes explains it",
+                "check mount, attitude, clock and names of the points: the report shows how errors go "
+                "together",
+            )
     yield from _single(given)
-
-
-def _unexplained(flight: Flight, given: Sightings, angle: float) -> Iterator[Finding]:
-    named = bool((given.labels != "").any())
-    many = flight.manifest.targets.many
-    if not named and many is not None and many.others:
-        return  # most of what is detected may be of those whose places nobody knows
-    seen_of = "clicks on known points pass them" if named else "detections pass the nearest known target"
-    yield Finding(
-        "warning",
-        f"nav/{given.source}",
-        "",
-        f"the rays of {seen_of} by {words.number(metres(given))} m, {angle:.0f} deg (median), and none of "
-        "the usual mistakes explains it",
-        "check mount, attitude, clock and names of the points: the report shows how errors go together"
-        if named
-        else "check mount, attitude and clock; where most detections are of others than the known targets, "
-        "state `others = true` in [targets.many]",
-    )
 
 
 def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]]:
@@ -101,7 +100,7 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     part = f"poses.{s.source}"
     yield from mount_mistakes(s)
     for b in attitude_mistakes(part):
-        yield Mistake(b.cause, b.said, b.write, _attitude(b.undo))
+        yield Mistake(b.cause, b.said, b.write, with_attitude(b.undo))
     yield from pixel_mistakes(s)
     yield from calibration_mistakes(s)
     for a in place_mistakes(part, s.origin):
@@ -111,14 +110,6 @@ def camera_mistakes(flight: Flight, s: Sightings) -> Iterator[Mistake[Sightings]
     yield from height_mistakes(s)
     if flight.manifest.time.kind == "utc":
         yield from clock_mistakes(s, flight.manifest.clocks.camera_offset_s)
-
-
-def _attitude(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
-    def change(s: Sightings) -> Sightings | None:
-        R = undo(s.R_nb)
-        return None if R is None else replace(s, R_nb=R)
-
-    return change
 
 
 def _position(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:

@@ -70,8 +70,12 @@ class Sightings:
         Of frame n.
     looked
         Poses, angles of the gimbal and known points as they were a shift in seconds later.
-    label
+    labels, frames
         (N,) name of the point, (N,) name of the image.
+    own_gimbal
+        Whether its angles are the log's.
+    named
+        Whether it is said of which point each is.
     """
 
     source: str
@@ -90,6 +94,7 @@ class Sightings:
     labels: NDArray[np.object_]
     frames: NDArray[np.object_]
     own_gimbal: bool = False
+    named: bool = True
 
     def take(self, rows: NDArray[np.bool_]) -> Sightings:
         """Some of the rows; the poses at other times go with them."""
@@ -138,13 +143,13 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         return None
     detections = flight.detections
     rows = (detections["kind"] == "pixel").to_numpy() & np.isfinite(detections["u_px"].to_numpy())
-    labelled = np.zeros(len(rows), bool)
-    if "target_id" in detections and manifest.scoring.rule == "labelled":
-        labelled = rows & detections["target_id"].isin(flight.truth["target_id"]).to_numpy()
-    # Where none names a target, as a detector's do not, each may be of any of them.
-    named = bool(labelled.any())
+    named = "target_id" in detections and manifest.scoring.rule == "labelled"
     if named:
-        rows = labelled
+        ids = detections["target_id"]
+        labelled = rows & ids.isin(flight.truth["target_id"]).to_numpy()
+        # Where none names a target, as a detector's do not, each may be of any of them; or of something else.
+        named = bool(labelled.any())
+        rows = labelled if named else rows & (ids.isna() | (ids == "")).to_numpy()
     frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(detections["frame_id"]))
     chosen = np.flatnonzero(rows & (frame >= 0))
     if len(chosen) > MOST:
@@ -196,6 +201,7 @@ def sightings(flight: Flight, source: str) -> Sightings | None:
         labels=np.full(len(chosen), "", object) if labels is None else labels,
         frames=ids.to_numpy(object),
         own_gimbal=flight.gimbal is not None or "pan_rad" in frames,
+        named=named,
     )
     known = np.isfinite(p).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
     known &= np.isfinite(points).all(axis=2).any(axis=0) & np.isfinite(found.pan + found.tilt)
@@ -393,3 +399,13 @@ def degrees(s: Sightings) -> float:
     m = missed(s)
     good = finite(m)
     return float(np.degrees(np.median(np.linalg.norm(m.turn[good], axis=1)))) if good.any() else float("nan")
+
+
+def with_attitude(undo: Callable[[Array], Array | None]) -> Callable[[Sightings], Sightings | None]:
+    """From a change of attitudes (N, 3, 3) that of sightings."""
+
+    def change(s: Sightings) -> Sightings | None:
+        R = undo(s.R_nb)
+        return None if R is None else replace(s, R_nb=R)
+
+    return change
