@@ -8,11 +8,20 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from pydantic import Field
 
 from wildlab.cli import wildlab
 from wildlab.errors import WildlabError
 from wildlab.flight import files
-from wildlab.flight.files import read_regular, read_toml, regular_size, unreadable
+from wildlab.flight.files import (
+    Strict,
+    check_model,
+    parse_toml,
+    read_regular,
+    read_toml,
+    regular_size,
+    unreadable,
+)
 from wildlab.flight.store import Flight, load_flight, save_flight
 
 
@@ -90,3 +99,45 @@ def test_minutes_that_are_none_are_refused(tmp_path: Path, minutes: str) -> None
     for command in (["run", "sensitivity"], ["evaluate", str(tmp_path)]):
         ran = CliRunner().invoke(wildlab, [*command, "--timeout", minutes])
         assert ran.exit_code == 2 and "is not a number of minutes" in ran.output
+
+
+class Inner(Strict):
+    on: bool = False
+    size: float = 1.0
+
+
+class Outer(Strict):
+    number: float | None = None
+    count: int = 1
+    name: str | bool = ""
+    rows: tuple[tuple[float, ...], ...] = ()
+    by_name: dict[str, float] = Field(default_factory=dict)
+    parts: dict[str, Inner] = Field(default_factory=dict)
+    several: tuple[Inner, ...] = ()
+    maybe: bool | None = None
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ("number = true", "number"),
+        ("count = false", "count"),
+        ("rows = [[1, 0], [true, 1]]", "rows"),
+        ("by_name = {x = 1.0, y = true}", "by_name"),
+        ("parts = {a = {size = true}}", "parts.a.size"),
+        ("several = [{size = 1.0}, {size = true}]", "several[1].size"),
+    ],
+)
+def test_true_is_no_number_wherever_it_stands(text: str, field: str) -> None:
+    with pytest.raises(WildlabError, match=r"(true|false) is no value for this key") as caught:
+        check_model(Outer, parse_toml(text, Path("a.toml")), None)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("text", ['maybe = "yes"', "maybe = 1", "parts = {a = {on = 0}}"])
+def test_what_is_true_or_false_is_written_so(text: str) -> None:
+    with pytest.raises(WildlabError, match="is neither true nor false"):
+        check_model(Outer, parse_toml(text, Path("a.toml")), None)
+    right = "name = true\nmaybe = false\nparts = {a = {on = true}}\nseveral = [{on = true}]\ncount = 2\n"
+    made = check_model(Outer, parse_toml(right, Path("a.toml")), None)
+    assert made.name is True and made.parts["a"].on and made.several[0].on and made.maybe is False

@@ -30,7 +30,7 @@ TOML_LIMIT = 4_000_000
 
 
 class Strict(BaseModel):
-    """A part of a TOML file: unknown keys are errors, numbers are finite, and true is no number."""
+    """A part of a TOML file: unknown keys are errors, numbers are finite, true is no number, and 1 not true."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 
@@ -40,6 +40,8 @@ class Strict(BaseModel):
         # Python takes True for 1: `calm = true` would be a share of one.
         annotation = cls.model_fields[str(info.field_name)].annotation
         truths = [] if _takes(annotation, bool) or _model_in(annotation) else list(_truths(value))
+        if annotation in (bool, bool | None) and not isinstance(value, bool) and value is not None:
+            raise ValueError(f"{value!r} is neither true nor false; write true or false, without quotes")
         if truths or (isinstance(value, bool) and not _takes(annotation, bool)):
             said = str(truths[0] if truths else value).lower()
             raise ValueError(f"{said} is no value for this key; write a number, a text or a table")

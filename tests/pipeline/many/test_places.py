@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,7 +17,7 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
 from wildlab.pipeline.following.beliefs import of_flight, of_sensor
 from wildlab.pipeline.georeference import georeference, observe
-from wildlab.pipeline.many.places import Places, places_of, sees_of
+from wildlab.pipeline.many.places import Places, _of_ranges, places_of, sees_of
 from wildlab.pipeline.scans import Scans, scans_of
 from wildlab.simulation.twins import simulate_twin
 from wildlab.tracking.many import Scan
@@ -45,6 +48,22 @@ def test_covariances_are_those_of_errors_drawn_at_random() -> None:
     azimuth = np.arctan2(off[1], off[0]) + rng.normal(0, np.radians(1.5), 200_000)
     drawn = np.cov(np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth)]))
     assert np.allclose(scan.R[0], drawn, atol=0.03 * np.trace(drawn))
+
+
+def test_a_range_no_longer_than_the_drop_tells_no_place() -> None:
+    """From 100 m up: below that it is noise, and just above it along the line of sight nobody knows much."""
+    scans: Any = SimpleNamespace(
+        detections=np.array([[[99.0, 0.3], [100.0, 0.3], [100.001, 0.3], [125.0, 0.3]]]),
+        drop=np.array([100.0]),
+        platform=np.zeros((1, 2)),
+    )
+    beliefs: Any = SimpleNamespace(noise=np.array([0.5, 0.01]))
+    z, R = _of_ranges(scans, beliefs)
+    assert np.isnan(z[0, :2]).all() and np.isnan(R[0, :2]).all()
+    assert np.linalg.norm(z[0, 3]) == pytest.approx(75.0)
+    toward = np.array([np.cos(0.3), np.sin(0.3)])
+    along = np.sqrt(np.einsum("i,mij,j->m", toward, R[0, 2:], toward))
+    assert np.allclose(along, [0.5 * 100.001 / np.sqrt(100.001**2 - 1e4), 0.5 * 125 / 75])
 
 
 def test_positions_are_taken_as_they_are() -> None:

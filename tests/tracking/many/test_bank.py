@@ -6,21 +6,26 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.assignment import global_nearest
 from wildlab.tracking.many.bank import Looks, Tuning, run_bank
+from wildlab.tracking.many.bank_life import nobody
 from wildlab.tracking.many.bank_rules import (
     DISTANCE,
     FEATURES,
+    RULES,
     STATE,
     VETO,
     Appearance,
     associate,
+    compare_looks,
     limits_of,
 )
+from wildlab.tracking.many.features import feature_distances
 from wildlab.tracking.measurement import positions
 from wildlab.tracking.motion import constant_velocity, in_steps
 from wildlab.tracking.run import Start, run_filter
@@ -137,6 +142,46 @@ def test_features_in_the_state_are_a_filter_of_the_whole_state():
         assert np.allclose(bank.x[k, 0], x[:4], atol=1e-8) and np.allclose(bank.P[k, 0], P[:4, :4], atol=1e-8)
     assert (bank.track[2:] == 0).tolist() == took
     assert 0 < outside < 20, "some that are near enough do not look like it"
+
+
+def test_a_gate_lets_in_as_many_with_features_as_without():
+    """Of chi-square numbers, however many features count or are known; and a large gate stays finite."""
+    rng = np.random.default_rng(2)
+    weights = np.array([1.0, 0.0, 3.0])
+    looks = Appearance(np.zeros((1, 3)), np.ones(3), weights)
+    place = (rng.normal(size=(40000, 2)) ** 2).sum(axis=1)
+    for known in ([1, 1, 1], [1, 1, 0], [0, 1, 0]):
+        features = rng.normal(size=(40000, 3)) * np.where(np.array(known) > 0, 1.0, np.nan)
+        # A track with very many detections: what it knows of a feature is certain.
+        alive = nobody(3)._replace(total=np.zeros((1, 3)), known=np.full((1, 3), 1e9))
+        limits = limits_of(STATE, TUNING.gate, 0.999, looks)
+        inside = place + compare_looks(features, alive, looks, STATE, TUNING.gate)[:, 0] <= limits.gate
+        assert inside.mean() == pytest.approx(0.99, abs=0.002), known
+    assert limits_of(STATE, 76.0, 0.999, looks).gate == pytest.approx(chi2.isf(np.exp(-38.0), 4))
+    assert limits_of(STATE, np.inf, 0.999, looks).gate == np.inf
+    veto = limits_of(VETO, TUNING.gate, 0.99, looks)
+    squares = feature_distances(rng.normal(size=(40000, 3)), np.zeros((1, 3)), np.ones(3), looks.used)
+    assert (squares <= veto.alike).mean() == pytest.approx(0.99, abs=0.002)
+    none = Appearance(np.zeros((1, 1)), np.ones(1), np.zeros(1))
+    assert limits_of(VETO, TUNING.gate, 0.99, none).alike == np.inf
+
+
+def test_weights_are_of_features_that_are_weighed_in_alone():
+    alive = nobody(1)._replace(stored=np.zeros((1, 1)), total=np.zeros((1, 1)), known=np.full((1, 1), 2.0))
+    looks = Appearance(np.zeros((1, 1)), np.ones(1), np.array([9.0]))
+    seen = {rule: compare_looks(np.array([[3.0]]), alive, looks, rule, 9.21) for rule in RULES[1:]}
+    assert np.allclose([seen[rule] for rule in (FEATURES, VETO, STATE)], [[[54.0]], [[6.0]], [[6.0]]])
+
+
+def test_what_is_outside_of_the_gate_of_place_and_looks_starts_a_track_of_its_own():
+    """Near a track that took nothing, but of other looks: with features in the state it is another target."""
+    image = np.arange(6)
+    strange = np.array([0, 0, 0, 4.2, 4.2, 4.2])[:, None]
+    near = Looks(image, np.zeros((6, 2)), INTERVAL)
+    track = run_bank(near, TUNING, STATE, Appearance(strange, np.ones(1), np.ones(1))).track.tolist()
+    assert track == [0, 0, 0, 1, 1, 1]
+    # By place alone they would lie in its gate, which has room for them.
+    assert run_bank(near, TUNING, DISTANCE).track.tolist() == [0] * 6
 
 
 def test_looks_in_the_state_follow_what_went_to_the_track():

@@ -119,6 +119,8 @@ def usable_for(flight: Flight) -> list[Use]:
     if not scored:
         lacks.append("truth")
     lacks += [f"{name} without a problem" for name in ("frames", "detections", "truth") if name in broken]
+    if not lacks and not of_known_targets(flight):
+        lacks.append("detections that are said to be of a known target")
     if lacks:
         georeferencing = f"it lacks {_and(lacks)}"
     else:
@@ -164,6 +166,25 @@ def usable_for(flight: Flight) -> list[Use]:
             f"it lacks {_and(navigation)}" if navigation else slow or f"imu and gnss are there{unstated}",
         ),
     ]
+
+
+def of_known_targets(flight: Flight) -> bool:
+    """Whether anything says of which known target pixels are: a name, or the rule that it is the nearest.
+
+    Where others are about whose places nobody knows, the nearest known target says nothing.
+    """
+    if flight.detections is None or flight.truth is None:
+        return False
+    if flight.manifest.scoring.rule == "nearest":
+        return not others_about(flight)
+    pixels = flight.detections[flight.detections["kind"] == "pixel"]
+    return "target_id" in pixels and bool(pixels["target_id"].isin(flight.truth["target_id"]).any())
+
+
+def others_about(flight: Flight) -> bool:
+    """Whether it is stated that targets are about whose places nobody knows."""
+    many = flight.manifest.targets.many
+    return many is not None and many.others
 
 
 def _kinds(flight: Flight) -> set[str]:
@@ -217,14 +238,31 @@ def _missing(flight: Flight) -> Iterator[Finding]:
     elif flight.manifest.scoring.rule == "labelled" and len(_seen(flight)):
         seen = _seen(flight)
         labelled = "target_id" in seen and (seen["target_id"] != "").any()
-        if not labelled and flight.truth["target_id"].nunique() > 1:
+        if not labelled and ("pixel" in _kinds(flight) or flight.truth["target_id"].nunique() > 1):
+            others = others_about(flight)
             yield Finding(
-                "warning",
+                "note" if others else "warning",
                 "detections",
                 "target_id",
-                "detections are scored by the target they name, and none names one",
-                'fill target_id, or set [scoring] rule = "nearest"',
+                "detections are scored by the target they name, and none names one: how accurate their "
+                "places are cannot be judged",
+                "fill target_id where it is known"
+                + (
+                    "; `wildlab track --many` needs no names"
+                    if others
+                    else '; where every detection is of a known target, set [scoring] rule = "nearest"; '
+                    "where others are about, state `others = true` in [targets.many]: `wildlab track --many` "
+                    "needs no names"
+                ),
             )
+    elif flight.manifest.scoring.rule == "nearest" and others_about(flight) and len(_seen(flight)):
+        yield Finding(
+            "warning",
+            "flight.toml",
+            "scoring.rule",
+            "detections are scored by the nearest known target, and others are about: most may be of those",
+            'name what is known in target_id and set [scoring] rule = "labelled"',
+        )
 
 
 def _uncertainty(flight: Flight) -> Iterator[Finding]:

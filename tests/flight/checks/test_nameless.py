@@ -1,0 +1,121 @@
+"""Pixels without names: mistakes are named by how many meet a known target, and right ones not accused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wildlab.flight.checks.check import check_flight, usable_for
+from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense.seen import seen
+from wildlab.flight.manifest import replace_in_manifest
+from wildlab.flight.store import Flight
+from wildlab.simulation.twins import simulate_twin
+
+QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
+
+
+@pytest.fixture(scope="module")
+def flown() -> Flight:
+    """Rows over 25 animals, by a detector that gives no names."""
+    flight = simulate_twin("uav-tracking", 1)
+    detections = flight.table("detections").assign(target_id="")
+    nav = {"autopilot": flight.nav["autopilot"]}
+    return replace(flight, nav=nav, tables={**flight.tables, "detections": detections})
+
+
+def told(flight: Flight) -> list[Finding]:
+    return list(seen(flight))
+
+
+def turned(flight: Flight, change: Callable[[np.ndarray], np.ndarray]) -> Flight:
+    """With other angles (N, 3), yaw, pitch and roll, in the poses."""
+    nav = flight.nav["autopilot"].copy()
+    angles = Rotation.from_quat(nav[QUATERNION].to_numpy()[:, [1, 2, 3, 0]]).as_euler("ZYX")
+    nav[QUATERNION] = Rotation.from_euler("ZYX", change(angles)).as_quat()[:, [3, 0, 1, 2]]
+    return replace(flight, nav={"autopilot": nav})
+
+
+def few(flight: Flight, count: int) -> Flight:
+    """With the truth of so many of them alone."""
+    truth = flight.table("truth")
+    kept = truth["target_id"].drop_duplicates().sample(count, random_state=count)
+    return replace(flight, tables={**flight.tables, "truth": truth[truth["target_id"].isin(kept)]})
+
+
+def with_others(flight: Flight) -> Flight:
+    return replace(
+        flight, manifest=replace_in_manifest(flight.manifest, {"targets": {"many": {"others": True}}})
+    )
+
+
+@pytest.mark.parametrize("count", [25, 12, 6, 2, 1])
+def test_what_is_right_is_not_accused_however_few_are_known(flown: Flight, count: int) -> None:
+    assert told(few(flown, count)) == []
+    nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
+    assert told(replace(few(flown, count), manifest=nearest)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda a: a * [-1, 1, 1], "yaw has the wrong sign"),
+        (lambda a: a + np.array([np.pi / 2, 0, 0]), "quarter turn"),
+    ],
+)
+def test_a_wrong_attitude_is_named_also_where_half_of_them_are_known(
+    flown: Flight, change: Callable[[np.ndarray], np.ndarray], said: str
+) -> None:
+    for count in (25, 12):
+        (found,) = told(few(turned(flown, change), count))
+        assert found.level == "warning" and said in found.sentence
+        assert "others = true" in found.fix
+    assert told(with_others(turned(flown, change))) == []
+
+
+def test_a_clock_that_is_off_is_named_with_what_to_write(flown: Flight) -> None:
+    frames = flown.table("frames")
+    late = replace(flown, tables={**flown.tables, "frames": frames.assign(time_s=frames["time_s"] + 8.0)})
+    (found,) = told(late)
+    assert "the images were taken" in found.sentence and "earlier than their stamps say" in found.sentence
+    written = float(found.fix.split("camera_offset_s = ")[1].split("`")[0])
+    assert written == pytest.approx(flown.manifest.clocks.camera_offset_s - 8.0, abs=1.0)
+
+
+def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown: Flight) -> None:
+    wrong = turned(flown, lambda a: a * [-1, 1, 1])
+    detections = wrong.table("detections").assign(target_id="somebody else")
+    assert told(replace(wrong, tables={**wrong.tables, "detections": detections})) == []
+
+
+def test_other_things_in_a_photo_are_no_wrong_photo(flown: Flight) -> None:
+    seen_by = flown.table("detections")
+    rows = seen_by.drop_duplicates("frame_id").iloc[[5, 25, 45]]
+    more = [rows.assign(u_px=rows["u_px"] + by, detection_id=[f"{by}-{i}" for i in range(3)])
+            for by in (-250.0, 250.0)]  # fmt: skip
+    both = pd.concat([seen_by, *more], ignore_index=True)
+    assert told(replace(flown, tables={**flown.tables, "detections": both})) == []
+
+
+def georeferencing(flight: Flight) -> tuple[bool, str]:
+    use = next(one for one in usable_for(flight) if one.purpose == "georeferencing accuracy")
+    return use.usable, use.why
+
+
+def test_whether_places_can_be_judged_is_said_as_the_report_will_have_it(flown: Flight) -> None:
+    assert georeferencing(flown) == (False, "it lacks detections that are said to be of a known target")
+    nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
+    assert georeferencing(replace(flown, manifest=nearest))[0]
+    strange = with_others(replace(flown, manifest=nearest))
+    assert not georeferencing(strange)[0]
+    (warning,) = [one for one in check_flight(strange) if one.field == "scoring.rule"]
+    assert "most may be of those" in warning.sentence
+    (one,) = [one for one in check_flight(flown) if "none names one" in one.sentence]
+    assert one.level == "warning" and "others = true" in one.fix
+    (one,) = [one for one in check_flight(with_others(flown)) if "none names one" in one.sentence]
+    assert one.level == "note" and "rule" not in one.fix
