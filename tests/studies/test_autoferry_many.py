@@ -60,7 +60,7 @@ def test_sentences_turn_with_the_numbers() -> None:
     )
     assert "radar alone 8.0 m (8.0 to 16.0 with the 2 best draws)" in said[0]
     assert "another boat 0 times, and a boat got a new track 6 times" in said[1]
-    assert "a track at 90 to 90 % of the looks" in said[2] and "in 1 of 2 scenarios" in said[3]
+    assert "a track at 90 % of the looks" in said[2] and "in 1 of 2 scenarios" in said[3]
     better = table.assign(gospa=table["gospa"].where(table["mode"] != "both", 1.0))
     assert "in 2 of 2 scenarios" in words.fusion(better[(better["rank"] == 1) & (better["case"] != "s1")])
     own = table[(table["rank"] == 1) & (table["case"] != "s1")]

@@ -344,6 +344,17 @@ def test_words_on_the_veto(numbers, wrong, said):
     assert "70 detections go to no track" in text.veto_words(spread)
 
 
+def test_what_tells_best_is_said_where_one_does(numbers):
+    def told(*apart: float) -> str:
+        names = ("size", "intensity", "hu")
+        changes = {(LOOKS, f"separation_{k}"): v for k, v in zip(names, apart, strict=True)}
+        return text.looks_words(spread_of(numbers, changes, 3))
+
+    assert told(2.0, 5.0, 1.0).endswith("Intensity tells them apart best.")
+    for none in ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0), (np.nan, np.nan, np.nan), (2.0, np.nan, 1.0)):
+        assert "best" not in told(*none)
+
+
 def test_words_on_features_in_the_state_turn_with_the_flights(numbers):
     state = {(STATE, "wrong"): 2.0, (STATE, "tracks"): 9.0, (STATE, "unassigned"): 70.0}
     base = {(FEATURES, "wrong"): 5.0, (FEATURES, "tracks"): 2.0, (FEATURES, "unassigned"): 30.0}

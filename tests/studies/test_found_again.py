@@ -170,3 +170,16 @@ def test_the_caption_counts_what_was_rightly_new():
 def test_what_is_explained_is_what_was_told():
     assert "ends 10 s after" in text.EXPLAINED and "5 m/s" in text.EXPLAINED
     assert "gate of 99 %" in text.EXPLAINED and "99.9 %" in text.EXPLAINED and "19 times" in text.EXPLAINED
+
+
+def test_flights_with_nothing_to_find_count_nowhere() -> None:
+    """Half of eight flights have a track to find: of four, in each column and sentence."""
+    parts = {text.RIGHT: [1.0] * 4 + [0.0] * 4, text.WRONG: 0.0, text.MISSED: 0.0, text.NEW: 0.0}
+    table = pd.DataFrame({(way, name): np.broadcast_to(values, 8)
+                          for way in text.NAMES for name, values in parts.items()})  # fmt: skip
+    for _, row in text.again_table(table).iterrows():
+        assert row["none wrong"].startswith("4 of 4") and row["all right"].startswith("4 of 4")
+    assert "larger on 0 of 4" in text.again_words(table)
+    none = table * 0.0
+    words = text.again_words(none)
+    assert "On no flight is there anything to find again" in words and "wrong for none" not in words

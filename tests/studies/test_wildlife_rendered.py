@@ -157,6 +157,8 @@ def test_a_paragraph_for_each_weather() -> None:
     both = text.frames_words(GOOD, {DAWN: GOOD, CLOUDS: GOOD}, 100, 0.9)
     assert [one.partition(",")[0] for one in both.split("\n\n")] == ["At dawn", "Under clouds at noon"]
     assert "first 100 images of the multicopter, 2 min" in text.opening_words(100, 99.0)
+    assert "first 20 images of the multicopter, 20 s, are" in text.opening_words(20, 20.0)
+    assert text.opening_words(1, 0.0).startswith("One image of the multicopter, 0 s, is rendered")
 
 
 def test_no_frame_at_all_is_refused() -> None:

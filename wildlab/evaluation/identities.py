@@ -176,7 +176,7 @@ def scan_gospa(scan: Scan, cutoff: float, order: float = 2.0) -> Gospa:
     Returns
     -------
     Gospa
-        `gospa` itself where every target is visible.
+        `gospa` itself where every target is visible and the scan complete.
 
     Raises
     ------

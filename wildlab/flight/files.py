@@ -30,7 +30,7 @@ TOML_LIMIT = 4_000_000
 
 
 class Strict(BaseModel):
-    """A part of a TOML file: unknown keys are errors, numbers are finite, true is no number, and 1 not true."""
+    """A part of a TOML file: no unknown keys, finite numbers; true is no number, 1 is not true."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 

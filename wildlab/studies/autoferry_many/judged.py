@@ -93,7 +93,9 @@ def cameras(rows: pd.DataFrame, first: str) -> str:
     own = rows[rows["case"] != first]
     if not len(own):
         return ""
-    change = own["with"] - own["without"]
+    change = (own["with"] - own["without"]).dropna()
+    if not len(change):
+        return ""
     middle = float(change.median())
     word = (
         f"{abs(middle):.1f} m {'larger' if middle > 0 else 'smaller'}"
@@ -102,7 +104,8 @@ def cameras(rows: pd.DataFrame, first: str) -> str:
     )
     return (
         f"With the cameras' bearings and the same settings GOSPA is smaller in {int((change < 0).sum())} of "
-        f"{len(own)} pairs of one of {own['case'].nunique()} scenarios and one of the best draws, and in the "
+        f"{len(change)} pairs of one of {own.loc[change.index, 'case'].nunique()} scenarios and one of the "
+        "best draws, and in the "
         f"median {word} "
         f"({change.min():+.1f} to {change.max():+.1f} m)."
     )
@@ -113,7 +116,7 @@ def medians(rows: pd.DataFrame, first: str) -> pd.DataFrame:
     smallest and largest of the best few."""
     elsewhere = rows[rows["case"] != first]
     found = []
-    for mode, own in elsewhere.groupby("mode", sort=False):
+    for mode, own in elsewhere.dropna(subset=["gospa"]).groupby("mode", sort=False):
         by_rank = own.groupby("rank")["gospa"].median()
         found.append(
             {
@@ -189,14 +192,17 @@ def followed_share(own: pd.DataFrame) -> str:
     share = own.loc[own["mode"] == "both", "tracked"].dropna()
     if not len(share):
         return ""
+    low, high = f"{share.min():.0f}", f"{share.max():.0f}"
+    said = high if low == high else f"{low} to {high}"
+    of = "the scenario" if len(share) == 1 else f"each of {len(share)} scenarios"
     return (
-        f"With both sensors boats have a track at {share.min():.0f} to {share.max():.0f} % of the looks at "
-        f"which they are within reach, over {len(share)} scenarios."
+        f"With both sensors boats have a track at {said} % of the looks at which they are within reach, in "
+        f"the mean over the boats of {of}."
     )
 
 
 def fusion(own: pd.DataFrame) -> str:
-    """Whether both sensors are better than each alone, scenario by scenario; "" without all modes."""
+    """Whether both sensors are better than the radar alone, scenario by scenario; "" without these two."""
     wide = own.pivot_table(index="case", columns="mode", values="gospa", sort=False)
     if not {"both", "radar"} <= set(wide):
         return ""
@@ -229,7 +235,8 @@ def caption() -> str:
     """What the columns of the table of scenarios mean."""
     return (
         f"{caption_of_gospa()} Boats are asked for up to {RADAR_REACH_M:g} m with the radar, and as far as "
-        "the lidar sees one of their size without it. Confirmed within: median over the boats that were. "
+        "the lidar sees one of their size without it. Tracked: share of the looks at which a boat is asked "
+        "for and has a track, mean over the boats. Confirmed within: median over the boats that were. "
         "Mean NEES / 2 is 1 where errors are as large as the tracks say. Swaps: tracks that go over to "
         "another boat. Breaks: boats that get a new track."
     )
@@ -248,8 +255,8 @@ def limits() -> list[str]:
     return [
         "Other boats are about whose places nobody published: a track on one of them counts as false.",
         "The antenna of a boat is not its middle, and nothing says where on the hull it is.",
-        "Bearings move tracks, and neither begin, confirm nor end one: where the cameras looked is not "
-        "logged. It is judged at the looks of the lidar and the radar only.",
+        "Bearings move tracks, and neither begin nor confirm one: where the cameras looked is not logged. It "
+        "is judged at the looks of the lidar and the radar only.",
     ]
 
 

@@ -70,12 +70,18 @@ def again_table(spread: pd.DataFrame) -> pd.DataFrame:
         {
             "way": words,
             **{name: share_words(shares(spread, subject, name)) for name in (RIGHT, WRONG, MISSED)},
-            "none wrong": counted(int((spread[subject, WRONG] == 0).sum()), len(spread)),
-            "all right": counted(int((shares(spread, subject, RIGHT) == 1).sum()), len(spread)),
+            "none wrong": _flights(shares(spread, subject, WRONG), 0.0),
+            "all right": _flights(shares(spread, subject, RIGHT), 1.0),
         }
         for subject, words in NAMES.items()
     ]
     return pd.DataFrame(rows)
+
+
+def _flights(values: Array, wanted: float) -> str:
+    """Of the flights that have a share, so many have this one."""
+    known = values[np.isfinite(values)]
+    return counted(int((known == wanted).sum()), len(known))
 
 
 #: Headings of `again_table`.
@@ -122,7 +128,10 @@ def _differ(spread: pd.DataFrame, subject: str, other: str, name: str) -> tuple[
 
 def _looks_words(spread: pd.DataFrame) -> str:
     more, fewer, told = _differ(spread, WITH, WITHOUT, RIGHT)
-    counts = f"with features the share is larger on {more} of {len(spread)}, smaller on {fewer}"
+    known = int(np.isfinite(shares(spread, WITH, RIGHT) - shares(spread, WITHOUT, RIGHT)).sum())
+    if not known:
+        return "On no flight is there anything to find again by both."
+    counts = f"with features the share is larger on {more} of {known}, smaller on {fewer}"
     if not told:
         return f"Flight by flight {counts}, which chance may have done too."
     return f"Flight by flight {counts}: looks {'help' if more > fewer else 'do harm'}, beyond chance."
@@ -135,6 +144,8 @@ def _guess_words(spread: pd.DataFrame) -> str:
         ("By distance alone", WITHOUT, GUESSED_WITHOUT),
         ("With features", WITH, GUESSED_WITH),
     ):
+        if not np.isfinite(shares(spread, guessed, RIGHT)).any():
+            continue
         more, fewer, told = _differ(spread, guessed, careful, WRONG)
         wrong = {one: share_words(shares(spread, one, WRONG)) for one in (careful, guessed)}
         if told:
@@ -145,4 +156,4 @@ def _guess_words(spread: pd.DataFrame) -> str:
             f"{words} a guess is right for {share_words(shares(spread, guessed, RIGHT))} and wrong for "
             f"{wrong[guessed]}; without guessing {wrong[careful]} are wrong: {how}."
         )
-    return f"To guess is to take the likeliest, however little it leads. {' '.join(parts)}"
+    return " ".join(["To guess is to take the likeliest, however little it leads.", *parts])

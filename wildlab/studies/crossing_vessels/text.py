@@ -212,12 +212,16 @@ def looks_words(spread: pd.DataFrame) -> str:
         words: float(spread[LOOKS, f"separation_{name}"].median())
         for name, words in (("size", "size"), ("intensity", "intensity"), ("hu", "Hu's first moment"))
     }
-    best = max(apart, key=lambda words: apart[words])
     parts = ", ".join(f"{words} {value:.1f}" for words, value in apart.items())
-    return (
+    said = (
         f"In rendered images the means of the two differ by so many spreads within a vessel: {parts} "
-        f"(medians over flights). {best[0].upper()}{best[1:]} tells them apart best."
+        "(medians over flights)."
     )
+    known = {words: round(value, 1) for words, value in apart.items() if np.isfinite(value)}
+    best = [words for words, value in known.items() if value > 0 and value == max(known.values())]
+    if len(best) != 1 or len(known) < len(apart):
+        return said
+    return f"{said} {best[0][0].upper()}{best[0][1:]} tells them apart best."
 
 
 def curve_words(spread: pd.DataFrame) -> str:

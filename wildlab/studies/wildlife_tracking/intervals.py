@@ -19,8 +19,9 @@ def positive_interval(values: ArrayLike) -> Interval | None:
 
     Student's interval with its half width :math:`h` is taken on the logarithm of the mean :math:`m`, whose
     standard deviation is that of the mean over the mean (delta method): from :math:`m\,e^{-h/m}` to
-    :math:`m\,e^{h/m}`. Values may be zero. Where they hardly spread it is Student's interval; where they are
-    skewed, as means of squares are, it holds the mean more often than that.
+    :math:`m\,e^{h/m}`. Values may be zero. Where they hardly spread it is Student's interval. Of
+    few worlds with skewed values no such interval holds the mean as often as it says: of 5 log-normal ones
+    nine times in ten, and of a count that is 0.2 in the mean two times in three; of 40 worlds it does.
 
     Parameters
     ----------

@@ -103,10 +103,12 @@ def summary_words(by_weather: Mapping[str, Counted]) -> str:
 
 def opening_words(frames: int, seconds: float) -> str:
     """What was done, with how many frames over how long."""
+    first = f"The first {frames} images of the multicopter" if frames != 1 else "One image of the multicopter"
+    lasting = f"{seconds / 60:.0f} min" if seconds >= 90 else f"{seconds:.0f} s"
     return (
-        f"The first {frames} images of the multicopter, {seconds / 60:.0f} min, are rendered whole, and F's "
-        "chain looks at each: background taken off, adaptive threshold, contours of an animal's size; the "
-        "detections go to the ground and to the same particle filter."
+        f"{first}, {lasting}, {'are' if frames != 1 else 'is'} rendered whole, and F's chain looks at "
+        f"{'each' if frames != 1 else 'it'}: background taken off, adaptive threshold, contours of an "
+        "animal's size; the detections go to the ground and to the same particle filter."
     )
 
 
@@ -195,12 +197,13 @@ def _sight(one: Counted, drawn: Counted) -> str:
 def limit_words(runs: Renderings) -> str:
     """What the rendered frames leave out."""
     hours = " and ".join(
-        f"{one.weather.hour:.0f} h with {100 * one.weather.clouds:.0f} % of clouds"
-        for one in runs.by_weather.values()
+        f"{WHEN[name][0].lower()}{WHEN[name][1:]} ({one.weather.hour:.0f} h, "
+        f"{100 * one.weather.clouds:.0f} % of clouds)"
+        for name, one in runs.by_weather.items()
     )
     count = len(runs.world.images.times)
     return (
-        f"The rendered frames are {count} of one world, at {hours}; the weather stays. "
+        f"The rendered frames are {count} of one world, {hours}; the weather stays. "
         "Bodies throw no shadow and warm no ground, stones and trees are strewn evenly over the enclosures, "
         "and the patches of warm ground are drawn. The detector's numbers are those F prints for its own "
         "images."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import mean_interval
@@ -46,8 +47,10 @@ def search_table(spread: pd.DataFrame) -> pd.DataFrame:
 def search_words(spread: pd.DataFrame) -> str:
     """What visits change."""
     longer = (spread[REVISITS, "minutes"] - spread[ROWS, "minutes"]).to_numpy(float)
-    time = ""
-    if len(longer) > 1:
+    time, longer = "", longer[np.isfinite(longer)]
+    if len(longer) > 1 and not longer.any():
+        time = " The search takes as long in every world."
+    elif len(longer) > 1:
         found = mean_interval(longer)
         sure = found.low > 0 or found.high < 0
         low, high = sorted((abs(found.low), abs(found.high)))

@@ -238,7 +238,10 @@ def consistency_words(spread: pd.DataFrame) -> str:
             f"taken another animal's detection {positive_words(own)}, {_verdict(of_own)}."
         )
     if not said:
-        return "So few worlds say nothing of whether tracks are as far off as they say."
+        return (
+            "Too few worlds have animals out of sight whose tracks can be judged: whether tracks are as far off "
+            "as they say is not known."
+        )
     return f"ANEES is 2 where tracks are as far off as they say. {' '.join(said)}"
 
 
