@@ -14,7 +14,7 @@ from wildlab.pipeline.following.beliefs import Said
 from wildlab.pipeline.many.errors import OF_COVARIANCE, Errors
 from wildlab.reporting import many_tracks as words
 from wildlab.reporting.many_sections import pose_limits
-from wildlab.tracking.many import POINT, Shown
+from wildlab.tracking.many import POINT, Hull, Shown
 from wildlab.tracking.predictions import POSE
 
 
@@ -181,6 +181,23 @@ def test_tracks_that_may_be_farther_off_than_what_counts_are_told() -> None:
     assert "Tracks say that they may be 7" in said and "farther than 20 m counts as on nothing" in said
     one.cutoff_m = 22.0
     assert not any("may be" in said for said in words.summary(one, lives())[0])
+
+
+def test_a_hull_longer_than_what_counts_as_on_it_is_told_with_what_to_state() -> None:
+    one = followed()
+    assert "longest kind" not in said(one, lives())[0]
+    one.targets = SimpleNamespace(hulls=(POINT, Hull("ferry", 60.5, 12.0)))
+    text, _, _ = said(one, lives())
+    assert "The longest kind of target has 60 m" in text and "`reach_m = 61` in [targets]" in text
+    one.cutoff_m = 61.0
+    assert "longest kind" not in said(one, lives())[0]
+
+
+def test_where_others_are_about_no_track_is_praised_for_being_on_nothing() -> None:
+    one = followed()
+    assert "on nothing" in said(one, lives())[0]
+    one.others = True
+    assert "on nothing" not in said(one, lives())[0]
 
 
 @pytest.mark.parametrize(

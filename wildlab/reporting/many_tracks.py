@@ -89,8 +89,9 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
     said = [
         f"{first}{_share(shares[least])} of those at which it can be seen{off if on_target(lives) else ''}.",
         f"{_how_often(lives.swaps, 'track went over to another target', 'tracks went over to others')}, "
-        f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}, "
-        f"and {_false_words(lives)}.",
+        f"{_how_often(lives.breaks, 'target got a new track', 'times a target got a new track').lower()}"
+        # Where tracks on others are not judged, none is on nothing.
+        + ("." if followed.others else f", and {_false_words(lives)}."),
     ]
     if len(lives.gospa) < looks:
         said.append(f"Judged are {len(lives.gospa)} of {looks} looks: a true place is known there.")
@@ -102,8 +103,7 @@ def summary(followed: Followed, lives: Identities | None) -> tuple[list[str], st
             else f"At {lives.incomplete} of the judged looks not every target's true place is known: tracks "
             "on none of the known ones are left out there."
         )
-    if wide := _wide_words(followed):
-        said.append(wide)
+    said += [one for one in (_wide_words(followed), _long_words(followed)) if one]
     lost = [name for name, share in shares.items() if share == 0]
     if lost:
         said.append(f"Never followed: {', '.join(plain(str(name)) for name in lost)}.")
@@ -122,6 +122,18 @@ def _wide_words(followed: Followed) -> str:
         f"Tracks say that they may be {length(widest)} off (standard deviation of the worse axis, median), "
         f"and what is farther than {followed.cutoff_m:g} m counts as on nothing: honest tracks may be among "
         f"it. State `reach_m = {np.ceil(WITHIN_SDS * widest):.0f}` in [targets]."
+    )
+
+
+def _long_words(followed: Followed) -> str:
+    """Where a target is longer than what counts as on it; "" else."""
+    longest = max((hull.length_m for hull in followed.targets.hulls), default=0.0)
+    if longest <= followed.cutoff_m:
+        return ""
+    return (
+        f"The longest kind of target has {length(longest)}, and a track farther than {followed.cutoff_m:g} m "
+        "from where a target is said to be counts as on nothing, also where it is on its other end. State "
+        f"`reach_m = {np.ceil(longest):.0f}` in [targets]."
     )
 
 

@@ -239,8 +239,8 @@ def consistency_words(spread: pd.DataFrame) -> str:
         )
     if not said:
         return (
-            "Too few worlds have animals out of sight whose tracks can be judged: whether tracks are as far off "
-            "as they say is not known."
+            "Too few worlds have animals out of sight whose tracks can be judged: whether tracks are as far "
+            "off as they say is not known."
         )
     return f"ANEES is 2 where tracks are as far off as they say. {' '.join(said)}"
 
