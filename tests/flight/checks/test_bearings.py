@@ -13,9 +13,10 @@ from wildlab.flight.store import Flight
 
 
 def radar_flight(
-    make: Callable[..., Flight], reads: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    make: Callable[..., Flight], reads: Callable[[np.ndarray, np.ndarray], np.ndarray], factor: float = 1.0
 ) -> Flight:
-    """A boat that turns by 150 deg and sees a buoy and clutter; ``reads``: of true bearing and yaw, rad."""
+    """A boat that turns by 150 deg and sees a buoy and clutter; ``reads``: of true bearing and yaw, rad, and
+    ranges are multiplied by ``factor``."""
     rng = np.random.default_rng(4)
     t = np.arange(0.0, 100.0)
     yaw = np.radians(20 + 1.5 * t)
@@ -30,13 +31,20 @@ def radar_flight(
         {"target_id": ["buoy"], "time_s": [np.nan], "north_m": 100.0, "east_m": 300.0, "down_m": 0.0}
     )
     to_buoy = np.arctan2(300.0, 100.0 - 2.0 * t) + rng.normal(0, np.radians(0.3), 100)
+    distance = np.hypot(300.0, 100.0 - 2.0 * t) + rng.normal(0, 2.0, 100)
     seen = [
-        pd.DataFrame({"frame_id": flight.tables["frames"]["frame_id"], "azimuth_rad": reads(bearing, yaw)})
-        for bearing in (to_buoy, rng.uniform(-np.pi, np.pi, 100))
+        pd.DataFrame(
+            {
+                "frame_id": flight.tables["frames"]["frame_id"],
+                "azimuth_rad": reads(bearing, yaw),
+                "range_m": factor * r,
+            }
+        )
+        for bearing, r in ((to_buoy, distance), (rng.uniform(-np.pi, np.pi, 100), np.full(100, 300.0)))
     ]
     detections = pd.concat(seen, ignore_index=True)
     flight.tables["detections"] = detections.assign(
-        detection_id=[str(k) for k in range(200)], source="radar", kind="range-bearing", range_m=300.0
+        detection_id=[str(k) for k in range(200)], source="radar", kind="range-bearing"
     )
     return flight
 
@@ -49,6 +57,7 @@ def said(flight: Flight) -> list[str]:
     ("reads", "cause"),
     [
         (lambda bearing, yaw: bearing - yaw, 'counts_from = "bow"'),
+        (lambda bearing, yaw: 2 * yaw - bearing, "counts from the bow to the left"),
         (lambda bearing, yaw: bearing - np.pi / 2, "it counts from east"),
     ],
 )
@@ -63,4 +72,20 @@ def test_what_bearings_count_from_is_named(
 
 
 def test_true_bearings_are_no_finding(make_flight: Callable[..., Flight]) -> None:
+    assert said(radar_flight(make_flight, lambda bearing, yaw: bearing)) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "cause"),
+    [
+        (0.3048, "the range is in m, and was read as ft"),
+        (1 / 0.3048, "the range is in ft, and was read as m"),
+    ],
+)
+def test_a_range_in_another_unit_is_named(
+    make_flight: Callable[..., Flight], factor: float, cause: str
+) -> None:
+    flight = radar_flight(make_flight, lambda bearing, yaw: bearing, factor)
+    (sentence,) = said(flight)
+    assert cause in sentence
     assert said(radar_flight(make_flight, lambda bearing, yaw: bearing)) == []

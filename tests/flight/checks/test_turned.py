@@ -15,6 +15,7 @@ from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense.looks import Scan, seen_at
 from wildlab.flight.checks.sense.turned import best_turn, turned
+from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.frames import wrap
 
@@ -52,7 +53,8 @@ def watched(make: Make, off_deg: float = 0.0, late_s: float = 0.0, clutter: int 
         place = {"north_m": north + v_north * t, "east_m": east + v_east * t + sway, "down_m": 0.0}
         truth.append(pd.DataFrame({"target_id": name, "time_s": t - late_s, **place}))
         to = np.arctan2(place["east_m"] - aside, place["north_m"] - 2.0 * t)
-        seen.append((to + rng.normal(0, np.radians(0.4), len(t)), 200.0))
+        distance = np.hypot(place["east_m"] - aside, place["north_m"] - 2.0 * t)
+        seen.append((to + rng.normal(0, np.radians(0.4), len(t)), distance))
     seen += [(rng.uniform(-np.pi, np.pi, len(t)), 300.0) for _ in range(clutter)]
     flight.tables["truth"] = pd.concat(truth, ignore_index=True)
     rows = [
@@ -115,6 +117,24 @@ def test_gross_mistakes_of_bearings_are_told_from_a_heading(
     # What is written can be found in a recipe, and nothing is said of what stands there now.
     assert '`azimuth` in the [[detections]] with source = "radar"' in found.fix
     assert "the recipe says" not in found.sentence + found.fix
+
+
+def test_the_clock_of_one_of_two_sensors_is_named_with_what_to_state(make_flight: Make) -> None:
+    """The other one sees all where it is: it is neither the truth nor a heading."""
+    flight = watched(make_flight)
+    frames, seen = flight.table("frames"), flight.table("detections")
+    other = seen.assign(
+        frame_id="e" + seen["frame_id"], detection_id="e" + seen["detection_id"], source="eye"
+    )
+    looks = frames.assign(frame_id="e" + frames["frame_id"], sensor="eye", time_s=frames["time_s"] + 0.5)
+    flight.tables["frames"] = pd.concat([frames, looks], ignore_index=True)
+    flight.tables["detections"] = pd.concat([seen, other], ignore_index=True)
+    assert said(flight) == []
+    stated = replace_in_manifest(flight.manifest, {"sensors": {"radar": {"clock_offset_s": 20.0}}})
+    (found,) = said(replace(flight, manifest=stated))
+    assert "of radar in a look" in found.sentence and "its stamps are about" in found.sentence
+    written = float(found.fix.split("clock_offset_s = ")[1].split("`")[0])
+    assert abs(written) <= 1.5 and "[sensors.radar]" in found.fix
 
 
 def test_exchanged_axes_of_the_truth_are_told_from_a_heading(make_flight: Make) -> None:

@@ -27,8 +27,9 @@ USUAL, NONE = 0.25, 0.01
 @dataclass(frozen=True)
 class Scan:
     """What one source saw: places (N, 3) in n or azimuths (N,), from where (N, 3), and the targets (M, N, 3);
-    targets and own place at other times; where the bow pointed, (N,) rad from north towards east; and the
-    number of the look (N,), counted from 0 without gaps."""
+    own place and targets had the truth been later by so much; where the bow pointed, (N,) rad from north
+    towards east; the number of the look (N,), counted from 0 without gaps; own place, targets and bow had the
+    sensor's stamps been later; and how far away (N,) m, where it says so beside the azimuth."""
 
     source: str
     places: Array | None
@@ -38,6 +39,8 @@ class Scan:
     at: Callable[[float], tuple[Array, Array]]
     heading: Array
     look: NDArray[np.intp]
+    stamped: Callable[[float], tuple[Array, Array, Array]] | None = None
+    distance: Array | None = None
 
 
 def scans_of(flight: Flight) -> list[Scan]:
@@ -59,7 +62,8 @@ def scans_of(flight: Flight) -> list[Scan]:
         frame = pd.Index(frames["frame_id"]).get_indexer(pd.Index(rows["frame_id"]))
         rows, frame = rows[frame >= 0], frame[frame >= 0]
         try:
-            times = frame_times(flight)[frame]
+            stated = flight.manifest.sensors.get(str(source))
+            times = frame_times(flight)[frame] + (0.0 if stated is None else stated.clock_offset_s)
             ids = rows["frame_id"]
 
             def at(shift: float, times: Array = times, ids: pd.Series = ids) -> tuple[Array, Array]:
@@ -67,8 +71,16 @@ def scans_of(flight: Flight) -> list[Scan]:
                 offset = flight.manifest.clocks.truth_offset_s
                 return own, truth_at(truth, times + shift, offset_s=offset)[1]
 
+            def stamped(
+                shift: float, times: Array = times, ids: pd.Series = ids
+            ) -> tuple[Array, Array, Array]:
+                own, R, _ = poses_at(nav, times + shift, ids)
+                offset = flight.manifest.clocks.truth_offset_s
+                targets = truth_at(truth, times + shift, offset_s=offset)[1]
+                return own, targets, np.arctan2(R[:, 1, 0], R[:, 0, 0])
+
             own, targets = at(0.0)
-            R = poses_at(nav, times, ids)[1]
+            heading = stamped(0.0)[2]
         except (WildlabError, ValueError):  # said by the checks of times
             continue
         if len(rows) < ENOUGH:
@@ -82,8 +94,10 @@ def scans_of(flight: Flight) -> list[Scan]:
                 own,
                 targets,
                 at,
-                np.arctan2(R[:, 1, 0], R[:, 0, 0]),
+                heading,
                 np.unique(frame, return_inverse=True)[1],
+                stamped,
+                rows["range_m"].to_numpy(float) if kind == "range-bearing" else None,
             )
         )
     return found
@@ -112,6 +126,9 @@ def hits(s: Scan) -> Array:
         else:
             off = np.abs(wrap(s.azimuth - np.arctan2(away[..., 1], away[..., 0])))
             near = off < NEAR_RAD
+            if s.distance is not None:
+                apart = np.linalg.norm(away, axis=-1)
+                near &= np.abs(apart - s.distance) < NEAR_M + NEAR_SHARE * apart
     return np.asarray(near.any(axis=0), float)
 
 

@@ -26,7 +26,7 @@ def scans(flight: Flight) -> Iterator[Finding]:
     if not given:
         return
     named = explain(misfit, given, common_mistakes(flight))
-    of_each = [explain(misfit, (one,), source_mistakes(one)) for one in given]
+    of_each = [explain(misfit, (one,), source_mistakes(one, _offset(flight, one))) for one in given]
     # Each source as its own mistakes leave it, where it has any.
     undone = tuple(own[0].undone[0] if own else one for one, own in zip(given, of_each, strict=True))
     turn = best_turn(given, [*(one.undone for one in named), *([undone] if any(of_each) else [])])
@@ -110,8 +110,23 @@ def _later(s: Scan, by: float) -> Scan:
     return replace(s, own=own, targets=targets)
 
 
-def source_mistakes(one: Scan) -> Iterator[Mistake[Scans]]:
-    """Mistakes about the positions or the bearings of one source."""
+def _offset(flight: Flight, one: Scan) -> float:
+    """What is stated of its clock, s."""
+    stated = flight.manifest.sensors.get(one.source)
+    return 0.0 if stated is None else stated.clock_offset_s
+
+
+def source_mistakes(one: Scan, offset_s: float = 0.0) -> Iterator[Mistake[Scans]]:
+    """Mistakes about the positions, the bearings or the clock of one source.
+
+    Parameters
+    ----------
+    one
+        What it saw, with the offset of its clock as it is stated.
+    offset_s
+        That offset.
+    """
+    yield from _clock_mistakes(one, offset_s)
     block = f'the [[detections]] with source = "{one.source}"'
 
     def each(change: Callable[[Scan], Scan]) -> Callable[[Scans], Scans]:
@@ -156,6 +171,18 @@ def source_mistakes(one: Scan) -> Iterator[Mistake[Scans]]:
                 each(lambda s, M=np.array(matrix, float): replace(s, places=s.places @ M.T)),  # type: ignore[misc]  # noqa: B008
             )
         return
+    if one.distance is not None:
+        for unit, k in LENGTHS.items():
+            for factor, cause, write in (
+                (k, f"the range is in {unit}, and was read as m", unit),
+                (1 / k, f"the range is in m, and was read as {unit}", "m"),
+            ):
+                yield Mistake(
+                    f"{one.source}: {cause}",
+                    cause,
+                    f'`unit = "{write}"` of `range` in {block}',
+                    each(lambda s, f=factor: replace(s, distance=f * s.distance)),  # type: ignore[misc]
+                )
     azimuth = f"`azimuth` in {block}"
     towards = "it counts from true north towards east"
     for cause, write, bearing in (
@@ -212,8 +239,38 @@ def source_mistakes(one: Scan) -> Iterator[Mistake[Scans]]:
             each(lambda s, b=bearing: replace(s, azimuth=b(s.azimuth))),  # type: ignore[misc]
         )
     yield Mistake(
+        f"{one.source}: the bearing from the bow counts to the left",
+        "the bearing counts from the bow to the left (wrong sign)",
+        f'turn `negate` of {azimuth}, with `counts_from = "bow"`',
+        each(lambda s: replace(s, azimuth=2 * s.heading - s.azimuth)),  # type: ignore[operator]
+    )
+    yield Mistake(
         f"{one.source}: the bearing counts from the bow",
         "the bearing counts from the bow, and was taken to count from north",
         f'`counts_from = "bow"` in {block}',
         each(lambda s: replace(s, azimuth=s.azimuth + s.heading)),  # type: ignore[operator]
     )
+
+
+def _clock_mistakes(one: Scan, offset_s: float) -> Iterator[Mistake[Scans]]:
+    """The clock of the sensor alone: what it saw stays, and all else is where it was at other times."""
+    if one.stamped is None:
+        return
+    best = min(CLOCKS, key=lambda t: float(misfit((_stamped(one, t),))[0, 0]))
+    if best != 0:
+        yield Mistake(
+            f"{one.source}: clock ({best:g} s)",
+            f"its stamps are about {abs(best):g} s {'early' if best > 0 else 'late'}",
+            f"`clock_offset_s = {offset_s + best:g}` in [sensors.{one.source}]",
+            lambda given: tuple(_stamped(s, best) for s in given),
+            fitted=True,
+        )
+
+
+def _stamped(s: Scan, by: float) -> Scan:
+    if s.stamped is None:
+        return s
+    own, targets, heading = s.stamped(by)
+    # What a sensor on board places, it places about itself.
+    places = None if s.places is None else s.places + (own - s.own)
+    return replace(s, own=own, targets=targets, heading=heading, places=places)
