@@ -56,6 +56,16 @@ def test_a_swap_counts_for_each_track_when_the_targets_are_apart_again():
     assert all(one.distance == 0 for one in found.gospa)
 
 
+@pytest.mark.parametrize("order", [1.0, 3.0])
+def test_tracks_hold_on_up_to_half_the_cutoff_by_any_order(order):
+    """Each is on the other's target from the second scan on."""
+    for apart, swaps in ((9.9, 0), (10.1, 2)):
+        targets = {"A": (0, 0), "B": (apart, 0)}
+        right = scan(0, {1: (0, 0), 2: (apart, 0)}, targets)
+        wrong = scan(1, {1: (apart, 0), 2: (0, 0)}, targets)
+        assert compare_identities([right, wrong], CUTOFF, order).swaps == swaps
+
+
 def test_noise_beside_another_target_is_no_swap():
     """The tracks are for a moment nearer to each other's target."""
     wrong = scan(1, {1: (6, 0), 2: (4, 0)}, {"A": (0, 0), "B": (10, 0)})
@@ -129,6 +139,13 @@ def test_false_tracks_by_the_minute():
     assert [found.tracks[one].false for one in (1, 2, 3)] == [False, True, True]
     assert found.false_tracks_per_minute == pytest.approx(4)
     assert np.isnan(compare_identities([scan(0, {}, target)], CUTOFF).false_tracks_per_minute)
+
+
+def test_a_scan_has_half_of_the_time_to_either_neighbour():
+    """Of 180 s the scan that is left out has 30 s before it and 60 s after it."""
+    scans = [scan(t, {1: (0, 0), 2: (90, 0)}, {"A": (0, 0)}) for t in (0, 60, 180)]
+    scans[1] = scans[1]._replace(complete=False)
+    assert compare_identities(scans, CUTOFF).false_tracks_per_minute == pytest.approx(60 / 90)
 
 
 def test_a_track_on_a_target_for_half_of_its_scans_is_not_false():

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.pipeline.survey_twin import Survey, simulate
 from wildlab.flight.checks.sense import (
     bounds,
     camera,
@@ -26,7 +27,7 @@ from wildlab.flight.checks.sense.attitudes import attitude_mistakes, rotations_o
 from wildlab.flight.checks.sense.felt import Felt, axes_words, felt_mistakes, other_axes
 from wildlab.flight.checks.sense.field import Seen, field_mistakes
 from wildlab.flight.checks.sense.places import place_mistakes
-from wildlab.flight.checks.sense.sightings import Look, Sightings, metres, missed
+from wildlab.flight.checks.sense.sightings import Look, Sightings, metres, missed, sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
@@ -136,6 +137,17 @@ def test_a_camera_that_looks_the_other_way_is_ninety_degrees_off() -> None:
     assert np.median(angle) == pytest.approx(90, abs=15)
     assert metres(wrong) > 80
     assert metres(replace(wrong, mount=Mount("down"))) < 1e-6
+
+
+def test_however_well_attitudes_are_stated_the_camera_is_not_known_that_well() -> None:
+    """Clicks are held against what is expected: beside next to nothing all of them would be wrong."""
+    expected = []
+    for stated in (1e-9, 0.01, 1.0):
+        found = sightings(simulate(Survey(images=6, stated_deg=stated)), "logged")
+        assert found is not None
+        expected.append(found.sd[0, [0, 3]])
+    assert np.array_equal(expected[0], expected[1]) and (expected[0] > np.radians(0.1)).all()
+    assert np.allclose(expected[2], np.radians(1.0))
 
 
 def test_what_a_mistake_gains_is_shown_where_a_tilted_mount_hides_it(monkeypatch: pytest.MonkeyPatch) -> None:

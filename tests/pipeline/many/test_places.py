@@ -66,6 +66,21 @@ def test_a_range_no_longer_than_the_drop_tells_no_place() -> None:
     assert np.allclose(along, [0.5 * 100.001 / np.sqrt(100.001**2 - 1e4), 0.5 * 125 / 75])
 
 
+def test_a_slant_range_tells_less_of_the_place_on_the_level() -> None:
+    """50 m to what lies 30 m below is 40 m on the level, which change by 5 m where the range does by 4 m."""
+    noise = {"sensors": {"radar": {"noise": {"range_m": 2.0, "azimuth_deg": 1.5}}}}
+    flight = robot_flight(seconds=30.0, manifest=noise)
+    scans = scans_of(flight, "radar", 0.0, None)
+    scans.detections[..., 0] = 50.0
+    belief, _ = of_sensor(flight, scans, of_flight(flight))
+    high = scans._replace(drop=np.full(len(scans.times), 30.0))
+    scan = places_of(flight, high, belief, 0, None).scans[20]
+    off = scan.z[0] - scan.platform
+    towards = np.array([off / 40, [-off[1] / 40, off[0] / 40]])
+    assert np.hypot(*off) == pytest.approx(40.0)
+    assert np.allclose(towards @ scan.R[0] @ towards.T, np.diag([2.5, 40 * np.radians(1.5)]) ** 2)
+
+
 def test_positions_are_taken_as_they_are() -> None:
     noise = {"sensors": {"radar": {"noise": {"position_m": 1.5}}}}
     found = places(robot_flight(kind="position", clutter=2, labelled=False, manifest=noise))
@@ -122,6 +137,18 @@ def test_how_much_ground_an_image_covers() -> None:
     look = Scan(0.0, 0, np.zeros(2), *nothing, sees_of(scans, 0))
     found = Places("eye", "pixel", [look], [frozenset()], 1.0, 0)
     assert found.area(50.0) == pytest.approx(640 * 512 * (60 / 700) ** 2, rel=0.02)
+
+
+@pytest.mark.parametrize("count", [3, 120])
+def test_the_ground_covered_is_that_of_most_looks(count: int) -> None:
+    """The first one sees nothing, as before a camera is turned on, and the others everything."""
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2))
+    looks = [
+        Scan(float(k), 0, np.zeros(2), *nothing, lambda at, shows=k > 0: np.full(len(at), shows))
+        for k in range(count)
+    ]
+    found = Places("eye", "pixel", looks, [frozenset()] * count, 1.0, 0)
+    assert found.area(50.0) == pytest.approx(np.pi * 50.0**2)
 
 
 def test_bearings_are_taken_as_they_are() -> None:

@@ -242,6 +242,14 @@ def test_it_is_looked_for_where_it_began_also_when_it_ends():
     assert bank.identity.tolist() == [0, 0]
 
 
+def test_that_its_place_is_lost_by_its_end_makes_nobody_found():
+    """It began 150 m off after 10 s, too far; undetected for 80 s by its end, it may be anywhere."""
+    looks, owner = going((range(10), (0, 0), 0.0), (range(30, 40), (150, 0), 0.0), ([200], (900, 0), 0.0))
+    bank = run_bank(looks, living(AGE), FEATURES, looking(owner, 0.0))
+    assert bank.ended.tolist() == [30, 200]
+    assert bank.identity.tolist() == [0, 1]
+
+
 def test_reach_is_from_where_it_was_detected_last():
     """200 m on its way it vanishes for 20 s: it may have gone on, stayed or turned."""
     for back, identity in ((280, 0), (200, 0), (140, 0), (40, 1), (360, 1)):
@@ -315,6 +323,16 @@ def test_a_detection_in_the_gate_confirms_whoever_takes_it():
     looks, _ = still([range(5)])
     strange = Appearance(np.array([0, 0, 90, 90, 90], float)[:, None], np.ones(1), np.ones(1))
     bank = run_bank(looks, living(Life(confirm=(3, 5))), VETO, strange)
+    assert bank.track.tolist() == [0, 0, -1, -1, -1]
+    assert bank.believed.tolist() == [True]
+
+
+def test_a_detection_in_the_gate_was_looked_at_whoever_takes_it():
+    """No view shows the place: else there would be more images with a detection than images that looked."""
+    looks, _ = still([range(5)])
+    blind = looks._replace(sees=dict.fromkeys(range(5), never))
+    strange = Appearance(np.array([0, 0, 90, 90, 90], float)[:, None], np.ones(1), np.ones(1))
+    bank = run_bank(blind, living(Life(confirm=(3, 5))), VETO, strange)
     assert bank.track.tolist() == [0, 0, -1, -1, -1]
     assert bank.believed.tolist() == [True]
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracking.many.test_run import BOTH, LONG, SHIP
-from wildlab.tracking.many.hulls import STEERS_M_S, gather, hull_noise, near_side, on_one_hull
+from wildlab.tracking.many.hulls import STEERS_M_S, Gathered, gather, hull_noise, near_side, on_one_hull
 from wildlab.tracking.many.tracks import begin
 
 
@@ -77,6 +77,40 @@ def test_parts_of_a_hull_count_as_they_are_likely() -> None:
         z, R, np.zeros((len(z), 2, 0)), np.array([[0.0, 0.0]]), kinds, sure, 0 * likely, sensor, BOTH.hulls
     )
     assert np.allclose(found.z, [[300.0, 0.0], [-5.0, 0.5]])
+
+
+def along(*north: float, likely: float, clutter: float = 1e-5) -> Gathered:
+    """Measurements along a line through one track of 50 %, gathered; all of them as likely of the ship."""
+    z = np.array([[one, 0.0] for one in north])
+    likelihood = np.zeros((1, 2, len(z)))
+    likelihood[0, 1] = likely
+    return gather(
+        z, np.tile(np.eye(2), (len(z), 1, 1)), np.zeros((len(z), 2, 0)), np.zeros((1, 2)),
+        np.full((1, 2), 0.5), np.array([True]), likelihood,
+        LONG._replace(several=True, clutter=clutter), BOTH.hulls,
+    )  # fmt: skip
+
+
+def test_each_further_measurement_tells_of_a_ship_and_the_first_does_not() -> None:
+    """On its hull they are three times as dense as clutter; the first one any target has."""
+    clutter = 1 / (3 * SHIP.length_m * SHIP.beam_m)
+    assert np.allclose(along(0.0, likely=0.01, clutter=clutter).kinds, [[1 / 2, 1 / 2]])
+    assert np.allclose(along(-5.0, 5.0, likely=0.01, clutter=clutter).kinds, [[1 / 4, 3 / 4]])
+    assert np.allclose(along(-5.0, 0.0, 5.0, likely=0.01, clutter=clutter).kinds, [[1 / 10, 9 / 10]])
+
+
+def test_what_is_farther_apart_than_a_ship_is_long_is_not_one() -> None:
+    """All of it lies in the gate of the one track."""
+    assert np.allclose(along(-14.5, 14.5, likely=0.01).z, [[0.0, 0.0]])
+    apart = along(-15.5, 15.5, likely=0.01)
+    assert len(apart.z) == 2 and np.allclose(apart.kinds, 0.5)
+
+
+def test_what_no_gate_takes_is_of_a_ship_up_to_a_little_more_than_its_half() -> None:
+    """Within a length of each other both times: 17 m from the middle may be its bow, 20 m is beyond it."""
+    assert np.allclose(along(-5.0, 17.0, likely=0.0).z, [[6.0, 0.0]])
+    beyond = along(-5.0, 20.0, likely=0.0)
+    assert len(beyond.z) == 2 and np.allclose(beyond.kinds, 0.5)
 
 
 def test_bearings_of_one_hull_are_not_merged() -> None:

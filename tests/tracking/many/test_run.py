@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from wildlab.errors import WildlabError
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.beliefs import POINT, Hull, Scan, SensorBeliefs, TargetBeliefs
-from wildlab.tracking.many.run import follow_many, run_many
-from wildlab.tracking.many.tracks import moves
+from wildlab.tracking.many.run import follow_many, run_many, step
+from wildlab.tracking.many.tracks import begin, moves
 from wildlab.tracking.maritime import white_acceleration
 
 EYE = SensorBeliefs("eye", 0.9, 1e-4, 0.0, 1e6, 3.0, (0.0,), (0.0,), (0.0,))
@@ -279,6 +279,32 @@ def test_two_boats_abreast_are_not_one_hull() -> None:
     places = lines(np.array([[-60.0, 0.0], [-60.0, 12.0]]), np.array([[3.0, 0.0], [3.0, 0.0]]), 40)
     shown = run_many(looks(places, rng), [LONG._replace(rough_m=(0.0, 1.0))], BOTH)
     assert np.mean([len(one.identity) == 2 for one in shown[15:]]) > 0.8
+
+
+def test_a_measurement_is_compared_however_far_apart_two_kinds_have_a_target() -> None:
+    """The measurement is where one kind has it, which is far from the middle of both."""
+    targets = POINTS._replace(hulls=(POINT, POINT._replace(name="other")))
+    eye, platform = EYE._replace(rough_m=(0.0,) * 2, along_m=(0.0,) * 2, near_side_m=(0.0,) * 2), np.zeros(2)
+    tracks = begin(
+        np.array([[50.0, 0.0]]), R[None], 0.0, platform, (eye,), 0, targets, 0, np.zeros((1, 2, 0))
+    )
+    tracks.x[0, 1, 0] = 150.0
+    scan = Scan(0.0, 0, platform, np.array([[150.0, 0.0]]), R[None])
+    after, free = step(tracks._replace(existence=np.ones(1)), scan, 0.0, 0.0, (eye,), targets, 1)
+    assert after.hits.tolist() == [2] and free == 1, "it is the track's, and begins none"
+    assert after.kinds[0, 1] > 0.9
+
+
+def test_bow_and_stern_of_a_known_ship_begin_no_target() -> None:
+    """15 m off its middle, in no gate, and at a speed at which no track that begins there is a double."""
+    targets, platform = POINTS._replace(hulls=(SHIP,)), np.array([0.0, -500.0])
+    tracks = begin(np.zeros((1, 2)), R[None], 0.0, platform, (EYE,), 0, targets, 0, np.zeros((1, 2, 0)))
+    tracks.x[0, 0, 2] = 5.0
+    known = tracks._replace(existence=np.ones(1), confirmed=np.ones(1, bool))
+    for confirmed, off, began in ((known, 15.0, 0), (known, 30.0, 2), (tracks, 15.0, 2)):
+        ends = Scan(0.0, 0, platform, np.array([[off, 0.0], [-off, 0.0]]), np.tile(R, (2, 1, 1)))
+        _, free = step(confirmed, ends, 0.0, 0.0, (EYE,), targets, 1)
+        assert free == 1 + began, off
 
 
 @pytest.mark.parametrize(("change", "words"), [({"time": np.nan}, "no time"), ({"sensor": 3}, "there are 1")])

@@ -11,7 +11,7 @@ from tests.tracking.many.test_together import OPEN, SURE, moved
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.beliefs import POINT, Scan, SensorBeliefs, TargetBeliefs
 from wildlab.tracking.many.run import Shown, run_many
-from wildlab.tracking.many.smoothing import smooth_many
+from wildlab.tracking.many.smoothing import smooth_considering, smooth_many
 from wildlab.tracking.maritime import white_acceleration
 
 H = np.eye(2, 4)
@@ -123,6 +123,34 @@ def test_smoothed_tracks_of_many_are_closer_to_the_truth() -> None:
             for name, at in (("filter", one.x[place, :2]), ("smoothed", x[place, :2])):
                 off[name].append(float(np.linalg.norm(truth[k] - at, axis=1).min()))
     assert np.mean(off["smoothed"]) < 0.75 * np.mean(off["filter"])
+
+
+def test_what_fades_is_less_common_with_what_was_before() -> None:
+    """Three looks, an error that fades by a fifth, gains as one likes: all from sources of size one.
+
+    The second look moves the other way than the first by just so much that the estimate then has nothing in
+    common with the error: so what is approximated where errors fade is exact here.
+    """
+    left, shares = 0.8, np.array([1.0, -0.8, 1.5])
+    F, Q = white_acceleration(1.0, 0.3)
+    gains = np.vstack([np.eye(2) / 2, np.zeros((2, 2))]), np.vstack([np.eye(2) / 2, 0.3 * np.eye(2)])
+    # One row for each of o, its two changes, v, and of noise n and process noise w at each look.
+    o, *changes, v, n, n1, n2, w1, w2 = np.split(np.eye(19), [1, 2, 3, 5, 7, 9, 11, 15])
+    root, J = np.linalg.cholesky(Q), np.array([[2.0], [1.0]])
+    truth, shared = [np.zeros((4, 19))], [o]
+    e = [np.vstack([-(n + shares[0] * J @ o), v])]
+    for k, (gain, noise, w) in enumerate(zip(gains, (n1, n2), (w1, w2), strict=True)):
+        truth.append(F @ truth[-1] + root @ w)
+        shared.append(left * shared[-1] + np.sqrt(1 - left**2) * changes[k])
+        ahead = F @ e[-1] + root @ w
+        e.append(ahead - gain @ (H @ ahead + noise + shares[k + 1] * J @ shared[-1]))
+    assert np.allclose(e[1] @ shared[1].T, 0) and not np.allclose(e[0] @ o.T, 0)
+    P = np.array([one @ one.T for one in e])
+    C = np.array([one @ other.T for one, other in zip(e, shared, strict=True)])
+    lasting, x = [-1 / np.log(left)], np.array(truth) - np.array(e)
+    after = [smooth_considering([0.0, 1.0, 2.0], x[..., k], P, C, 0.3, lasting) for k in range(19)]
+    off = np.array(truth) - np.stack([mean for mean, _ in after], axis=-1)
+    assert np.allclose(after[0][1], off @ np.swapaxes(off, 1, 2))
 
 
 @pytest.mark.parametrize("lasting", [0.0, 5.0, 40.0, np.inf])

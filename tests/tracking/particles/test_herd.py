@@ -7,6 +7,7 @@ import pytest
 
 from tests.tracking.particles.worlds import NOISE, RULES, SIZE, WALK, followed, inside, world
 from wildlab.errors import WildlabError
+from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking import kalman
 from wildlab.tracking.particles import (
     Look,
@@ -166,6 +167,21 @@ def test_both_lost_rules_and_found_again_under_the_same_name():
     assert herd.lost.tolist() == [True]
     herd, _ = step_nearest(herd, look(6.0, [50.0, 41.0], sight=wide), by_search, rng)
     assert herd.missed.tolist() == [1.0] and not herd.lost.any()
+
+
+@pytest.mark.parametrize(("share", "name"), [(0.9, 1), (1.1, 2)])
+def test_a_lost_one_is_found_in_its_gate_alone(share, name):
+    rng = np.random.default_rng(17)
+    rules = RULES._replace(lost_trace=40.0)
+    herd, _ = step_nearest(no_herd(rules), look(0.0, [50.0, 40.0]), rules, rng)
+    herd, _ = step_nearest(herd, look(80.0), rules, rng)
+    assert herd.lost.tolist() == [True]
+    # At the time of that image it does not move: squared distances are those to the cloud as it is.
+    mean, covariance = moments(herd.cloud)
+    edge = np.sqrt(gate_threshold(rules.gate_probability, 2))
+    off = np.sqrt(share) * edge * np.linalg.cholesky(covariance[0] + R)[:, 0]
+    _, taken = step_nearest(herd, look(80.0, mean[0] + off), rules, rng)
+    assert taken.tolist() == [name]
 
 
 def test_two_lost_ones_are_not_one_detection_each_twice():

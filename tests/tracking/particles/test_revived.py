@@ -49,6 +49,20 @@ def test_it_is_what_a_kalman_filter_would_have(off: float) -> None:
     assert min(np.linalg.eigvalsh(one).min() for one in covariances) > 0.02
 
 
+def test_a_handful_of_particles_is_not_taken_for_what_is_known() -> None:
+    """Of n points drawn from a distribution the variance about their own mean is 1 - 1/n of its own.
+
+    After 32 s an animal may be sqrt(8) m off: of 500 particles the detection leaves 2 * 500 * 0.04 / 8 = 5.
+    """
+    covariances = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        herd, _ = step_nearest(no_herd(rules()), Look(0.0, np.zeros((1, 2)), R[None], nothing), rules(), rng)
+        herd, _ = step_nearest(herd, Look(32.0, np.zeros((1, 2)), R[None], nothing), rules(), rng)
+        covariances.append(moments(herd.cloud)[1][0])
+    assert np.trace(np.mean(covariances, axis=0)) == pytest.approx(2 * 0.04 * 8.04 / 8.08, rel=0.05)
+
+
 def test_a_cloud_with_particles_enough_stays_its_own() -> None:
     rng = np.random.default_rng(3)
     wide = 4.0 * np.eye(2)
