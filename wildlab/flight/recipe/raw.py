@@ -289,7 +289,30 @@ def numbers(
     found = plain_numbers(table, quantity.column, part, may_be_empty=may_be_empty)
     if quantity.plus is not None:
         found = found + plain_numbers(table, quantity.plus, f"{part}.plus", may_be_empty=may_be_empty)
+    if dimension == "angle" and quantity.unit == "rad":
+        _refuse_degrees(found, table, quantity.column, part)
     return scale * found
+
+
+def _refuse_degrees(found: Array, table: RawTable, column: str, part: str) -> None:
+    """Refuse what is said to be in radians and cannot be.
+
+    An angle that is counted on over whole turns may be large, but it begins within one and never leaps by
+    one; and nothing rolls or pitches by more than a turn.
+    """
+    beyond = np.abs(found) > 2 * np.pi
+    if not beyond.any():
+        return
+    known = found[np.isfinite(found)]
+    leaps = np.abs(np.diff(known)) > 2 * np.pi
+    if part.rsplit(".", 1)[-1] in ("roll", "pitch") or np.abs(known[0]) > 2 * np.pi or leaps.any():
+        raise table.fail(
+            f"the angles run from {known.min():.4g} to {known.max():.4g}, which no angle in radians does",
+            'write unit = "deg", if they are in degrees',
+            column,
+            part,
+            int(np.argmax(beyond)),
+        )
 
 
 def plain_numbers(table: RawTable, column: str, part: str, *, may_be_empty: bool = False) -> Array:
