@@ -160,6 +160,23 @@ def test_where_some_true_places_are_known_tracks_on_others_are_not_judged() -> N
     assert lives.incomplete == int((~whole).sum()) and len(lives.gospa) == len(whole)
 
 
+def test_detections_that_are_no_sensors_are_told_and_not_left_out_in_silence() -> None:
+    flight = robot_flight()
+    frames, seen = flight.table("frames").assign(sensor="radar"), flight.table("detections")
+    some = seen.assign(source=np.where(np.arange(len(seen)) < 5, "rader", "radar"))
+    followed = follow_all(replace(flight, tables={**flight.tables, "frames": frames, "detections": some}))
+    said = "5 detections of the source 'rader' are in looks of the sensor 'radar' and are not used"
+    assert any(note.startswith(said) for note in followed.notes)
+    assert not any("are not used" in note for note in follow_all(flight).notes)
+    bearings = robot_flight(kind="bearing", sensor="eye")
+    both = pd.concat([seen.assign(source="rader"), bearings.table("detections")], ignore_index=True)
+    looks = pd.concat([frames, bearings.table("frames").assign(sensor="eye")], ignore_index=True)
+    wrong = replace(bearings, tables={**bearings.tables, "detections": both, "frames": looks})
+    with pytest.raises(WildlabError, match="of the source 'rader' are in looks") as caught:
+        follow_all(wrong)
+    assert caught.value.fix == "give detections the source of their sensor's name"
+
+
 def test_what_settings_say_in_vain_is_said() -> None:
     text = "[sensors.rader.many]\ndetection = 0.7\n[sensors.radar.considered.clock]\nsd_s = 2.0\n"
     text += "[sensors.radar.considered.heading]\nsd_deg = 2.0\n"

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wildlab.errors import WildlabError
+from wildlab.flight.checks.sensors import looks_of_others
 from wildlab.flight.following import Settings, absent_sensors
 from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import (
@@ -98,7 +99,7 @@ def follow_targets(
         said = [one for one in said if not one.what.startswith("acceleration")]
         said.insert(0, tuned.said_of_density())
     wanted = sensors_with_detections(flight, sensors)
-    notes = notes_of_absent(flight, told)
+    notes = [*notes_of_absent(flight, told), *notes_of_sources(flight)]
     scans: dict[str, Scans] = {}
     beliefs: dict[str, Beliefs] = {}
     tracks: list[SensorTrack] = []
@@ -167,6 +168,21 @@ def notes_of_absent(flight: Flight, told: Settings) -> list[str]:
     return [
         f"The settings speak of a sensor {name!r}, which this flight does not have; {meant}."
         for name, meant in absent.items()
+    ]
+
+
+def notes_of_sources(flight: Flight) -> list[str]:
+    """A sentence for each source whose detections are of no sensor: these are not used."""
+    frames, seen = flight.frames, flight.detections
+    if frames is None or seen is None:
+        return []
+    others = looks_of_others(frames, seen)
+    strange = others[~others["source"].isin(sensors_of(flight))]
+    return [
+        f"{len(rows)} detections of the source {str(source)!r} are in looks of "
+        f"{f'the sensor {str(sensor)!r}' if sensor else 'no sensor'} and are not used: detections are a "
+        "sensor's where their source has its name."
+        for (source, sensor), rows in strange.groupby(["source", "sensor"], sort=True)
     ]
 
 

@@ -17,6 +17,7 @@ from wildlab.flight.store import Flight
 from wildlab.pipeline.following.beliefs import STATED, Said, of_flight, of_sensor, of_targets
 from wildlab.pipeline.following.follow import (
     notes_of_absent,
+    notes_of_sources,
     order_notes,
     refuse_without_times,
     sensors_with_detections,
@@ -110,7 +111,8 @@ def follow_all(
     told = of_flight(flight, settings)
     following, said = of_targets(told.targets)
     said = [one for one in said if one.what.startswith(("acceleration", "speed"))]
-    notes = notes_of_absent(flight, told)
+    left_out = notes_of_sources(flight)
+    notes = [*notes_of_absent(flight, told), *left_out]
     places: dict[str, Places] = {}
     for name in sensors_with_detections(flight, sensors):
         looks = scans_of(flight, name, 0.0, source)
@@ -144,8 +146,10 @@ def follow_all(
             notes.append(f"{found.without} detections of {name} have no place on the ground.")
     if all(one.bearings for one in places.values()):
         raise WildlabError(
-            "no sensor detects places: bearings alone begin no track",
-            "follow one target by its bearings: wildlab track without --many",
+            " ".join(["no sensor detects places: bearings alone begin no track.", *left_out]).rstrip("."),
+            "give detections the source of their sensor's name"
+            if left_out
+            else "follow one target by its bearings: wildlab track without --many",
             file=flight.folder, field="detections.kind",
         )  # fmt: skip
     beliefs = of_many(told, following, list(places.values()))
