@@ -12,7 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from wildlab.flight.checks.check import check_flight, usable_for
 from wildlab.flight.checks.findings import Finding
+from wildlab.flight.checks.sense import nameless
 from wildlab.flight.checks.sense.seen import seen
+from wildlab.flight.checks.sense.sightings import sightings
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
 from wildlab.simulation.twins import simulate_twin
@@ -65,6 +67,17 @@ def test_where_few_are_known_a_share_that_grows_proves_nothing(flown: Flight) ->
     """Negated yaw, and undone: of 3 and of 1 of 25 animals a share is too small to be told from strangers'."""
     for count in (3, 1):
         assert told(few(turned(flown, lambda a: a * [-1, 1, 1]), count)) == []
+
+
+@pytest.mark.parametrize(("before", "accused"), [(0.29, True), (0.31, False)])
+def test_what_meets_targets_often_enough_needs_no_explanation(
+    flown: Flight, monkeypatch: pytest.MonkeyPatch, before: float, accused: bool
+) -> None:
+    """As where a mount is off by a few degrees, which another mistake may make up for."""
+    given = sightings(flown, "autopilot")
+    assert given is not None
+    monkeypatch.setattr(nameless, "shares", lambda s: np.full(3, before if s is given else 0.9))
+    assert bool(list(nameless.nameless(flown, given))) is accused
 
 
 @pytest.mark.parametrize(
