@@ -64,7 +64,7 @@ def test_what_is_right_is_not_accused_however_few_are_known(flown: Flight, count
 
 
 def test_where_few_are_known_a_share_that_grows_proves_nothing(flown: Flight) -> None:
-    """Negated yaw, and undone: of 3 and of 1 of 25 animals a share is too small to be told from strangers'."""
+    """Negated yaw, and undone: of 3 and of 1 of 25 animals a share is too small to be told from others'."""
     for count in (3, 1):
         assert told(few(turned(flown, lambda a: a * [-1, 1, 1]), count)) == []
 
