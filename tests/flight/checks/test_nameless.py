@@ -114,11 +114,17 @@ def test_a_name_that_is_no_known_targets_says_nothing_of_known_ones(flown: Fligh
 
 def test_other_things_in_a_photo_are_no_wrong_photo(flown: Flight) -> None:
     seen_by = flown.table("detections")
-    rows = seen_by.drop_duplicates("frame_id").iloc[[5, 25, 45]]
-    more = [rows.assign(u_px=rows["u_px"] + by, detection_id=[f"{by}-{i}" for i in range(3)])
-            for by in (-250.0, 250.0)]  # fmt: skip
-    both = pd.concat([seen_by, *more], ignore_index=True)
-    assert told(replace(flown, tables={**flown.tables, "detections": both})) == []
+    # One in a photo, so that all in it are soon of others.
+    rows = seen_by.drop_duplicates("frame_id").iloc[::15].reset_index(drop=True)
+    more = [rows.iloc[[5, 25, 45]].assign(u_px=u, v_px=30.0, detection_id=[f"{u}-{i}" for i in range(3)])
+            for u in (20.0, 320.0, 620.0)]  # fmt: skip
+    both = pd.concat([rows, *more], ignore_index=True)
+    strange = replace(flown, tables={**flown.tables, "detections": both})
+    assert told(strange) == []
+    # Where it is said that each is of a known target, it is.
+    nearest = replace_in_manifest(flown.manifest, {"scoring": {"rule": "nearest"}})
+    (found,) = told(replace(strange, manifest=nearest))
+    assert "off while the others fit" in found.sentence
 
 
 def georeferencing(flight: Flight) -> tuple[bool, str]:
