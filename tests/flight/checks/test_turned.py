@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from wildlab.flight.checks.check import check_flight
 from wildlab.flight.checks.findings import Finding
 from wildlab.flight.checks.sense.looks import Scan, seen_at
+from wildlab.flight.checks.sense.scans import _stamped
 from wildlab.flight.checks.sense.turned import best_turn, turned
 from wildlab.flight.manifest import replace_in_manifest
 from wildlab.flight.store import Flight
@@ -203,3 +204,19 @@ def test_positions_are_turned_about_the_own_place() -> None:
     other = np.where(np.arange(80)[:, None] % 5 == 0, places + 50.0, places)
     assert best_turn((turned(replace(scan, places=other), 6.0),), []) is not None
     assert best_turn((turned(replace(scan, places=other), 6.0),), [(scan,)]) is None
+
+
+def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved() -> None:
+    """Places are about where the sensor was: later stamps put both elsewhere, and targets and bow too."""
+    places, own = np.array([[30.0, 5.0, 0.0]] * 4), np.zeros((4, 3))
+    targets = np.zeros((2, 4, 3))
+
+    def stamped(by: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return own + [2.0 * by, 0.0, 0.0], targets + [0.0, by, 0.0], np.full(4, 0.1 * by)
+
+    at = stamped(0.0)
+    scan = Scan("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
+    later = _stamped(scan, 3.0)
+    assert later.places is not None
+    assert np.allclose(later.places - later.own, places) and np.allclose(later.own[:, 0], 6.0)
+    assert np.allclose(later.targets[..., 1], 3.0) and np.allclose(later.heading, 0.3)

@@ -13,7 +13,7 @@ from wildlab.geometry.validation import gate_threshold
 from wildlab.tracking.kalman import predict, update
 from wildlab.tracking.many.assignment import global_nearest
 from wildlab.tracking.many.bank import Looks, Tuning, run_bank
-from wildlab.tracking.many.bank_life import nobody
+from wildlab.tracking.many.bank_life import Life, nobody
 from wildlab.tracking.many.bank_rules import (
     DISTANCE,
     FEATURES,
@@ -182,6 +182,16 @@ def test_what_is_outside_of_the_gate_of_place_and_looks_starts_a_track_of_its_ow
     assert track == [0, 0, 0, 1, 1, 1]
     # By place alone they would lie in its gate, which has room for them.
     assert run_bank(near, TUNING, DISTANCE).track.tolist() == [0] * 6
+
+
+def test_a_start_counts_what_lies_in_the_gate_of_place_and_looks():
+    """The third detection is beyond the gate of places alone, by its looks, and within that of both."""
+    image, tuning = np.arange(3), TUNING._replace(life=Life(confirm=(1, 2)))
+    other = np.sqrt(1.5 * 10.5)
+    looks = Appearance(np.array([[0.0], [0.0], [other]]), np.ones(1), np.ones(1))
+    assert TUNING.gate < 10.5 < limits_of(STATE, TUNING.gate, 0.999, looks).gate
+    bank = run_bank(Looks(image, np.zeros((3, 2)), INTERVAL), tuning, STATE, looks)
+    assert bank.track.tolist() == [0, 0, 0] and bank.believed.tolist() == [True]
 
 
 def test_looks_in_the_state_follow_what_went_to_the_track():
