@@ -212,7 +212,7 @@ def test_what_a_sensor_places_goes_with_its_platform_where_its_clock_is_moved() 
     targets = np.zeros((2, 4, 3))
 
     def stamped(by: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return own + [2.0 * by, 0.0, 0.0], targets + [0.0, by, 0.0], np.full(4, 0.1 * by)
+        return own + np.array([2.0 * by, 0, 0]), targets + np.array([0, by, 0]), np.full(4, 0.1 * by)
 
     at = stamped(0.0)
     scan = Scan("a", places, None, *at[:2], lambda t: at[:2], at[2], np.arange(4), stamped)
