@@ -1,5 +1,7 @@
 """Calibration finds what was put in, says how well, and refuses what the data cannot tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,6 +96,27 @@ def test_a_correction_turns_about_the_axes_of_the_airframe():
     assert np.allclose(R_bm @ [1.0, 0.0, 0.0], [0.0, np.cos(0.1), np.sin(0.1)])
 
 
+def test_radial_adds_to_k1_of_the_lens():
+    """Against r (1 + k1 r^2) written out, and its derivative at zero, from 100 m straight down."""
+    xy = np.random.default_rng(3).uniform(-0.25, 0.25, (50, 2))
+    r2 = (xy**2).sum(axis=1, keepdims=True)
+    own, added = 0.04, 0.1
+    lens = replace(TAU2, distortion=(own, 0.0, 0.0, 0.0, 0.0))
+    size, middle = [TAU2.fx, TAU2.fy], [TAU2.cx, TAU2.cy]
+
+    def ground(camera, uv, k1):
+        radial = Calibration(("radial",), np.array([k1]), np.eye(1), {}, 4, 4)
+        level = np.tile([0.0, 0.0, -100.0], (len(uv), 1)), np.tile(np.eye(3), (len(uv), 1, 1))
+        return georeference_calibrated(radial, lambda _: CameraPoses(camera, PLAIN, *level), uv, 0.0)[:, :2]
+
+    # Columns count to the right, rows backwards: east and south of a camera that looks down.
+    places = 100.0 * xy[:, ::-1] * [-1.0, 1.0]
+    assert np.allclose(ground(lens, middle + size * xy * (1 + (own + added) * r2), added), places, atol=1e-9)
+    uv = middle + size * xy
+    slope = (ground(TAU2, uv, 1e-5) - ground(TAU2, uv, -1e-5)) / 2e-5
+    assert np.allclose(slope, -places * r2, atol=1e-6)
+
+
 def test_clock_and_position_come_back_too():
     survey = Survey(2, EVERY_WAY, clock=0.4, wrong=(1.0, -2.0, 1.5), pixel_sd=0.2)
     asked = (*BORESIGHT, "clock", "north", "east", "down")
@@ -122,6 +145,7 @@ def noisy_log(survey, seed, position_sd, attitude_sd, every=0.1):
     return at
 
 
+@pytest.mark.slow
 def test_noise_of_a_fast_log_does_not_hold_the_clock():
     """Between two samples the slope is noise, and half way the noise is least: a well at each of them."""
     far_off, clocks = [], []

@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.mount import Mount
 from wildlab.geometry.terrain import Terrain, pixels_to_terrain
@@ -20,13 +21,7 @@ from wildlab.geometry.terrain_uncertainty import (
     terrain_flatness,
     terrain_jacobians,
 )
-from wildlab.geometry.uncertainty import (
-    PoseErrors,
-    ground_covariance,
-    ground_jacobians,
-    inside_ellipse,
-    ray_flatness,
-)
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, ground_jacobians, ray_flatness
 
 CAMERA = Camera(640, 512, 800.0, 790.0, 320.0, 256.0, 0.0, (-0.2, 0.05, 0.001, -0.001, 0.0))
 

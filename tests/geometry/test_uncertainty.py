@@ -6,15 +6,14 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import Camera, normalise
 from wildlab.geometry.camera_poses import CameraPoses
+from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
 from wildlab.geometry.frames import euler_to_matrix, rotation_vector_to_matrix
 from wildlab.geometry.georeference import georeference_pixels, intersect_plane, pixel_to_plane
 from wildlab.geometry.mount import R_MC_DOWN, Mount, camera_rotation, mount_rotation
 from wildlab.geometry.uncertainty import (
     PoseErrors,
-    ellipse_axes,
     ground_covariance,
     ground_jacobians,
-    inside_ellipse,
     ray_flatness,
     sample_ground,
 )

@@ -28,6 +28,7 @@ def flight():
     return fly()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_time", [0.0, 2.0])
 def test_compiled_and_reference_agree_on_axes_and_gauss_markov_errors(flight, rate_time):
     """With every state beyond the fifteen, a gap, and one antenna of two with a Gauss-Markov error."""

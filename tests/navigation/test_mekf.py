@@ -112,6 +112,7 @@ def spoilt(flight, seed, **options):
     return imu, begin(flight, biases, rng), fixes(flight, rng, **options), biases
 
 
+@pytest.mark.slow
 def test_compiled_and_plain_agree(flight):
     """With every kind of measurement, a gap, an outage that the gate must forgive, and the turning Earth."""
     imu, start, antennas, _ = spoilt(flight, 0, every=50)

@@ -143,6 +143,7 @@ def test_manifests_of_two_flights_differ_in_nothing_but_the_seed(stated):
     assert one == other
 
 
+@pytest.mark.slow
 def test_only_the_simulation_asks_what_was_drawn():
     """Filters, navigation and the tables between them never import it."""
     package = Path(wildlab.__file__).parent

@@ -75,6 +75,7 @@ def test_angular_rate_is_the_derivative_of_attitude(name):
     assert np.degrees(np.abs(rate)).max() < 120  # turning round where a course reverses
 
 
+@pytest.mark.slow
 def test_ideal_inertial_readings_carry_a_strapdown_over_the_rows():
     """Rate and force as the inertial unit would feel them, for four minutes: two rows and their turns."""
     twin = load_twin("uav-search-low")

@@ -291,8 +291,8 @@ def test_check_finds_nothing_wrong(flight, tmp_path):
 
 def test_the_manifest_does_not_give_the_simulated_errors_away(twin, flight):
     stated, real = flight.manifest.uncertainty, twin.autopilot
-    assert stated.roll_deg != real.roll_sd.number
-    assert stated.yaw_deg != real.yaw_sd.number
+    assert stated.tilt_deg != real.roll_sd.number
+    assert stated.heading_deg != real.yaw_sd.number
     assert stated.position_horizontal_m != real.horizontal_sd.number
     assert stated.pixel_px != twin.camera.marking_sd.number
     other = quick(with_values(twin, autopilot__roll_sd=3.0, autopilot__horizontal_sd=7.0), 3)

@@ -22,6 +22,13 @@ takes a vector from b to n; ``p_nc`` is the position of c relative to n, in n.
  [173.2   0.    0. ]]
 """
 
+from wildlab.geometry.attitude_uncertainty import (
+    attitude_covariance,
+    level_axes,
+    pose_covariance,
+    tilt_and_heading,
+    tilt_from_roll_pitch,
+)
 from wildlab.geometry.board_views import (
     INTRINSICS,
     Projected,
@@ -35,6 +42,7 @@ from wildlab.geometry.board_views import (
 )
 from wildlab.geometry.calibration import (
     BORESIGHT,
+    BOUNDS,
     PARAMETERS,
     Calibration,
     Fit,
@@ -43,9 +51,11 @@ from wildlab.geometry.calibration import (
     calibrate,
     calibrated_camera,
     calibrated_poses,
+    differentiate,
     fit_points,
     georeference_calibrated,
     split_images,
+    undetermined_parameter,
     with_covariance,
 )
 from wildlab.geometry.camera import (
@@ -64,6 +74,7 @@ from wildlab.geometry.camera import (
 )
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.directions import direction_differences, direction_sd, image_raster
+from wildlab.geometry.ellipses import ellipse_axes, inside_ellipse
 from wildlab.geometry.flodell import geodetic_to_enu_linear, linear_enu_error, metres_per_degree
 from wildlab.geometry.flow import (
     CameraMotion,
@@ -92,7 +103,6 @@ from wildlab.geometry.frames import (
     Origin,
     ecef_to_geodetic,
     enu_to_ned,
-    euler_errors_to_body,
     euler_to_matrix,
     geodetic_to_ecef,
     geodetic_to_ned,
@@ -173,11 +183,11 @@ from wildlab.geometry.uncertainty import (
     GroundCovariance,
     GroundJacobians,
     PoseErrors,
-    ellipse_axes,
+    arc_bend,
     ground_covariance,
     ground_jacobians,
-    inside_ellipse,
     ray_flatness,
+    ray_heading_sd,
     sample_ground,
     sample_rays,
 )
@@ -195,6 +205,7 @@ from wildlab.geometry.visibility import Seen, image_border, lines_clear, visible
 __all__ = [
     "BECAME",
     "BORESIGHT",
+    "BOUNDS",
     "EARTH_RATE",
     "ESTIMATED",
     "INTRINSICS",
@@ -235,6 +246,8 @@ __all__ = [
     "Views",
     "Viewshed",
     "apply_calibration",
+    "arc_bend",
+    "attitude_covariance",
     "attraction",
     "calibrate",
     "calibrate_camera",
@@ -252,6 +265,7 @@ __all__ = [
     "choose_lens",
     "compare_angles",
     "confused",
+    "differentiate",
     "direction_differences",
     "direction_sd",
     "distort",
@@ -259,7 +273,6 @@ __all__ = [
     "ecef_to_geodetic",
     "ellipse_axes",
     "enu_to_ned",
-    "euler_errors_to_body",
     "euler_to_matrix",
     "field_of_view",
     "fit_linear",
@@ -291,6 +304,7 @@ __all__ = [
     "intersect_plane",
     "intersect_terrain",
     "lens_velocity",
+    "level_axes",
     "linear_enu_error",
     "lines_clear",
     "local_earth",
@@ -311,10 +325,12 @@ __all__ = [
     "pixel_rays",
     "pixel_to_plane",
     "pixels_to_terrain",
+    "pose_covariance",
     "project",
     "project_board",
     "quaternion_to_matrix",
     "ray_flatness",
+    "ray_heading_sd",
     "rotation_vector_to_matrix",
     "sample_ground",
     "sample_rays",
@@ -330,6 +346,9 @@ __all__ = [
     "terrain_covariance",
     "terrain_flatness",
     "terrain_jacobians",
+    "tilt_and_heading",
+    "tilt_from_roll_pitch",
+    "undetermined_parameter",
     "undistort",
     "undistort_approximately",
     "velocity_covariance",

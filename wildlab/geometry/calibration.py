@@ -8,7 +8,7 @@ of one image share the image's pose error. What the data cannot tell apart is na
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from wildlab.geometry.corrections import (
     BORESIGHT,
+    BOUNDS,
     PARAMETERS,
     Calibration,
     PosesAt,
@@ -29,6 +30,7 @@ from wildlab.geometry.robust import fit_linear, student_cost, student_scale
 
 __all__ = [
     "BORESIGHT",
+    "BOUNDS",
     "PARAMETERS",
     "Calibration",
     "Fit",
@@ -37,9 +39,11 @@ __all__ = [
     "calibrate",
     "calibrated_camera",
     "calibrated_poses",
+    "differentiate",
     "fit_points",
     "georeference_calibrated",
     "split_images",
+    "undetermined_parameter",
     "with_covariance",
 ]
 
@@ -89,6 +93,7 @@ def fit_points(
     known_points: ArrayLike,
     estimate: Sequence[str] = BORESIGHT,
     covariance: ArrayLike | None = None,
+    thing: ArrayLike | None = None,
 ) -> Fit:
     """The estimate of `calibrate`, which see, without its covariance: a tenth of the work.
 
@@ -96,6 +101,9 @@ def fit_points(
     ----------
     poses_at, uv, known_points, estimate, covariance
         As for `calibrate`.
+    thing
+        (N,) what each pixel is of, where it is not known where that is: residuals are then from the weighted
+        mean of its thing, and north and east of the known points are not looked at.
 
     Returns
     -------
@@ -113,11 +121,13 @@ def fit_points(
         raise ValueError(f"unknown parameters {sorted(unknown)}; known are {list(PARAMETERS)}")
     uv, known = np.asarray(uv, float), np.asarray(known_points, float)
     whiten = _whitening(covariance, len(uv))
+    centre = None if thing is None else _Centre(thing, whiten)
 
     def residuals(names: tuple[str, ...], scaled: Array) -> Array:
         trial = _unscaled(names, scaled)
-        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])
-        return np.asarray(np.einsum("nij,nj->ni", whiten, ground[:, :2] - known[:, :2]))
+        ground = georeference_calibrated(trial, poses_at, uv, known[:, 2])[:, :2]
+        off = ground - known[:, :2] if centre is None else centre.subtract(ground)
+        return np.asarray(np.einsum("nij,nj->ni", whiten, off))
 
     wanted = tuple(name for name in PARAMETERS if name in estimate)
     usable = np.asarray(np.isfinite(residuals(wanted, np.zeros(len(wanted)))).all(axis=1))
@@ -178,15 +188,8 @@ def fit_points(
         return np.nan_to_num(residuals(names, scaled)[usable], nan=1e6)
 
     def derivative(names: tuple[str, ...], scaled: Array) -> Array:
-        """Derivative (N, 2, P) of the residuals by central differences; zero for a ray that misses."""
-        steps = [CLOCK_STEP / PARAMETERS[name] if name == "clock" else 1e-5 for name in names]
-        columns = [
-            (residuals(names, scaled + step * axis) - residuals(names, scaled - step * axis))[usable]
-            / (2 * step)
-            for step, axis in zip(steps, np.eye(len(names)), strict=True)
-        ]
-        empty = np.zeros((int(usable.sum()), 2, 0))
-        return np.nan_to_num(np.stack(columns, axis=-1)) if columns else empty
+        """Derivative (M, 2, P) of the residuals; zero for a ray that misses."""
+        return np.nan_to_num(differentiate(lambda x: residuals(names, x)[usable], names, scaled))
 
     names, undetermined = wanted, dict[str, tuple[str, ...]]()
     starts = [np.zeros(len(names))] + ([start(names)] if "clock" in names else [])
@@ -197,7 +200,7 @@ def fit_points(
             r = at(names, scaled)
         noise = student_scale((r**2).sum(axis=1))
         J = derivative(names, scaled)
-        blurred = _undetermined(names, J.reshape(2 * len(J), -1), noise) if names else None
+        blurred = undetermined_parameter(names, J.reshape(2 * len(J), -1), noise)
         if blurred is None:
             break
         name, partners = blurred
@@ -319,12 +322,70 @@ def _whitening(covariance: ArrayLike | None, n: int) -> Array:
     return W
 
 
-def _undetermined(names: tuple[str, ...], J: Array, noise: float) -> tuple[str, tuple[str, ...]] | None:
+def differentiate(residuals: Callable[[Array], Array], names: tuple[str, ...], scaled: Array) -> Array:
+    """Derivatives (N, 2, P) of residuals by parameters in their usual sizes, by central differences.
+
+    Parameters
+    ----------
+    residuals
+        Takes (P,) and gives (N, 2).
+    names
+        Of the P parameters.
+    scaled
+        (P,) where, in units of :data:`PARAMETERS`.
+
+    Returns
+    -------
+    (N, 2, P)
+    """
+    steps = [CLOCK_STEP / PARAMETERS[name] if name == "clock" else 1e-5 for name in names]
+    columns = [
+        (residuals(scaled + step * axis) - residuals(scaled - step * axis)) / (2 * step)
+        for step, axis in zip(steps, np.eye(len(names)), strict=True)
+    ]
+    return np.stack(columns, axis=-1) if columns else np.zeros((*residuals(scaled).shape, 0))
+
+
+class _Centre:
+    """Takes the mean of its thing, weighted by whitening (N, 2, 2), off each point; NaN for one alone."""
+
+    def __init__(self, thing: ArrayLike, whiten: Array) -> None:
+        self._of = np.unique(np.asarray(thing), return_inverse=True)[1]
+        self._weights = np.swapaxes(whiten, 1, 2) @ whiten
+
+    def subtract(self, ground: Array) -> Array:
+        """Points (N, 2) less the mean of their things."""
+        good = np.isfinite(ground).all(axis=1) & np.isfinite(self._weights).all(axis=(1, 2))
+        of, W = self._of[good], self._weights[good]
+        total = np.zeros((int(self._of.max()) + 1, 2, 3))
+        np.add.at(total, of, np.concatenate([W, W @ ground[good][..., None]], axis=-1))
+        several = np.bincount(of, minlength=len(total)) > 1
+        mean = np.full((len(total), 2), np.nan)
+        mean[several] = np.linalg.solve(total[several, :, :2], total[several, :, 2:])[..., 0]
+        return np.asarray(ground - mean[self._of])
+
+
+def undetermined_parameter(
+    names: tuple[str, ...], J: Array, noise: float
+) -> tuple[str, tuple[str, ...]] | None:
     """The parameter to give up, if any, with those it cannot be told apart from.
 
-    ``J`` (2N, P) is per usual size of each parameter. A direction is lost when the data determine it no
-    better than one already knew, or when columns are so nearly parallel (correlation beyond 0.99) that only
-    the curvature of the projection keeps them apart. The last parameter in rank with a say in it is given up.
+    A direction is lost when the data determine it no better than one already knew, or when columns are so
+    nearly parallel (correlation beyond 0.99) that only the curvature of the projection keeps them apart. The
+    last parameter in rank with a say in it is given up.
+
+    Parameters
+    ----------
+    names
+        P parameters.
+    J
+        (M, P) whitened derivatives, per usual size of each parameter.
+    noise
+        Standard deviation of a whitened residual.
+
+    Returns
+    -------
+    The parameter and its partners; None where the data determine all.
     """
     if not names:
         return None

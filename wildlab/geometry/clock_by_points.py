@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wildlab.geometry.calibration import BORESIGHT, PARAMETERS, Fit, with_covariance
+from wildlab.geometry.calibration import BORESIGHT, BOUNDS, PARAMETERS, Fit, with_covariance
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.corrections import Calibration, apply_calibration
 from wildlab.geometry.frames import Array
@@ -29,8 +29,6 @@ SHARE = 0.8
 STEP_S = 0.2
 #: An offset this far away (s) is another one, not the flank of the best.
 APART_S = 1.5
-#: A boresight (rad) further off than this is none: the data do not tell it from the clock.
-LARGEST_ANGLE = float(np.radians(15.0))
 #: Logarithm of how much more likely the best offset has to be than any other, for each draw of the errors.
 CERTAIN = 5.0
 
@@ -72,7 +70,7 @@ class ClockByPoints(NamedTuple):
         what was tried."""
         tried = self.offsets[np.isfinite(self.cost)]
         inside = tried.min() + APART_S / 2 < self.offset_s < tried.max() - APART_S / 2
-        can_be = np.abs(self.angles).max() < LARGEST_ANGLE
+        can_be = (np.abs(self.angles) <= [BOUNDS[name] for name in BORESIGHT]).all()
         return bool(np.isfinite(self.sd_s) and self.margin > CERTAIN and inside and can_be)
 
 

@@ -19,12 +19,13 @@ from wildlab.geometry.georeference import georeference_pixels
 from wildlab.geometry.mount import Mount
 
 #: Every parameter that can be estimated, in the order in which they are kept when the data cannot carry all;
-#: with the size an error of it would usually have (radians, seconds, metres, shares, pixels). A parameter, or
-#: a combination, that the data determine no better than that is not worth fitting.
+#: with the size an error of it would usually have (radians, seconds, metres, shares, pixels, k1). A
+#: parameter, or a combination, that the data determine no better than that is not worth fitting.
 PARAMETERS: dict[str, float] = {
     "roll": np.radians(3.0),
     "tilt": np.radians(3.0),
     "pan": np.radians(3.0),
+    "heading": np.radians(3.0),
     "clock": 0.5,
     "down": 5.0,
     "north": 5.0,
@@ -33,6 +34,28 @@ PARAMETERS: dict[str, float] = {
     "aspect": 0.02,
     "centre_u": 20.0,
     "centre_v": 20.0,
+    "radial": 0.03,
+}
+#: How large a correction can plausibly be, either way, in the same units. An estimate beyond is no correction
+#: but a sign that something else is wrong (a wrong import, another lens, parameters that the geometry
+#: confuses): a mount is turned by hand, a compass misses the declination (30 degrees at most where people
+#: fly), barometers and satellite fixes drift by tens of metres (a geoid is taken off on import), focal
+#: lengths of a wrong data sheet or another focus differ by some 10 %, and pixels are nearly square. A k1 of
+#: 0.3 moves points at 45 degrees from the axis by 30 %: beyond is a fisheye, which k1 does not describe.
+BOUNDS: dict[str, float] = {
+    "roll": np.radians(15.0),
+    "tilt": np.radians(15.0),
+    "pan": np.radians(30.0),
+    "heading": np.radians(30.0),
+    "clock": 30.0,
+    "down": 30.0,
+    "north": 30.0,
+    "east": 30.0,
+    "focal": 0.15,
+    "aspect": 0.05,
+    "centre_u": 200.0,
+    "centre_v": 200.0,
+    "radial": 0.3,
 }
 BORESIGHT = ("roll", "tilt", "pan")
 
@@ -49,10 +72,11 @@ class Calibration:
     names
         The parameters estimated.
     values
-        Corrections (P,), radians, seconds, metres, shares, pixels: angles turn the camera's base on the
-        airframe, ``clock`` is to be added to the camera's stamps, ``north``/``east``/``down`` to the logged
-        position, ``centre_u``/``centre_v`` to the principal point. Both focal lengths are multiplied by
-        ``exp(focal)``, and their ratio (that of columns over that of rows) by ``exp(aspect)``.
+        Corrections (P,), radians, seconds, metres, shares, pixels, k1: roll, tilt and pan turn the camera's
+        base on the airframe, ``heading`` turns that about the vertical, ``clock`` is to be added to the
+        camera's stamps, ``north``/``east``/``down`` to the logged position, ``centre_u``/``centre_v`` to the
+        principal point, ``radial`` to k1. Both focal lengths are multiplied by ``exp(focal)``, and their
+        ratio (that of columns over that of rows) by ``exp(aspect)``.
     covariance
         (P, P); clicks of one image count as one draw of the image's error.
     undetermined
@@ -109,7 +133,7 @@ def apply_calibration(calibration: Calibration, mount: Mount) -> Mount:
 
 
 def calibrated_camera(calibration: Calibration, camera: Camera) -> Camera:
-    """The camera with the estimated focal lengths and principal point.
+    """The camera with the estimated focal lengths, principal point and radial distortion.
 
     Parameters
     ----------
@@ -129,11 +153,12 @@ def calibrated_camera(calibration: Calibration, camera: Camera) -> Camera:
         fy=camera.fy * float(np.exp(both - half)),
         cx=camera.cx + calibration.value("centre_u"),
         cy=camera.cy + calibration.value("centre_v"),
+        distortion=(camera.distortion[0] + calibration.value("radial"), *camera.distortion[1:]),
     )
 
 
 def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses:
-    """Poses with a calibration applied to clock, position, mount and camera.
+    """Poses with a calibration applied to clock, position, heading, mount and camera.
 
     Parameters
     ----------
@@ -151,6 +176,7 @@ def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses
     return replace(
         poses,
         p_nb=poses.p_nb + shift,
+        R_nb=euler_to_matrix(0.0, 0.0, calibration.value("heading")) @ poses.R_nb,
         mount=apply_calibration(calibration, poses.mount),
         camera=calibrated_camera(calibration, poses.camera),
     )
@@ -159,7 +185,7 @@ def calibrated_poses(calibration: Calibration, poses_at: PosesAt) -> CameraPoses
 def georeference_calibrated(
     calibration: Calibration, poses_at: PosesAt, uv: ArrayLike, plane_down: ArrayLike
 ) -> Array:
-    """Ground points with a calibration applied to clock, position and mount.
+    """Ground points with a calibration applied to clock, position, heading and mount.
 
     Parameters
     ----------

@@ -312,28 +312,3 @@ def wrap(angle: ArrayLike) -> Array:
     20.0
     """
     return np.asarray((np.asarray(angle, float) + np.pi) % (2 * np.pi) - np.pi)
-
-
-def euler_errors_to_body(roll: ArrayLike, pitch: ArrayLike) -> Array:
-    """What small errors of roll, pitch and yaw are as a rotation vector in b.
-
-    The derivative of H (5.10): ``R(angles + d) ~ R(angles) Exp(E d)``.
-
-    Parameters
-    ----------
-    roll, pitch
-        Radians, (N,) or scalars.
-
-    Returns
-    -------
-    E, (N, 3, 3) or (3, 3).
-    """
-    phi, theta = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
-    E = np.zeros((*phi.shape, 3, 3))
-    E[..., 0, 0] = 1.0
-    E[..., 0, 2] = -np.sin(theta)
-    E[..., 1, 1] = np.cos(phi)
-    E[..., 1, 2] = np.sin(phi) * np.cos(theta)
-    E[..., 2, 1] = -np.sin(phi)
-    E[..., 2, 2] = np.cos(phi) * np.cos(theta)
-    return E

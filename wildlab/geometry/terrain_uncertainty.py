@@ -23,7 +23,16 @@ from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, skew
 from wildlab.geometry.georeference import matching
 from wildlab.geometry.terrain import Met, Terrain, intersect_terrain, pixels_to_terrain
-from wildlab.geometry.uncertainty import FLAT, SAMPLES, UNBOUNDED, PoseErrors, sample_rays
+from wildlab.geometry.uncertainty import (
+    ARC,
+    FLAT,
+    SAMPLES,
+    UNBOUNDED,
+    PoseErrors,
+    arc_bend,
+    ray_heading_sd,
+    sample_rays,
+)
 
 #: Of the ellipse's own size, how far the terrain may lie from the touching plane.
 BENT = 0.2
@@ -220,6 +229,8 @@ def terrain_covariance(
     # A ray may end where the slope has no height beside it: a point without a plane is sampled, too.
     doubtful = np.isfinite(points).all(axis=1) & ~linear
     doubtful |= linear & ~(terrain_flatness(poses, pixels, slopes, errors) <= FLAT)
+    offset = points[:, :2] - poses.p_nc[..., :2]
+    doubtful |= linear & (arc_bend(offset, ray_heading_sd(poses, errors), covariance) > ARC)
     rest = linear & ~doubtful
     doubtful[rest] = _bent(poses.take(rest), terrain, points[rest], slopes[rest], covariance[rest])
     for i in np.flatnonzero(doubtful):

@@ -2,12 +2,14 @@
 
 Errors of the pixel, the pose (position in n, attitude as a rotation vector in b: ``R_true = R Exp(delta)``,
 H 7.15), the mount (a rotation vector in m) and the height of the plane are taken to the ground by
-linearisation. Where the ray is flat against its own uncertainty that is known to be wrong (the cotangent
-bends), and the ellipse comes from samples instead.
+linearisation. Where the ray is flat against its own uncertainty (the cotangent bends), or the heading sweeps
+an arc that no ellipse along its tangent holds, that is known to be wrong, and the ellipse comes from samples.
 
 How flat is too flat has a closed form. With depression ``a`` of the ray and standard deviation ``s`` of ``a``
 the second-order term of ``h cot(a)`` is ``s cot(a)`` times the first. Linear ellipses are kept up to a tenth,
-which for 2 deg is a ray 19 deg below the horizon.
+which for 2 deg is a ray 19 deg below the horizon. So has the arc: a heading of standard deviation ``s`` draws
+a point at the distance ``r`` in by ``r s^2 / 2``, whose own standard deviation is ``r s^2 / sqrt(2)``. Linear
+ellipses are kept up to a third of the one that they have in that direction.
 """
 
 from __future__ import annotations
@@ -16,16 +18,18 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammaincinv
 
 from wildlab.errors import WildlabError
 from wildlab.geometry.camera import normalise, normalise_jacobian
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, rotation_vector_to_matrix, skew
 from wildlab.geometry.georeference import georeference_pixels, intersect_plane, matching
+from wildlab.geometry.quantiles import chi2_quantile
 
 #: Ratio of the second-order to the first-order term above which the linear ellipse is not trusted.
 FLAT = 0.1
+#: Ratio of the arc's standard deviation to the linear one, towards the aircraft, above which it is not.
+ARC = 1 / 3
 #: Share of samples above the horizon beyond which no ellipse is given at all.
 UNBOUNDED = 0.05
 SAMPLES = 1000
@@ -189,6 +193,61 @@ def ray_flatness(poses: CameraPoses, uv: ArrayLike, errors: PoseErrors) -> Array
         return np.where(d_n[..., 2] > 0, np.sqrt(variance) * level / d_n[..., 2], np.inf)
 
 
+def arc_bend(offset: ArrayLike, heading_sd: ArrayLike, covariance: ArrayLike) -> Array:
+    """How far the arc that a heading sweeps leaves its tangent, against the ellipse towards the aircraft.
+
+    Parameters
+    ----------
+    offset
+        (N, 2) from the aircraft to the ground point, north and east, metres.
+    heading_sd
+        Standard deviation of the ray's rotation about the vertical, rad, scalar or (N,).
+    covariance
+        (N, 2, 2), linear, metres squared.
+
+    Returns
+    -------
+    (N,), no unit; NaN where the covariance is.
+
+    Examples
+    --------
+    A heading of 10 deg moves a point at 100 m by 2.2 m towards the aircraft, where 1 m is stated:
+
+    >>> print(arc_bend([[100.0, 0.0]], np.radians(10), np.diag([1.0, 300.0])[None]).round(1))
+    [2.2]
+    """
+    away, C = np.asarray(offset, float), np.asarray(covariance, float)
+    squared = np.einsum("...i,...ij,...j->...", away, C, away)
+    distance = np.linalg.norm(away, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        drawn_in = distance**2 * np.square(np.asarray(heading_sd, float)) / np.sqrt(2 * squared)
+    return np.asarray(np.where(squared > 0, drawn_in, 0.0 * squared))
+
+
+def ray_heading_sd(poses: CameraPoses, errors: PoseErrors) -> Array:
+    """By how much errors of pose and mount turn rays about the vertical.
+
+    Parameters
+    ----------
+    poses
+        The camera, with a pose for each pixel or one for all.
+    errors
+        Covariances of the sources; only these two play a part.
+
+    Returns
+    -------
+    Standard deviation, rad, scalar or (N,).
+    """
+    on_body = poses.R_nb[..., 2, :]
+    on_mount = np.einsum("...ji,...j->...i", poses.R_bm, on_body)
+    return np.asarray(
+        np.sqrt(
+            np.einsum("...i,...ij,...j->...", on_body, np.asarray(errors.pose)[..., 3:, 3:], on_body)
+            + np.einsum("...i,ij,...j->...", on_mount, errors.mount, on_mount)
+        )
+    )
+
+
 def ground_covariance(
     poses: CameraPoses,
     uv: ArrayLike,
@@ -196,7 +255,7 @@ def ground_covariance(
     errors: PoseErrors,
     rng: np.random.Generator,
 ) -> GroundCovariance:
-    """Covariance of each ground point (north, east), by linearisation or, for flat rays, by sampling.
+    """Covariance of each ground point (north, east), by linearisation or, where that fails, by sampling.
 
     A sampled covariance has the shape of the samples' second moment about the computed point and the size
     that puts 90 % of them inside its 90 % ellipse: what readers of an ellipse take it to mean.
@@ -234,9 +293,11 @@ def ground_covariance(
             )
     covariance = _linear(ground_jacobians(poses, uv, plane_down), errors)
     method = np.where(np.isfinite(covariance).all(axis=(1, 2)), "linear", "none").astype("<U9")
-    flat = (method == "linear") & (ray_flatness(poses, uv, errors) > FLAT)
     planes = np.broadcast_to(np.asarray(plane_down, float), n)
-    for i in np.flatnonzero(flat):
+    offset = georeference_pixels(poses, uv, planes)[:, :2] - poses.p_nc[..., :2]
+    bent = arc_bend(offset, ray_heading_sd(poses, errors), covariance) > ARC
+    curved = (method == "linear") & (bent | (ray_flatness(poses, uv, errors) > FLAT))
+    for i in np.flatnonzero(curved):
         one = PoseErrors(
             pixel=np.broadcast_to(errors.pixel, (n, 2, 2))[i],
             pose=np.broadcast_to(errors.pose, (n, 6, 6))[i],
@@ -324,7 +385,7 @@ def sample_rays(
 def _sampled(
     pose: CameraPoses, uv: Array, plane_down: float, errors: PoseErrors, rng: np.random.Generator
 ) -> Array:
-    """Covariance (2, 2) of one flat ray from samples; NaN where too many miss the ground."""
+    """Covariance (2, 2) of one ray from samples; NaN where too many miss the ground."""
     ground = sample_ground(pose, uv, plane_down, errors, rng, SAMPLES)
     centre = georeference_pixels(pose, uv, plane_down)[:2]
     offsets = ground - centre
@@ -338,77 +399,4 @@ def _sampled(
     squared = np.where(
         hit, np.einsum("ni,ij,nj->n", offsets, np.linalg.inv(shape), offsets, optimize=True), np.inf
     )
-    return np.asarray(shape * np.quantile(squared, 0.9, method="lower") / _chi2(0.9))
-
-
-def ellipse_axes(covariance: ArrayLike, probability: float = 0.9) -> tuple[Array, Array, Array]:
-    """Half axes and bearing of covariance ellipses.
-
-    Parameters
-    ----------
-    covariance
-        (N, 2, 2) or (2, 2), north-east, metres squared.
-    probability
-        Share of a normal distribution that the ellipse holds.
-
-    Returns
-    -------
-    Long and short half axis (metres) and the bearing of the long one (radians from north), each (N,). NaN
-    covariances give NaN.
-
-    Examples
-    --------
-    Twice as uncertain to the east as to the north:
-
-    >>> long_axis, short_axis, bearing = ellipse_axes([[1.0, 0.0], [0.0, 4.0]])
-    >>> print(f"{long_axis:.2f} m by {short_axis:.2f} m, {np.degrees(bearing):.0f} deg from north")
-    4.29 m by 2.15 m, 90 deg from north
-    """
-    C = np.asarray(covariance, float)
-    mean = (C[..., 0, 0] + C[..., 1, 1]) / 2
-    half = (C[..., 0, 0] - C[..., 1, 1]) / 2
-    spread = np.hypot(half, C[..., 0, 1])
-    scale = _chi2(probability)
-    long_axis = np.sqrt(scale * (mean + spread))
-    short_axis = np.sqrt(scale * np.maximum(mean - spread, 0))
-    return long_axis, short_axis, np.arctan2(C[..., 0, 1], half) / 2
-
-
-def inside_ellipse(offset: ArrayLike, covariance: ArrayLike, probability: float = 0.9) -> np.ndarray:
-    """Which offsets from the truth lie inside the ellipse of their covariance.
-
-    Parameters
-    ----------
-    offset
-        (N, 2) metres, north and east.
-    covariance
-        (N, 2, 2), or (2, 2) for all, metres squared.
-    probability
-        Share of a normal distribution that the ellipse holds.
-
-    Returns
-    -------
-    (N,) bool; NaN rows are outside.
-
-    Examples
-    --------
-    >>> inside_ellipse([[2.0, 0.0], [2.2, 0.0]], np.eye(2))
-    array([ True, False])
-    """
-    e, C = np.asarray(offset, float), np.asarray(covariance, float)
-    determinant = C[..., 0, 0] * C[..., 1, 1] - C[..., 0, 1] * C[..., 1, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        squared = (
-            C[..., 1, 1] * e[..., 0] ** 2
-            - 2 * C[..., 0, 1] * e[..., 0] * e[..., 1]
-            + C[..., 0, 0] * e[..., 1] ** 2
-        ) / determinant
-        return np.asarray(squared <= _chi2(probability))
-
-
-def _chi2(probability: float) -> float:
-    """Quantile of the chi-square distribution with two degrees of freedom.
-
-    As scipy.stats computes it, whose import alone takes longer than that of all of geometry.
-    """
-    return float(2 * gammaincinv(1.0, probability))
+    return np.asarray(shape * np.quantile(squared, 0.9, method="lower") / chi2_quantile(0.9, 2))

@@ -146,15 +146,17 @@ class TruePose(Strict):
 
 
 class Assumed(Strict):
-    """Standard deviations that someone who only has the published facts would assume."""
+    """Standard deviations that someone who only has the published facts would assume.
+
+    Tilt and heading: see `wildlab.geometry.attitude_uncertainty`.
+    """
 
     pixel: FocalLength
     horizontal: Length
     vertical: Length
     plane_height: Length
-    roll: Annotated[Parameter, quantity("deg", high=45, above=0)]
-    pitch: Annotated[Parameter, quantity("deg", high=45, above=0)]
-    yaw: Annotated[Parameter, quantity("deg", high=180, above=0)]
+    tilt: Annotated[Parameter, quantity("deg", high=45, above=0)]
+    heading: Annotated[Parameter, quantity("deg", high=180, above=0)]
 
 
 class Boresight(Strict):
