@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import t
 
 from wildlab.evaluation.blocks import (
-    Neighbours,
     block_mean,
     compare_halves,
     compare_neighbours,
@@ -107,21 +105,3 @@ def test_neighbours_are_those_in_time_and_one_wild_click_does_not_decide():
     assert not compare_neighbours(rng.normal(size=(60, 2)) + 2.0, np.arange(60)).alike
     assert not compare_neighbours(slow[:5], np.arange(5)).alike
     assert not compare_neighbours(np.zeros((9, 2)), np.arange(9)).alike
-
-
-def test_images_that_wander_are_worth_what_the_variance_of_their_mean_says():
-    # Of a first-order process the variance of a mean is (1 + rho) / (1 - rho) times that of independent ones.
-    rng = np.random.default_rng(3)
-    for keep in (0.5, 0.8):
-        series = [wandering(rng, 300, keep) for _ in range(400)]
-        variance = np.var([one.mean(axis=0) for one in series])
-        worth = np.median([compare_neighbours(one, np.arange(300)).worth for one in series])
-        assert 1 / variance == pytest.approx(worth, rel=0.15)
-    assert Neighbours(0.1, 40).worth == 40 and Neighbours(0.1, 40).widening(10) == 1.0
-
-
-def test_intervals_widen_only_where_images_are_worth_fewer_than_their_blocks():
-    assert Neighbours(0.5, 200).widening(10) == 1.0
-    few = Neighbours(0.6, 40)
-    expected = np.sqrt(10 / few.worth) * t.ppf(0.95, few.worth - 1) / t.ppf(0.95, 9)
-    assert few.widening(10) == pytest.approx(expected) and expected > 1.2

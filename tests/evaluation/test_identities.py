@@ -34,7 +34,7 @@ def test_a_perfect_track():
     found = compare_identities([scan(t, {1: (t, 2)}, {"A": (t, 0)}) for t in range(60)], CUTOFF)
     assert (found.swaps, found.breaks, found.false_tracks_per_minute) == (0, 0, 0)
     assert found.targets["A"] == (60, 1.0, 0.0, 0, 0)
-    assert found.tracks[1] == (60, 60, 1.0, False)
+    assert found.tracks[1] == (60, 60, 1.0, False, 60, 1.0)
     assert all(one.distance == pytest.approx(2) for one in found.gospa)
 
 
@@ -91,7 +91,7 @@ def test_where_not_all_targets_are_known_no_track_is_false():
     assert whole.tracks[2].false and whole.false_tracks_per_minute == pytest.approx(1 / 3)
     scans[1] = scans[1]._replace(complete=False)
     found = compare_identities(scans, CUTOFF)
-    assert found.tracks[2] == (0, 0, pytest.approx(np.nan, nan_ok=True), False) and found.incomplete == 1
+    assert found.tracks[2][:4] == (0, 0, pytest.approx(np.nan, nan_ok=True), False) and found.incomplete == 1
     assert found.tracks[1].scans == 3 == found.tracks[1].on_target
     assert found.gospa[1].distance == 0 < whole.gospa[1].distance
     # Where a track is false, it is so over the minutes that are judged: of four, one is about t = 60.
@@ -352,4 +352,5 @@ def test_the_truth_own_error_is_beside_the_tracks() -> None:
     """3 m off with 1 m of its own and a truth known to 2 m: 9 over 5 in one axis."""
     one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False],
                truth_sd=[2.0])  # fmt: skip
-    assert compare_identities([one], 5.0).tracks["t"].anees == pytest.approx(9 / 5)
+    found = compare_identities([one], 5.0).tracks["t"]
+    assert (found.anees, found.anees_alone, found.compared) == (pytest.approx(9 / 5), pytest.approx(9), 1)

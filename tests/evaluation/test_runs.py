@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binomtest, ttest_1samp
 
 from wildlab.errors import WildlabError
-from wildlab.evaluation import mean_interval, share_interval
+from wildlab.evaluation import mean_interval, mean_share_interval, share_interval
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.95])
@@ -34,10 +34,16 @@ def test_share_is_that_of_wilson(count: int, runs: int, probability: float) -> N
     )
 
 
+def test_few_runs_have_a_mean_and_no_interval() -> None:
+    for found in (mean_interval([1.0, np.nan]), mean_share_interval([1.0])):
+        assert found.estimate == 1.0 and np.isnan(found[1:]).all()
+    for nothing in (mean_interval([]), mean_share_interval([np.nan]), share_interval(0, 0)):
+        assert np.isnan(nothing).all()
+
+
 def test_what_has_no_interval_is_refused() -> None:
-    for values, probability in (([1.0], 0.95), ([1.0, np.nan], 0.95), ([1.0, 2.0], 1.0)):
-        with pytest.raises(WildlabError, match="No interval for the mean"):
-            mean_interval(values, probability)
-    for count, runs, probability in ((0, 0, 0.95), (-1, 5, 0.95), (6, 5, 0.95), (1, 5, 0.0)):
+    with pytest.raises(WildlabError, match="No interval with probability 1"):
+        mean_interval([1.0, 2.0], 1.0)
+    for count, runs, probability in ((1, 0, 0.95), (-1, 5, 0.95), (6, 5, 0.95), (1, 5, 0.0)):
         with pytest.raises(WildlabError, match=f"No interval for {count} of {runs} runs"):
             share_interval(count, runs, probability)

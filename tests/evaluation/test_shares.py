@@ -134,3 +134,10 @@ def test_a_calculation_holds_or_does_not_and_has_no_share() -> None:
 def test_any_other_check_is_decided_by_flights() -> None:
     true, premise = np.arange(40) < 30, np.arange(40) < 38
     assert s.decide_check(s.Check(true=true, premise=premise)) == s.decide(true, premise)
+
+
+def test_what_no_flight_measures_is_not_decided_and_a_flight_without_counts_against() -> None:
+    none, few = np.full(40, np.nan), np.r_[np.full(30, np.nan), np.zeros(10)]
+    assert s.decide_check(s.Check(measured=none), 1.0).verdict == s.NO_PREMISE
+    found = s.decide_check(s.Check(measured=few), 1.0)
+    assert (found.true, found.met, found.flights) == (10, 40, 40) and found.verdict == s.MOSTLY_NOT

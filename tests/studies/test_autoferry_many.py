@@ -6,19 +6,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from wildlab.evaluation.identities import Scan, compare_identities
 from wildlab.flight.following import parse_settings
 from wildlab.flight.toml import dump_toml
 from wildlab.studies.autoferry_many import judged as words
-from wildlab.studies.autoferry_many.tuning import Tuned, draw, order
+from wildlab.studies.autoferry_many.tuning import Lasting, Tuned, anees_of, draw, order
 
-CLOCKS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
+OFFSETS = {"lidar": -1.0, "radar": -2.0, "ir": -0.5, "eo": 0.0}
+ERRORS = {name: Lasting(offset, 0.9, 20.0) for name, offset in OFFSETS.items()}
 
 
 def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
-    one, other = (draw(np.random.default_rng(3), CLOCKS) for _ in range(2))
-    assert one == other != draw(np.random.default_rng(4), CLOCKS)
+    one, other = (draw(np.random.default_rng(3), ERRORS) for _ in range(2))
+    assert one == other != draw(np.random.default_rng(4), ERRORS)
     for seed in range(50):
-        settings = draw(np.random.default_rng(seed), CLOCKS)
+        settings = draw(np.random.default_rng(seed), ERRORS)
         many, lidar = settings.targets.many, settings.sensors["lidar"].many
         assert (
             many is not None
@@ -33,7 +35,8 @@ def test_draws_are_those_of_their_seed_and_within_their_ranges() -> None:
 
 def rows() -> pd.DataFrame:
     """Three scenarios, two draws by each way to look; the first scenario is what it was tuned on."""
-    base = {"rmse": 1.0, "tracked": 90.0, "confirm": 2.0, "swaps": 0, "breaks": 1, "false": 0.0, "anees": 1.0}
+    base = {"rmse": 1.0, "tracked": 90.0, "confirm": 2.0, "swaps": 0, "breaks": 1, "false": 0.0, "anees": 1.0,
+            "anees_with": 0.9}  # fmt: skip
     found = []
     for mode, values in (("radar", (5, 9, 7)), ("lidar", (3, 4, 6)), ("both", (4, 8, 8))):
         for rank in (1, 2):
@@ -71,12 +74,19 @@ def test_sentences_turn_with_the_numbers() -> None:
 
 
 def test_draws_whose_tracks_are_as_wrong_as_they_say_go_first() -> None:
-    settings = draw(np.random.default_rng(1), CLOCKS)
+    settings = draw(np.random.default_rng(1), ERRORS)
     drawn = [
         Tuned(1, settings, 3.0, 9.0), Tuned(2, settings, 5.0, 1.9), Tuned(3, settings, 4.0, 0.6),
         Tuned(4, settings, 2.0, float("nan")), Tuned(5, settings, 4.0, 1.0),
     ]  # fmt: skip
     assert [one.number for one in sorted(drawn, key=order)] == [3, 5, 2, 4, 1]
+
+
+def test_what_is_assumed_of_the_truth_chooses_no_draw() -> None:
+    one = Scan(0.0, np.array([[3.0, 0.0]]), np.eye(2)[None], ["t"], np.zeros((1, 2)), ["a"], [True], [False])
+    for sd in (0.0, 2.0):
+        lives = compare_identities([one._replace(truth_sd=sd)], 5.0)
+        assert anees_of(lives) == 9 / 2 and anees_of(lives, alone=False) == 9 / (1 + sd**2) / 2
 
 
 def test_cameras_are_judged_with_the_settings_of_those_without() -> None:
@@ -103,15 +113,16 @@ def test_the_table_of_draws_has_each_scenario_once() -> None:
 def test_scenarios_are_followed_by_what_one_teaches(shared_data, tmp_path) -> None:  # type: ignore[no-untyped-def]
     from wildlab.flight.recipe.importing import import_flight
     from wildlab.paths import DATA
-    from wildlab.studies.autoferry_many.tuning import clocks_of, follow_mode, tune
+    from wildlab.studies.autoferry_many.tuning import errors_of, follow_mode, tune
 
     raw = shared_data("tracking", "autoferry")
     first, second = (
         import_flight(DATA / "recipes" / f"autoferry-{n}.toml", raw, tmp_path / str(n)) for n in (2, 3)
     )
-    clocks = clocks_of(first)
-    assert -2.5 < clocks["radar"] < -1.5 and -1.5 < clocks["lidar"] < -0.5
+    errors = errors_of(first)
+    assert -2.5 < errors["radar"].offset_s < -1.5 and -1.5 < errors["lidar"].offset_s < -0.5
+    assert all(0.5 < errors[name].share < 1 for name in ("lidar", "radar"))
     tuned = tune(first, draws=3, seed=1)
     for mode, ordered in tuned.items():
-        assert [one.gospa for one in ordered] == sorted(one.gospa for one in ordered) and len(ordered) == 3
+        assert ordered == sorted(ordered, key=order) and len(ordered) == 3
         assert follow_mode(second, mode, ordered[0].settings) is not None

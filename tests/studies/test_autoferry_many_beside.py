@@ -242,7 +242,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(shared_data, tmp_path
     from wildlab.flight.recipe.importing import import_flight
     from wildlab.paths import DATA
     from wildlab.pipeline.many.follow import follow_all
-    from wildlab.studies.autoferry_many.tuning import MODES, clocks_of, draw, gospa_of, reach_of
+    from wildlab.studies.autoferry_many.tuning import MODES, draw, errors_of, gospa_of, reach_of
 
     raw = shared_data("tracking", "autoferry")
     flights = {
@@ -250,7 +250,7 @@ def test_the_draws_are_ordered_by_the_first_scenario_alone(shared_data, tmp_path
         for n in (2, 17)
     }
     monkeypatch.setattr(beside, "FOR_EACH", 1)
-    settings = draw(np.random.default_rng(1), clocks_of(flights["scenario-2"]))
+    settings = draw(np.random.default_rng(1), errors_of(flights["scenario-2"]))
     rows = beside.judge_beside(flights, dict.fromkeys(MODES, settings), 2, 1)
     assert rows["mode"].unique().tolist() == beside.modes_beside() and len(rows) == 2 * 2 * 3
     first = rows[rows["case"] == "scenario-2"]

@@ -33,8 +33,9 @@ def track(sensor: str, target: str, name: str, error: float, nees: float, seed: 
     values = nees * rng.uniform(0.5, 1.5, n)
     known = np.ones(n, bool)
     return SensorTrack(
-        sensor, target, name, np.arange(n) * 0.5, estimate, errors, values, innovation, nis, known, known
-    )
+        sensor, target, name, np.arange(n) * 0.5, estimate, errors, values, innovation, nis, known, known,
+        np.tile(np.eye(4), (n, 1, 1)),
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -183,8 +184,8 @@ def test_a_sensor_is_called_useless_where_it_is() -> None:
     both = words.use_words(of_use(turned))
     assert both.startswith("The colour camera and thermal camera are each alone of no use")
     assert "0 of 3" in both and "1 of 4" in both and "70 metres" in both
-    assert len(words.limits(of_use(good))) + 1 == len(words.limits(of_use(bad)))
-    assert "thermal camera" in words.limits(of_use(bad))[-1]
+    assert len(words.limits(of_use(good), 0.04)) + 1 == len(words.limits(of_use(bad), 0.04))
+    assert "thermal camera" in words.limits(of_use(bad), 0.04)[-1]
 
 
 def test_lost_tracks_are_counted_apart_and_named() -> None:

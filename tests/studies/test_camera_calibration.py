@@ -66,7 +66,11 @@ def test_each_cause_is_sized_to_leave_what_is_printed(cause):
 
 
 def test_the_printed_error_at_the_height_of_the_flight():
-    assert mounting.error_from_height() == pytest.approx(6.68, abs=0.005)
+    found = mounting.error_from_height()
+    assert found.estimate == pytest.approx(6.68, abs=0.005)
+    # The corners of what 0.0229 m and 1.2 m are rounded from, to first order.
+    assert found.low == pytest.approx(0.02285 * 350 / 1.25, abs=0.02)
+    assert found.high == pytest.approx(0.02295 * 350 / 1.15, abs=0.02)
 
 
 def test_aspect_and_offset_turn():
@@ -89,7 +93,7 @@ def test_distortion_turns():
 
 
 def cause(name, ground, unit="deg", size=0.8):
-    return Cause(name, unit, size, 0.0229, ground / 350, ground)
+    return Cause(name, unit, size, 0.0229, 0.0, ground / 350, ground)
 
 
 def test_the_meaning_of_what_is_left_turns():

@@ -13,6 +13,7 @@ from wildlab.studies.crossing_vessels.trial import DISTANCE, joint
 from wildlab.studies.crossing_vessels.trial.crossing import BOATS, EVERY
 
 
+@pytest.mark.slow
 def test_joint_association_of_two_far_apart_is_two_tracks():
     crossing = passing(closest=400, noise=5)
     numbers = joint.joint_numbers(crossing)

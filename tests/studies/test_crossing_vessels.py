@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+from scipy.stats import binomtest
 
 from wildlab.geometry.validation import gate_threshold
 from wildlab.pipeline.georeference import observe
@@ -302,7 +303,7 @@ def test_words_turn_with_the_numbers(numbers):
     assert "by distance alone 1800 on each of 20 flights" in first[1]
     assert "features 5 on each of 20 flights. Published" in first[1]
     worst = pd.concat([good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
-    assert "features 5 in the median (5 to 455 on 21 flights). Published" in text.summary(worst)[1]
+    assert "features 5 in the median (5 to 455 on nine flights of ten). Published" in text.summary(worst)[1]
     hidden = pd.concat([good, good, spread_of(numbers, GOOD | {(FEATURES, "wrong"): 455.0}, 1)])
     assert "(5 to 5 on nine flights of ten, at most 455). Published" in text.summary(hidden)[1]
     assert "features 5. Published" in text.summary(good[:1])[1]
@@ -433,3 +434,8 @@ def test_two_are_apart_up_to_just_before_they_meet_and_from_just_after():
     assert until == (300 - 18) * INTERVAL and since == (300 + 18) * INTERVAL
     together = crossing._replace(truth=np.zeros_like(crossing.truth))
     assert apart_times(together) == (0.0, 599 * INTERVAL)
+
+
+def test_a_difference_beyond_chance_is_that_of_a_sign_test():
+    for one, other in ((one, other) for one in range(13) for other in range(13) if one + other):
+        assert text.beyond_chance(one, other) == (binomtest(one, one + other).pvalue < 0.05), (one, other)

@@ -36,12 +36,12 @@ def test_published_beside_flights(report: Report) -> None:
     spread = recorded(report, mae=np.r_[20.0, np.linspace(8, 12, 100)], mean_north=north)
     table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae", "mean_north"])
     error, mean = (table.iloc[i] for i in (0, 1))
-    assert (error["published"], error["drawn"], error["verdict"]) == (9.4, 20.0, "agrees")
+    assert (error["published"], error["drawn"], error["verdict"]) == (9.4, 20.0, "close, within")
     assert error["here"] == spread["ekf", "mae"].median() and error["ratio"] == "1.07"
     assert error["below"] == "35 %"
     # By size: 4.1 beside the median of sizes, which is not the size of the median.
     assert (mean["published"], mean["here"], mean["drawn"]) == (4.1, np.median(np.abs(north)), 1.0)
-    assert mean["quantity"] == "mean north, by size" and mean["verdict"] == "agrees"
+    assert mean["quantity"] == "mean north, by size" and mean["verdict"] == "no power"
     # A ratio to a mean near zero says nothing: the difference stands in its place.
     assert mean["ratio"] == f"\N{MINUS SIGN}{4.1 - np.median(np.abs(north)):.2f}"
     with pytest.raises(WildlabError, match="Speed of ekf is not published"):
@@ -54,7 +54,7 @@ def test_a_number_that_needs_what_is_not_printed_is_not_judged(report: Report) -
     assert row is not None
     spread = recorded(report, mae=np.full(101, row["value"]))
     assert monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])["verdict"].tolist() == [
-        "agrees"
+        "close, within"
     ]
     row["unjudged"] = "nobody says which way"
     table = monte_carlo.beside_published(report, spread, {"ekf": "EKF"}, ["mae"])

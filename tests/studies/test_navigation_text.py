@@ -16,28 +16,33 @@ def found(yaw_sd: float = 2.4, **more: float) -> dict[str, float]:
 
 
 def test_the_axes_are_taken_together_and_the_point_moves_by_roll_and_pitch() -> None:
-    (first, second, _), level, verdict = text.summary(found(), "in the air", True)
+    (first, second, _), verdict, reason = text.summary(found(), "in the air", True)
     assert "1.30 degrees from the truth" in first and "it would be 2.60" in first and "median" not in first
-    assert f"by {300 * np.radians(0.5):.1f} metres" in second and level == "neutral"
-    assert verdict == ("within what it states", "From the truth it differs by 0.5 times what it states.")
+    assert f"by {300 * np.radians(0.5):.1f} metres" in second and verdict.colour == "neutral"
+    assert reason == "From the truth it differs by 0.5 times what it states."
 
 
-@pytest.mark.parametrize(
-    ("yaw", "word"), [(2.3, "within what it states"), (2.7, "not far beyond what it states")]
-)
-def test_within_is_said_only_of_what_is(yaw: float, word: str) -> None:
+@pytest.mark.parametrize("true", [True, False])
+@pytest.mark.parametrize("yaw", [2.3, 2.7, 3.9])
+def test_the_reason_is_the_ratio(yaw: float, true: bool) -> None:
     errors = {name: value * 2 for name, value in FOUND.items() if name.startswith("rms")}
-    *_, verdict = text.summary(found() | errors | {"rms_yaw": yaw}, "in the air", True)
-    off, stated = np.hypot(1.0, yaw), np.linalg.norm([0.6, 0.8, 2.4])
-    assert verdict is not None and verdict[0] == word and (off <= stated) == word.startswith("within")
+    _, verdict, reason = text.summary(found() | errors | {"rms_yaw": yaw}, "in the air", true)
+    ratio = np.hypot(1.0, yaw) / np.linalg.norm([0.6, 0.8, 2.4])
+    assert f"{ratio:.1f} times" in reason and verdict.value == "not judged"
+
+
+def test_the_noise_as_stated_leads_and_what_was_found_stands_beside() -> None:
+    better = found() | {"rms_roll": 0.0, "rms_pitch": 0.0, "rms_yaw": 0.5}
+    (first, second, *_), *verdict = text.summary(found(), "in the air", False, receiver=better)
+    assert "1.30 degrees" in first and "0.50 degrees" in second
+    assert tuple(verdict) == text.summary(found(), "in the air", False)[1:]
 
 
 @pytest.mark.parametrize("times", [0.2, 5.0])
 def test_surer_than_the_difference_allows_only_where_it_is(times: float) -> None:
     sure = {name: value * (1 / times if name.startswith("rms") else 1) for name, value in found().items()}
-    (first, _, last), level, verdict = text.summary(sure, "in the air", False)
-    assert ("surer of itself" in last) == (times < 1) == (level == "warn")
-    assert verdict is not None and (verdict[0] == "too sure of itself") == (times < 1)
+    (first, _, last), verdict, _ = text.summary(sure, "in the air", False)
+    assert ("surer of itself" in last) == (times < 1) == (verdict.value == "look closer")
     assert "found on board" in first and "truth" in last
 
 
@@ -47,8 +52,8 @@ def test_the_middle_flight_speaks_for_all_of_them() -> None:
     spread["observer", "rms_yaw"] = 50.0
     middle = text.middle_flight(spread)
     assert middle["rms_yaw"] == 1.2 and len(middle) == 6
-    (first, *_), level, verdict = text.summary(middle, "in the air", True, 3)
-    assert level == "neutral" and verdict is None
+    (first, *_), verdict, reason = text.summary(middle, "in the air", True, 3)
+    assert verdict.colour == "neutral" and not reason
     assert "1.30 degrees" in first and ", median of 3 flights;" in first
     assert text.tiles(middle, True, 3)[2] == (
         "1.20°",

@@ -28,6 +28,7 @@ from wildlab.studies.precision_drop.trial import (
     Drop,
     alarms,
     check_claims,
+    error_of_mean,
     flown,
     horizon_views,
     look_of,
@@ -51,7 +52,11 @@ def test_what_is_found_is_the_tarpaulin_and_is_put_beside_the_truth(few):
     # With the autopilot's poses a position is metres off, and with the pixel alone it would be centimetres.
     assert 0.2 < np.hypot(*errors.T).mean() < 15
     assert numbers[MEAN, "error"] == pytest.approx(np.hypot(*errors.mean(axis=0)))
-    assert numbers[MEAN, "after_10"] == pytest.approx(np.hypot(*errors[:10].mean(axis=0)))
+    tens = [np.hypot(*errors[k : k + 10].mean(axis=0)) for k in range(3)]
+    assert numbers[MEAN, "after_10"] == pytest.approx(np.median(tens))
+    # A mean of one is a single position, and a mean of all is the mean.
+    assert numbers[MEAN, "after_1"] == pytest.approx(numbers[SINGLE, "median_error"])
+    assert error_of_mean(errors, 12) == pytest.approx(numbers[MEAN, "error"])
     assert np.isnan(numbers[MEAN, "after_75"])
     assert {subject for subject, _ in numbers} <= set(STUDY.subjects)
 
@@ -85,7 +90,9 @@ def test_numbers_by_hand():
     found = numbers_of(one, np.array([[3.0, 4], [-3, 2]]), CAMERA, 106.4)
     assert (found[FOUND, "detection_rate"], found[FOUND, "false_alarms_per_image"]) == (0.5, 1 / 8)
     assert (found[FOUND, "pixel_error"], found[FOUND, "off_centre"]) == (3.5, 0.5)
-    assert (found[MEAN, "error"], found[MEAN, "after_1"], found[MEAN, "after_2"]) == (3.0, 5.0, 3.0)
+    assert (found[MEAN, "error"], found[MEAN, "after_1"], found[MEAN, "after_2"]) == (
+        3.0, pytest.approx((5 + np.sqrt(13)) / 2), 3.0,
+    )  # fmt: skip
     assert found[FOUND, "few_pixels"] == pytest.approx(0.6)
     assert found[SINGLE, "rms_error"] == pytest.approx(np.sqrt((25 + 13) / 2))
 
@@ -194,3 +201,10 @@ def test_pictures_say_what_they_show(few):
     assert "one region is accepted" in shown[2]
     assert "nothing is accepted" in charts.image_shown(view, Colour(smallest_px=1e6), "x", "y", "")[2]
     assert "3.0 m after 75" in charts.mean_shown(table())[2]
+
+
+@pytest.mark.parametrize(("flights", "key"), [(1, None), (2, "lowest to highest"), (30, "middle 90 %")])
+def test_a_band_is_called_what_it_is(flights, key):
+    figure = charts.mean_shown(pd.concat([table()] * 15, ignore_index=True).head(flights))[0]
+    called = {one.get_text() for one in figure.legends[0].get_texts()}
+    assert {one for one in called if one.startswith("flights, ")} == ({f"flights, {key}"} if key else set())

@@ -8,7 +8,7 @@ import pytest
 from wildlab.errors import WildlabError
 from wildlab.evaluation.pose_noise import KINDS, PoseNoise
 from wildlab.flight.store import Flight
-from wildlab.pipeline.navigation_inputs import imu_noise
+from wildlab.pipeline.navigation_errors import SETTLING_S, errors_against
 from wildlab.pipeline.pose_noise import covariance_of
 from wildlab.pipeline.sighting_errors import pauses
 from wildlab.pipeline.track import Sighting, follow_schmidt
@@ -26,6 +26,7 @@ from wildlab.studies.schmidt.trial import (
     NAMES,
     NEES_NAMES,
     PUBLISHED,
+    SHEET,
     SOURCE,
     SUBJECTS,
     TUNING,
@@ -38,7 +39,6 @@ from wildlab.studies.schmidt.trial import (
     only,
     scaled,
     sheet_sighting,
-    sheet_tuning,
     trial,
 )
 from wildlab.tracking.run import Track
@@ -104,11 +104,13 @@ def test_an_estimated_covariance_is_that_of_position_and_attitude() -> None:
     assert np.sqrt(np.diag(covariance_of(NOISE))).tolist() == pytest.approx([0.5, 0.5, 0.8, 0.02, 0.02, 0.05])
 
 
-def test_the_sheet_is_what_the_flight_states(flight: Flight) -> None:
-    noise, tuning = imu_noise(flight), sheet_tuning(flight)
-    assert np.radians(tuning.angle_random_walk_deg) == pytest.approx(noise.angle_random_walk)
-    assert tuning.velocity_random_walk == noise.velocity_random_walk
-    assert tuning.horizontal == flight.table("gnss")["sd_horizontal_m"].median()
+def test_the_sheet_is_the_whole_sheet(flight: Flight) -> None:
+    """The same filter as the navigation study's, of the sensors' errors alone: its covariance holds."""
+    times = sheet_sighting(flight).times
+    nav, payload = flight.nav[SHEET], flight.nav["truth-payload"]
+    found = errors_against(payload, nav, times[times > SETTLING_S])
+    rms, sd = (np.sqrt(np.nanmean(one[:, 6:] ** 2)) for one in (found.error, found.sd))
+    assert 0.5 < rms / sd < 2.0
 
 
 def test_a_part_of_a_flight_ends_its_sensors_and_leaves_the_rest(flight: Flight) -> None:
@@ -190,7 +192,7 @@ def test_on_the_fast_flight_schmidt_is_consistent_and_the_extended_filter_far_le
     asked |= {(who, name) for who in FILTERS for name in NAMES}
     asked |= {(who, name) for who in PUBLISHED for name in MORE_NAMES}
     assert asked <= set(found)
-    assert {who for who, _ in set(found) - asked} == {SOURCE, "mekf-data-sheet", ESTIMATED, "flight"}
+    assert {who for who, _ in set(found) - asked} == {SOURCE, SHEET, ESTIMATED, "flight"}
     assert set(COVARIANCES) | set(CURVE) | set(CONSTANT) <= {who for who, _ in found}
     assert BOUNDS[0] <= found["schmidt", "nees"] <= BOUNDS[1]
     # A flight's true sensors are drawn: the extended filter is above the bound on most flights, not on all.

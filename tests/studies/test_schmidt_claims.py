@@ -8,8 +8,8 @@ import pytest
 
 from wildlab.evaluation.consistency import chi_square_interval
 from wildlab.reporting.published import load_claims, load_published
-from wildlab.studies.schmidt.claims import apart, band, check_claims, within
-from wildlab.studies.schmidt.trial import BOUNDS, FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
+from wildlab.studies.schmidt.claims import apart, band, check_claims
+from wildlab.studies.schmidt.trial import FILTERS, MORE_NAMES, NAMES, NEES_NAMES, PUBLISHED, SUBJECTS
 
 STUDIES = ("schmidt-fast-vessel", "schmidt-slow-vessel-eight", "schmidt-drifting-vessel-eight")
 #: What the claims of all three studies need for their vague words; the strictest where they differ.
@@ -75,7 +75,7 @@ def test_what_the_tables_print_makes_all_claims_true_that_do_not_contradict_othe
     ("changed", "lost"),
     [
         ({"schmidt__nees": 4.2}, {"schmidt-nees-inside", "schmidt-fits", "attitude-makes-the-difference"}),
-        ({"ekf__nees": 3.9}, {"ekf-nees-above", "attitude-makes-the-difference"}),
+        ({"ekf__nees": 3.9}, {"ekf-nees-above", "ekf-needs-more-noise", "attitude-makes-the-difference"}),
         ({"ekf-60-pixels__nees": 4.2}, {"ekf-needs-more-noise"}),
         ({"ekf-60-pixels__nees": 4.2, "ekf-60-pixels__nees_worth": 1.0}, set()),
         ({"ekf__fraction_above_predicted": 0.5}, {"ekf-overconfident-between"}),
@@ -137,16 +137,10 @@ def test_what_contradicts_a_claim_is_true_elsewhere(changed: dict[str, float], w
         ({"mekf__largest_shift_px": 59.0}, "ekf-nis-too-large"),
         ({"flight__pauses": 0.0}, "ekf-overconfident-between"),
         ({"flight__pauses": 1.0}, "high-nis-after-pauses"),
-        ({"mekf__rms_roll": 0.5, "mekf__rms_pitch": 0.5}, "schmidt-nees-inside"),
-        ({"mekf__rms_roll": 4.0}, "schmidt-inside-mostly"),
-        ({"mekf__rms_roll": 2.0, "mekf__rms_pitch": 2.0}, "schmidt-pessimistic"),
-        ({"ekf__nees": 3.0}, "one-to-two-degrees"),
-        ({"ekf__nees": 3.0}, "ekf-needs-more-noise"),
-        ({"ekf__nees": 1.9}, "attitude-makes-the-difference"),
         ({"flight__moving": 0.4}, "course-better"),
         ({"flight__turning": 0.05}, "schmidt-oscillates-less"),
         ({"flight__turning": 0.95}, "schmidt-oscillates-less"),
-        ({"mekf__rms_turning": 1.2}, "largest-errors-in-turns"),
+        ({"flight__turning": 0.05}, "largest-errors-in-turns"),
         ({"flight__crab": 4.0}, "yaw-errors-outside"),
         ({"flight__settled": 30.0}, "covariance-constant"),
     ],
@@ -155,6 +149,19 @@ def test_each_premise_is_lost_by_what_it_speaks_of(changed: dict[str, float], of
     with_it, without = (check_claims(pd.DataFrame([flight_with(**one)]))[of].premise for one in ({}, changed))
     assert with_it is not None and with_it[0]
     assert without is not None and not without[0]
+
+
+@pytest.mark.parametrize("times", [0.2, 5.0])
+def test_premises_do_not_depend_on_what_the_filters_gave(times: float) -> None:
+    """Nor on how well the stated deviations of the poses fit their errors: that is what NEES measures."""
+    first = flight_with()
+    other = {
+        key: value * (times if key[0] not in ("flight", "mekf") or "rms_" in key[1] else 1)
+        for key, value in first.items()
+    }
+    before, after = (check_claims(pd.DataFrame([one])) for one in (first, other))
+    for name, check in before.items():
+        assert np.array_equal(check.premise, after[name].premise), name  # type: ignore[arg-type]
 
 
 def test_comparisons_compare_what_they_name() -> None:
@@ -168,13 +175,13 @@ def test_comparisons_compare_what_they_name() -> None:
 
 
 @pytest.mark.parametrize("study", STUDIES)
-def test_every_claim_is_decided_has_a_premise_and_every_number_has_its_subject(study: str) -> None:
+def test_every_claim_is_decided_and_every_number_has_its_subject(study: str) -> None:
     checks = check_claims(pd.DataFrame([flight_with()]))
     claims = load_claims(study)
     assert len(claims) > 15 and len({claim["id"] for claim in claims}) == len(claims)
     for claim in claims:
         check = checks[claim["id"]]
-        assert claim["premise"], claim
+        assert check.premise is None or claim["premise"], claim
         assert ("threshold" in claim) == ("reason" in claim) == (check.measured is not None), claim
         check.holds(float(claim["threshold"]) if "threshold" in claim else None)
     numbers = load_published(study)
@@ -191,12 +198,6 @@ def test_an_average_is_held_against_the_band_of_what_it_is_worth() -> None:
     assert found.inside.tolist() == [True, True, False, False]
     assert found.below.tolist() == [False, False, True, False]
     assert found.above.tolist() == [False, False, False, True]
-
-
-def test_an_average_at_the_thesis_bounds_is_within_and_an_unknown_one_is_not() -> None:
-    values = [BOUNDS[0], BOUNDS[1], np.nextafter(BOUNDS[1], 9), 0.0, np.nan]
-    assert within(values).tolist() == [True, True, False, False, False]
-    assert pytest.approx((0.0506, 7.38), rel=1e-3) == BOUNDS
 
 
 def test_apart_is_a_share_of_the_smaller() -> None:

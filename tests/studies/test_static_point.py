@@ -149,7 +149,7 @@ def test_words_turn_with_their_numbers():
     )
     assert (
         "costs 1.0 metres beside one that is" in text.summary(far, 0.1)[1]
-        and "helps less" in text.summary(far, 0.1)[2]
+        and "are wrong in the same way" in text.summary(far, 0.1)[2]
     )
     cheap = pd.DataFrame(
         [{**GOOD, **OPPOSED["synchronisation-matters"], **OPPOSED["innovations-coloured"]}] * 2

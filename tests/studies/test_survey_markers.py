@@ -107,7 +107,7 @@ def diagnosed(flight, tilt_deg=0.0, down_m=0.0):
     flight.nav["logged"] = nav
     try:
         observations = observe(flight)
-        return diagnose(flight, observations, errors(flight, observations), np.random.default_rng(0))
+        return diagnose(flight, observations, errors(flight, observations))
     finally:
         flight.nav["logged"] = logged
 
@@ -128,19 +128,23 @@ def test_the_flight_as_flown_has_little_constant_error_and_one_photo_far_out(as_
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tilt_deg", "down_m", "causes"),
+    ("tilt_deg", "down_m", "causes", "certain"),
     [
-        (5.0, 0.0, {"boresight"}),
-        (-5.0, 0.0, {"boresight"}),
-        (0.0, 8.0, {"height"}),
-        (0.0, -8.0, {"height"}),
-        (-5.0, 8.0, {"boresight", "height"}),
+        (5.0, 0.0, {"boresight"}, True),
+        (-5.0, 0.0, {"boresight"}, True),
+        (0.0, 8.0, {"height"}, False),
+        (0.0, -8.0, {"height"}, False),
+        (-5.0, 8.0, {"boresight", "height"}, False),
     ],
 )
-def test_what_is_made_wrong_is_named_and_taken_off(flights, as_flown, tilt_deg, down_m, causes):
-    """The flight has errors of its own: its correction changes by what was put in."""
+def test_what_is_made_wrong_is_named_and_taken_off(flights, as_flown, tilt_deg, down_m, causes, certain):
+    """The flight has errors of its own: its correction changes by what was put in.
+
+    Among them are pixels that seem to be 5 % wider than high, more than a camera has. With a height put wrong
+    the lens is therefore fitted along, and so much estimated from so few passes may be chance.
+    """
     found = diagnosed(flights["openathena-f1"], tilt_deg, down_m)
-    assert set(found.winner.causes) == causes and found.counts
+    assert causes <= set(found.winner.causes) and found.counts == certain
     assert found.winner.gain.with_ <= 1.1 * as_flown.winner.gain.with_
     own = next(model for model in as_flown.models if set(model.causes) == causes)
     before = dict(zip(own.fit.names, own.fit.values, strict=True))
@@ -149,4 +153,5 @@ def test_what_is_made_wrong_is_named_and_taken_off(flights, as_flown, tilt_deg, 
             low, high = found.calibration.interval(name)
             assert low <= before[name] + put_in <= high, name
             assert not low <= 0 <= high
-    assert [(one.kind, one.photo) for one in found.outliers] == [("photo", "T038")]
+    if certain:  # else it is not taken off, and no photo is far out
+        assert [(one.kind, one.photo) for one in found.outliers] == [("photo", "T038")]

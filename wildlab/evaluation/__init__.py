@@ -9,10 +9,13 @@ Floating Objects using UAVs with Optical Sensors, doctoral thesis, NTNU 2019.
 - `innovation_whiteness`, `autocorrelation`, `effective_sample_size`: are its innovations white?
 - `track_errors.track_errors`, `summarise_track`: how far is a track from the truth?
 - `ospa`, `gospa`: how far is a set of tracks? `compare_identities`: who follows whom, how long, and how well.
+- `estimate_position_noise`: how rough is the truth itself?
 - `mean_interval`, `mean_share_interval`, `share_interval`: what do so many independent runs say?
 - `summarise`, `scatter_by_image`, `bootstrap_interval`, `estimate_pose_noise`: single positions, and why they
   err; `time_blocks`, `block_mean`, `compare_halves`: in blocks in time order.
-- `held_out`, `gain_of`, `rank_models`: which constant error is behind them; `split_along`; `find_outliers`.
+- `held_out`, `gain_of`, `rank_models`: which constant error is behind them, `estimate_wander`: against noise
+that
+  is correlated in time; `split_along`; `find_outliers`.
 - `judge_ellipses`, `try_averaging`, `spread_of_sightings`, `ambiguous`: what they are worth.
 """
 
@@ -38,18 +41,19 @@ from wildlab.evaluation.consistency import (
     share_inside,
     whiten,
 )
+from wildlab.evaluation.correlated_errors import WanderNoise, estimate_wander
 from wildlab.evaluation.ellipses import EllipseVerdict, judge_ellipses
 from wildlab.evaluation.errors import (
     ErrorSummary,
     Scatter,
     bootstrap_interval,
-    mean_summary,
     scatter_by_image,
     summarise,
 )
 from wildlab.evaluation.identities import Identities, Scan, compare_identities, scan_gospa
 from wildlab.evaluation.outliers import Outlier, find_outliers
 from wildlab.evaluation.pose_noise import PoseNoise, estimate_pose_noise
+from wildlab.evaluation.position_noise import estimate_position_noise
 from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
 from wildlab.evaluation.sets import Gospa, Ospa, gospa, ospa
 from wildlab.evaluation.sightings import Averaged, Spread, spread_of_sightings, try_averaging
@@ -86,6 +90,7 @@ __all__ = [
     "Spread",
     "TrackErrors",
     "TrackSummary",
+    "WanderNoise",
     "Whiteness",
     "ambiguous",
     "autocorrelation",
@@ -98,6 +103,8 @@ __all__ = [
     "compare_neighbours",
     "effective_sample_size",
     "estimate_pose_noise",
+    "estimate_position_noise",
+    "estimate_wander",
     "find_outliers",
     "gain_of",
     "gospa",
@@ -107,7 +114,6 @@ __all__ = [
     "largest_visible",
     "mean_interval",
     "mean_share_interval",
-    "mean_summary",
     "nees",
     "nis",
     "ospa",

@@ -119,32 +119,9 @@ class Neighbours(NamedTuple):
         """Whether independent images would be so alike once in twenty flights at most."""
         return bool(self.correlation > normal_quantile(0.95) / np.sqrt(max(self.images, 1)))
 
-    @property
-    def worth(self) -> float:
-        """How many independent images they are worth: as of a first-order process, whose correlation a short
-        series shows too small (Kendall: by (1 + 4 rho) / N)."""
-        if not self.alike:
-            return float(self.images)
-        rho = min(self.correlation + (1 + 4 * self.correlation) / self.images, 0.99)
-        return self.images * (1 - rho) / (1 + rho)
-
-    def widening(self, blocks: int, probability: float = PROBABILITY) -> float:
-        """By how much an interval from so many blocks is too short, at least one: blocks are worth no more
-        than the images in them."""
-        worth = max(self.worth, 2.0)
-        if not self.alike or worth >= blocks or blocks < 2:
-            return 1.0
-        upper = (1 + probability) / 2
-        return float(
-            np.sqrt(blocks / worth) * student_quantile(upper, worth - 1) / student_quantile(upper, blocks - 1)
-        )
-
 
 def compare_neighbours(errors: ArrayLike, order: ArrayLike) -> Neighbours:
     """Correlation of the mean errors of images that follow each other.
-
-    What wanders over several images makes them worth less than their number, and what blocks of a few images
-    say of a mean too certain.
 
     Parameters
     ----------

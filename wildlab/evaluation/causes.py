@@ -1,29 +1,34 @@
-"""Which constant error is behind those of a flight? Nested models, compared on images they have not seen.
+"""Which constant error is behind those of a flight? Nested models, compared by their likelihood.
 
-Blocks of images in time order are put into folds, many times over; each model is fitted to all folds but one
-and predicts that one. Its held-out error at a point is the mean over the rounds. Models share the points,
-so they are compared point by point: the gain of one over another is the mean difference of their held-out
-errors, and its standard error comes from the blocks. Rounds are no independent repetitions (they share most
-of what they are fitted to), so their spread is not used for that. The simplest model that is no more than
-one standard error of that difference behind the best one wins (Breiman et al. 1984).
+Pose errors wander, so that a constant is compared with noise that is correlated in time:
+`wildlab.evaluation.correlated_errors`. Models are ordered by Schwarz's criterion under that covariance. The
+simplest one within the odds of the best wins, and any other within them that does not hold it is one that the
+data do not separate from it. What taking it off gains is measured on blocks of images in time order, each
+placed by parameters from the others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
-from wildlab.evaluation.blocks import PROBABILITY, Labels, block_mean, standard_error
+from wildlab.evaluation.ambiguity import ODDS
+from wildlab.evaluation.blocks import PROBABILITY, Labels, block_mean
+from wildlab.evaluation.correlated_errors import Covariance, Places, PosePoints, WanderNoise, fit_generalised
 from wildlab.evaluation.runs import Interval
-from wildlab.geometry.robust import fit_linear
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
-#: Folds of one round, and rounds.
-FOLDS, ROUNDS = 5, 10
+#: Probability that any of the models tried is taken for a cause where nothing is constantly wrong: one flight
+#: in a thousand, as for what is far out (`wildlab.evaluation.outliers`).
+CHANCE = 0.001
+#: How much less a score has to be for odds of `ODDS`.
+MARGIN = 2 * np.log(ODDS)
 
 
 class Linear(NamedTuple):
@@ -32,64 +37,114 @@ class Linear(NamedTuple):
     Attributes
     ----------
     J, r
-        (M, 2, P) derivatives and (M, 2) residuals, whitened, of the points it is estimated from.
+        (M, 2, P) derivatives and (M, 2) residuals, m, of the points it is estimated from.
     values
         (P,) the estimate.
     place
         Takes P parameters and gives the errors (N, 2) m, north-east; NaN where a ray misses the ground.
-    used
-        (N,) which points these M are; all where left out.
+        Where places are not known, positions instead of errors.
     """
 
     J: Array
     r: Array
     values: Array
     place: Callable[[Array], Array]
-    used: NDArray[np.bool_] | None = None
 
 
-def draw_folds(blocks: Labels, rng: np.random.Generator, folds: int = FOLDS) -> Labels:
-    """Fold (N,) of each point: whole blocks (N,), as evenly as they go."""
-    labels, index = np.unique(blocks, return_inverse=True)
-    fold = rng.permutation(len(labels)) % min(folds, len(labels))
-    return np.asarray(fold[index])
+class Fold(NamedTuple):
+    """Points that are left out together.
+
+    Attributes
+    ----------
+    unseen
+        (N,) bool.
+    seen
+        (M,) bool, which of the points that models are estimated from are not left out.
+    covariance
+        Of the errors of these.
+    """
+
+    unseen: Mask
+    seen: Mask
+    covariance: Covariance
 
 
-def held_out(model: Linear, rounds: Sequence[Labels]) -> Array:
-    """Errors (R, N, 2) of every point, each placed by parameters that its fold had no part in.
+def leave_out(
+    groups: Labels, used: Mask, points: PosePoints, noise: WanderNoise, places: Places | None = None
+) -> list[Fold]:
+    """Each group of points left out in turn.
+
+    Parameters
+    ----------
+    groups
+        (N,) which points are left out together.
+    used
+        (N,) bool, M points that models are estimated from.
+    points
+        These M.
+    noise
+        Of their poses and pixels.
+    places
+        Of these M, where errors of their places are not negligible.
+
+    Returns
+    -------
+    list of Fold
+    """
+    folds = []
+    for group in np.unique(groups):
+        unseen = np.asarray(groups == group)
+        seen = ~unseen[used]
+        of = None if places is None else places.take(seen)
+        if seen.any():
+            folds.append(Fold(unseen, seen, Covariance(points.take(seen), noise, of)))
+    return folds
+
+
+def held_out(
+    model: Linear, folds: Sequence[Fold], used: Mask, places: NDArray[np.generic] | None = None
+) -> Array:
+    """Errors (N, 2) of every point, each placed by parameters that its fold had no part in.
 
     The fits are steps from the estimate of all points with its derivatives, for these hardly move; the points
-    are then placed without linearising. Points that no estimate rests on are placed like the others.
+    are then placed without linearising. Where places are not known, a point's error is the distance to the
+    mean of the same thing in the other folds.
 
     Parameters
     ----------
     model
         The model.
-    rounds
-        R times the fold (N,) of each point.
+    folds
+        From `leave_out`.
+    used
+        (N,) bool, the points it is estimated from.
+    places
+        (N,) which place each is of, where places are not known.
 
     Returns
     -------
-    (R, N, 2) m, north-east
-
-    Examples
-    --------
-    >>> r = np.array([[1.0, 0.0], [1.2, 0.0], [0.8, 0.0]])
-    >>> shift = Linear(np.tile(-np.eye(2), (3, 1, 1)), r - 1.0, np.array([1.0, 1.0]), lambda x: r - x)
-    >>> held_out(shift, [np.array([0, 1, 2])])[0, 1].round(1).tolist()  # the mean of the others is 0.9
-    [0.3, 0.0]
+    (N, 2) m, north-east; NaN for what is not left out or not seen elsewhere
     """
-    if not model.J.shape[-1]:
-        return np.repeat(model.place(model.values)[None], len(rounds), axis=0)
-    out = np.empty((len(rounds), len(rounds[0]), 2))
-    used = np.ones(out.shape[1], bool) if model.used is None else model.used
-    for i, folds in enumerate(rounds):
-        for fold in np.unique(folds):
-            unseen = folds == fold
-            seen = ~unseen[used]
-            step = fit_linear(model.J[seen], model.r[seen]).x
-            out[i, unseen] = model.place(model.values + step)[unseen]
+    out = np.full((len(used), 2), np.nan)
+    for fold in folds:
+        step = fit_generalised(model.J[fold.seen], model.r[fold.seen], fold.covariance).x
+        found = model.place(model.values + step)
+        if places is not None:
+            others = np.zeros(len(used), bool)
+            others[used] = fold.seen
+            found = found - mean_of_others(found, places, others)
+        out[fold.unseen] = found[fold.unseen]
     return out
+
+
+def mean_of_others(positions: Array, places: NDArray[np.generic], others: Mask) -> Array:
+    """(N, 2) mean of the positions (N, 2) that are of the same place and among ``others`` (N,); else NaN."""
+    of = np.unique(places, return_inverse=True)[1]
+    good = others & np.isfinite(positions).all(axis=1)
+    count = np.bincount(of[good], minlength=int(of.max()) + 1).astype(float)
+    count[count == 0] = np.nan
+    sums = [np.bincount(of[good], weights=axis[good], minlength=len(count)) for axis in positions.T]
+    return np.asarray((np.stack(sums, axis=-1) / count[:, None])[of])
 
 
 class Gain(NamedTuple):
@@ -98,7 +153,7 @@ class Gain(NamedTuple):
     Attributes
     ----------
     without, with_
-        Mean error without and with it, m, and of the latter the value of each round.
+        Mean error without and with it, m.
     gain
         Without minus with, with its interval from the blocks.
     """
@@ -112,48 +167,14 @@ class Gain(NamedTuple):
         """Whether the interval lies above zero."""
         return bool(self.gain.low > 0)
 
-    def widened(self, by: float) -> Gain:
-        """The same with an interval that is so many times as long."""
-        estimate, low, high = self.gain.estimate, self.gain.low, self.gain.high
-        return self._replace(
-            gain=Interval(estimate, estimate - by * (estimate - low), estimate + by * (high - estimate))
-        )
-
-
-class Ranked(NamedTuple):
-    """Models by their held-out errors.
-
-    Attributes
-    ----------
-    means
-        (M,) mean held-out error, m.
-    behind
-        (M,) how far each is behind the best, m.
-    errors
-        (M,) standard error of that.
-    best, winner
-        Numbers of the best model and of the simplest one within one standard error of it.
-    rivals
-        Those within one standard error of the best that are neither the winner nor hold all that it holds.
-    """
-
-    means: Array
-    behind: Array
-    errors: Array
-    best: int
-    winner: int
-    rivals: tuple[int, ...]
-
 
 def gain_of(without: Array, with_: Array, blocks: Labels, probability: float = PROBABILITY) -> Gain:
-    """Gain of held-out errors (R, N, 2) over errors (N, 2) without the cause, by blocks (N,).
+    """Gain of held-out errors (N, 2) over errors (N, 2) without the cause, by blocks (N,).
 
     Parameters
     ----------
-    without
+    without, with_
         (N, 2) m.
-    with_
-        (R, N, 2) m, from `held_out`.
     blocks
         (N,).
     probability
@@ -162,32 +183,54 @@ def gain_of(without: Array, with_: Array, blocks: Labels, probability: float = P
     Returns
     -------
     Gain
-        Of the points that both have.
+        Of the points that both have; NaN where none is.
     """
-    before, after = np.hypot(*without.T), distances(with_)
+    before, after = np.hypot(*without.T), np.hypot(*with_.T)
     both = np.isfinite(before) & np.isfinite(after)
-    difference = np.where(both, before - after, np.nan)
-    gain = block_mean(difference, blocks, probability)
+    if not both.any():
+        nan = float("nan")
+        return Gain(nan, nan, Interval(nan, nan, nan))
+    gain = block_mean(np.where(both, before - after, np.nan), blocks, probability)
     return Gain(float(before[both].mean()), float(after[both].mean()), gain)
 
 
-def distances(errors: Array) -> Array:
-    """Mean distance (N,) over the rounds of held-out errors (R, N, 2); NaN where a round lost the point."""
-    return np.asarray(np.hypot(errors[..., 0], errors[..., 1]).mean(axis=0))
+class Ranked(NamedTuple):
+    """Models by their likelihood.
+
+    Attributes
+    ----------
+    scores
+        (M,) Schwarz's criterion: deviance, and the logarithm of the number of images for each parameter.
+    winner
+        Number of the simplest model within the odds of the best.
+    rivals
+        Those within the odds of the winner, of no more parameters, that do not hold it.
+    """
+
+    scores: Array
+    winner: int
+    rivals: tuple[int, ...]
 
 
-def rank_models(held: Sequence[Array], contents: Sequence[frozenset[str]], blocks: Labels) -> Ranked:
-    """Rank models by held-out distances.
+def rank_models(
+    deviances: Sequence[float],
+    contents: Sequence[frozenset[str]],
+    images: int,
+    alike: Mapping[str, str] | None = None,
+) -> Ranked:
+    """Rank models by their likelihood and their number of parameters.
 
     Parameters
     ----------
-    held
-        For each of M models (N,) m, from `distances`. A point that a model loses counts as the worst that any
-        model makes of it, or the worst that this model makes of any point: losing points must not pay.
+    deviances
+        For each of M models, squared length of its residuals in units of their covariance.
     contents
         For each model, its parameters.
-    blocks
-        (N,).
+    images
+        How many images they were fitted to.
+    alike
+        Parameters that correct the same as another one, by name: models that differ in these alone are no
+        rivals.
 
     Returns
     -------
@@ -195,22 +238,43 @@ def rank_models(held: Sequence[Array], contents: Sequence[frozenset[str]], block
 
     Examples
     --------
-    >>> near, far = np.array([1.0, 1.1, 0.9]), np.array([2.0, 2.1, 1.9])
-    >>> rank_models([far, near, near], [frozenset(), frozenset("a"), frozenset("ab")], np.arange(3)).winner
+    >>> rank_models([90.0, 40.0, 39.0], [frozenset(), frozenset("a"), frozenset("ab")], 40).winner
     1
+    >>> rank_models([90.0, 40.0, 42.0], [frozenset(), frozenset("a"), frozenset("b")], 40).rivals
+    (2,)
     """
-    table = np.stack(held)
-    kept = np.isfinite(table).any(axis=0)
-    table, group = table[:, kept], np.asarray(blocks)[kept]
-    worst = np.fmax(np.nanmax(table, axis=1, keepdims=True), np.nanmax(table, axis=0))
-    table = np.where(np.isfinite(table), table, worst)
-    means = table.mean(axis=1)
-    best = int(means.argmin())
-    behind = means - means[best]
-    errors = np.array([standard_error(row - table[best], group) for row in table])
-    near = [m for m in range(len(means)) if m == best or behind[m] <= errors[m]]
-    winner = min(near, key=lambda m: (len(contents[m]), means[m]))
+    scores = np.asarray(deviances, float) + np.log(images) * np.array([len(one) for one in contents])
+    near = np.flatnonzero(scores <= scores.min() + MARGIN).tolist()
+    winner = int(min(near, key=lambda m: (len(contents[m]), scores[m])))
+    effects = [frozenset((alike or {}).get(name, name) for name in one) for one in contents]
     rivals = tuple(
-        m for m in near if m != winner and contents[winner] and not contents[winner] <= contents[m]
-    )
-    return Ranked(means, behind, errors, best, winner, rivals)
+        m
+        for m in np.flatnonzero(scores <= scores[winner] + MARGIN).tolist()
+        if m != winner and contents[m] and contents[winner]
+        and len(contents[m]) <= len(contents[winner]) and not effects[m] <= effects[winner]
+    )  # fmt: skip
+    return Ranked(scores, winner, rivals)
+
+
+def chance_of(wald: float, parameters: int, freedom: float, tried: int) -> float:
+    """Probability that any of what was tried is so far from zero where there is no constant error.
+
+    Parameters
+    ----------
+    wald
+        Wald's statistic of the estimate.
+    parameters
+        How many it has.
+    freedom
+        Degrees of freedom of the noise.
+    tried
+        Models that were tried.
+
+    Returns
+    -------
+    float
+        By the F distribution and Bonferroni's bound.
+    """
+    if not parameters:
+        return 1.0
+    return min(1.0, tried * float(fdtrc(parameters, freedom, wald / parameters)))

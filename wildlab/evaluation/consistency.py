@@ -286,30 +286,25 @@ def simulate_filter_runs(
     acceleration_m_s2, measurement_m
         Standard deviations of the process noise (constant over a step) and of each measured coordinate.
     """
-    # Imported here, for it brings scipy.stats along, which takes longer than all else that is imported.
-    from filterpy.common import Q_discrete_white_noise
-    from filterpy.kalman import KalmanFilter
-
     F = np.kron(np.array([[1.0, interval_s], [0.0, 1.0]]), np.eye(2))
-    # The order of the state is north, east, velocity north, velocity east.
-    Q = np.kron(Q_discrete_white_noise(2, dt=interval_s, var=acceleration_m_s2**2), np.eye(2))
-    H = np.eye(2, 4)
-    R = np.eye(2) * measurement_m**2
-    P0 = np.diag([10.0, 10.0, 3.0, 3.0]) ** 2
-    # Q has rank 2: one acceleration per axis, which moves position and velocity together.
+    # The order of the state is north, east, velocity north, velocity east. Q has rank 2: one acceleration per
+    # axis, which moves position and velocity together.
     push = np.kron(np.array([[interval_s**2 / 2], [interval_s]]), np.eye(2)) * acceleration_m_s2
-    values = np.empty((2, runs, steps))
-    for run in range(runs):
-        truth = rng.standard_normal(4) * np.sqrt(np.diag(P0))
-        errors, innovations = np.empty((steps, 4)), np.empty((steps, 2))
-        P, S = np.empty((steps, 4, 4)), np.empty((steps, 2, 2))
-        kf = KalmanFilter(dim_x=4, dim_z=2)
-        kf.F, kf.H, kf.Q, kf.R, kf.P = F, H, Q, R * claimed_noise**2, P0.copy()
-        for step in range(steps):
-            truth = F @ truth + push @ rng.standard_normal(2)
-            kf.predict()
-            kf.update(H @ truth + measurement_m * rng.standard_normal(2))
-            errors[step], P[step] = truth - kf.x.ravel(), kf.P
-            innovations[step], S[step] = kf.y.ravel(), kf.S
-        values[0, run], values[1, run] = nees(errors, P), nis(innovations, S)
+    Q, H, R = push @ push.T, np.eye(2, 4), np.eye(2) * (measurement_m * claimed_noise) ** 2
+    P = np.diag([10.0, 10.0, 3.0, 3.0]) ** 2
+    drawn = rng.standard_normal((runs, 4 + 4 * steps))
+    truth = drawn[:, :4] * np.sqrt(np.diag(P))
+    pushes, noises = np.split(drawn[:, 4:].reshape(runs, steps, 4), 2, axis=2)
+    # All runs have the same covariances, so that one gain serves them all.
+    estimate, values = np.zeros((runs, 4)), np.empty((2, runs, steps))
+    for step in range(steps):
+        truth = truth @ F.T + pushes[:, step] @ push.T
+        estimate, P = estimate @ F.T, F @ P @ F.T + Q
+        S = H @ P @ H.T + R
+        K = P @ H.T @ np.linalg.inv(S)
+        innovation = (truth - estimate) @ H.T + measurement_m * noises[:, step]
+        kept = np.eye(4) - K @ H
+        estimate, P = estimate + innovation @ K.T, kept @ P @ kept.T + K @ R @ K.T
+        values[0, :, step] = nees(truth - estimate, np.broadcast_to(P, (runs, 4, 4)))
+        values[1, :, step] = nis(innovation, np.broadcast_to(S, (runs, 2, 2)))
     return FilterRuns(np.arange(1, steps + 1, dtype=np.float64) * interval_s, values[0], values[1])

@@ -57,26 +57,9 @@ def summarise(errors: ArrayLike) -> ErrorSummary:
     )
 
 
-def mean_summary(rounds: ArrayLike) -> ErrorSummary:
-    """Summary of horizontal errors that are known R times over: each figure is the mean over the rounds.
-
-    Parameters
-    ----------
-    rounds
-        (R, N, 2) north, east in n, m.
-
-    Returns
-    -------
-    ErrorSummary
-
-    Examples
-    --------
-    >>> mean_summary([[[3.0, 4.0]], [[0.0, 1.0]]]).mean
-    3.0
-    """
-    each = [summarise(one) for one in np.asarray(rounds, float)]
-    means = [float(np.mean(values)) for values in zip(*each, strict=True)]
-    return ErrorSummary(round(means[0]), *means[1:])
+#: Errors beside another of their image from which the spread within images is estimated, at least: its
+#: standard deviation is then known to about a quarter.
+FEWEST_WITHIN = 10
 
 
 class Scatter(NamedTuple):
@@ -92,6 +75,7 @@ class Scatter(NamedTuple):
     between_sd: Array
     within_sd: Array
     bias: Array
+    whole_m: float
 
     @property
     def parts_m(self) -> tuple[float, float, float]:
@@ -99,11 +83,6 @@ class Scatter(NamedTuple):
         shares are those of their squares."""
         bias, image, within = (float(np.hypot(*of)) for of in (self.bias, self.between_sd, self.within_sd))
         return bias, image, within
-
-    @property
-    def whole_m(self) -> float:
-        """Root mean square of all: the squares of `parts_m` add up to its square."""
-        return float(np.linalg.norm(self.parts_m))
 
 
 def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
@@ -121,7 +100,8 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     Returns
     -------
     Scatter
-        All NaN where fewer than two images are left, or none has more than one error.
+        All NaN where fewer than two images are left, or fewer than `FEWEST_WITHIN` errors beside another of
+        their image: how errors within an image differ is then anybody's guess.
     """
     e = np.asarray(errors, float).reshape(-1, 2)
     keep = np.isfinite(e).all(axis=1)
@@ -130,16 +110,17 @@ def scatter_by_image(errors: ArrayLike, image: ArrayLike) -> Scatter:
     n, k = len(e), len(count)
     mean = e.mean(axis=0)
     of_image = np.stack([np.bincount(group, weights=e[:, axis]) / count for axis in (0, 1)], axis=-1)
-    if n <= k or k < 2:
+    if n - k < FEWEST_WITHIN or k < 2:
         nan = np.full(2, np.nan)
-        return Scatter(float("nan"), float("nan"), float("nan"), nan, nan, nan)
+        return Scatter(float("nan"), float("nan"), float("nan"), nan, nan, nan, float("nan"))
     within = ((e - of_image[group]) ** 2).sum(axis=0) / (n - k)
     mean_square = (count[:, None] * (of_image - mean) ** 2).sum(axis=0) / (k - 1)
     usual = (n - (count**2).sum() / n) / (k - 1)
     between = np.maximum((mean_square - within) / usual, 0.0)
     parts = np.array([(mean**2).sum(), between.sum(), within.sum()])
     bias, image_share, within_share = (float(x) for x in parts / parts.sum())
-    return Scatter(bias, image_share, within_share, np.sqrt(between), np.sqrt(within), mean)
+    whole = float(np.sqrt((e**2).sum(axis=1).mean()))
+    return Scatter(bias, image_share, within_share, np.sqrt(between), np.sqrt(within), mean, whole)
 
 
 def bootstrap_interval(

@@ -103,12 +103,18 @@ class TrackLife(NamedTuple):
         its degrees of freedom: k where it is consistent; NaN where none is known.
     false
         Whether it was on no target at more than half of its scans.
+    compared
+        How many NEES are in their mean.
+    anees_alone
+        Their mean with the truth taken for exact.
     """
 
     scans: int
     on_target: int
     anees: float
     false: bool
+    compared: int = 0
+    anees_alone: float = np.nan
 
 
 class Identities(NamedTuple):
@@ -386,7 +392,7 @@ def _target_lives(
 def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hashable, TrackLife]:
     scans: dict[Hashable, int] = {}
     on: dict[Hashable, int] = {}
-    errors: dict[Hashable, list[tuple[Array, Array]]] = {}
+    errors: dict[Hashable, list[tuple[Array, Array, Array]]] = {}
     for one, found in zip(given, pairs, strict=True):
         for identity in one.identities:
             scans[identity] = scans.get(identity, 0) + one.complete
@@ -395,22 +401,25 @@ def _track_lives(given: Sequence[_Checked], pairs: Sequence[Pairs]) -> dict[Hash
             on[identity] = on.get(identity, 0) + one.complete
             if not one.ignored[column]:
                 error = one.truth[column] - one.x[row]
-                spread = one.P[row] + one.truth_sd[column] ** 2 * np.eye(len(error))
-                errors.setdefault(identity, []).append((error, spread))
-    return {
-        identity: TrackLife(
-            count,
-            on.get(identity, 0),
-            _anees(errors.get(identity, [])),
-            2 * on.get(identity, 0) < count,
-        )
-        for identity, count in scans.items()
-    }
+                own = one.truth_sd[column] ** 2 * np.eye(len(error))
+                errors.setdefault(identity, []).append((error, one.P[row], own))
+    lives = {}
+    for identity, count in scans.items():
+        values, alone = _nees_of(errors.get(identity, []))
+        own = on.get(identity, 0)
+        lives[identity] = TrackLife(count, own, _mean(values), 2 * own < count, len(values), _mean(alone))
+    return lives
 
 
-def _anees(errors: Sequence[tuple[Array, Array]]) -> float:
+def _nees_of(errors: Sequence[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
+    """NEES that are known, with the truth's own error and without."""
     if not errors:
-        return np.nan
-    values = nees(*(np.array(part) for part in zip(*errors, strict=True)))
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else np.nan
+        return np.empty(0), np.empty(0)
+    error, P, own = (np.array(part) for part in zip(*errors, strict=True))
+    both = np.array([nees(error, P + own), nees(error, P)])
+    with_truth, alone = both[:, np.isfinite(both).all(axis=0)]
+    return with_truth, alone
+
+
+def _mean(values: Array) -> float:
+    return float(values.mean()) if len(values) else np.nan

@@ -19,9 +19,9 @@ Mask = NDArray[np.bool_]
 Names = NDArray[np.str_]
 Kind = Literal["mark", "photo", "click"]
 
-#: Far out is beyond so many spreads of its like (four in 100 000 of normal errors are), and, for what several
-#: points share, beyond so many of a single point's.
-FAR, WORTH = 4.5, 2.0
+#: With normal errors a flight has a click, a photo or a mark that is far out with this probability each; what
+#: several points share is far out only beyond so many spreads of a single point, too.
+CHANCE, WORTH = 1e-3, 2.0
 #: As few of a kind have no spread of their own.
 FEWEST = 5
 #: Standard error of a median over that of a mean.
@@ -82,7 +82,7 @@ def find_outliers(
     photos, marks = np.asarray(photo, str), np.asarray(mark, str)
     rest = np.ones(len(z), bool)
     found: list[Outlier] = []
-    scale = student_scale((z**2).sum(axis=1))
+    scale, every = student_scale((z**2).sum(axis=1)), len(np.unique(photos))
 
     def out(kind: Kind, rows: Mask) -> None:
         names = {"photo": np.unique(photos[rows]), "mark": np.unique(marks[rows])}
@@ -98,11 +98,26 @@ def find_outliers(
         rows = rest & (photos == name)
         out("photo", rows)
         rest &= ~rows
-    for row in np.flatnonzero(rest & (np.hypot(*z.T) > FAR * scale)):
+    for row in np.flatnonzero(rest & (np.hypot(*z.T) > far_limit(len(z), every) * scale)):
         only = np.arange(len(z)) == row
         out("click", only)
         rest &= ~only
     return tuple(sorted(found, key=lambda one: -one.off_m)), rest
+
+
+def far_limit(count: int, photos: int) -> float:
+    """How many spreads the largest of so many normal errors in the plane exceeds with probability `CHANCE`.
+
+    The spread is estimated itself, and points of a photo share its pose: it is known as well as from one
+    error of each photo. The square over twice the spread's is distributed as F with 2 and ``2 photos``
+    degrees of freedom, whose quantile has a closed form.
+
+    Examples
+    --------
+    >>> round(far_limit(200, 40), 2), round(far_limit(200, 4000), 2)
+    (5.34, 4.94)
+    """
+    return float(np.sqrt(2 * photos * np.expm1(np.log(max(count, 1) / CHANCE) / photos)))
 
 
 def _far_marks(z: Array, e: Array, marks: Names, photos: Names, rows: Mask, scale: float) -> list[str]:
@@ -126,7 +141,11 @@ def _far_marks(z: Array, e: Array, marks: Names, photos: Names, rows: Mask, scal
         agree[i] = (np.hypot(*(e[own] - middle).T) < length / 2).mean() > 0.5
     if len(names) >= FEWEST:
         errors = np.maximum(errors, student_scale(sizes**2))
-    far = (agree > 0) & (sizes > FAR * errors) & (sizes > WORTH * scale)
+    far = (
+        (agree > 0)
+        & (sizes > far_limit(len(names), len(np.unique(photos))) * errors)
+        & (sizes > WORTH * scale)
+    )
     return [str(name) for name, out in zip(names, far, strict=True) if out]
 
 
@@ -136,5 +155,9 @@ def _far_photos(z: Array, photos: Names, rows: Mask, scale: float) -> list[str]:
     if len(names) < FEWEST:
         return []
     length = np.array([np.hypot(*np.median(z[rows & (photos == name)], axis=0)) for name in names])
-    far = (count > 1) & (length > FAR * student_scale(length**2)) & (length > WORTH * scale)
+    far = (
+        (count > 1)
+        & (length > far_limit(len(names), len(names)) * student_scale(length**2))
+        & (length > WORTH * scale)
+    )
     return [str(name) for name in names[far]]

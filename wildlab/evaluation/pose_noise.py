@@ -1,9 +1,10 @@
 """How noisy were poses and pixels? Standard deviations estimated from the errors of known points.
 
-Every image has a pose error of its own: position (three axes), roll, pitch and yaw. It moves all points of
-the image together, each through its own derivative, and that tells it from the error of single pixels, where
-clicking and an imperfect lens model end up. The standard deviations are those under which the observed errors
-are most likely, with a broad prior about the ones assumed, so that what the data cannot decide stays put.
+Every image has a pose error of its own: position (three axes), two tilts and a heading. It moves all points
+of the image together, each through its own derivative, and that tells it from the error of single pixels,
+where clicking and an imperfect lens model end up. The standard deviations are those under which the observed
+errors are most likely, with a broad prior about the ones assumed, so that what the data cannot decide stays
+put.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
 
-#: Which of the six pose errors (north, east, down, roll, pitch, yaw) share a standard deviation. The pixel's
-#: (both axes) stands last and is each point's own.
+#: Which of the six pose errors (north, east, down, two tilts, heading) share a standard deviation. The
+#: pixel's (both axes) stands last and is each point's own.
 KINDS: dict[str, tuple[int, ...]] = {
     "position_horizontal": (0, 1),
     "position_vertical": (2,),
-    "roll_pitch": (3, 4),
-    "yaw": (5,),
+    "tilt": (3, 4),
+    "heading": (5,),
     "pixel": (),
 }
 #: Standard deviation of the prior on the logarithm: a factor of three either way.
@@ -60,7 +61,7 @@ def estimate_pose_noise(
         (N, 2) north-east in n, metres, computed minus known. A row with NaN here, in ``derivatives`` or in
         ``noise`` is left out.
     derivatives
-        (N, 2, 6) of each point with respect to north, east, down (m) and roll, pitch, yaw (rad).
+        (N, 2, 6) of each point with respect to north, east, down (m), two tilts and the heading (rad).
     pixel_derivatives
         (N, 2, 2) of each point with respect to its pixel, m per pixel.
     noise

@@ -34,12 +34,12 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     Returns
     -------
     Interval
-        In the unit of the values.
+        In the unit of the values; its ends are NaN where fewer than two are known, all is where none is.
 
     Raises
     ------
     WildlabError
-        If fewer than two values are known, or ``probability`` is not between 0 and 1.
+        If ``probability`` is not between 0 and 1.
 
     Examples
     --------
@@ -48,11 +48,10 @@ def mean_interval(values: ArrayLike, probability: float = 0.95) -> Interval:
     """
     array = np.asarray(values, float)
     known = array[np.isfinite(array)]
-    if len(known) < 2 or not 0 < probability < 1:
-        raise WildlabError(
-            f"no interval for the mean of {len(known)} values with probability {probability}",
-            "give two runs or more, and a probability between 0 and 1",
-        )
+    if not 0 < probability < 1:
+        raise WildlabError(f"no interval with probability {probability}", "give one between 0 and 1")
+    if len(known) < 2:
+        return Interval(float(known[0]) if len(known) else np.nan, np.nan, np.nan)
     mean = float(known.mean())
     half = float(
         student_quantile((1 + probability) / 2, len(known) - 1) * known.std(ddof=1) / np.sqrt(len(known))
@@ -71,11 +70,7 @@ def mean_share_interval(shares: ArrayLike) -> Interval:
     Returns
     -------
     Interval
-
-    Raises
-    ------
-    WildlabError
-        If fewer than two are known.
+        With NaN as `mean_interval` has it.
 
     Examples
     --------
@@ -104,23 +99,25 @@ def share_interval(count: float, runs: float, probability: float = 0.95) -> Inte
     Returns
     -------
     Interval
-        From 0 to 1.
+        From 0 to 1; NaN where there is no run.
 
     Raises
     ------
     WildlabError
-        Where there is no run, ``count`` is not among them, or ``probability`` not between 0 and 1.
+        Where ``count`` is not among the runs, or ``probability`` not between 0 and 1.
 
     Examples
     --------
     >>> [round(x, 2) for x in share_interval(8, 10)]
     [0.8, 0.49, 0.94]
     """
-    if runs < 1 or not 0 <= count <= runs or not 0 < probability < 1:
+    if 0 < runs < 1 or not 0 <= count <= runs or not 0 < probability < 1:
         raise WildlabError(
             f"no interval for {count} of {runs} runs with probability {probability}",
-            "give at least one run, no more than all of them, and a probability between 0 and 1",
+            "give no more than all of them, and a probability between 0 and 1",
         )
+    if runs == 0:
+        return Interval(np.nan, np.nan, np.nan)
     share, z2 = count / runs, float(normal_quantile((1 + probability) / 2)) ** 2
     centre = (share + z2 / (2 * runs)) / (1 + z2 / runs)
     half = np.sqrt(z2 * (share * (1 - share) / runs + z2 / (4 * runs**2))) / (1 + z2 / runs)

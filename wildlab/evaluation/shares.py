@@ -52,7 +52,8 @@ class Check:
         (N,) bool: of which flights it is true. None where a threshold decides, which the sentence's author
         has to name: then ``measured`` is held against it.
     measured
-        (N,), what the threshold is for, in its unit; NaN counts as not true.
+        (N,), what the threshold is for, in its unit. A flight without one (NaN) counts as not true, so that
+        what failed is not left out; where no flight has one, nothing is decided.
     above
         Whether the sentence is true above the threshold; else it is below.
     premise
@@ -263,6 +264,8 @@ def decide_check(check: Check, threshold: float | None = None) -> Decision:
         yes, no = (over, under) if check.above else (under, over)
         return Decision(HOLDS if yes else FAILS if no else UNDECIDED, None, 0, flights, flights)
     true = check.holds(threshold)
+    if check.measured is not None and not np.isfinite(check.measured).any():
+        return Decision(NO_PREMISE, None, 0, 0, flights)
     if check.calculated:
         verdict = HOLDS if true.all() else UNDECIDED if true.any() else FAILS
         return Decision(verdict, None, int(true.sum()), flights, flights)

@@ -28,21 +28,17 @@ def with_interval(values: ArrayLike, digits: int = 1, lowest: float = 0.0, highe
     >>> with_interval([0.5, 0.6]), with_interval([0.5, 0.5])
     ('55.0 % (0 to 100 %)', '50.0 %')
     """
-    array = np.asarray(values, float)
-    known = array[np.isfinite(array)]
-    if not len(known):
-        return "none"
-    said = _signed(float(known.mean()), digits)
-    if len(known) < 2:
+    found, low, high = mean_interval(values)
+    said = _signed(found, digits)
+    if np.isnan(low):
         return said
-    _, low, high = mean_interval(known)
     ends = [_signed(float(np.clip(one, lowest, highest)), digits) for one in (low, high)]
     return said if ends[0] == ends[1] else f"{said} ({ends[0].removesuffix(' %')} to {ends[1]})"
 
 
 def _signed(share: float, digits: int) -> str:
     """In per cent, with a minus where there is one."""
-    return percent(share, digits) if share >= 0 else f"\N{MINUS SIGN}{100 * -share:.{digits}f} %"
+    return percent(share, digits) if not share < 0 else f"\N{MINUS SIGN}{100 * -share:.{digits}f} %"
 
 
 def difference_words(values: ArrayLike, more: str = "more", less: str = "less", digits: int = 1) -> str:
@@ -52,9 +48,14 @@ def difference_words(values: ArrayLike, more: str = "more", less: str = "less", 
     --------
     >>> difference_words([-0.2, -0.2])
     '20.0 % less'
+    >>> difference_words([0.0, 0.0])
+    'no more'
     """
     array = np.asarray(values, float)
-    sense = 1.0 if np.nanmean(array) > 0 else -1.0
+    mean_of = mean_interval(array).estimate
+    if mean_of == 0:
+        return f"no {more}"
+    sense = 1.0 if mean_of > 0 else -1.0
     said = with_interval(sense * array, digits, -np.inf, np.inf)
     size, _, ends = said.partition(" (")
     return f"{size} {more if sense > 0 else less}" + (f" ({ends}" if ends else "")

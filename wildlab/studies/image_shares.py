@@ -73,7 +73,7 @@ def shares_beside_published(report: Report, names: Mapping[tuple[str, str], str]
         if row is None:
             raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
         found = report.recorded[name, subject]
-        compared = judge(row, report.recorded, report.published)
+        compared = judge(row, report.recorded)
         interval = [found[one] for one in ("value", "low", "high")]
         known = all(one is not None for one in interval)
         rows.append(
@@ -82,7 +82,7 @@ def shares_beside_published(report: Report, names: Mapping[tuple[str, str], str]
                 "published": percent(row["value"]),
                 "here": "{} ({} to {})".format(*map(percent, interval)) if known else "",
                 "images": found["n"],
-                "verdict": "" if compared is None else compared.verdict,
+                "verdict": "" if compared is None else compared.words,
             }
         )
     return pd.DataFrame(rows)

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from wildlab.errors import WildlabError
 from wildlab.evaluation.consistency import average
+from wildlab.evaluation.order_statistics import LEVEL, median_interval
+from wildlab.evaluation.replication import power_of
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.shares import FITTED, HOLDS, NO_PREMISE, Check, decide_check, paired_difference
 from wildlab.reporting.published import SHARE_OF_IMAGES, load_claims, quantity_kind
@@ -140,12 +142,16 @@ def record_spread(report: Report, study: Study, spread: pd.DataFrame, n: Mapping
         name, subject, unit = named
         values, printed = spread[key], report.printed(name, subject)
         if len(values) > 1 and values.notna().sum() == 1 and np.isfinite(values.iloc[0]):
-            report.metric(name, subject, values.iloc[0], unit, n=1)
+            report.metric(name, subject, values.iloc[0], unit, n=1, flights=1)
             continue
         if printed is not None and printed["kind"] == SHARE_OF_IMAGES:
             share, images = pooled_share(spread, *key)
             if images:
-                report.metric(name, subject, share.estimate, unit, n=images, low=share.low, high=share.high)
+                centre = share_interval(min(share.estimate, 1.0) * images, images, LEVEL)
+                report.metric(
+                    name, subject, share.estimate, unit, n=images, low=share.low, high=share.high,
+                    flights=int(values.notna().sum()), centre_low=centre.low, centre_high=centre.high,
+                )  # fmt: skip
                 continue
         value = None if printed is None else float(printed["value"])
         _record(report, name, subject, values, unit, n.get(subject), value)
@@ -164,7 +170,22 @@ def _record(
 ) -> None:
     low, high = bounds_of(values)
     below = None if printed is None else share_below(values, printed)
-    report.metric(name, subject, values.median(), unit, n=n, low=low, high=high, below=below)
+    centre_low, centre_high = median_interval(values)
+    kind = quantity_kind(name)
+    report.metric(
+        name,
+        subject,
+        values.median(),
+        unit,
+        n=n,
+        low=low,
+        high=high,
+        below=below,
+        flights=int(np.isfinite(values).sum()),
+        centre_low=centre_low,
+        centre_high=centre_high,
+        power=power_of(values / 100 if kind == "rate" and unit == "%" else values, kind) if kind else None,
+    )
 
 
 def beside_published(
@@ -194,7 +215,7 @@ def beside_published(
             row = report.printed(name, subject)
             if row is None:
                 raise WildlabError(f"{name} of {subject} is not published", "leave it out of the table")
-            compared = judge(row, report.recorded, report.published)
+            compared = judge(row, report.recorded)
             found, by_size = recorded_for(row, report.recorded), bool(row["by_size"])
             values = spread[subject, name].abs() if by_size else spread[subject, name]
             below = found.get("below")
@@ -210,9 +231,7 @@ def beside_published(
                     "below": "" if below is None else f"{100 * below:.0f} %",
                     "verdict": ""
                     if compared is None
-                    else compared.verdict
-                    + (", fitted to it" if row["fitted"] else "")
-                    + (f": {row['unjudged']}" if row["unjudged"] else ""),
+                    else compared.words + (f": {row['unjudged']}" if row["unjudged"] else ""),
                     "drawn": values.iloc[0],
                 }
             )

@@ -24,8 +24,12 @@ def stated_words(nees: float) -> str:
     --------
     >>> stated_words(18.0), stated_words(2.1), stated_words(0.5)
     ('3.0 times as large as it states', 'about as large as it states', '0.50 of what it states')
+    >>> stated_words(float("nan"))
+    'not known'
     """
     factor = float(np.sqrt(nees / 2))
+    if np.isnan(factor):
+        return "not known"
     if factor > ALIKE:
         return f"{factor:.1f} times as large as it states"
     if factor < 1 / ALIKE:
@@ -47,6 +51,8 @@ def surprise_words(nees: float, nis: float) -> str:
     'errors are 3.0 times as large as it states'
     """
     errors = f"errors are {stated_words(nees)}"
+    if not np.isfinite([nees, nis]).all():
+        return errors
     bad = nees > 2 * ALIKE**2
     if nis > 2 * ALIKE**2:
         seen = "single detections show it, too" if bad else "single detections would suggest larger ones"
@@ -65,6 +71,8 @@ def claim_words(verdict: str, share: float | None, flights: int) -> str:
     --------
     >>> claim_words("holds", 0.98, 200)
     'on nearly all of 200 flights (98 %)'
+    >>> claim_words("holds", 1.0, 1)
+    'on 1 of 1 flights, which decides nothing'
     """
     much = {
         HOLDS: "on nearly all",
@@ -74,8 +82,8 @@ def claim_words(verdict: str, share: float | None, flights: int) -> str:
         FAILS: "on hardly any",
     }
     if verdict == NO_PREMISE or share is None:
-        return f"not tested: the {flights} flights lack what it is about"
-    if verdict == UNDECIDED:
+        return f"not tested: {flights} flights lack what it is about"
+    if verdict == UNDECIDED or flights == 1:
         return f"on {share * flights:.0f} of {flights} flights, which decides nothing"
     return f"{much[verdict]} of {flights} flights ({100 * share:.0f} %)"
 
@@ -97,6 +105,8 @@ def accuracy_words(names: Mapping[str, str], mae: pd.DataFrame) -> str:
     """
     (one, first), (two, second) = names.items()
     apart = (mae[two] - mae[one]).dropna().to_numpy()
+    if not len(apart):
+        return f"which of {first} and {second} is nearer to the truth is not known"
     nearer, mean = int((apart > 0).sum()), float(apart.mean())
     if nearer * 2 >= len(apart):
         who, count = first, nearer
@@ -116,7 +126,9 @@ def typical_words(values: ArrayLike) -> str:
     """
     array = np.asarray(values, float)
     others = array[1:][np.isfinite(array[1:])]
-    if not len(others) or not np.isfinite(array[0]):
+    if not np.isfinite(array[0]):
+        return "not known"
+    if not len(others):
         return "the only one"
     smaller = int((others < array[0]).sum())
     share = smaller / len(others)

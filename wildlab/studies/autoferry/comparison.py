@@ -123,9 +123,9 @@ def outcomes(table: pd.DataFrame, keys: Sequence[str], fixed: str) -> pd.DataFra
 def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     """The filter to hold fixed, from the flight that everything is tuned on and nothing else.
 
-    Of those for positions other than the white one, the one whose mean NEES lies nearest its ideal (mean of
-    `off_ideal`) among those that are, in the median, within `PRICE`; among all where none is. Tracks that the
-    white filter loses are left out.
+    Of those for positions other than the white one, the one whose mean NEES, the truth taken for exact, lies
+    nearest its ideal (mean of `off_ideal`) among those that are, in the median, within `PRICE`; among all
+    where none is. Tracks that the white filter loses are left out.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def choose_filter(table: pd.DataFrame, keys: Sequence[str]) -> str:
     both = both[both["kind"] == "position"]
     if both.empty:
         return FILTERS["position"][1]
-    off = pd.Series(off_ideal(both["anees"]), both.index).groupby(both["filter"], sort=False).mean()
+    off = pd.Series(off_ideal(both["anees_alone"]), both.index).groupby(both["filter"], sort=False).mean()
     cheap = both.groupby("filter", sort=False)["rmse_ratio"].median() <= PRICE
     return str((off[cheap] if cheap.any() else off).idxmin())
 

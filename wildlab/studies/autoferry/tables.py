@@ -96,7 +96,7 @@ def record_tunings(report: Report, tunings: Mapping[str, SensorTuning]) -> pd.Da
         causes = {
             f"position {one.position_sd_m:.1f} m": one.position_sd_m > 0.05,
             f"clock {one.clock_sd_s:.1f} s": one.clock_sd_s > 0.05,
-            f"heading {np.degrees(one.yaw_sd_rad):.1f}°": np.degrees(one.yaw_sd_rad) > 0.05,
+            f"heading {np.degrees(one.heading_sd_rad):.1f}°": np.degrees(one.heading_sd_rad) > 0.05,
         }
         rows.append(
             {

@@ -272,13 +272,14 @@ def offsets_caption(again: pd.DataFrame, first: str) -> str:
     return f"{what}; only that of {first.replace('-', ' ')} is used. {parts}."
 
 
-def limits(use: pd.DataFrame) -> list[str]:
-    """What the report does not tell."""
+def limits(use: pd.DataFrame, truth_sd: float) -> list[str]:
+    """What the report does not tell; ``truth_sd`` m, from one true place to the next."""
     said = [
         "No detection says what it is of. Tracks start on the first detection near a boat's true place; "
         "what they follow later may be another boat, the wake or the shore.",
-        "The ferry's own heading and its error are not published, nor how good the boats' receivers are: "
-        "one metre was assumed.",
+        "The ferry's own heading and its error are not published, nor how good the boats' receivers are. "
+        f"From one to the next their positions are wrong by up to {truth_sd:.2g} m (SD of each axis, "
+        "estimated); slower errors are unknown, and count as the tracks'.",
         "A detection is of the side of the hull that is seen, the truth is of an antenna. On a straight "
         "course that cannot "
         "be told from a late clock.",
@@ -321,7 +322,8 @@ filter considers position, clock and heading, each with the variance that non-ne
 fading with $\tau$; the rest is white. Thinning keeps detections so far apart that their errors are correlated
 by less than $1/e$.
 
-NEES is of the position, truth minus estimate; the truth's own variance is added to the filter's. A mean NEES
+NEES is of the position, truth minus estimate, with the truth's variance where it is stated; the filter is
+chosen with the truth taken for exact. A mean NEES
 is honest where it lies in the 95 % interval of the mean of as many independent chi-square values as the
 correlated ones are worth, overconfident above it. {RULE} A filter gains on a track that stays where its mean
 NEES is in that interval, that of white noise is not, and its error is at most {100 * (PRICE - 1):.0f} %

@@ -55,7 +55,8 @@ class Ranked(Protocol):
 
 
 class Tuned(NamedTuple):
-    """One draw, and where it was tuned the mean GOSPA that it has, m, and the mean NEES / 2 of its tracks."""
+    """One draw, and where it was tuned its mean GOSPA, m, and the mean NEES / 2 of its tracks, the truth
+    taken for exact."""
 
     number: int
     settings: Settings
@@ -75,20 +76,33 @@ def reach_of(flight: Flight, mode: str) -> dict[str, float]:
     }
 
 
-def clocks_of(flight: Flight) -> dict[str, float]:
-    """To be added to the stamps of each sensor, s, as one scenario tells."""
-    return {sensor: tune_sensor(flight, sensor).offset_s for sensor in MODES["cameras"]}
+class Lasting(NamedTuple):
+    """Of one sensor, as one scenario tells: what to add to its stamps, s, and which share of its errors'
+    variance lasts from scan to scan, for how long (s)."""
+
+    offset_s: float
+    share: float
+    time_s: float
 
 
-def draw(rng: np.random.Generator, clocks: Mapping[str, float]) -> Settings:
+def errors_of(flight: Flight) -> dict[str, Lasting]:
+    """Of each sensor."""
+    found = {sensor: tune_sensor(flight, sensor) for sensor in MODES["cameras"]}
+    return {
+        sensor: Lasting(one.offset_s, one.next_correlation, one.correlation_time_s)
+        for sensor, one in found.items()
+    }
+
+
+def draw(rng: np.random.Generator, errors: Mapping[str, Lasting]) -> Settings:
     """Everything that the tracker is told, from ranges that are wide and mean something.
 
     Scales are drawn evenly over their logarithm, shares and distances evenly.
 
     Parameters
     ----------
-    clocks
-        From `clocks_of`.
+    errors
+        From `errors_of`.
     """
     targets = ManyTargetsPart(
         hulls=(
@@ -151,7 +165,13 @@ def draw(rng: np.random.Generator, clocks: Mapping[str, float]) -> Settings:
         ),
         sensors={
             name: SensorPart(
-                clock_offset_s=clocks[name], noise=noise[name], thinning_s=thinning.get(name), many=part
+                clock_offset_s=errors[name].offset_s,
+                noise=noise[name],
+                thinning_s=thinning.get(name),
+                many=part,
+                # Of bearings scans are thinned instead.
+                correlation=None if name in thinning else errors[name].share,
+                correlation_time_s=None if name in thinning else errors[name].time_s,
             )
             for name, part in parts.items()
         },
@@ -182,14 +202,14 @@ def follow_mode(flight: Flight, mode: str, settings: Settings) -> Identities | N
     )
 
 
-def anees_of(lives: Identities | None) -> float:
-    """Mean NEES / 2 over tracks, each in as many looks as it was on a target; NaN where there is none."""
+def anees_of(lives: Identities | None, alone: bool = True) -> float:
+    """Mean NEES / 2 over tracks, each by its NEES; NaN where there is none.
+
+    ``alone``: the truth taken for exact, so that no draw is preferred for what somebody assumed of the truth.
+    """
     on = [one for one in (lives.tracks.values() if lives else ()) if np.isfinite(one.anees)]
-    return (
-        float(np.average([one.anees / 2 for one in on], weights=[max(one.on_target, 1) for one in on]))
-        if on
-        else np.nan
-    )
+    values = [(one.anees_alone if alone else one.anees) / 2 for one in on]
+    return float(np.average(values, weights=[one.compared for one in on])) if on else np.nan
 
 
 def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
@@ -207,10 +227,10 @@ def tune(flight: Flight, draws: int, seed: int) -> dict[str, list[Tuned]]:
     -------
     By mode, the best first.
     """
-    clocks = clocks_of(flight)
+    errors = errors_of(flight)
     found: dict[str, list[Tuned]] = {mode: [] for mode in MODES}
     for number, rng in enumerate(np.random.default_rng(seed).spawn(draws), start=1):
-        settings = draw(rng, clocks)
+        settings = draw(rng, errors)
         for mode, tuned in found.items():
             lives = follow_mode(flight, mode, settings)
             tuned.append(Tuned(number, settings, gospa_of(lives), anees_of(lives)))

@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.detection.boards import Board, find_board, grey8
+from wildlab.evaluation.replication import propagate_rounding
+from wildlab.evaluation.runs import Interval
 from wildlab.geometry.board_views import Views, parameters_of, project_board
 from wildlab.geometry.camera import Camera, camera_from_data_sheet, normalise
 from wildlab.geometry.directions import direction_differences
@@ -33,6 +35,12 @@ HEIGHT = 350.0
 def theoretical() -> Camera:
     """The camera of H (2.2) by its data sheet, which H (2.4) prints."""
     return camera_from_data_sheet(640, 512, LENS, 640 * PITCH, 512 * PITCH)
+
+
+def theoretical_focal_length() -> Interval:
+    """Its focal length, pixels; bounds are of what 19 mm and 17 µm were rounded from."""
+    low, high = propagate_rounding(lambda one: one[0] / one[1], [LENS, PITCH], [0.5e-3, 0.5e-6])
+    return Interval(LENS / PITCH, float(low), float(high))
 
 
 class Centres(NamedTuple):

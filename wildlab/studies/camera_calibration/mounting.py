@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wildlab.evaluation.replication import propagate_rounding
+from wildlab.evaluation.runs import Interval
 from wildlab.geometry.camera_poses import CameraPoses
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
@@ -45,8 +47,8 @@ class Cause(NamedTuple):
         What is wrong, and what its size is counted in.
     size
         That leaves the printed error: a standard deviation, or (of what is constant) the size itself.
-    left
-        Mean error left by it in the calibration, metres.
+    left, left_error
+        Mean error left by it in the calibration, and its standard error, with that of the size found, metres.
     angle
         Root mean squared angle by which the lens then points elsewhere, radians.
     ground
@@ -57,6 +59,7 @@ class Cause(NamedTuple):
     unit: str
     size: float
     left: float
+    left_error: float
     angle: float
     ground: float
 
@@ -139,13 +142,25 @@ def explain(rng: np.random.Generator, cause: str, runs: int) -> Cause:
     """
     unit, size = CAUSES[cause]
     for _ in range(2):  # what is left grows with the size, nearly in proportion
-        tried = [calibrate_once(rng, cause, size)[0].error for _ in range(max(runs // 2, 2))]
-        left = float(np.mean(tried))
-        size *= PRINTED_ERROR / left
+        tried = np.array([calibrate_once(rng, cause, size)[0].error for _ in range(max(runs // 2, 2))])
+        size *= PRINTED_ERROR / float(tried.mean())
     found = [calibrate_once(rng, cause, size) for _ in range(runs)]
-    left = float(np.mean([one.error for one, _ in found]))
+    errors = np.array([one.error for one, _ in found])
+    # What chance does to the size that was found counts as well: it is proportional.
+    scaled = tried * PRINTED_ERROR / tried.mean()
+    both = [
+        float(one.std(ddof=1) / np.sqrt(len(one))) if len(one) > 1 else np.nan for one in (errors, scaled)
+    ]
     angle = float(np.sqrt(np.mean([angle**2 for _, angle in found])))
-    return Cause(cause, unit, size, left, angle, HEIGHT * float(np.tan(angle)))
+    return Cause(
+        cause,
+        unit,
+        size,
+        float(errors.mean()),
+        float(np.linalg.norm(both)),
+        angle,
+        HEIGHT * float(np.tan(angle)),
+    )
 
 
 def printed_angles(found: Mounting) -> tuple[float, float, float]:
@@ -153,6 +168,14 @@ def printed_angles(found: Mounting) -> tuple[float, float, float]:
     return helgesen_misalignment(*found.mount.misalignment)
 
 
-def error_from_height() -> float:
-    """The printed error taken for one of orientation, at the height of the flight: H 5.6.1 has 6.6 m."""
-    return PRINTED_ERROR * HEIGHT / PRINTED_RANGE
+def error_from_height() -> Interval:
+    """The printed error taken for one of orientation, at the height of the flight: H 5.6.1 has 6.6 m.
+
+    Returns
+    -------
+    Interval
+        Bounds are of what the printed error and range were rounded from, metres.
+    """
+    given = [PRINTED_ERROR, PRINTED_RANGE]
+    low, high = propagate_rounding(lambda one: one[0] * HEIGHT / one[1], given, [0.00005, 0.05])
+    return Interval(PRINTED_ERROR * HEIGHT / PRINTED_RANGE, float(low), float(high))

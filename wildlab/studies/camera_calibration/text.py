@@ -106,7 +106,7 @@ def mounting_words(causes: Sequence[Cause], printed_error: float, printed_ground
         "metres from 350 metres, if their cause differs from image to image"
     )
     if high < CLEARLY * printed_ground:
-        return f"{said}: less than the {printed_ground:.1f} metres of the thesis, for images average it."
+        return f"{said}: less than the {printed_ground:.1f} metres of the thesis."
     if low > printed_ground:
         return f"{said}: more than the {printed_ground:.1f} metres of the thesis."
     return f"{said}: about the {printed_ground:.1f} metres of the thesis."

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
+from scipy.special import bdtr
 
 from wildlab.evaluation.runs import share_interval
 from wildlab.reporting.spread import bounds_of, range_clause, range_words, spread_words
@@ -98,7 +98,9 @@ def swap_words(spread: pd.DataFrame, subject: str) -> str:
     >>> swap_words(table, "veto")
     '1 of 10 flights (2 to 40 %)'
     """
-    count, n = int(spread[subject, "swapped"].sum()), len(spread)
+    count, n = int(spread[subject, "swapped"].sum()), int(spread[subject, "swapped"].notna().sum())
+    if n == 0:
+        return "nan flights"
     if n == 1:
         return "the one flight" if count else "no flight of one"
     found = share_interval(count, n)
@@ -226,7 +228,10 @@ def looks_words(spread: pd.DataFrame) -> str:
 
 def curve_words(spread: pd.DataFrame) -> str:
     """From which separation on a made-up feature serves."""
-    counts = {at: int(spread[curve_subject(at), "swapped"].sum()) for at in SEPARATIONS}
+    swapped = {at: spread[curve_subject(at), "swapped"] for at in SEPARATIONS}
+    if any(one.isna().any() for one in swapped.values()):
+        return ""
+    counts = {at: int(one.sum()) for at, one in swapped.items()}
     none = [at for at in SEPARATIONS if all(counts[further] == 0 for further in SEPARATIONS if further >= at)]
     n = len(spread)
     parts = ", ".join(f"{count} at {at}" for at, count in counts.items())
@@ -293,11 +298,11 @@ def beyond_chance(one_way: int, other_way: int) -> bool:
 
     Examples
     --------
-    >>> beyond_chance(3, 0), beyond_chance(6, 0), beyond_chance(0, 0)
+    >>> beyond_chance(5, 0), beyond_chance(6, 0), beyond_chance(0, 0)
     (False, True, False)
     """
     either = one_way + other_way
-    return bool(either) and bool(binomtest(one_way, either).pvalue < 0.05)
+    return bool(either) and bool(2 * bdtr(min(one_way, other_way), either, 0.5) < 0.05)
 
 
 def as_published_words(spread: pd.DataFrame) -> str:

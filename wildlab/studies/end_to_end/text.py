@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.runs import mean_interval, mean_share_interval
@@ -95,14 +96,9 @@ def with_interval(values: pd.Series, scale: float = 1.0, decimals: int = 1, *, s
     >>> with_interval(pd.Series([1.0, 2.0, 3.0]))
     '2.0 (−0.5 to 4.5)'
     """
-    known = values[values.notna()]
-    if not len(known):
-        return ""
-    if len(known) < 2:
-        return f"{scale * known.iloc[0]:.{decimals}f}"
-    found = mean_share_interval(known) if share else mean_interval(known)
-    mean, low, high = (scale * end for end in found)
-    return f"{mean:.{decimals}f} ({low:.{decimals}f} to {high:.{decimals}f})".replace("-", "\N{MINUS SIGN}")
+    found = mean_share_interval(values) if share else mean_interval(values)
+    mean, low, high = (f"{scale * end:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for end in found)
+    return mean if np.isnan(found.low) else f"{mean} ({low} to {high})"
 
 
 def detections_table(spread: pd.DataFrame) -> pd.DataFrame:
@@ -222,8 +218,7 @@ def ellipse_word(shares: pd.Series) -> str:
     >>> ellipse_word(pd.Series([0.9, 0.91, 0.9])), ellipse_word(pd.Series([0.7, 0.71, 0.7]))
     ('honest', 'too small')
     """
-    known = shares[shares.notna()]
-    low, high = mean_interval(known)[1:] if len(known) > 1 else (0.0, 1.0)
+    low, high = mean_interval(shares)[1:]
     if high < HONEST[0]:
         return "too small"
     if low > HONEST[1]:

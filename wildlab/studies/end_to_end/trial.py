@@ -17,8 +17,9 @@ from wildlab.detection.ground import RISE
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels, ground_to_pixel
-from wildlab.geometry.uncertainty import PoseErrors, ground_covariance, inside_ellipse
+from wildlab.geometry.uncertainty import PoseErrors, ground_covariance
 from wildlab.pipeline.georeference import observe, pose_errors
 from wildlab.pipeline.rendered import Marks, Photographer, exposures_of, marks_of, with_detections
 from wildlab.pipeline.track import Sighting, sighting

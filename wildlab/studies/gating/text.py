@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from wildlab.evaluation.printed import Comparison
+from wildlab.evaluation.replication import Comparison
 from wildlab.studies.gating.monte_carlo import FORMS, GATES, Gated, Outcome
 from wildlab.studies.gating.readings import DEFAULT, READINGS, STRESS
 from wildlab.studies.gating.variations import standard_error
@@ -59,9 +59,8 @@ def range_of(values: Iterable[float], decimals: int = 1) -> str:
 
 
 def judged_words(verdicts: Mapping[str, Comparison]) -> str:
-    """The verdicts of the front page on the rates, by form; a sentence."""
-    listed = ", ".join(f"{form} {one.verdict} ({one.reason})" for form, one in verdicts.items())
-    return f"The front page's verdicts, which grant a tolerance besides: {listed}."
+    """Whether each rate is close to the published one, and within chance of it; a sentence."""
+    return "; ".join(f"{form}: {one.words}" for form, one in verdicts.items()) + "."
 
 
 def beside_print_words(table: pd.DataFrame) -> str:

@@ -79,13 +79,19 @@ def best(spread: pd.DataFrame, name: str) -> str:
     return max(STRATEGIES, key=lambda one: mean(spread, one, name))
 
 
-def summary(spread: pd.DataFrame) -> list[str]:
+def lap_words(percent_of_lap: float) -> str:
+    """How far the gondola went, at a sentence's end; nothing where it went all the way round."""
+    return "" if percent_of_lap == 100 else f" on {percent_of_lap:g} % of the lap"
+
+
+def summary(spread: pd.DataFrame, percent_of_lap: float) -> list[str]:
     """Three sentences on what the trials give, one row for each draw."""
     most, near = best(spread, "seen"), best(spread, "near")
     least = min(STRATEGIES, key=lambda one: outside(spread, one).mean())
     return [
         f"Most of the enclosures is seen with {name_of(most)}: {share_words(spread, most, 'seen')}, "
-        f"against {share_words(spread, DOWN, 'seen')} with the camera straight down.",
+        f"against {share_words(spread, DOWN, 'seen')} with the camera straight down"
+        f"{lap_words(percent_of_lap)}.",
         f"Least beside the enclosures is seen with {name_of(least)}, "
         f"{with_interval(outside(spread, least))} of what it sees; within {NEAR:.0f} m of the cable most is "
         f"seen with {name_of(near)}, {share_words(spread, near, 'near')} of that ground.",
@@ -139,7 +145,7 @@ def strategies_words(spread: pd.DataFrame) -> str:
     adaptive, roll = "adaptive-60", "roll-60"
     more = spread[adaptive, "seen"] - spread[roll, "seen"]
     often = int((more > 0).sum())
-    share = share_interval(often, len(spread))
+    share = share_interval(often, int(more.notna().sum()))
     return (
         "Of what a strategy sees, a smaller share lies outside of the enclosures where it is adaptive at "
         f"{fewer} of {len(pairs)} limits ({saved}, adaptive for plain). At 60 degrees it sees "

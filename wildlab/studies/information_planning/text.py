@@ -8,7 +8,7 @@ import pandas as pd
 from wildlab.evaluation.runs import Interval, share_interval
 from wildlab.evaluation.shares import paired_difference
 from wildlab.planning.planner import Horizon
-from wildlab.reporting.text import percent
+from wildlab.reporting.text import percent, percent_between
 from wildlab.studies.information_planning.trial import (
     AHEAD,
     BUDGET_S,
@@ -101,13 +101,8 @@ def sooner_share(
     spread: pd.DataFrame, other: str, name: str = "all_found", one: str = INFORMATION
 ) -> Interval:
     """In which share of the worlds a planner is sooner than another, with its 95 % interval."""
-    true = spread[one, name].to_numpy(float) < spread[other, name].to_numpy(float)
-    return share_interval(int(true.sum()), len(true))
-
-
-def with_interval(share: Interval) -> str:
-    """A share in per cent, and its 95 % interval."""
-    return f"{percent(share.estimate)} ({percent(share.low)} to {percent(share.high)})"
+    own, others = (spread[who, name].to_numpy(float) for who in (one, other))
+    return share_interval(int((own < others).sum()), int((~np.isnan(own + others)).sum()))
 
 
 def minutes(seconds: float) -> str:
@@ -130,8 +125,8 @@ def summary(spread: pd.DataFrame) -> list[str]:
     swing, down = sooner_share(spread, SWING), sooner_share(spread, ROWS)
     return [
         f"Planning by information, whose camera may look anywhere, finds all animals sooner than rows whose "
-        f"camera looks from side to side in {with_interval(swing)} of {len(spread)} worlds, "
-        f"{wanted_words(swing)}; than rows with the camera straight down in {with_interval(down)}, "
+        f"camera looks from side to side in {percent_between(swing)} of {len(spread)} worlds, "
+        f"{wanted_words(swing)}; than rows with the camera straight down in {percent_between(down)}, "
         f"{wanted_words(down)}.",
         f"On the median world all are found {when_words(spread, INFORMATION)}, in rows from side to side "
         f"{when_words(spread, SWING)}, in rows with the camera down {when_words(spread, ROWS)}.",
@@ -161,14 +156,14 @@ def why_words(spread: pd.DataFrame) -> str:
         "later": "With both cameras fixed straight down, such planning is sooner than rows only in",
         "open": "With both cameras straight down it is not settled which is sooner: such planning is in",
     }[_side(fixed)]
-    return f"{said} {with_interval(fixed)}."
+    return f"{said} {percent_between(fixed)}."
 
 
 def turns_words(spread: pd.DataFrame) -> str:
     """What is left of the shares where a turn takes the whole time."""
     one = STOPPING[INFORMATION]
     shares = {who: sooner_share(spread, STOPPING[who], one=one) for who in (ROWS, SWING)}
-    said = "; ".join(f"than {NAMES[who]} in {with_interval(share)}" for who, share in shares.items())
+    said = "; ".join(f"than {NAMES[who]} in {percent_between(share)}" for who, share in shares.items())
     missed = int((spread[one, "share_found"] < 1).sum())
     return (
         f"Where any turn beyond {np.degrees(STOPS_BEYOND):.0f} degrees takes as long as one round, by "
@@ -194,7 +189,7 @@ def table(spread: pd.DataFrame) -> pd.DataFrame:
                 "all": median_words(spread[who, "all_found"]),
                 "missed": f"{missed} of {len(spread)}",
                 "covered": percent(float(spread[who, "covered"].median())),
-                "sooner": "" if who == INFORMATION else with_interval(sooner_share(spread, who)),
+                "sooner": "" if who == INFORMATION else percent_between(sooner_share(spread, who)),
             }
         )
     return pd.DataFrame(rows)
@@ -241,14 +236,15 @@ def cost_words(spread: pd.DataFrame, cost: pd.DataFrame) -> str:
 def greedy_words(spread: pd.DataFrame) -> str:
     """What choosing by the present situation costs."""
     greedy, ahead = (spread[who, "tour_time"].to_numpy(float) for who in (GREEDY, AHEAD))
-    longer = np.where(np.isfinite(greedy), greedy / ahead - 1, np.inf)
-    turned = share_interval(int((spread[GREEDY, "broken_off"] > 0).sum()), len(spread))
+    longer = greedy / ahead - 1
+    turns = spread[GREEDY, "broken_off"].dropna()
+    turned = share_interval(int((turns > 0).sum()), len(turns))
     given_up = int(np.isinf(greedy).sum())
     more = f" In {given_up} it did not come to an end." if given_up else ""
     return (
         f"Choosing by F (5.3) every second takes {percent(float(np.median(longer)))} longer than the "
         f"shortest order of the same goals on the median world, and turns round on the way to a goal in "
-        f"{with_interval(turned)} of the worlds.{more}"
+        f"{percent_between(turned)} of the worlds.{more}"
     )
 
 
@@ -263,7 +259,7 @@ def survey_words(spread: pd.DataFrame) -> str:
     most = percent(float(spread[SURVEY, "most_known"].mean()))
     return (
         f"In rows with F's high-level planner every enclosure has had all its animals known at once within "
-        f"{BUDGET_S / 60:.0f} minutes in {with_interval(whole)} of {count} worlds; at best {most} of the "
+        f"{BUDGET_S / 60:.0f} minutes in {percent_between(whole)} of {count} worlds; at best {most} of the "
         f"animals are known, on the mean. A search goes back {means['revisits']:.1f} times; "
         f"{means['lost_by_covariance']:.1f} times an animal is lost because its covariance is beyond the "
         f"limit, {means['lost_by_search']:.1f} times because it was not found where it should be."

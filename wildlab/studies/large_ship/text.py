@@ -116,18 +116,21 @@ def cause_words(spread: pd.DataFrame) -> str:
             f"{left:.1f} m of {whole:.1f} m from the receiver, {left_middle:.1f} m of {whole_middle:.1f} m "
             "from the ship's middle"
         )
-    count = int((scatter_left(spread) < HALF_OF_VARIANCE).sum())
-    if count == len(spread):
+    share_left = scatter_left(spread)
+    count, of = int((share_left < HALF_OF_VARIANCE).sum()), int(np.isfinite(share_left).sum())
+    if not of:
+        return ""
+    if count == of:
         verdict = "So much of the scatter comes from the poses, as the thesis has it."
     elif count:
         verdict = (
-            f"So on {count} of {len(spread)} flights much of the scatter comes from the poses, as the "
+            f"So on {count} of {of} flights much of the scatter comes from the poses, as the "
             "thesis has it, and on the others not."
         )
     else:
         verdict = (
-            "So half of the variance or more, of one of them at least, is in which part of the ship shows; "
-            "the thesis puts it down to the poses."
+            "So half of the variance or more, of one of them at least, is left with true poses; the thesis "
+            "puts it down to the poses."
         )
     return f"With the true poses there would be left: {'; '.join(parts)}. {verdict}"
 
@@ -151,6 +154,8 @@ def origin_words(spread: pd.DataFrame, published: Mapping[tuple[str, str], float
 def detected_words(spread: pd.DataFrame) -> str:
     """How often the ship was found, and how often it was cut and moved."""
     rates, clear = (spread[DETECTOR, name] for name in ("detection_rate", "rate_beyond_sliver"))
+    if not rates.notna().any():
+        return ""
     high = [int((1 - one < MISSED).sum()) for one in (rates, clear)]
     largest = spread[DETECTOR, "largest_missed"].max()
     missed = (

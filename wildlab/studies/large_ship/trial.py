@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wildlab.flight.store import Flight
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.georeference import georeference_pixels
-from wildlab.geometry.uncertainty import ground_covariance, inside_ellipse
+from wildlab.geometry.uncertainty import ground_covariance
 from wildlab.pipeline.georeference import observe, pose_errors
 from wildlab.pipeline.rendered import (
     Marks,

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wildlab.evaluation.runs import mean_interval
+from wildlab.evaluation.runs import mean_interval, mean_share_interval
 from wildlab.geometry.frames import Array
-from wildlab.reporting.text import number, percent
+from wildlab.reporting.text import number, percent, percent_between
 from wildlab.simulation.landscape import EAST_M, HIGHEST_M, LOWEST_M, NORTH_M, STEP_M, TREES_M, TREES_SHARE
 from wildlab.studies.line_of_sight.claims import at_heights, disagreement, hidden, saved
 from wildlab.studies.line_of_sight.timing import REPEATS, WAYS, seconds
@@ -90,14 +90,7 @@ LIMITS = [
 
 def with_interval(values: ArrayLike) -> str:
     """Mean share of lands in per cent, and its 95 % interval where there are two of them."""
-    array = np.asarray(values, float)
-    known = array[np.isfinite(array)]
-    if len(known) < 2:
-        return percent(float(known.mean())) if len(known) else "none"
-    mean, low, high = mean_interval(known)
-    if low == high:
-        return percent(mean)
-    return f"{percent(mean)} ({percent(max(low, 0.0))} to {percent(min(high, 1.0))})"
+    return percent_between(mean_share_interval(values))
 
 
 def time_ratios(times: pd.DataFrame, way: str) -> Array:
@@ -196,10 +189,8 @@ def view_words(spread: pd.DataFrame) -> str:
 
 def mean_words(values: pd.Series, digits: int) -> str:
     """Mean over lands, with its 95 % interval where there are two of them."""
-    if len(values) < 2:
-        return f"{values.mean():.{digits}f}"
     mean, low, high = mean_interval(values)
-    return f"{mean:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    return f"{mean:.{digits}f}" + ("" if np.isnan(low) else f" ({low:.{digits}f} to {high:.{digits}f})")
 
 
 def trees_words(spread: pd.DataFrame) -> str:

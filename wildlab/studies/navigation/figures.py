@@ -114,7 +114,7 @@ def show_errors(report: Report, studied: Studied, window: tuple[float, float], f
     ``figures`` is the first figure of H's chapter 7 that the flight answers to; None for a public flight.
     """
     late = (studied.times >= window[0]) & (studied.times < window[1])
-    of = {"mekf": studied.scored[studied.filter], "observer": studied.scored["observer"]}
+    of = {"mekf": studied.scored["mekf"], "observer": studied.scored["observer"]}
     whom = "the truth" if has_truth(studied) else "the one found on board"
     period = tracking_period(studied.flight)
 
@@ -200,7 +200,7 @@ def show_against_autopilot(report: Report, studied: Studied, tuned: str, begin: 
 
 def show_states(report: Report, studied: Studied, printed: Sequence[float] | None) -> None:
     """Deviations and biases that the filter states; ``printed`` are six published means, m and degrees."""
-    sd = studied.scored[studied.filter].sd
+    sd = studied.scored["mekf"].sd
     both = np.hstack([sd[:, :3], np.degrees(sd[:, 6:])])
     report.figure(
         deviation_chart(studied.times, both, printed, ("m", "°"), "What the filter states of itself"),
@@ -209,7 +209,7 @@ def show_states(report: Report, studied: Studied, printed: Sequence[float] | Non
         caption="Standard deviations over time"
         + ("; broken: the means that H prints of its own." if printed is not None else "."),
     )
-    biases = studied.found[studied.filter].biases
+    biases = studied.found["mekf"].biases
     columns = [str(name) for name in biases if not str(name).startswith("sd_") and name != "time_s"]
     report.figure(
         bias_chart(
@@ -226,7 +226,7 @@ def show_states(report: Report, studied: Studied, printed: Sequence[float] | Non
 
 def show_innovations(report: Report, studied: Studied, window: tuple[float, float]) -> None:
     """NIS and autocorrelation of the filter's innovations, in figures and in a table."""
-    found = studied.found[studied.filter]
+    found = studied.found["mekf"]
     raw = found.innovations[found.innovations["time_s"].between(*window)]
     split = {str(name): part for name, part in raw.groupby("source", sort=False)}
     report.figure(
@@ -266,14 +266,11 @@ def show_innovations(report: Report, studied: Studied, window: tuple[float, floa
             "bound": "white below",
         },
         digits={"nis": 2, "inside": 1, "left_out": 1, "lag1": 3, "bound": 3},
-        caption=f"Innovations of the filter ({WORDS[studied.filter]}).",
+        caption=f"Innovations of the filter ({WORDS['mekf']}).",
     )
-    signs = list(found.signs)
-    if studied.filter != "mekf":  # what was wrong with the other may only be hidden by the noise
-        signs += [f"{WORDS['mekf']}: {sign}" for sign in studied.found["mekf"].signs]
-    if signs:
+    if found.signs:
         report.subsection("What should make you doubt it")
-        report.points(signs)
+        report.points(found.signs)
 
 
 def show_nees(report: Report, studied: Studied, begin: float) -> None:

@@ -76,7 +76,7 @@ def show_paths(report: Report, studied: Studied, window: Period, figures: int) -
     seen = observation_times(flight)
     if flight.truth is None or not len(flight.truth) or not len(seen):
         return
-    nav = studied.found[studied.filter].nav
+    nav = studied.found["mekf"].nav
     nav = nav[nav["time_s"].between(*window)]
     path = nav[["north_m", "east_m", "down_m"]].to_numpy(float)
     places = np.stack([np.interp(seen, nav["time_s"], column) for column in path.T], axis=1)
@@ -166,7 +166,7 @@ def _names(sources: Iterable[str]) -> str:
 
 def _sources(studied: Studied, *, twin: bool) -> dict[str, pd.DataFrame]:
     """Filter and autopilot as in H; on a public flight filter, observer, and what was found on board."""
-    mekf = studied.found[studied.filter].nav
+    mekf = studied.found["mekf"].nav
     if twin and "autopilot" in studied.flight.nav:
         return {"mekf": mekf, "autopilot": studied.flight.nav["autopilot"]}
     reference = studied.flight.nav[studied.reference]

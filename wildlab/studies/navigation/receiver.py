@@ -254,11 +254,12 @@ def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> 
         changed, before is now.
     """
     rows = []
+    last = "mekf-receiver" if "mekf-receiver" in studied.found else "mekf"
     for words, begin, end in parts:
-        now = summarise_innovations(studied.found[studied.filter], begin, end)
+        now = summarise_innovations(studied.found[last], begin, end)
         was = summarise_innovations(studied.found["mekf"], begin, end)
         off = {}
-        for who in ("mekf", studied.filter):
+        for who in ("mekf", last):
             numbers = summarise(studied.scored[who], begin, end)
             off[who] = float(np.linalg.norm([numbers[f"rms_{axis}"] for axis in AXES]))
         for (_, before), (_, after) in zip(was.iterrows(), now.iterrows(), strict=True):
@@ -272,7 +273,7 @@ def parts_table(studied: Studied, parts: Sequence[tuple[str, float, float]]) -> 
                     "ratio": ratio,
                     "lag1": lag1,
                     "off_before": off["mekf"],
-                    "off": off[studied.filter],
+                    "off": off[last],
                     "left": " and ".join(left_over(ratio, lag1)),
                 }
             )

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from wildlab.pipeline.navigation_errors import AXES
+from wildlab.pipeline.overviews.verdict import Evidence, Verdict, verdict_of
 
 #: A difference that is so many times what the filter states is more than it can answer for.
 TOO_SURE = 2.0
@@ -35,9 +36,13 @@ def middle_flight(spread: pd.DataFrame) -> dict[str, float]:
 
 
 def summary(
-    found: Mapping[str, float], part: str, true: bool, flights: int = 1
-) -> tuple[list[str], str, tuple[str, str] | None]:
-    """Three sentences on how far off the filter's attitude is, the colour, and the word that it means.
+    found: Mapping[str, float],
+    part: str,
+    true: bool,
+    flights: int = 1,
+    receiver: Mapping[str, float] | None = None,
+) -> tuple[list[str], Verdict, str]:
+    """Sentences on how far off the filter's attitude is, the verdict, and its reason.
 
     Parameters
     ----------
@@ -49,14 +54,15 @@ def summary(
         Whether it is held against the truth, or against another estimate.
     flights
         Of how many ``found`` are the medians.
+    receiver
+        As ``found``, with the receiver's noise that was found on the flight; None where none was.
 
     Returns
     -------
-    list of str, str, (str, str) or None
-        The sentences; ``"warn"`` or ``"neutral"``; the verdict and its reason. Of many flights it is None:
-        what they come to is how they stand to the printed numbers.
+    list of str, Verdict, str
+        Of many flights there is no reason: what they come to is how they stand to the printed numbers.
     """
-    off, stated = (float(np.linalg.norm([found[f"{of}_{axis}"] for axis in AXES])) for of in _PAIR)
+    off, stated = _off_and_stated(found)
     aside = HEIGHT * np.radians(np.hypot(found["rms_roll"], found["rms_pitch"]))
     too_sure = off > TOO_SURE * stated
     if true:
@@ -65,26 +71,34 @@ def summary(
         last = "The filter is surer of itself than this difference allows. Neither of the two is the truth."
     else:
         last = "Neither of the two is the truth: what both get wrong in the same way goes unseen."
+    other = []
+    if receiver is not None:
+        beside = _off_and_stated(receiver)
+        other = [
+            f"With the receiver's noise found on this flight it is {beside[0]:.2f} degrees, and by its own "
+            f"account {beside[1]:.2f}."
+        ]
     sentences = [
         f"The filter's attitude is {off:.2f} degrees from "
         f"{'the truth' if true else 'the one found on board'}, all three axes together, {part}"
         f"{_over(flights)}; by its own account it would be {stated:.2f}.",
+        *other,
         f"Seen straight down from {HEIGHT:.0f} metres, its differences in roll and pitch move a point by "
         f"{aside:.1f} metres.",
         last,
     ]
     if flights > 1:
-        return sentences, "neutral", None
+        return sentences, Verdict.UNJUDGED, ""
     against = "the truth" if true else "the attitude found on board"
     reason = f"From {against} it differs by {off / stated:.1f} times what it states."
-    if too_sure:
-        return sentences, "warn", ("too sure of itself", reason)
     # What is told apart here is no test: up to twice what is stated, one flight does not show it wrong.
-    word = "within what it states" if off <= stated else "not far beyond what it states"
-    return sentences, "neutral", (word if true else "not contradicted", reason)
+    return sentences, verdict_of(Evidence(troubled=int(too_sure))), reason
 
 
-_PAIR = ("rms", "mean_sd")
+def _off_and_stated(found: Mapping[str, float]) -> tuple[float, float]:
+    """RMS and stated deviation of all three axes together, degrees."""
+    rms, sd = (float(np.linalg.norm([found[f"{of}_{axis}"] for axis in AXES])) for of in ("rms", "mean_sd"))
+    return rms, sd
 
 
 def tiles(found: Mapping[str, float], true: bool, flights: int = 1) -> list[tuple[str, str]]:

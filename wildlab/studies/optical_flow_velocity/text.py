@@ -196,6 +196,8 @@ def cause_words(spread: pd.DataFrame) -> str:
     left = {one: size(spread, one) for one in (SYNCHRONISED, STILL, CALIBRATED)}
     parts = ", ".join(f"{value:.1f} m/s {_WITH[one]}" for one, value in left.items())
     image = size(spread, TRUE)
+    if not np.isfinite([image, whole]).all():
+        return ""
     from_poses = (
         "Most of it comes from the poses"
         if image < 0.5 * whole

@@ -311,8 +311,7 @@ def check_claims(spread: pd.DataFrame) -> dict[str, Check]:
     whole, synchronised, still = (sizes(spread, one) for one in (LOGGED, SYNCHRONISED, STILL))
     correlation = np.minimum(of(LOGGED, "correlation_u"), of(LOGGED, "correlation_v"))
     return {
-        # A mean over some pairs of a flight that could as well lie on the other side decides nothing.
-        "mean-within-one": Check(true=largest_means(spread) <= WITHIN_M_S, premise=mean_decided(spread)),
+        "mean-within-one": Check(true=largest_means(spread) <= WITHIN_M_S),
         "very-large-variance": Check(
             measured=np.minimum(of(LOGGED, "sd_north"), of(LOGGED, "sd_east")), above=True
         ),

@@ -10,6 +10,7 @@ from matplotlib.patches import Rectangle
 
 from wildlab.detection.colour import Colour, coloured, find_coloured
 from wildlab.reporting.figures import BLUE, GREY, INK, ORANGE, new_figure
+from wildlab.reporting.spread import bounds_of, spread_words
 from wildlab.simulation.scene.coloured import ColourView
 from wildlab.studies.precision_drop.trial import COUNTS, MEAN, SINGLE
 
@@ -45,10 +46,14 @@ def image_shown(view: ColourView, thresholds: Colour, name: str, what: str, coun
 def mean_shown(spread: pd.DataFrame) -> Shown:
     """The error of the mean after so many detections, beside what independent ones would give."""
     known = np.array([count for count in COUNTS if spread[MEAN, f"after_{count}"].notna().all()])
-    errors = np.column_stack([spread[MEAN, f"after_{count}"] for count in known])
-    low, middle, high = np.percentile(errors, [5, 50, 95], axis=0)
+    columns = [spread[MEAN, f"after_{count}"] for count in known]
+    middle = np.array([column.median() for column in columns])
     fig, ax = new_figure(5.6, 3.4)
-    ax.fill_between(known, low, high, color=BLUE, alpha=0.18, lw=0, label="90 % of the flights")
+    if len(spread) > 1:
+        low, high = np.transpose([bounds_of(column) for column in columns])
+        ax.fill_between(
+            known, low, high, color=BLUE, alpha=0.18, lw=0, label=f"flights, {spread_words(len(spread)).key}"
+        )
     ax.plot(known, middle, "o-", color=BLUE, label="median flight")
     ax.plot(known, middle[0] / np.sqrt(known / known[0]), ":", color=INK, label="if errors were independent")
     ax.axhline(
@@ -63,5 +68,5 @@ def mean_shown(spread: pd.DataFrame) -> Shown:
         fig, "mean",
         f"Error of the mean position against the number of detections: {middle[0]:.1f} m after {known[0]}, "
         f"{middle[-1]:.1f} m after {known[-1]} on the median flight.",
-        "Detections as they come, pass after pass. H gathers about 75 before each drop.",
+        "Detections in a row, wherever they begin. H gathers about 75 before each drop.",
     )  # fmt: skip

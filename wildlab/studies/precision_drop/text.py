@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from wildlab.evaluation.matching import group_draws, percentile
-from wildlab.evaluation.runs import Interval, mean_interval, share_interval
-from wildlab.reporting.text import percent
+from wildlab.evaluation.runs import Interval, mean_interval, mean_share_interval, share_interval
+from wildlab.reporting.text import percent, percent_between
 from wildlab.studies.precision_drop.trial import COUNTS, FEW_PX, FOUND, HORIZON, MEAN, SINGLE
 
 METHOD = r"""The six steps of H 4.4.2 on images of 640 x 360 pixels, with the printed limits of hue,
@@ -34,11 +34,6 @@ def pooled(spread: pd.DataFrame, count: str, of: str) -> Interval:
     """Share of images over all flights, with its interval; both are names of numbers of what was found."""
     numbers = (round(float(spread[FOUND, name].sum())) for name in (count, of))
     return share_interval(*numbers)
-
-
-def with_interval(share: Interval) -> str:
-    """A share in per cent, and its 95 % interval."""
-    return f"{percent(share.estimate)} ({percent(share.low)} to {percent(share.high)})"
 
 
 def worth(spread: pd.DataFrame) -> float:
@@ -81,7 +76,7 @@ def summary(spread: pd.DataFrame) -> list[str]:
         else f"alike: their mean is worth about {max(many, 1):.0f}{between} {ones}."
     )
     return [
-        f"By its colour the tarpaulin is found in {with_interval(rate)} of the images that have it inside "
+        f"By its colour the tarpaulin is found in {percent_between(rate)} of the images that have it inside "
         f"the borders. In the {images} images that were looked at, {alarms}.",
         f"A single position is typically {single:.1f} metres off, the mean of {count:.0f} is {mean:.1f} "
         f"metres off, which is {much if mean < single else 'no better'}.",
@@ -92,19 +87,20 @@ def summary(spread: pd.DataFrame) -> list[str]:
 def mean_words(spread: pd.DataFrame) -> str:
     """How the error of the mean falls with more detections, beside what independent ones would give."""
     known = [count for count in COUNTS if spread[MEAN, f"after_{count}"].notna().all()]
+    if not known:
+        return ""
     first, last = known[0], known[-1]
     error = {count: float(spread[MEAN, f"after_{count}"].median()) for count in (first, last)}
-    errors = mean_interval(spread[MEAN, "error"]) if len(spread) > 1 else None
-    over = "" if errors is None else f" (mean over flights {_span(errors)})"
+    errors = mean_interval(spread[MEAN, "error"])
+    over = "" if np.isnan(errors.low) else f" (mean over flights {_span(errors)})"
     if worth(spread) > NEARLY_ALL * last:
         why = "That is what independent errors would give"
     else:
         why = (
             f"Were their errors independent, {last} would lower it to "
             f"{error[first] / np.sqrt(last / first):.1f} m. {percent(min(common(spread), 1.0))} of the mean "
-            "square error of single positions is still in their mean. What can last over a flight is the "
-            "slow part of the autopilot's position and angles, the mount's angles and the camera's "
-            "calibration; how much comes from which is not computed here"
+            "square error of single positions is still in their mean. Which of "
+            "the errors that last over a flight it comes from is not computed here"
         )
     return (
         f"After {first} detection{'s' * (first > 1)} the median flight is {error[first]:.1f} m off, after "
@@ -139,16 +135,15 @@ def _coverage(spread: pd.DataFrame) -> str:
     shares = spread[FOUND, "ellipse_coverage_90"]
     if len(spread) < 2:
         return f"{percent(float(shares.mean()))} of the images of the one flight"
-    found = mean_interval(shares)
-    found = found._replace(low=max(found.low, 0.0), high=min(found.high, 1.0))
+    found = mean_share_interval(shares)
     known = (
-        "wider than the errors ask for: they allow for a part that is missed on one side only"
+        "wider than the errors ask for"
         if found.low > ELLIPSE
         else "too narrow"
         if found.high < ELLIPSE
         else "not told from right"
     )
-    return f"{with_interval(found)} of a flight's images, on the mean: they are {known}"
+    return f"{percent_between(found)} of a flight's images, on the mean: they are {known}"
 
 
 def horizon_words(spread: pd.DataFrame) -> str:
@@ -166,5 +161,5 @@ def horizon_words(spread: pd.DataFrame) -> str:
     return (
         f"Of {images:.0f} images with the horizon, {every} have a sky that is as blue as the tarpaulin "
         f"({flights} of {len(spread)} flights; how blue skies are is chosen). The borders let {kept} of "
-        f"these through, {with_interval(share)}."
+        f"these through, {percent_between(share)}."
     )

@@ -18,10 +18,10 @@ from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check
 from wildlab.flight.store import Flight
 from wildlab.geometry.camera import Camera
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.geometry.frames import Array, euler_to_matrix
 from wildlab.geometry.georeference import ground_to_pixel
 from wildlab.geometry.mount import R_MC_DOWN
-from wildlab.geometry.uncertainty import inside_ellipse
 from wildlab.pipeline.evaluate import errors_of, score_points
 from wildlab.pipeline.georeference import georeference, observe
 from wildlab.simulation.camera_view import marks, numbered
@@ -254,7 +254,6 @@ def numbers_of(drop: Drop, errors: Array, camera: Camera, height: float) -> dict
         Of the images, and how high they were taken, m.
     """
     distance = np.hypot(*errors.T)
-    means = np.cumsum(errors, axis=0) / np.arange(1, len(errors) + 1)[:, None]
     off = drop.uv - drop.true
     numbers = {
         (FOUND, "detection_rate"): drop.right / drop.should if drop.should else np.nan,
@@ -270,13 +269,26 @@ def numbers_of(drop: Drop, errors: Array, camera: Camera, height: float) -> dict
         (FOUND, "few_pixels"): FEW_PX * height / camera.fx,
         (SINGLE, "median_error"): float(np.median(distance)),
         (SINGLE, "rms_error"): float(np.sqrt((distance**2).mean())),
-        (MEAN, "error"): float(np.hypot(*means[-1])),
+        (MEAN, "error"): error_of_mean(errors, len(errors)),
         (MEAN, "detections"): float(len(errors)),
     }
-    for count in COUNTS:
-        at = float(np.hypot(*means[count - 1])) if count <= len(means) else np.nan
-        numbers[MEAN, f"after_{count}"] = at
-    return numbers
+    return numbers | {(MEAN, f"after_{count}"): error_of_mean(errors, count) for count in COUNTS}
+
+
+def error_of_mean(errors: Array, count: int) -> float:
+    """Size of the mean of so many detections in a row, the median over where in a flight they begin, m.
+
+    Parameters
+    ----------
+    errors
+        (N, 2) of single positions in the order of time, m.
+    count
+        How many are averaged; NaN where there are fewer.
+    """
+    if count > len(errors):
+        return float("nan")
+    sums = np.cumsum(np.vstack([np.zeros((1, 2)), errors]), axis=0)
+    return float(np.median(np.hypot(*(sums[count:] - sums[:-count]).T)) / count)
 
 
 def trial(seed: int, *, twin: str, detections: int, images: int) -> dict[tuple[str, str], float]:

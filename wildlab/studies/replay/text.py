@@ -59,7 +59,9 @@ def summary(spread: pd.DataFrame) -> list[str]:
     kinds = [(name, caption) for name, _, caption in SCREENSHOTS]
     missing = [caption for name, caption in kinds if not (spread[name, "share_of_frames"] > 0).all()]
     n = len(spread)
-    if missing:
+    if any(spread[name, "share_of_frames"].isna().any() for name, _ in kinds):
+        first = ""
+    elif missing:
         first = f"Not each of the {n} flights has a moment like every screenshot: {'; '.join(missing)}."
     else:
         first = f"Each of the {n} flights has moments like all {len(kinds)} screenshots."

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from wildlab.evaluation.consistency import ERROR_CONVENTION
+from wildlab.evaluation.consistency import ERROR_CONVENTION, share_inside
 from wildlab.evaluation.runs import share_interval
 from wildlab.evaluation.track_errors import SLOWEST_M_S
 from wildlab.pipeline.track import Sighting
@@ -25,7 +25,6 @@ from wildlab.reporting.charts.tracks import (
 from wildlab.reporting.figures import GREEN, GREY, INK, colour, new_figure
 from wildlab.reporting.report import Report
 from wildlab.reporting.spread import spread_words
-from wildlab.studies.schmidt.claims import within
 from wildlab.studies.schmidt.headline import ORIGINS, curve_table, curve_words, honesty
 from wildlab.studies.schmidt.text import WORDS
 from wildlab.studies.schmidt.trial import BOUNDS, COVARIANCES, DEGREES, PUBLISHED, Compared
@@ -58,13 +57,13 @@ def nees_over_pose_sd(
     upper.fill_between(sd, curve["low"], curve["high"], color=color, alpha=0.25, lw=0)
     upper.plot(sd, curve["median"], color=color, marker=".", label="printed covariance, scaled")
     upper.set_yscale("log")
-    upper.set_ylabel("mean NEES of a flight")
+    upper.set_ylabel("mean NEES")
     share = curve["inside"].to_numpy(float)
     limits = np.array([share_interval(round(one * flights), flights)[1:] for one in share])
     lower.fill_between(sd, 100 * limits[:, 0], 100 * limits[:, 1], color=color, alpha=0.25, lw=0)
     lower.plot(sd, 100 * share, color=color, marker=".")
     lower.set_ylim(-4, 104)
-    lower.set_ylabel("flights in the band (%)")
+    lower.set_ylabel("in the band (%)")
     for who, (at, nees, inside) in marks.items():
         look = {"ls": "none", "marker": _MARKS[who], "mfc": "white", "mec": INK, "ms": 7, "mew": 1.5}
         upper.plot(at, nees, label=ORIGINS[who][0], **look)
@@ -93,6 +92,7 @@ def marks_of(spread: pd.DataFrame) -> dict[str, tuple[float, float, float]]:
 def show_curve(report: Report, spread: pd.DataFrame) -> None:
     """The curve over the poses' standard deviation, and what it says."""
     curve, marks = curve_table(spread), marks_of(spread)
+    band = spread_words(len(spread)).key
     title, points = curve_words(spread)
     along = "; ".join(
         f"{row['sd']:.2f}°: NEES {row['median']:.2g}, {100 * row['inside']:.0f} %"
@@ -107,7 +107,7 @@ def show_curve(report: Report, spread: pd.DataFrame) -> None:
         name="nees-over-pose-sd",
         alt="Median NEES and share of flights within the band of single values, over the stated standard "
         f"deviation of the attitude. {title}. {along}. Beside the curve: {apart}.",
-        caption=f"{len(spread)} flights. Above: median, shaded: {spread_words(len(spread)).key}; green: "
+        caption=f"{len(spread)} flights. Above: median{f', shaded: {band}' if band else ''}; green: "
         "bounds of single values; dashed: two. Below: flights whose average lies between these bounds, with "
         f"the share's 95 % interval. Grey: the {DEGREES[0]:g} to {DEGREES[-1]:g}° of H 7.5.4.",
     )
@@ -116,7 +116,7 @@ def show_curve(report: Report, spread: pd.DataFrame) -> None:
 
 def show_flights(report: Report, spread: pd.DataFrame, published: Mapping[tuple[str, str], float]) -> None:
     """NEES of every flight by filter."""
-    share = {who: 100 * within(spread[who, "nees"]).mean() for who in WORDS}
+    share = {who: 100 * share_inside(spread[who, "nees"], BOUNDS) for who in WORDS}
     middle = {who: spread[who, "nees"].median() for who in WORDS}
     report.figure(
         nees_over_flights(

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wildlab.evaluation.consistency import Average, average
+from wildlab.evaluation.consistency import Average, average, share_inside
 from wildlab.reporting.published import load_published
 from wildlab.reporting.spread import bounds_of
-from wildlab.studies.schmidt.claims import within
 from wildlab.studies.schmidt.trial import (
+    BOUNDS,
     CALIBRATION_S,
     COVARIANCES,
     CURVE,
@@ -70,7 +70,9 @@ class Honesty(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """`OPTIMISTIC`, `PESSIMISTIC` or `CONSISTENT`, by the test over all flights."""
+        """`OPTIMISTIC`, `PESSIMISTIC`, `CONSISTENT` or "not known", by the test over all flights."""
+        if np.isnan(self.drawn.mean):
+            return "not known"
         if self.drawn.inside:
             return CONSISTENT
         return OPTIMISTIC if self.drawn.mean > self.drawn.high else PESSIMISTIC
@@ -80,7 +82,7 @@ def honesty(spread: pd.DataFrame, who: str) -> Honesty:
     """`Honesty` of a filter over flights, one row each."""
     values = spread[who, "nees"]
     drawn = average(spread[who, "nees_drawn"].to_numpy(float), 2)
-    return Honesty(float(values.median()), drawn, float(within(values).mean()), len(values))
+    return Honesty(float(values.median()), drawn, share_inside(values, BOUNDS), len(values))
 
 
 def honest_words(one: Honesty) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from wildlab.studies.schmidt.claims import within
+from wildlab.evaluation.consistency import share_inside
 from wildlab.studies.schmidt.trial import BOUNDS, PUBLISHED
 from wildlab.studies.track_text import accuracy_words, typical_words
 
@@ -61,8 +61,9 @@ the pose's covariance shrinks; here the cross-covariance is then scaled along, w
 constant bias, counted in standard deviations.
 
 The first pose covariance is that of an MEKF whose noise was chosen so that its mean standard deviations are
-those that H prints for the first flight. The second is that of the same filter, told what the data sheets
-state of inertial sensor and receivers. The third is constant: the standard deviations under which the errors
+those that H prints for the first flight. The second is that of an MEKF given all that the data sheets state
+of inertial sensor and receivers: white noise, biases, axes that are off, and the part of GNSS errors that
+wanders. The third is constant: the standard deviations under which the errors
 of the known target on another flight are most likely, one image a second, with a prior a factor of three wide
 about the first.
 
@@ -86,7 +87,7 @@ def medians_table(spread: pd.DataFrame) -> pd.DataFrame:
     names = [name for name in COLUMNS if name not in ("filter", "inside")]
     return pd.DataFrame(
         [
-            {"filter": words, "inside": 100 * within(spread[who, "nees"]).mean()}
+            {"filter": words, "inside": 100 * share_inside(spread[who, "nees"], BOUNDS)}
             | {name: float(spread[who, name].median()) for name in names}
             for who, words in WORDS.items()
         ]
@@ -95,7 +96,7 @@ def medians_table(spread: pd.DataFrame) -> pd.DataFrame:
 
 def variant_points(spread: pd.DataFrame) -> list[str]:
     """What the variants come to, a sentence each."""
-    share = {who: 100 * within(spread[who, "nees"]).mean() for who in WORDS}
+    share = {who: 100 * share_inside(spread[who, "nees"], BOUNDS) for who in WORDS}
     mae = pd.DataFrame({who: spread[who, "mae"] for who in PUBLISHED})
     both = {who: f"the {WORDS[who]} filter" for who in PUBLISHED}
     nearer = accuracy_words(both | {"ekf": "the extended filter"}, mae)

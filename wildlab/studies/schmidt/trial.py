@@ -1,7 +1,7 @@
 """The extended and the Schmidt-Kalman filter on three flights with one tuning: H 7.5.3 and 7.5.4.
 
 The Schmidt filter is as honest as the covariance of the poses that it is told. It is told three: that of an
-MEKF tuned so that it states what H prints (``schmidt``), that of the same filter told what the data sheets of
+MEKF tuned so that it states what H prints (``schmidt``), that of an MEKF given all that the data sheets of
 its sensors state (``schmidt-data-sheet``), and a constant one from the known positions of the target on
 another flight (``schmidt-estimated``). The first is also scaled (`FACTORS`).
 """
@@ -21,9 +21,8 @@ from wildlab.evaluation.track_errors import summarise_track, track_errors
 from wildlab.flight.clocks import frame_times
 from wildlab.flight.store import Flight
 from wildlab.pipeline.consistency import worth
-from wildlab.pipeline.navigate import PUBLISHED_LIKE, MekfTuning, navigate_mekf
+from wildlab.pipeline.navigate import PUBLISHED_LIKE, navigate_mekf
 from wildlab.pipeline.navigation_errors import errors_against
-from wildlab.pipeline.navigation_inputs import imu_noise
 from wildlab.pipeline.pose_noise import covariance_of, estimate_from_sighting
 from wildlab.pipeline.sighting_errors import NAMES as POSE_NAMES
 from wildlab.pipeline.sighting_errors import (
@@ -138,20 +137,10 @@ def navigated_sighting(flight: Flight) -> Sighting:
     return sighting(flight, SOURCE)
 
 
-def sheet_tuning(flight: Flight) -> MekfTuning:
-    """What the data sheets state of the flight's sensors, for the same filter."""
-    noise, gnss = imu_noise(flight), flight.table("gnss")
-    return MekfTuning(
-        noise.velocity_random_walk,
-        float(np.degrees(noise.angle_random_walk)),
-        float(gnss["sd_horizontal_m"].median()),
-        float(gnss["sd_vertical_m"].median()),
-    )
-
-
 def sheet_sighting(flight: Flight) -> Sighting:
-    """What the camera saw, with the poses of the MEKF that believes the data sheets."""
-    flight.nav[SHEET] = navigate_mekf(flight, tuning=sheet_tuning(flight)).nav
+    """What the camera saw, with the poses of the MEKF that is given all that the data sheets state: noise,
+    biases, axes, and GNSS errors that wander."""
+    flight.nav[SHEET] = navigate_mekf(flight).nav
     return sighting(flight, SHEET)
 
 

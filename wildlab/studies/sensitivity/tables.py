@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wildlab.evaluation.replication import propagate_rounding
 from wildlab.geometry.camera import Camera
 from wildlab.geometry.frames import Array, euler_to_matrix, matrix_to_euler
 from wildlab.geometry.georeference import pixel_to_plane
@@ -91,6 +92,23 @@ def helgesen_tables(
                 )
                 table[f"{attitude}/{name}/{altitude:.0f}m"] = float(np.hypot(*shift[0]))
     return table
+
+
+def rounded_tables() -> dict[str, tuple[float, float]]:
+    """Bounds of each of the 42 numbers over what the printed camera and mounting angles were rounded from.
+
+    Focal lengths have one decimal, the principal point none, the angles one: half of the last digit is open.
+    """
+    names = list(helgesen_tables())
+
+    def errors(given: Array) -> list[float]:
+        camera = Camera(TAU2.width, TAU2.height, *given[:4])
+        mount = Mount(looks="down", misalignment=helgesen_misalignment(*np.radians(given[4:])))
+        return list(helgesen_tables(camera, mount).values())
+
+    printed = [TAU2.fx, TAU2.fy, TAU2.cx, TAU2.cy, *PRINTED_MISALIGNMENT_DEG]
+    low, high = propagate_rounding(errors, printed, [0.05, 0.05, 0.5, 0.5, 0.05, 0.05, 0.05])
+    return dict(zip(names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
 
 
 class Convention(NamedTuple):

@@ -54,11 +54,7 @@ def summary(spread: pd.DataFrame) -> list[str]:
         f"Against where the vessel really is the images are {exact:.1f} metres off; the receiver is "
         f"{reference:.1f} metres off itself.",
         f"A filter that follows the vessel is {track:.1f} metres off on average, "
-        + (
-            "less than the images it is made of."
-            if track < images
-            else "more than the images it is made of: it expects a steadier vessel than this one."
-        ),
+        f"{'less' if track < images else 'more'} than the images it is made of.",
     ]
 
 

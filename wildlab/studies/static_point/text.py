@@ -57,13 +57,15 @@ def summary(spread: pd.DataFrame, bound: float) -> list[str]:
     more = float((mae[UNSYNCED] - mae[OBSERVER]).median())
     unsynced = (
         f"a camera clock that is not synchronised costs {more:.1f} metres beside one that is."
-        if more > 0
+        if not more <= 0
         else "a camera clock that is not synchronised costs nothing on most flights."
     )
+    alike = float(spread[_LAGS].median().min())
     watching = (
-        "helps less than it seems to: images taken right after one another are wrong in the same way."
-        if spread[_LAGS].median().min() > bound
-        else "helps: images taken right after one another are not all wrong in the same way."
+        ""
+        if np.isnan(alike)
+        else f"Images taken right after one another are {'' if alike > bound else 'not all '}wrong in the "
+        "same way."
     )
     return [
         f"From 350 metres a single thermal image places a point about {mae[OBSERVER].median():.0f} metres "
@@ -71,13 +73,16 @@ def summary(spread: pd.DataFrame, bound: float) -> list[str]:
         f"is {mae[AUTOPILOT].median():.0f} metres.",
         f"Where the angles of those sensors are not calibrated it is {mae[UNCALIBRATED].median():.0f} "
         f"metres; {unsynced}",
-        f"Watching the point for longer {watching}",
+        watching,
     ]
 
 
 def sureness(spread: pd.DataFrame) -> str:
     """Whether the filter's last estimate is as near as it states, over all flights."""
-    nees, flights = spread["filter", "nees_at_end"].to_numpy(float), len(spread)
+    nees = spread["filter", "nees_at_end"].dropna().to_numpy(float)
+    flights = len(nees)
+    if not flights:
+        return "not known"
     above = int((nees > chi_square_interval(2)[1]).sum())
     return f"surer than it may be on {above} of {flights} flight{'s' * (flights > 1)}"
 
@@ -105,6 +110,7 @@ def partings(
     ratio = float((spread[AUTOPILOT, "mae"] / ours).median())
     coverage = 100 * float(spread["filter", "coverage"].median())
     near, met = int((mean_off <= published_off).sum()), int((ours <= theirs).sum())
+    known = int(ours.notna().sum()) or np.nan
     alike = float(spread[_LAGS].median().min())
     shared = (
         f" Innovations here are correlated by {alike:.2f} at lag one on the median flight (the less "
@@ -116,7 +122,7 @@ def partings(
     return [
         f"The published mean of all positions is {published_off:.1f} m from the truth; {near} of "
         f"{len(spread)} flights come that near, their median is {np.median(mean_off):.1f} m.{shared}",
-        f"The published mean error of {theirs:.2f} m or less is met by {met} of {len(spread)} flights.",
+        f"The published mean error of {theirs:.2f} m or less is met by {met} of {known} flights.",
         f"The autopilot's mean error is {ratio:.1f} times the observer's here, and "
         f"{published[AUTOPILOT, 'mae'] / theirs:.1f} times in print.",
         f"The ellipses computed from the uncertainties that are assumed here hold the truth in "

@@ -146,6 +146,8 @@ def held_words(spread: pd.DataFrame) -> str:
         if short
         else f"In every draw of every case at least {percent(HELD, 0)} of it was seen"
         if not sum(none.values())
+        else "Whether it was seen cannot be said"
+        if np.isnan(list(worst.values())).all()
         else f"Wherever there was some, at least {percent(HELD, 0)} of it was seen"
     )
     left = "; ".join(f"{NAMES[name]}, in {count} of {len(spread)}" for name, count in none.items() if count)

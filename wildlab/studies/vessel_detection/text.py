@@ -10,7 +10,7 @@ import pandas as pd
 
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.evaluation.runs import Interval, mean_share_interval, share_interval
-from wildlab.reporting.text import percent
+from wildlab.reporting.text import percent, percent_between
 from wildlab.studies.vessel_detection.trial import BOATS, CUT, SEA, SHIP, WHOLE
 
 NAMES = {
@@ -66,11 +66,6 @@ def false_alarms(spread: pd.DataFrame, *subjects: str) -> tuple[int, int]:
     return round(float(np.sum(alarms))), round(float(np.sum(images)))
 
 
-def percent_within(share: Interval) -> str:
-    """A share in per cent with its 95 % interval."""
-    return f"{percent(share.estimate)} ({percent(share.low)} to {percent(share.high)})"
-
-
 def reach(heights: pd.DataFrame, kind: str, column: str = "found") -> float:
     """Up to which height a kind is found without a gap below, m; 0 for none."""
     own = heights[heights["kind"] == kind].sort_values("height_m")
@@ -112,8 +107,8 @@ def summary(spread: pd.DataFrame, heights: pd.DataFrame) -> list[str]:
         else f"{alarms} false alarm{'s' * (alarms != 1)} came in {images} images"
     )
     return [
-        f"In {percent_within(ship)} of the images the ship is found, or the part of it that shows, and in "
-        f"{percent_within(whole)} all boats that are wholly in view.",
+        f"In {percent_between(ship)} of the images the ship is found, or the part of it that shows, and in "
+        f"{percent_between(whole)} all boats that are wholly in view.",
         f"{false}; the thesis counts 15 in 27866.",
         f"Up to which height smaller things are found, {_needed(heights)} at each: {reach_words(heights)}.",
     ]
@@ -123,7 +118,7 @@ def alarmed_words(spread: pd.DataFrame) -> str:
     """How many images were looked at, and in which share of such there is a false alarm, by the interval."""
     some = sum(spread[one, "images_with_false"].sum() for one in (SHIP, BOATS))
     images = false_alarms(spread, SHIP, BOATS)[1]
-    return f"{images} images, some in {percent_within(share_interval(round(float(some)), images))} of them"
+    return f"{images} images, some in {percent_between(share_interval(round(float(some)), images))} of them"
 
 
 def flights_words(spread: pd.DataFrame) -> str:

@@ -17,7 +17,7 @@ from wildlab.detection.floating import FloatingObjects, find_objects
 from wildlab.detection.thresholds import FloatingThresholds
 from wildlab.errors import WildlabError
 from wildlab.evaluation.shares import Check, Pooled
-from wildlab.geometry.uncertainty import inside_ellipse
+from wildlab.geometry.ellipses import inside_ellipse
 from wildlab.pipeline.rendered import judge
 from wildlab.simulation.error_models import stream
 from wildlab.simulation.parameters import load_twin

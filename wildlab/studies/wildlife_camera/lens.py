@@ -193,8 +193,8 @@ def compare_models(
 
 def come_back(
     rng: np.random.Generator, camera: Camera, noise: float, runs: int, images: int = IMAGES
-) -> dict[str, float]:
-    """Means over calibrations with F's model, by parameter: does the camera come back?
+) -> pd.DataFrame:
+    """Calibrations with F's model: does the camera come back?
 
     Parameters
     ----------
@@ -203,8 +203,8 @@ def come_back(
 
     Returns
     -------
-    dict of float
-        Of fx, fy, cx, cy (px) and k1.
+    DataFrame
+        A row a run: fx, fy, cx, cy (px) and k1.
     """
     names = (*PINHOLE, "k1")
     values = []
@@ -214,7 +214,7 @@ def come_back(
         uv = uv + rng.normal(0, noise, uv.shape)
         found = calibrate_camera(BOARD.points, uv, camera.width, camera.height, names, resample=False)
         values.append(found.values)
-    return dict(zip(names, np.mean(values, axis=0).tolist(), strict=True))
+    return pd.DataFrame(values, columns=names)
 
 
 def bent_camera(camera: Camera) -> Camera:

@@ -201,6 +201,8 @@ def summary(spread: pd.DataFrame) -> list[str]:
         f"as {words} with the numbers of figure{'s' * (len(figures) > 1)} {', '.join(figures)}"
         for words, figures in read.items()
     )
+    if not all(np.isfinite(best_of(spread, method)[1].estimate) for method in PRINTED):
+        level = "nan"
     return [
         f"On a clear night the best of {len(METHODS)} settings has an F1 of {_best_words(*night)}; {beside}.",
         change_words(spread),

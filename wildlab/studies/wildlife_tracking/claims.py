@@ -37,7 +37,7 @@ def check_claims(spread: pd.DataFrame, cost: Array | None = None) -> dict[str, C
         later, right = of(f"{platform}-{NEGATIVE}", "later"), of(f"{platform}-{NEGATIVE}", "right")
         with np.errstate(invalid="ignore"):
             each = (later - right) / later
-        pooled = Pooled(int((later - right).sum()), int(later.sum()))
+        pooled = Pooled(int(np.nansum(later - right)), int(np.nansum(later)))
         return Check(measured=each, above=True, pooled=pooled, reach=(0, 1), unit="animals seen again")
 
     def lower(name: str, first: str, second: str) -> Check:

@@ -1,0 +1,342 @@
+"""Errors of points whose poses wander: their covariance, estimated by restricted likelihood.
+
+The errors of N points are ``r = J x + Z m + G a + e``. ``J x`` are constants that all images share, ``Z m``
+the errors of the places of things, ``e`` is each point's own (pixel and ground height), and ``a`` is the pose
+error of its image: position in n and rotation vector in n. Part of ``a`` is each image's own, the rest is a
+first-order Gauss-Markov process, whose correlation falls by e in a time constant. A constant counts only
+against that: what wanders for longer than a flight looks constant in it.
+
+The standard deviations, the share that wanders and its time constant maximise the likelihood of what neither
+``J x`` nor ``Z m`` can explain (REML: Patterson and Thompson 1971), with a broad prior about what was
+assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_solve_banded, cholesky_banded, solve_triangular
+from scipy.optimize import minimize
+
+from wildlab.evaluation.pose_noise import KINDS, PRIOR
+
+Array = NDArray[np.float64]
+
+#: Standard deviation of the prior on the logit of the share.
+PRIOR_SHARE = 1.5
+#: Time constants of positions and attitudes about which their priors lie, s: minutes for a satellite fix,
+#: tens of seconds for an attitude (H 5.6). Where images have no times, images.
+LASTS_S, LASTS_IMAGES = (60.0, 20.0), (10.0, 3.0)
+
+
+class PosePoints(NamedTuple):
+    """N points, as far as their covariance depends on them.
+
+    Attributes
+    ----------
+    derivatives
+        (N, 2, 6) of each point with respect to position (m) and rotation vector (rad) in n.
+    pixel, own
+        (N, 2, 2) covariance, m^2, of a pixel error of one pixel, and of what else is each point's own.
+    time
+        (N,) of its image, s; points of one image have the same.
+    """
+
+    derivatives: Array
+    pixel: Array
+    own: Array
+    time: Array
+
+    def take(self, rows: NDArray[np.bool_]) -> PosePoints:
+        """Some of the points."""
+        return PosePoints(*(values[rows] for values in self))
+
+
+class Places(NamedTuple):
+    """What N points are of, and how well it is known where that is.
+
+    Attributes
+    ----------
+    of
+        (N,) names.
+    sd
+        Standard deviation of a place along either axis, m; infinite where places are not known.
+    """
+
+    of: NDArray[np.generic]
+    sd: float
+
+    def take(self, rows: NDArray[np.bool_]) -> Places:
+        """Of some of the points."""
+        return self._replace(of=self.of[rows])
+
+
+class WanderNoise(NamedTuple):
+    """How noisy poses and pixels are.
+
+    Attributes
+    ----------
+    sd
+        Standard deviations by `wildlab.evaluation.pose_noise.KINDS`: m, rad, pixels.
+    share
+        Of the variance of pose errors that wanders; the rest is each image's own.
+    lasts
+        Time constants of what wanders in positions and in attitudes, s.
+    """
+
+    sd: dict[str, float]
+    share: float
+    lasts: tuple[float, float]
+
+    @property
+    def logarithms(self) -> Array:
+        """(8,) of standard deviations and time constants, and the logit of the share."""
+        logit = np.log(self.share / (1 - self.share))
+        return np.append(np.log([*self.sd.values(), *self.lasts]), logit)
+
+    @staticmethod
+    def from_logarithms(x: Array) -> WanderNoise:
+        """The noise whose logarithms (8,) these are."""
+        *sd, position, attitude = map(float, np.exp(x[:-1]))
+        share = float(1 / (1 + np.exp(-x[-1])))
+        return WanderNoise(dict(zip(KINDS, sd, strict=True)), share, (position, attitude))
+
+
+class WanderFit(NamedTuple):
+    """Estimated noise.
+
+    Attributes
+    ----------
+    noise
+        The most likely one.
+    posterior
+        Negative logarithm of the posterior of its logarithms (8,).
+    """
+
+    noise: WanderNoise
+    posterior: Callable[[Array], float]
+
+
+class Covariance:
+    """The covariance of the errors of N points, factorised; cost grows with the number of images.
+
+    Parameters
+    ----------
+    points
+        The points.
+    noise
+        Of their poses and pixels.
+    places
+        Of what the points are, where errors of their places are not negligible.
+
+    Examples
+    --------
+    >>> points = PosePoints(np.zeros((1, 2, 6)), np.eye(2)[None], np.zeros((1, 2, 2)), np.zeros(1))
+    >>> sd = {**dict.fromkeys(KINDS, 1.0), "pixel": 2.0}
+    >>> Covariance(points, WanderNoise(sd, 0.5, LASTS_S)).solve(np.ones((1, 2, 1))).ravel().tolist()
+    [0.25, 0.25]
+    """
+
+    def __init__(self, points: PosePoints, noise: WanderNoise, places: Places | None = None) -> None:
+        when, self._image = np.unique(points.time, return_inverse=True)
+        self._count = len(when)
+        self._order = np.argsort(self._image, kind="stable")
+        self._first = np.searchsorted(self._image[self._order], np.arange(len(when)))
+        own = np.linalg.cholesky(points.own + noise.sd["pixel"] ** 2 * points.pixel)
+        self._own = np.linalg.inv(own)
+        sd = np.array([noise.sd[kind] for kind, axes in KINDS.items() for _ in axes])
+        G = self._own @ (points.derivatives * sd)
+        self._H = np.concatenate([np.sqrt(1 - noise.share) * G, np.sqrt(noise.share) * G], axis=-1)
+        blocks = self._by_image(np.einsum("nij,nik->njk", self._H, self._H))
+        rho = np.minimum(np.exp(-np.diff(when)[:, None] / np.repeat(noise.lasts, 3)), 1 - 1e-6)
+        none = np.zeros((1, 6))
+        left, right = np.vstack([none, rho]), np.vstack([rho, none])
+        diagonal = 1 / (1 - left**2) + right**2 / (1 - right**2)
+        axes = np.arange(6)
+        blocks[:, axes, axes] += 1.0
+        blocks[:, axes + 6, axes + 6] += diagonal
+        band = np.zeros((13, self._count, 12))
+        row, column = np.tril_indices(12)
+        band[row - column, :, column] = blocks[:, row, column].T
+        band[12, :-1, 6:] = -rho / (1 - rho**2)
+        self._chain = cholesky_banded(band.reshape(13, -1), lower=True)
+        self.log_determinant = float(
+            2 * np.log(np.diagonal(own, axis1=1, axis2=2)).sum()
+            + np.log1p(-(rho**2)).sum()
+            + 2 * np.log(self._chain[0]).sum()
+        )
+        self._places: tuple[Array, Array] | None = None
+        if places is not None:
+            of = np.unique(places.of, return_inverse=True)[1]
+            Z = np.zeros((len(of), 2, int(of.max()) + 1, 2))
+            Z[np.arange(len(of)), 0, of, 0] = Z[np.arange(len(of)), 1, of, 1] = 1.0
+            solved = self.solve(Z.reshape(len(of), 2, -1))
+            information = _product(Z.reshape(len(of), 2, -1), solved)
+            if np.isfinite(places.sd):
+                information += np.eye(len(information)) / places.sd**2
+                self.log_determinant += 2 * len(information) * float(np.log(places.sd))
+            inner = np.asarray(np.linalg.cholesky(information), float)
+            self._places = inner, solved
+            self.log_determinant += float(2 * np.log(np.diagonal(inner)).sum())
+
+    def solve(self, B: Array) -> Array:
+        """Inverse covariance times B (N, 2, K); with unknown places, of what they cannot explain."""
+        white = self._own @ B
+        states = self._by_image(np.einsum("nij,nik->njk", self._H, white))
+        found = cho_solve_banded((self._chain, True), states.reshape(12 * self._count, -1))
+        rest = white - self._H @ found.reshape(self._count, 12, -1)[self._image]
+        out = np.asarray(np.swapaxes(self._own, 1, 2) @ rest)
+        if self._places is not None:
+            inner, solved = self._places
+            part = solve_triangular(inner, _product(solved, B), lower=True)
+            out = out - solved @ solve_triangular(inner, part, lower=True, trans="T")
+        return out
+
+    def _by_image(self, values: Array) -> Array:
+        """Sums (K, ...) over the points of each of K images."""
+        return np.asarray(np.add.reduceat(values[self._order], self._first, axis=0))
+
+
+def _product(A: Array, B: Array) -> Array:
+    """(P, Q) of A (N, 2, P), transposed, and B (N, 2, Q)."""
+    return np.asarray(A.reshape(-1, A.shape[-1]).T @ B.reshape(-1, B.shape[-1]))
+
+
+class LinearFit(NamedTuple):
+    """Generalised least squares.
+
+    Attributes
+    ----------
+    x
+        (P,) that makes ``r + J x`` least.
+    information
+        (P, P), inverse covariance of x.
+    deviance
+        Squared length of ``r + J x`` in units of the covariance.
+    """
+
+    x: Array
+    information: Array
+    deviance: float
+
+
+def fit_generalised(J: Array, r: Array, covariance: Covariance) -> LinearFit:
+    """The ``x`` under which residuals ``r + J x`` are least by their covariance.
+
+    Parameters
+    ----------
+    J, r
+        (N, 2, P) and (N, 2) m.
+    covariance
+        Of the N residuals.
+
+    Returns
+    -------
+    LinearFit
+    """
+    both = np.concatenate([J, r[..., None]], axis=-1)
+    inner = _product(both, covariance.solve(both))
+    information, gradient = inner[:-1, :-1], inner[:-1, -1]
+    if not len(gradient):
+        return LinearFit(gradient, information, float(inner[-1, -1]))
+    x = np.asarray(-np.linalg.lstsq(information, gradient, rcond=None)[0], float)
+    return LinearFit(x, information, float(inner[-1, -1] + gradient @ x))
+
+
+def estimate_wander(
+    points: PosePoints,
+    r: ArrayLike,
+    J: ArrayLike,
+    assumed: dict[str, float],
+    lasts: tuple[float, float] = LASTS_S,
+    places: Places | None = None,
+) -> WanderFit:
+    """Most likely noise behind residuals, whatever constants are behind them too.
+
+    Parameters
+    ----------
+    points
+        N points.
+    r, J
+        (N, 2) residuals, m, and (N, 2, P) their derivatives with respect to constants, each in a unit of
+        which it is known to be a few at most: its prior has a standard deviation of one.
+    assumed
+        Standard deviations by the same names, above zero, about which the prior lies.
+    lasts
+        Time constants about which the priors lie, in the unit of the points' times.
+    places
+        Of what the points are, where errors of their places are not negligible.
+
+    Returns
+    -------
+    WanderFit
+    """
+    residuals, constants = np.asarray(r, float), np.asarray(J, float)
+    both = np.concatenate([constants, residuals[..., None]], axis=-1)
+    start = np.log([*(assumed[kind] for kind in KINDS), *lasts])
+
+    def negative_log_posterior(x: Array) -> float:
+        covariance = Covariance(points, WanderNoise.from_logarithms(x), places)
+        inner = _product(both, covariance.solve(both))
+        information = inner[:-1, :-1] + np.eye(len(inner) - 1)
+        deviance = inner[-1, -1] - inner[-1, :-1] @ np.linalg.solve(information, inner[:-1, -1])
+        prior = (((x[:-1] - start) / PRIOR) ** 2).sum() + (x[-1] / PRIOR_SHARE) ** 2
+        freed = np.linalg.slogdet(information)[1]
+        return float(0.5 * (covariance.log_determinant + freed + deviance + prior))
+
+    first = np.append(start, 0.0)
+    bounds = [(value - 3 * PRIOR, value + 3 * PRIOR) for value in start] + [(-4.0, 4.0)]
+    found = minimize(
+        negative_log_posterior, first, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40, "ftol": 1e-6}
+    )
+    return WanderFit(WanderNoise.from_logarithms(found.x), negative_log_posterior)
+
+
+def degrees_of_freedom(
+    J: Array, x: Array, points: PosePoints, found: WanderFit, places: Places | None = None
+) -> float:
+    """Degrees of freedom of a test of constants, for the noise is only estimated (Satterthwaite 1946).
+
+    Parameters
+    ----------
+    J
+        (N, 2, P) derivatives by the constants.
+    x
+        (P,) their estimate, above all its direction.
+    points, places
+        As for `estimate_wander`.
+    found
+        From it.
+
+    Returns
+    -------
+    float
+        Of Wald's statistic of the estimate: two over its squared relative uncertainty.
+    """
+    moved = (J @ x)[..., None]
+
+    def logarithm(at: Array) -> float:
+        covariance = Covariance(points, WanderNoise.from_logarithms(at), places)
+        return float(np.log((moved * covariance.solve(moved)).sum()))
+
+    at, step = found.noise.logarithms, 0.05
+    uncertainty = np.linalg.inv(_second_derivatives(found.posterior, at))
+    slope = np.array([logarithm(at + e) - logarithm(at - e) for e in step * np.eye(len(at))]) / (2 * step)
+    return 2 / max(float(slope @ uncertainty @ slope), 1e-6)
+
+
+def _second_derivatives(function: Callable[[Array], float], x: Array, h: float = 0.05) -> Array:
+    """Hessian (n, n) by central differences, at least that of the priors alone."""
+    e, middle = h * np.eye(len(x)), function(x)
+    out = np.empty((len(x), len(x)))
+    for i in range(len(x)):
+        out[i, i] = (function(x + e[i]) - 2 * middle + function(x - e[i])) / h**2
+        for j in range(i):
+            corners = (function(x + a * e[i] + b * e[j]) * a * b for a in (1, -1) for b in (1, -1))
+            out[i, j] = out[j, i] = sum(corners) / (4 * h**2)
+    # Where it is at a bound, or bent the other way, the prior is what is left.
+    values, vectors = np.linalg.eigh(out)
+    return np.asarray((vectors * np.maximum(values, 1 / PRIOR_SHARE**2)) @ vectors.T)
